@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from math import degrees
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
+from actuator_lti.reading import shown_path
 from reports.document import plain
 
 
@@ -34,6 +36,8 @@ def as_json(value: Any) -> Any:
         return {str(key): as_json(item) for key, item in value.items()}
     if isinstance(value, np.ndarray) and not np.iscomplexobj(value):
         return plain(value)
+    if isinstance(value, PurePath):
+        return shown_path(value)
     if isinstance(value, tuple | list | np.ndarray):
         return [as_json(item) for item in value]
     return plain(value)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +34,9 @@ class SignalComparison:
     max_error: float
     max_error_time_s: float
     delay_s: float | None
-    time_s: FloatArray
-    measured: FloatArray
-    modelled: FloatArray
+    time_s: FloatArray = field(repr=False)
+    measured: FloatArray = field(repr=False)
+    modelled: FloatArray = field(repr=False)
 
 
 def compare_signals(

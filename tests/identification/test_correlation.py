@@ -83,18 +83,6 @@ def test_flat_signals_have_no_delay_and_zero_is_refused() -> None:
         compare_signals("x", "1", time, np.zeros(100), np.ones(100))
 
 
-def test_a_simulated_run_correlates_with_itself(tmp_path: Path) -> None:
-    from nonlinear import commands, simulate
-
-    design = load_design("ilr33-amber")
-    run = simulate(design, commands.sine(0.05, 3.0), 0.6, load_Nm=3.0)
-    run.to_csv(tmp_path / "run.csv")
-    result = correlate_record(design, open_record(tmp_path / "run.csv"))
-    assert {s.name for s in result.signals} == {"angle", "output_angle", "speed", "current", "voltage"}
-    for signal in result.signals:
-        assert signal.relative_error < 1e-9, signal.name
-
-
 def test_the_record_s_supply_becomes_the_voltage_limit(tmp_path: Path) -> None:
     from nonlinear import commands, simulate
 
