@@ -16,7 +16,7 @@ from analyses.records.csv_stream import MAX_ROWS
 from analyses.records.inputs import spec_of_names
 from analyses.records.mat5 import MatContent
 from analyses.records.mat_reader import columns_of, load_mat, names_in
-from analyses.records.parquet_reader import parquet_columns
+from analyses.records.parquet_reader import load_parquet
 from analyses.records.published import EMPS_SPEC, ODRIVE_SPEC
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec
@@ -89,7 +89,7 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
     if suffix == ".mat":
         return _spec_of_mat(path)
     if suffix in (".parquet", ".pq"):
-        spec, why = spec_of_names(tuple(parquet_columns(path)))
+        spec, why = spec_of_names(tuple(load_parquet(path)[0]))
     else:
         head = _head(path)
         if head.startswith("%Motor characterization data"):
