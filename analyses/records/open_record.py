@@ -71,7 +71,6 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
 
 def _described(path: Path, max_rows: int) -> Record:
     data = read_toml(path)
-    table = Table(data, "", str(path))
     if "file" not in data:
         kind = "a design" if {"motor", "design"} & set(data) else "a TOML file"
         raise InputError(
@@ -79,7 +78,9 @@ def _described(path: Path, max_rows: int) -> Record:
             " (a design goes behind --design)",
             where=str(path),
         )
-    file = path.parent / table.text("file")
+    if not isinstance(data["file"], str):
+        raise Table(data, "", str(path)).fail("file", "a text is wanted")
+    file = path.parent / data["file"]
     spec = record_spec({k: v for k, v in data.items() if k != "file"}, str(path), "")
     return replace(read_record(file, spec, max_rows), name=shown_path(file.name))
 
