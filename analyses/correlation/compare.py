@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,11 @@ class SignalComparison:
     time_s: FloatArray = field(repr=False)
     measured: FloatArray = field(repr=False)
     modelled: FloatArray = field(repr=False)
+
+    @property
+    def share_of_motion(self) -> float:
+        """Norm of the difference over that of the measured about its mean; of a flat signal over its norm."""
+        return self.relative_error if isnan(self.fit_percent) else 1.0 - self.fit_percent / 100.0
 
 
 def compare_signals(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from analyses.correlation.summary import agrees, summarise, worst_of
+from analyses.correlation.summary import agrees, moves_alike, summarise, worst_of
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -29,6 +29,10 @@ NAMES = {
     "voltage": "Voltage",
     "force": "Force",
 }
+
+
+BESIDE = ("speed", "velocity", "current", "force")
+"""Signals that stand beside the motion in the first sentence."""
 
 
 def section(result: CorrelationResult, number: int = 1, *, error_limit: float | None = None) -> Section:
@@ -64,16 +68,17 @@ def words(results: Sequence[CorrelationResult], error_limit: float | None = None
     parts = [f"{record}: {outcome.subject}: {outcome.text}." for record, outcome in wrong[:2]]
     result, motion = worst_of(results)
     where = f" ({result.record})" if len(results) > 1 else ""
+    beside = [result[name] for name in BESIDE if name in result.signals and name != motion.name]
     parts.append(
-        f"{NAMES.get(motion.name, motion.name)} of the model within "
-        f"{show(100.0 * motion.relative_error, 'sig:3')} % of the measured{where}, "
-        f"rms {show(motion.rms_error, 'sig:3')} {motion.unit}, "
-        f"largest {show(motion.max_error, 'sig:3')} {motion.unit}."
+        f"{NAMES.get(motion.name, motion.name)} of the model within {_share(motion)} of the measured motion "
+        f"about its mean{where}, rms {show(motion.rms_error, 'sig:3')} {motion.unit}, largest "
+        f"{show(motion.max_error, 'sig:3')} {motion.unit}"
+        + "".join(f"; {NAMES.get(one.name, one.name).lower()} within {_share(one)}" for one in beside)
+        + "."
     )
+    apart = [one.record for one in results if not moves_alike(one)]
+    parts += [f"{record}: a fit below 0 %, the model moves otherwise." for record in apart]
     far = max((s for r in results for s in r.signals.values()), key=lambda s: s.relative_error)
-    if far.name != motion.name:
-        share = show(100.0 * far.relative_error, "sig:3")
-        parts.append(f"Furthest off: {NAMES.get(far.name, far.name).lower()}, {share} %.")
     if error_limit is None and not wrong:
         one = "The record contradicts" if len(results) == 1 else "The records contradict"
         parts.append(f"{one} neither {'itself' if len(results) == 1 else 'themselves'} nor the design.")
@@ -81,6 +86,10 @@ def words(results: Sequence[CorrelationResult], error_limit: float | None = None
         over = far.relative_error > error_limit
         parts.append(f"{'Above' if over else 'Within'} the limit of {100.0 * error_limit:g} %.")
     return " ".join(parts)
+
+
+def _share(signal: SignalComparison) -> str:
+    return f"{show(100.0 * signal.share_of_motion, 'sig:3')} %"
 
 
 def summary_section(results: Sequence[CorrelationResult], *, error_limit: float | None = None) -> Section:

@@ -13,6 +13,7 @@ from analyses.correlation import CorrelationResult, compare_signals, correlate_r
 from analyses.correlation.chirp import find_chirp, predict_chirp
 from analyses.correlation.voltage_motor import fit_step
 from analyses.records import open_record
+from tests.identification.bench_records import Command, write
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +64,18 @@ def test_figures_of_likeness_by_construction() -> None:
     about_mean = np.linalg.norm(measured - measured.mean())
     assert result.fit_percent == pytest.approx(100.0 * (1.0 - 0.1 * np.sqrt(1001) / about_mean), rel=1e-9)
     assert result.max_error == pytest.approx(0.1)
+
+
+def test_a_fit_below_zero_does_not_pass(tmp_path: Path, command: Command) -> None:
+    """A swing of 20 mrad about 1 rad, recorded 30 mrad off: 3 % of the angle, twice the motion (rms)."""
+    time = np.arange(0.0, 1.0, 1e-3)
+    swing = 0.02 * np.sin(6.0 * np.pi * time)
+    columns = {"time_s": time, "reference_rad": 1.0 + swing, "output_angle_rad": 1.0 + swing + 0.03}
+    ran = command("correlate", "ilr33-amber", write(tmp_path / "r.csv", columns), "--json")
+    angle = ran.data["records"][0]["signals"]["output_angle"]
+    assert ran.status == 1
+    assert angle["share_of_motion"] > 1.0 > 10.0 * angle["relative_error"]
+    assert "a fit below 0 %" in command("correlate", "ilr33-amber", tmp_path / "r.csv").out
 
 
 @pytest.mark.parametrize("delay", [-0.0213, 0.0004, 0.017])
