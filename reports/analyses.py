@@ -274,7 +274,8 @@ ANALYSES = (
         error, delay; over several records also all together, and the worst; with
         --out pictures of both and the difference. Where a record contradicts
         itself or the design's limits (a wrong unit, swapped columns, a clock that
-        is off), or a signal is off by more than --error-limit, the status is 1.
+        is off), a motion fits no better than its mean, or a signal is off by
+        more than --error-limit, the status is 1.
 
         The outermost command that is recorded drives the model: reference of the
         output angle, speed, current (or torque), or voltage; loops outside it do

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from math import degrees
-from pathlib import Path
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
+from actuator_lti.reading import shown_path
 from reports.document import plain
 
 
@@ -31,12 +32,12 @@ def as_json(value: Any) -> Any:
         return _named(value)
     if isinstance(value, complex | np.complexfloating):
         return plain({"size": abs(value), "phase_deg": degrees(np.angle(value))})
-    if isinstance(value, Path):
-        return str(value)
     if isinstance(value, Mapping):
         return {str(key): as_json(item) for key, item in value.items()}
     if isinstance(value, np.ndarray) and not np.iscomplexobj(value):
         return plain(value)
+    if isinstance(value, PurePath):
+        return shown_path(value)
     if isinstance(value, tuple | list | np.ndarray):
         return [as_json(item) for item in value]
     return plain(value)

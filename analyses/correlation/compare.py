@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +35,14 @@ class SignalComparison:
     max_error: float
     max_error_time_s: float
     delay_s: float | None
-    time_s: FloatArray
-    measured: FloatArray
-    modelled: FloatArray
+    time_s: FloatArray = field(repr=False)
+    measured: FloatArray = field(repr=False)
+    modelled: FloatArray = field(repr=False)
+
+    @property
+    def share_of_motion(self) -> float:
+        """Norm of the difference over that of the measured about its mean; of a flat signal over its norm."""
+        return self.relative_error if isnan(self.fit_percent) else 1.0 - self.fit_percent / 100.0
 
 
 def compare_signals(

@@ -11,12 +11,11 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.driving import command_of
 from analyses.estimation.parameters import parameter
-from analyses.identification.dynamic import NAMES, FrictionForm, Recipe
 from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
 from analyses.identification.following_error import following_item
 from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
-from analyses.identification.joint_model import JointModel
+from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, Recipe
 from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.own_bias import without_bias
 from analyses.identification.refinement import refine_records

@@ -13,8 +13,7 @@ from actuator_lti.errors import InputError, NumericalError
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import NotTold, Solution, by_record, solve, told_apart
 from analyses.estimation.parameters import parameter
-from analyses.identification.dynamic import FrictionForm, Recipe
-from analyses.identification.joint_model import JointModel, RecordFit, default_value
+from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, RecordFit, default_value
 from analyses.identification.rows import Rows, record_rows
 from analyses.records.record import Record
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.signal import lsim
 
 from actuator_lti.design.model import Design
-from analyses.identification.dynamic import Recipe
+from analyses.identification.joint_model import Recipe
 from analyses.records.differentiation import Motion, filtered_motion
 from analyses.records.record import Record
 

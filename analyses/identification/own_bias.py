@@ -12,9 +12,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import command_of
-from analyses.identification.dynamic import Recipe
 from analyses.identification.inverse import fit_records
-from analyses.identification.joint_model import JointModel, default_value
+from analyses.identification.joint_model import JointModel, Recipe, default_value
 from analyses.identification.rows import is_benchmark
 from analyses.records.record import Record
 

@@ -13,9 +13,9 @@ from analyses.identification.asked import Asked, fixed_values
 from analyses.identification.bench import BenchResult, BenchSettings, identify_bench
 from analyses.identification.campaign import CampaignResult, campaign_items, identify_campaign
 from analyses.identification.campaign_design import CampaignSuggestion, suggest_runs
-from analyses.identification.campaign_resimulation import steady_current_error
 from analyses.identification.contributions import Contribution, contributions
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
+from analyses.identification.resimulation import steady_current_error
 from analyses.identification.surface_fit import NAMES, PATHS
 from analyses.identification.to_design import design_with_fit, with_fixed
 from analyses.identification.verdict import Identified

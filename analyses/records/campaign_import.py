@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from analyses.records.campaign_file import Campaign, RunEntry
-from analyses.records.clocks import ClockJoin, Method, join_records
+from analyses.records.clocks import ClockJoin, join_records
 from analyses.records.csv_stream import MAX_ROWS, read_csv_record
 from analyses.records.inputs import InputUse, account
 from analyses.records.mat_reader import read_mat_record
@@ -158,9 +158,9 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
         record, join = join_records(
             drive,
             sensor,
-            first_signal=campaign.join_drive_signal,
-            second_signal=campaign.join_sensor_signal,
-            method=_method(campaign.join_method),
+            first_signal=campaign.join.drive_signal,
+            second_signal=campaign.join.sensor_signal,
+            method=campaign.join.method,
             offset_s=entry.offset_s,
         )
     if not np.any(record["speed"]):
@@ -176,7 +176,3 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
         sensor_inputs=() if sensor is None else sensor.inputs,
         sensor_sha256="" if sensor is None else sensor.sha256,
     )
-
-
-def _method(name: str) -> Method:
-    return "event" if name == "event" else "given" if name == "given" else "correlation"

@@ -16,7 +16,7 @@ from analyses.records.csv_stream import MAX_ROWS
 from analyses.records.inputs import spec_of_names
 from analyses.records.mat5 import MatContent
 from analyses.records.mat_reader import columns_of, load_mat, names_in
-from analyses.records.parquet_reader import parquet_columns
+from analyses.records.parquet_reader import load_parquet
 from analyses.records.published import EMPS_SPEC, ODRIVE_SPEC
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec
@@ -71,7 +71,6 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
 
 def _described(path: Path, max_rows: int) -> Record:
     data = read_toml(path)
-    table = Table(data, "", str(path))
     if "file" not in data:
         kind = "a design" if {"motor", "design"} & set(data) else "a TOML file"
         raise InputError(
@@ -79,7 +78,9 @@ def _described(path: Path, max_rows: int) -> Record:
             " (a design goes behind --design)",
             where=str(path),
         )
-    file = path.parent / table.text("file")
+    if not isinstance(data["file"], str):
+        raise Table(data, "", str(path)).fail("file", "a text is wanted")
+    file = path.parent / data["file"]
     spec = record_spec({k: v for k, v in data.items() if k != "file"}, str(path), "")
     return replace(read_record(file, spec, max_rows), name=shown_path(file.name))
 
@@ -89,7 +90,7 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
     if suffix == ".mat":
         return _spec_of_mat(path)
     if suffix in (".parquet", ".pq"):
-        spec, why = spec_of_names(tuple(parquet_columns(path)))
+        spec, why = spec_of_names(tuple(load_parquet(path)[0]))
     else:
         head = _head(path)
         if head.startswith("%Motor characterization data"):

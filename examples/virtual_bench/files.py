@@ -97,7 +97,7 @@ def write_bench(
         accuracy=bounds.torque_accuracy,
         gain=bounds.current_gain,
         offset=bounds.current_offset_A,
-        constant=bounds.torque_constant_gain,
+        constant=bounds.torque_constant,
     )
     parts = [_RUN.format(id=g.id, speed=g.speed_setting_rad_s, load=g.load_setting_Nm) for g in logs]
     path = folder / "campaign.toml"

@@ -96,7 +96,7 @@ def _draw(instruments: BenchInstruments, rng: np.random.Generator) -> DrawnError
         torque_at_full_scale_Nm=float(torque * full),
         current_gain=float(bounds.current_gain * gain),
         current_offset_A=float(bounds.current_offset_A * offset),
-        torque_constant_gain=float(bounds.torque_constant_gain * constant),
+        torque_constant_gain=float(bounds.torque_constant * constant),
         clock_rate=float(instruments.clock_rate * rate),
     )
 

@@ -165,7 +165,7 @@ def test_a_design_with_a_friction_map_is_moved_by_the_record_like_any_other() ->
     result = identify_bench(load_design("emps"), [record], settings=BenchSettings(form="map"))
     assert result.design.friction.points
     outcome = correlate_record(result.design, record)
-    assert all(np.isfinite(signal.relative_error) for signal in outcome.signals)
+    assert all(np.isfinite(signal.relative_error) for signal in outcome.signals.values())
     assert "torque needed for its motion" not in result.resimulated[0].how
 
 

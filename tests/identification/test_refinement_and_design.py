@@ -15,7 +15,6 @@ from actuator_lti.errors import InputError
 from analyses.estimation.fit import Fit
 from analyses.identification.bench import BenchSettings, identify_bench
 from analyses.identification.campaign_design import SuggestedRun, suggest_runs
-from analyses.identification.dynamic import Recipe
 from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import refine_by_output_error
 from analyses.identification.points import SteadyPoint
@@ -26,7 +25,6 @@ from analyses.identification.systematic import effects_of, shared_errors
 from analyses.identification.to_design import design_with_fit, joint_values
 from analyses.records import open_record
 from analyses.records.campaign_file import Instruments
-from analyses.records.record import Record, RowCounts
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
 BOUNDS = Instruments(torque_accuracy=0.005, current_gain=0.005, current_offset_A=0.002)
@@ -207,22 +205,6 @@ def test_the_emps_result_becomes_a_design(emps_file: Path) -> None:
             assert back.friction.offset_torque_Nm == 0.0
         else:
             assert back.friction.offset_torque_Nm == pytest.approx(model["offset"], rel=1e-6)
-
-
-def test_a_rotary_drive_is_identified_from_its_own_simulation() -> None:
-    """Inverse model of a simulated ilr33-amber: inertia and friction at the motor come back."""
-    from nonlinear import commands, simulate
-
-    design = load_design("ilr33-amber")
-    run = simulate(design, commands.multisine(0.005, [0.7, 1.9, 4.3], 6.0, 1e-4, seed=2), 6.0)
-    signals = {"angle": run.motor_angle_rad, "current": run.current_A}
-    counts = RowCounts(rows_in=len(run.time_s), rows_out=len(run.time_s))
-    units = {"angle": "rad", "current": "A"}
-    record = Record(name="run", time_s=run.time_s, signals=signals, units=units, counts=counts)
-    model = fit_records(design, [record], recipe=Recipe(cutoff_hz=1000.0))
-    assert model["inertia"] == pytest.approx(design.inertia_kgm2, rel=0.01)
-    assert model["dry"] == pytest.approx(2.25e-3, rel=0.01)
-    assert model["viscous"] == pytest.approx(5.25e-6, rel=0.02)
 
 
 def test_an_estimate_that_no_drive_has_is_refused_with_advice() -> None:

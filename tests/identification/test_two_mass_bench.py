@@ -134,6 +134,12 @@ def test_the_errors_of_the_stiffness_are_in_that_of_the_play() -> None:
     assert result.play.half_std_rad > 0.3 * share * torque / 400.0
 
 
+def test_a_motion_on_one_flank_does_not_tell_the_play() -> None:
+    part = reversal_record(_design(), seed=0).slice(0, 100)
+    with pytest.raises(InputError, match="must reverse"):
+        identify_frequency(_guess(), sweep_record(_design(), seed=0), play_record=part)
+
+
 def test_the_bench_says_where_it_cannot_measure() -> None:
     design = _design()
     with pytest.raises(InputError, match="leaves its flank"):

@@ -16,7 +16,7 @@ from analyses.identification.surface import fit_surface
 from analyses.identification.surface_fit import PATHS
 from analyses.identification.to_design import design_with_fit
 from analyses.records import import_campaign, load_campaign
-from analyses.records.campaign_file import Campaign, Instruments, RunEntry
+from analyses.records.campaign_file import Campaign, Instruments, Join, RunEntry
 from analyses.records.campaign_import import ImportedCampaign, assemble_run
 from examples.virtual_bench import (
     BenchInstruments,
@@ -63,9 +63,7 @@ def bench_campaign(logs: tuple[RunLogs, ...], design: str, bounds: Instruments) 
         design=design,
         drive=DRIVE_SPEC,
         sensor=SENSOR_SPEC,
-        join_method="correlation",
-        join_drive_signal="speed",
-        join_sensor_signal="torque",
+        join=Join(method="given"),
         instruments=bounds,
         runs=tuple(runs),
         origin=str(folder),
@@ -75,7 +73,7 @@ def bench_campaign(logs: tuple[RunLogs, ...], design: str, bounds: Instruments) 
 def _imported(runs: tuple[TrueRun, ...], seed: int) -> ImportedCampaign:
     """A campaign in memory, with the sensor's clock known: the joining has tests of its own."""
     logs, _ = measure_bench(runs, seed, INSTRUMENTS)
-    campaign = replace(bench_campaign(logs, "ilr33-amber", INSTRUMENTS.bounds), join_method="given")
+    campaign = bench_campaign(logs, "ilr33-amber", INSTRUMENTS.bounds)
     joined = [
         assemble_run(campaign, replace(entry, offset_s=log.sensor_offset_s), log.drive, log.sensor)
         for entry, log in zip(campaign.runs, logs, strict=True)
