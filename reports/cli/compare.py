@@ -14,6 +14,7 @@ from reports.cli.options import (
     SchedulerOption,
     TlsOption,
     WorkersOption,
+    engine_of,
 )
 
 if TYPE_CHECKING:
@@ -62,7 +63,6 @@ def compare(
         raise InputError("compare: give a study file or a design; --example prints a study file")
 
     from actuator_lti.verdict import Verdict
-    from analyses.engine import Engine
     from analyses.variants import compare as compared
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line
@@ -79,7 +79,7 @@ def compare(
             plan,
             validation=validation,
             progress=computing,
-            engine=Engine(workers, scheduler, tls=tls) if workers or scheduler else None,
+            engine=engine_of(workers, scheduler, tls) if workers or scheduler else None,
             folder=out / "designs",
         )
     made = study_document(

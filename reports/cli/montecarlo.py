@@ -19,6 +19,7 @@ from reports.cli.options import (
     SchedulerOption,
     TlsOption,
     WorkersOption,
+    engine_of,
     on_axis,
 )
 
@@ -77,7 +78,6 @@ def montecarlo(
 
     Every sample is kept as Parquet under --out; an interrupted run goes on where it stopped.
     """
-    from analyses.engine import Engine
     from analyses.monte_carlo import MonteCarloSettings, StepCheck, monte_carlo, sample_folder
     from analyses.sampling import read_table
     from reports.cli.errors import leave_with
@@ -92,10 +92,9 @@ def montecarlo(
         _print_sample(drive, settings, sample)
         return
     folder = sample_folder(drive, settings, out)
+    engine = engine_of(workers, scheduler, tls)
     with progress(f"sampling {drive.name}", quiet=quiet) as shown:
-        result = monte_carlo(
-            drive, folder, settings, engine=Engine(workers, scheduler, tls=tls), progress=shown
-        )
+        result = monte_carlo(drive, folder, settings, engine=engine, progress=shown)
     leave_with(_written(drive, result, out, at_least, as_json, quiet))
 
 
