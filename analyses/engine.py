@@ -10,14 +10,15 @@ only, under TLS with certificates that are made for the run and never leave it, 
 
 from __future__ import annotations
 
+import ipaddress
+import logging
 import os
 import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -26,6 +27,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.extras import need
+from analyses.proof import Proof, hold_against, packages_of, prove, prove_once
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
@@ -33,22 +35,21 @@ if TYPE_CHECKING:
 
 Chunk = tuple[int, int]
 Arrays = dict[str, np.ndarray]
-Sink = Callable[[Chunk, Arrays], None]
 Progress = Callable[[int, int], None]
 Item = TypeVar("Item")
+Part = TypeVar("Part", covariant=True)
 Result = TypeVar("Result")
 _IN_FLIGHT = 3  # parts a worker that are under way or waiting to be written
 CONNECT_S = 10.0
 _RETRIES = 20  # workers that may die over one part before the run gives up
 _TLS_FILES = {"tls_ca_file": "ca.pem", "tls_client_cert": "cert.pem", "tls_client_key": "key.pem"}
-_CODE = ("actuator_lti", "nonlinear", "analyses")
 
 
-class Task(Protocol):
+class Task(Protocol[Part]):
     """What is evaluated for numbers first to first + count - 1."""
 
-    def evaluate(self, first: int, count: int) -> Arrays:
-        """Columns by name, each of shape (count,)."""
+    def evaluate(self, first: int, count: int) -> Part:
+        """What they come to: columns by name, each of shape (count,), say."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,18 @@ class Engine:
     threads: int | None = None
     tls: Path | None = None
 
+    @property
+    def caution(self) -> str:
+        """What to know of the connection before it is used; empty where nothing."""
+        scheme, _, rest = (self.scheduler or "tls://").rpartition("://")
+        host = rest.rpartition(":")[0].strip("[]")
+        if scheme not in ("", "tcp") or host == "localhost" or _is_loopback(host):
+            return ""
+        return (
+            f"--scheduler {self.scheduler}: not encrypted, and whoever reaches it can run code on its workers"
+            " and here; use tls:// with --tls"
+        )
+
     def __post_init__(self) -> None:
         if self.workers is not None and self.scheduler is not None:
             raise InputError("--workers and --scheduler: one of them")
@@ -89,19 +102,27 @@ class Engine:
         """Whether parts go to other processes."""
         return self.workers is not None or self.scheduler is not None
 
-    def run(self, task: Task, chunks: Iterable[Chunk], sink: Sink, progress: Progress | None = None) -> None:
+    def run(
+        self,
+        task: Task[Result],
+        chunks: Iterable[Chunk],
+        sink: Callable[[Chunk, Result], None],
+        progress: Progress | None = None,
+    ) -> None:
         """Evaluate every chunk once and give each result to the sink, in any order.
 
         Raises
         ------
         NumericalError
-            If workers keep dying, or the scheduler cannot be reached.
+            If workers keep dying, or the scheduler cannot be reached or is lost.
+        InputError
+            If a worker computes otherwise than this process (`analyses.proof`).
         """
         todo = list(chunks)
         counted = _Counted(progress, sum(count for _, count in todo))
 
-        def take(chunk: Chunk, arrays: Arrays) -> None:
-            sink(chunk, arrays)
+        def take(chunk: Chunk, part: Result) -> None:
+            sink(chunk, part)
             counted.add(chunk[1])
 
         self._each(_evaluate, task, todo, take)
@@ -142,12 +163,18 @@ class Engine:
             with self._client() as client:
                 _submit(client, call, held, todo, sink)
                 finished = True
-        except (OSError, TimeoutError) as error:
+        except (OSError, TimeoutError, CancelledError) as error:
             if isinstance(error, InputError):
                 raise
             if not finished:  # a cluster too slow to close takes no result back
-                said = str(error) or "no answer in time"
-                raise NumericalError(f"Dask scheduler {self.scheduler or 'here'}: {said}") from error
+                lost = isinstance(error, CancelledError)
+                said = (
+                    "the connection is lost" if lost else " ".join(str(error).split()) or "no answer in time"
+                )
+                raise NumericalError(
+                    f"Dask scheduler {self.scheduler or 'here'}: {said}; what is done is kept: the same"
+                    " command goes on with it, on this scheduler or another"
+                ) from error
 
     @contextmanager
     def _client(self) -> Iterator[Client]:
@@ -155,11 +182,18 @@ class Engine:
         import distributed
 
         if self.scheduler is not None:
-            with _connected(self.scheduler, self.tls) as client:
+            with _quiet(), _connected(self.scheduler, self.tls) as client:
                 yield client
             return
-        with _local_cluster(self.workers or 1) as cluster, distributed.Client(cluster) as client:
+        with _quiet(), _local_cluster(self.workers or 1) as cluster, distributed.Client(cluster) as client:
             yield client
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def _connected(address: str, tls: Path | None) -> Client:
@@ -206,11 +240,12 @@ def _local_cluster(workers: int) -> LocalCluster:
 
     resource_tracker.ensure_running()  # its start would take the mask away again
     held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # what is started now inherits it
-    silent: dict[str, list[str]] = {
+    settings: dict[str, Any] = {
         f"distributed.{part}.http.routes": [] for part in ("scheduler", "worker", "nanny")
     }
+    settings["distributed.nanny.pre-spawn-environ"] = {}  # workers add up as this process does
     try:
-        with dask.config.set(silent):
+        with dask.config.set(settings):
             return distributed.LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
@@ -224,6 +259,26 @@ def _local_cluster(workers: int) -> LocalCluster:
             )
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, held)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """What Dask would log of a lost connection is said in one line, by what is raised."""
+    import distributed  # noqa: F401 - sets its handlers up
+
+    names = [
+        "distributed",
+        *(name for name in logging.root.manager.loggerDict if name.startswith("distributed.")),
+    ]
+    handlers = {handler for name in names for handler in logging.getLogger(name).handlers}
+    before = {handler: handler.level for handler in handlers}
+    for handler in handlers:
+        handler.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for handler, level in before.items():
+            handler.setLevel(level)
 
 
 @dataclass
@@ -265,14 +320,18 @@ def _submit(
     import distributed
 
     client.wait_for_workers(1, timeout=30)
-    _same_code(client, _packages(held))
+    packages = packages_of(held)
+    here = prove(packages)
+    for address, there in client.run(prove, packages, on_error="return").items():
+        hold_against(here, there, address)
+    here = prove(packages, held)
     sent = client.scatter(held, broadcast=True, hash=False)
     width = max(2, sum(client.nthreads().values())) * _IN_FLIGHT
     waiting = iter(todo)
     parts: dict[str, Any] = {}
 
     def start(part: Any) -> Any:
-        future = client.submit(_answered, call, sent, part, pure=False, retries=_RETRIES)
+        future = client.submit(_answered, call, sent, here, part, pure=False, retries=_RETRIES)
         parts[future.key] = part
         return future
 
@@ -287,53 +346,23 @@ def _submit(
             running.add(start(following))
 
 
-def _answered(call: Callable[[Any, Any], Any], held: Any, part: Any) -> tuple[Any, Exception | None]:
-    """The result or the error of a part: tried again is only what a dying worker took along."""
+def _answered(
+    call: Callable[[Any, Any], Any], held: Any, proof: Proof, part: Any
+) -> tuple[Any, Exception | None]:
+    """The result or the error of a part: tried again is only what a dying worker took along.
+
+    A worker proves itself before its first part, also one that has joined late.
+    """
     try:
+        prove_once(proof, packages_of(held), held)
         return call(held, part), None
     except Exception as error:  # noqa: BLE001 - raised again where it was asked for
         return None, error
 
 
-def _evaluate(task: Task, chunk: Chunk) -> Arrays:
+def _evaluate(task: Task[Result], chunk: Chunk) -> Result:
     return task.evaluate(*chunk)
 
 
 def _applied(work: Callable[[Any], Any], item: Any) -> Any:
     return work(item)
-
-
-def _packages(held: Any) -> tuple[str, ...]:
-    """The packages that a task needs: those of all calculations, and its own."""
-    owner = getattr(held, "func", held)  # a partial function is what it calls
-    own = (getattr(owner, "__module__", None) or type(held).__module__).partition(".")[0]
-    return _CODE if own in _CODE else (*_CODE, own)
-
-
-def code_version(packages: Sequence[str] = _CODE) -> str:
-    """Content hash of the code that computes parts: workers must have the same."""
-    import hashlib
-
-    digest = hashlib.sha256()
-    for name in packages:
-        try:
-            package = import_module(name)
-        except ImportError:
-            digest.update(f"{name}: absent\0".encode())
-            continue
-        file = Path(package.__file__ or "")
-        whole = file.name == "__init__.py"
-        for path in sorted(file.parent.rglob("*.py")) if whole else [file]:
-            digest.update(f"{name}/{path.relative_to(file.parent)}\0".encode() + path.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
-
-
-def _same_code(client: Any, packages: tuple[str, ...]) -> None:
-    """Refuse workers that run another version of the code."""
-    here = code_version(packages)
-    others = {
-        address: result for address, result in client.run(code_version, packages).items() if result != here
-    }
-    if others:
-        address = next(iter(others))
-        raise InputError(f"worker {address} runs other code ({others[address]}, here {here})")

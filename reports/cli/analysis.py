@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from actuator_lti.verdict import Verdict
-from analyses.request import Option, flag, options
+from analyses.request import OnMachines, Option, flag, options
 from reports.analyses import Analysis
 from reports.cli.drive import SetOption, command_quantity, load_drive, output_quantity, read_changes
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption, on_axis, read_load
@@ -101,17 +101,21 @@ def answer(
     from reports import document as doc
     from reports.build import notices
     from reports.cli.errors import leave_with
-    from reports.cli.output import print_json, print_line, print_warning
+    from reports.cli.output import print_json, print_line, print_note, print_warning
     from reports.cli.progress import progress
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
     for warning in warnings_of(drive) if one.warns else ():
         print_warning(f"{drive.name}: {warning}")
     values = {name: _read(name, option, chosen[name], drive) for name, (_, option) in _options(one).items()}
+    asked = one.asked(subject, values)
+    for each in asked:
+        if isinstance(each, OnMachines) and each.engine.caution:
+            print_note(f"actuator-lti: {each.engine.caution}")
     with progress(f"{one.doing} {getattr(subject, 'name', '')}", quiet=quiet) as doing, isolated() as missing:
         more: dict[str, Any] = {"progress": doing} if one.doing else {}
         more |= {"out": out} if one.keeps else {}
-        result = one.run(subject, *one.asked(subject, values), **more)
+        result = one.run(subject, *asked, **more)
     if (text := one.text(result)) is not None:
         print_line(text)
         return

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypedDict
 
 import numpy as np
 from markupsafe import Markup
 
+from actuator_lti.tree import Tree
 from reports.nightly.charts import Chart, line_chart
-from reports.nightly.clock import to_seconds
 from reports.nightly.figures import Figure, Verdict, first_number
 from reports.nightly.history import History
 from reports.nightly.records import Result
+from reports.nightly.text import to_seconds
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.trend import LOOK_BACK, ChangePoint, change_points, flaps
 from reports.nightly.view import DesignView, Overview
@@ -21,22 +21,11 @@ from reports.nightly.view import DesignView, Overview
 MAX_CHARTS = 60
 
 
-class CourseChart(TypedDict):
-    """A figure over the nights: its drawing, and the nights in which its level changed."""
-
-    title: str
-    id: str
-    unit: str
-    svg: Markup
-    points: list[tuple[str, ChangePoint]]
-    flaps: bool
-
-
 @dataclass
 class Course:
     """Charts for the page, figures without a change, change points and number of moves by night."""
 
-    charts: list[CourseChart] = field(default_factory=list)
+    charts: list[Tree] = field(default_factory=list)
     steady: list[Figure] = field(default_factory=list)
     marks: dict[int, list[tuple[Figure, ChangePoint]]] = field(default_factory=dict)
     moved: dict[int, int] = field(default_factory=dict)
@@ -89,7 +78,8 @@ class _Writer:
 
     def _chart(
         self, figure: Figure, values: np.ndarray, points: Sequence[ChangePoint], to_and_fro: bool
-    ) -> CourseChart:
+    ) -> Tree:
+        """A figure over the nights: its drawing, and the nights in which its level changed."""
         verdict = self.verdicts.get(figure.name)
         chart = Chart(
             title=verdict.label if verdict is not None else figure.name,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import platform
 import socket
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,14 +19,13 @@ from reports.nightly import memory
 from reports.nightly import site as site_files
 from reports.nightly.apart import Done, Limits, Task, build_each
 from reports.nightly.cache import Cache, CorruptEntry
-from reports.nightly.clock import now
 from reports.nightly.code_version import CodeVersion, code_version, commit_of
 from reports.nightly.figures import Figure
 from reports.nightly.history import FILE, NIGHTS, History, Reported, open_history
 from reports.nightly.job import BROKEN, Job, Outcome, check_jobs
 from reports.nightly.lock import hold
 from reports.nightly.records import Result
-from reports.nightly.text import one_line
+from reports.nightly.text import now, one_line
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.view import Overview, overview
 
@@ -159,23 +159,30 @@ def run_night(
         Where the history knows less than the site.
     """
     use = settings or Settings()
-    tell = say or _silent
     jobs = check_jobs(study.jobs, study.name)
+    version = code or code_version()
+    with _held(study, site, use) as (history, cache):
+        site_files.remove_leftovers(site, history.state)
+        site_files.mark(site)
+        run = history.start_run(started=clock(), **_about(version, study))
+        outcomes = _outcomes(jobs, version, cache, use, progress, say or _silent)
+        history.finish_run(run, clock(), [(_result(run.id, o), _reported(o)) for o in outcomes])
+        return publish(study, site, history, cache, use, {o.key: o.meta for o in outcomes})
+
+
+@contextmanager
+def _held(study: Study, site: Path, use: Settings, *, begun: bool = False) -> Iterator[tuple[History, Cache]]:
+    """Hold history and cache of a site, both as they should be; ``begun``: only where there is a history."""
     state = state_of(site, use)
     site_files.check_place(site)
     _unless_lost(site, state, use)
-    version = code or code_version()
+    if begun and not (state / FILE).exists():
+        raise InputError("no night has been built here yet", where=str(site))
     with hold(state, use.wait_s), open_history(state) as history:
-        site_files.remove_leftovers(site, state)
-        history.claim(study.name)
         if not use.accept_lost_history:
             memory.check(site, history.memory(), state)
-        site_files.mark(site)
-        run = history.start_run(started=clock(), **_about(version, study))
-        outcomes = _outcomes(jobs, version, Cache(state / "cache"), use, progress, tell)
-        history.finish_run(run, clock(), [(_result(run.id, o), _reported(o)) for o in outcomes])
-        metas = {o.key: o.meta for o in outcomes}
-        return publish(study, site, history, Cache(state / "cache"), use, metas)
+        history.claim(study.name)
+        yield history, Cache(state / "cache")
 
 
 def _unless_lost(site: Path, state: Path, use: Settings) -> None:
@@ -227,15 +234,7 @@ def approve(
     use = settings or Settings()
     if not by.strip() or not reason.strip():
         raise InputError("--by and --reason: an approval needs a name and a reason", where="nightly approve")
-    state = state_of(site, use)
-    site_files.check_place(site)
-    _unless_lost(site, state, use)
-    if not (state / FILE).exists():
-        raise InputError("no night has been built here yet", where=str(site))
-    with hold(state, use.wait_s), open_history(state) as history:
-        history.claim(study.name)
-        if not use.accept_lost_history:
-            memory.check(site, history.memory(), state)
+    with _held(study, site, use, begun=True) as (history, cache):
         if not history.runs:
             raise InputError("no night has been finished here yet", where=str(site))
         last = history.runs[-1].id
@@ -248,7 +247,7 @@ def approve(
                 )
         limits = {"by": one_line(by, 200), "reason": one_line(reason, 2000)}
         history.approve(last, list(names) or None, at=clock(), **limits)
-        return publish(study, site, history, Cache(state / "cache"), use)
+        return publish(study, site, history, cache, use)
 
 
 def _about(version: CodeVersion, study: Study) -> dict[str, Any]:

@@ -64,26 +64,6 @@ class DesignView:
         title = str(self.meta.get("title", ""))
         return "" if title == self.name else title
 
-    @property
-    def revision(self) -> str:
-        """Revision of the design."""
-        return str(self.meta.get("revision", ""))
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        """Files of its report."""
-        return tuple(self.meta.get("files", ()))
-
-    @property
-    def words(self) -> tuple[str, ...]:
-        """Verdict of its report, a line for each kind."""
-        return tuple(self.meta.get("words", ()))
-
-    @property
-    def failed_sections(self) -> tuple[str, ...]:
-        """Titles of the sections of its report that do not pass."""
-        return tuple(self.meta.get("failed_sections", ()))
-
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
         """Requirements of tonight's report."""

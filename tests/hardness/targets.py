@@ -40,7 +40,7 @@ from analyses.records import (
 from analyses.records.parquet_reader import read_parquet_record
 from analyses.sampling import read_table
 from nonlinear.records import read_columns
-from reports.nightly.cache import Cache, CorruptEntry
+from reports.nightly.cache import Cache, CorruptEntry, sealed
 from reports.nightly.history import FILE, NIGHTS, open_history
 from reports.nightly.memory import remembered
 from reports.nightly.source import read_study
@@ -311,11 +311,7 @@ def history_files() -> dict[str, bytes]:
 
 @cache
 def entry_file() -> bytes:
-    import tempfile
-
-    with tempfile.TemporaryDirectory() as folder:
-        Cache(Path(folder)).write("k" * 64, {"x": [1, 2]}, {"report.html": b"<p>" * 40})
-        return Cache(Path(folder)).path("k" * 64).read_bytes()
+    return sealed("k" * 64, {"x": [1, 2]}, {"report.html": b"<p>" * 40})
 
 
 def xml_seed() -> bytes:
