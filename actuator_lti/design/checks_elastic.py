@@ -10,12 +10,13 @@ from actuator_lti.reading import shown
 
 
 def check_place(design: Design) -> Iterator[Refusal]:
-    """Refuse a coupling after a gear that is none; whatever asks for an inertia needs its place."""
+    """Refuse names of gears that are none; whatever asks for an inertia needs the coupling's place."""
     after = None if design.coupling is None else design.coupling.after
     names = [gear.name for gear in design.gears]
-    if after is not None and after not in names:
-        known = ", ".join(names) or "none, as there are no gears; leave it out"
-        yield "coupling.after", shown(after), f"is no gear; allowed: {known}"
+    for key, name in (("coupling.after", after), ("load.locking_gear", design.load.locking_gear)):
+        if name is not None and name not in names:
+            known = ", ".join(names) or "none, as there are no gears; leave it out"
+            yield key, shown(name), f"is no gear; allowed: {known}"
 
 
 def check_elastic(design: Design) -> Iterator[Refusal]:
@@ -34,14 +35,21 @@ def check_elastic(design: Design) -> Iterator[Refusal]:
         yield "coupling.stiffness", f"{coupling.stiffness_Nm_rad:g}", allowed
     if design.friction.law == "tanh":
         yield "friction.law", '"tanh"', 'allowed with a coupling: "coulomb"'
+    names, locking = [gear.name for gear in design.gears], design.load.locking_gear
+    locks = names.index(locking) + 1 if locking else len(names)
     if design.load.path != "self-locking":
+        if locking is not None:
+            yield "load.locking_gear", f'"{locking}"', 'allowed with load.path = "self-locking"'
         return
-    least, coefficient = 1.0 / design.ratio_to_coupling, design.friction.load_coefficient
-    if design.ratio_behind_coupling != 1.0 or design.gears_before_coupling < len(design.gears):
-        allowed = "lies before the self-locking stage; allowed: the last gear, or load.path = back-drivable"
+    least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
+    if design.gears_before_coupling < locks:
+        allowed = (
+            f"lies before the self-locking stage; allowed: {', '.join(names[locks - 1 :])}, "
+            "load.locking_gear with a gear before the coupling, or load.path = back-drivable"
+        )
         yield "coupling.after", f'"{coupling.after or ""}"', allowed
     elif coefficient < least * (1 - 1e-12):
-        allowed = f"a self-locking stage with less than 1/N_c gives energy; allowed: at least {least:g}"
+        allowed = f"a self-locking stage with less than 1/N gives energy; allowed: at least {least:g}"
         yield "friction.load_coefficient", f"{coefficient:g}", allowed
 
 

@@ -213,6 +213,8 @@ class Load:
         "inertia", "{inertia}", "J_load", "inertia at the output shaft", example="2e-4 kg*m^2")] = 0.0
     path: Annotated[LoadPath, choice(
         "path", "whether the load torque only adds friction, or also drives the motor")] = "self-locking"
+    locking_gear: Annotated[str | None, text(
+        "name of the gear that locks itself, which stands before the coupling; default the last gear")] = None
     moment_max_Nm: Annotated[float, not_negative(
         "moment_max", "{torque}", "M_ext", "largest load torque at the output", example="8 N*m")] = 0.0
     moment_slope_Nm_rad: Annotated[float, quantity(
