@@ -26,18 +26,17 @@ class WithKernels(build_py):
     """Beside the modules, the libraries of their kernels."""
 
     def run(self) -> None:
-        """Copy the modules, then compile into the copy; an editable installation compiles in place."""
+        """Copy the modules, compile into the copy; ``python -m nonlinear.native`` compiles a checkout."""
         super().run()
+        if self.editable_mode:
+            return
         from actuator_lti.batch.library import LIBRARY as figures
         from nonlinear.native import LIBRARY as run
 
         for library in (run, figures):
-            if self.editable_mode:
-                library.build()
-            else:
-                package = Path(self.build_lib) / library.folder.relative_to(Path(__file__).parent)
-                shutil.rmtree(package / "_native", ignore_errors=True)
-                library.write(package, TARGET)
+            package = Path(self.build_lib) / library.folder.relative_to(Path(__file__).parent)
+            shutil.rmtree(package / "_native", ignore_errors=True)
+            library.write(package, TARGET)
 
 
 class ForOneKind(bdist_wheel):

@@ -17,6 +17,7 @@ from actuator_lti.compiled.library import Entry, Library, source_files
 from actuator_lti.drive import signals
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout, layout
+from nonlinear._kernels.forms import forms
 
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.uint16]
@@ -34,7 +35,7 @@ _ENTRIES = (
     Entry("nonlinear._kernels.run", "run",
           ("row", "row", "row", "row", "row", "row", "bytes", "row", "row"), "int"),
 )  # fmt: skip
-LIBRARY = Library("run", _FOLDER, _ENTRIES, source_files(_FOLDER / "_kernels", Path(signals.__file__)))
+LIBRARY = Library("run", _FOLDER, _ENTRIES, source_files(_FOLDER / "_kernels", Path(signals.__file__)), forms)
 
 
 def call(row: Floats, tables: Floats, history: Floats, flags: Flags, out: Floats, shared: Floats) -> int:

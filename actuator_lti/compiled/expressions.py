@@ -8,6 +8,7 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
+from actuator_lti.compiled.form import Form, value_of
 from actuator_lti.compiled.kernel import is_kernel
 from actuator_lti.compiled.kinds import FUNCTIONS, Function, Kind, c_float, c_name
 
@@ -34,11 +35,52 @@ class Expressions:
     constants : dict of str to int or float
         Filled with every named constant that is used.
     prefix : str
-        In front of every function name.
+        In front of the names of minimum and maximum.
+    form : Form, optional
+        Whose known numbers the function's row holds.
     """
 
-    def __init__(self, function: Function, call: Calls, constants: dict[str, Constant], prefix: str) -> None:
+    def __init__(
+        self,
+        function: Function,
+        call: Calls,
+        constants: dict[str, Constant],
+        prefix: str,
+        form: Form | None = None,
+    ) -> None:
         self.function, self.call, self.constants, self.prefix = function, call, constants, prefix
+        self.form = form
+        self.told: dict[str, bool] = {}
+
+    def value(self, node: ast.expr) -> Any:
+        """What an expression is worth by the known numbers of the form; None where it is not known."""
+        return None if self.form is None else value_of(node, self._look)
+
+    def _look(self, node: ast.expr) -> Any:
+        if isinstance(node, ast.Name) and node.id in self.told:
+            return self.told[node.id]
+        if isinstance(node, ast.Subscript):
+            return self._known(node)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            value = getattr(self.function.scope.get(node.value.id), node.attr, None)
+            return value if type(value) in (int, float) else None
+        return None
+
+    def _known(self, node: ast.Subscript) -> float | None:
+        """The known number at a constant place of the form's row."""
+        form = self.form
+        if form is None or not isinstance(node.value, ast.Name) or node.value.id != form.row:
+            return None
+        place = self._place(node.slice)
+        return None if place is None else form.known.get(place)
+
+    def _place(self, node: ast.expr) -> int | None:
+        if not isinstance(node, ast.Name | ast.Attribute):
+            return None
+        if isinstance(node, ast.Name) and node.id in (*self.function.variables, *self.function.arguments):
+            return None
+        value = self.constants.get(self.emit(node)[0])
+        return value if isinstance(value, int) else None
 
     def emit(self, node: ast.expr) -> Text:
         """Text and kind of an expression."""
@@ -76,6 +118,8 @@ class Expressions:
 
     def _Name(self, node: ast.Name) -> Text:
         function, name = self.function, node.id
+        if name in self.told:
+            return ("true" if self.told[name] else "false"), "bool"
         if name in function.variables:
             return c_name(name), function.variables[name]
         if name in function.arguments:
@@ -134,6 +178,9 @@ class Expressions:
     def element(self, node: ast.Subscript) -> str:
         """``row[index]``."""
         table = self._table(node.value)
+        known = self._known(node)
+        if known is not None:
+            return c_float(known)
         row, kind = (table, "row") if table else self.emit(node.value)
         if kind not in ("row", "bytes"):
             raise self.function.error(node, "only a row has elements")
@@ -210,6 +257,9 @@ class Expressions:
         return f"{self.as_float(left)} {sign} {self.as_float(right)}"
 
     def _IfExp(self, node: ast.IfExp) -> Text:
+        value = self.value(node.test)
+        if value is not None:
+            return self.emit(node.body if value else node.orelse)
         (yes, a), (no, b) = self.emit(node.body), self.emit(node.orelse)
         if a != b:
             raise self.function.error(node, f"one branch is a {a}, the other a {b}")
@@ -221,7 +271,7 @@ class Expressions:
             return texts[0], "float" if texts[1] == "float" else ("int" if texts[1] == "int" else "bool")
         if callee.returns is None or len(callee.returns) != 1:
             raise self.function.error(node, f"{callee.name} returns no single value")
-        return f"{self.prefix}{callee.name}({', '.join(texts)})", callee.returns[0]
+        return f"{callee.c_name}({', '.join(texts)})", callee.returns[0]
 
     def called(self, node: ast.Call) -> tuple[Function | None, list[str]]:
         """The function called and the texts of its arguments; None with text and kind for one built in."""

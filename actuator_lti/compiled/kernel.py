@@ -9,13 +9,24 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 Written = TypeVar("Written", bound=Callable[..., Any])
-_MARK = "is_kernel"
+_MARK, _SELDOM = "is_kernel", "is_seldom"
 
 
 def kernel(function: Written) -> Written:
     """Mark a function of the subset."""
     setattr(function, _MARK, True)
     return function
+
+
+def seldom(function: Written) -> Written:
+    """Mark a kernel that is called where something happens: `Form` leaves it as it is."""
+    setattr(function, _SELDOM, True)
+    return function
+
+
+def is_seldom(value: object) -> bool:
+    """Whether something is marked by `seldom`."""
+    return bool(getattr(value, _SELDOM, False))
 
 
 def is_kernel(value: object) -> bool:

@@ -41,6 +41,8 @@ class Function:
     scope : dict
         The globals of its module.
     arguments : dict of str to Kind
+    prefix : str
+        In front of its name in C.
     returns : tuple of Kind or None
         None where nothing is returned; one kind is a plain value.
     variables : dict of str to Kind
@@ -56,9 +58,15 @@ class Function:
     tree: ast.FunctionDef
     scope: dict[str, Any]
     arguments: dict[str, Kind]
+    prefix: str
     returns: tuple[Kind, ...] | None = None
     variables: dict[str, Kind] = field(default_factory=dict)
     written: set[str] = field(default_factory=set)
+
+    @property
+    def c_name(self) -> str:
+        """Its name in C."""
+        return f"{self.prefix}{self.name}"
 
     def error(self, node: ast.AST, text: str) -> EmitError:
         """The error of one place in the source."""

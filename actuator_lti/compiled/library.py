@@ -20,6 +20,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from actuator_lti.compiled.compiler import HERE, LIBRARY_FLAGS, TARGETS, compile_library
+from actuator_lti.compiled.form import Form
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.errors import InputError
 
@@ -119,12 +120,15 @@ class Library:
         What Python calls.
     sources : tuple of Path
         Modules that its C is emitted from, beside the emitter's.
+    forms : callable
+        Second forms of its functions, see `emit_c`.
     """
 
     name: str
     folder: Path
     entries: tuple[Entry, ...]
     sources: tuple[Path, ...]
+    forms: Callable[[], tuple[Form, ...]] = tuple
     _others: list[Any] = field(default_factory=list)
 
     def path(self, target: str = HERE) -> Path:
@@ -143,7 +147,8 @@ class Library:
         """Its C."""
         from actuator_lti.compiled.program import emit_c
 
-        return emit_c({entry.function: entry.arguments for entry in self.entries}).source
+        entries = {entry.function: entry.arguments for entry in self.entries}
+        return emit_c(entries, forms=self.forms()).source
 
     def build(self) -> Path:
         """Emit, compile and keep the library, if it is not there; older ones of this kind of machine go.

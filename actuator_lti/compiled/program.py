@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.compiled.expressions import Constant
+from actuator_lti.compiled.form import Form
+from actuator_lti.compiled.kernel import is_seldom
 from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name
 from actuator_lti.compiled.statements import INDENT, Statements, result_type
 
@@ -83,7 +85,9 @@ class Program:
         return "\n".join(lines)
 
 
-def emit_c(entries: Mapping[Any, Sequence[Kind]], prefix: str = "drive_") -> Program:
+def emit_c(
+    entries: Mapping[Any, Sequence[Kind]], prefix: str = "drive_", forms: Sequence[Form] = ()
+) -> Program:
     """C99 for compiled functions and everything that they call.
 
     Parameters
@@ -92,6 +96,8 @@ def emit_c(entries: Mapping[Any, Sequence[Kind]], prefix: str = "drive_") -> Pro
         The functions to be called from outside, with the kinds of their arguments.
     prefix : str
         In front of every function and type name.
+    forms : sequence of Form
+        Second forms of functions that these call; the function itself chooses by its row, at every call.
 
     Raises
     ------
@@ -101,20 +107,25 @@ def emit_c(entries: Mapping[Any, Sequence[Kind]], prefix: str = "drive_") -> Pro
     collector = _Collector(prefix)
     names = [collector.call(python, list(kinds), None, None).name for python, kinds in entries.items()]
     texts, types, declarations = [], [], {}
-    for function, lines in collector.done.values():
+    second = [_Formed(collector, form) for form in forms]
+    done = [*collector.done.values(), *(each for formed in second for each in formed.done.values())]
+    for function, lines in done:
         head = collector.head(function)
-        public = function.name in names
+        public = function.prefix == prefix and function.name in names
         if public:
             declarations[function.name] = f"{head};"
         if function.returns is not None and len(function.returns) > 1:
-            types.append(_structure(prefix, function))
-        texts.append(_definition(function, ("" if public else "static ") + head, lines))
+            types.append(_structure(function))
+        inner = function.prefix != prefix and all(function is not formed.root for formed in second)
+        linkage = "" if public else _INLINED if inner else "static "
+        texts.append(_definition(function, linkage + head, lines))
+    texts = [f"static {collector.head(formed.root)};" for formed in second] + texts
     return Program(collector.constants, "\n".join(types), "\n".join(texts), declarations, prefix)
 
 
 class _Collector:
-    def __init__(self, prefix: str) -> None:
-        self.prefix = prefix
+    def __init__(self, prefix: str, helpers: str = "", form: Form | None = None) -> None:
+        self.prefix, self.helpers, self.form = prefix, helpers or prefix, form
         self.constants: dict[str, Constant] = {}
         self.done: dict[str, tuple[Function, list[str]]] = {}
         self.open: list[str] = []
@@ -133,9 +144,9 @@ class _Collector:
             return known
         if name in self.open:
             raise EmitError(f"{name} calls itself: recursion is not in the subset")
-        function = _parsed(python, kinds)
+        function = _parsed(python, kinds, self.prefix)
         self.open.append(name)
-        lines = Statements(function, self.call, self.constants, self.prefix).body()
+        lines = Statements(function, self.call, self.constants, self.helpers, self.form).body()
         self.open.pop()
         self.done[name] = (function, lines)
         return function
@@ -151,32 +162,52 @@ class _Collector:
                 parts.append(f"{self.prefix}bytes {c_name(name)}")
             else:
                 parts.append(f"{C_TYPES[kind]} {c_name(name)}")
-        return f"{self._returned(function)} {self.prefix}{function.name}({', '.join(parts) or 'void'})"
-
-    def _returned(self, function: Function) -> str:
-        if function.returns is None:
-            return "void"
-        return (
-            C_TYPES[function.returns[0]] if len(function.returns) == 1 else result_type(self.prefix, function)
-        )
+        return f"{_returned(function)} {function.c_name}({', '.join(parts) or 'void'})"
 
 
-def _parsed(python: Any, kinds: list[Kind]) -> Function:
+def _returned(function: Function) -> str:
+    if function.returns is None:
+        return "void"
+    return C_TYPES[function.returns[0]] if len(function.returns) == 1 else result_type(function)
+
+
+_INLINED = "static inline __attribute__((always_inline)) "
+
+
+class _Formed(_Collector):
+    """The functions of a form; those marked `seldom` are those of the program."""
+
+    def __init__(self, program: _Collector, form: Form) -> None:
+        super().__init__(f"{program.prefix}{form.name}_", program.helpers, form)
+        self.program, self.constants = program, program.constants
+        self.chooser, lines = program.done[form.of]
+        self.root = self.call(self.chooser.scope[form.of], list(self.chooser.arguments.values()), None, None)
+        given = ", ".join(map(c_name, self.root.arguments))
+        chosen = f"return {self.root.c_name}({given});"
+        lines[:0] = [f"{INDENT}if ({form.test()}) {{", f"{INDENT * 2}{chosen}", f"{INDENT}}}"]
+
+    def call(self, python: Any, kinds: list[Kind], node: ast.AST | None, caller: Function | None) -> Function:
+        """A function of the form, or one of the program."""
+        return (self.program.call if is_seldom(python) else super().call)(python, kinds, node, caller)
+
+
+def _parsed(python: Any, kinds: list[Kind], prefix: str) -> Function:
     lines, first = inspect.getsourcelines(python)
     tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
     assert isinstance(tree, ast.FunctionDef)
     names = [argument.arg for argument in tree.args.args]
     file = Path(inspect.getsourcefile(python) or "?").name
     arguments = dict(zip(names, kinds, strict=False))
-    function = Function(python.__name__, python.__module__, file, first, tree, python.__globals__, arguments)
+    scope = python.__globals__
+    function = Function(python.__name__, python.__module__, file, first, tree, scope, arguments, prefix)
     if len(names) != len(kinds) or tree.args.defaults or tree.args.vararg or tree.args.kwonlyargs:
         raise function.error(tree, f"takes ({', '.join(names)}); defaults and stars are not in the subset")
     return function
 
 
-def _structure(prefix: str, function: Function) -> str:
+def _structure(function: Function) -> str:
     fields = " ".join(f"{C_TYPES[kind]} r{n};" for n, kind in enumerate(function.returns or ()))
-    return f"typedef struct {{ {fields} }} {result_type(prefix, function)};"
+    return f"typedef struct {{ {fields} }} {result_type(function)};"
 
 
 _ZERO: dict[Kind, str] = {"float": "0.0", "int": "0", "bool": "false"}

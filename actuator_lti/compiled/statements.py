@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterator
 
 from actuator_lti.compiled.expressions import Calls, Constant, Expressions, bare, widened
+from actuator_lti.compiled.form import Form
 from actuator_lti.compiled.kinds import C_TYPES, Function, Kind, c_name
 
 INDENT = "    "
@@ -14,9 +15,13 @@ INDENT = "    "
 class Statements:
     """Translates the body of one function, line by line."""
 
-    def __init__(self, function: Function, call: Calls, constants: dict[str, Constant], prefix: str) -> None:
-        self.function, self.prefix = function, prefix
-        self.expressions = Expressions(function, call, constants, prefix)
+    def __init__(
+        self, function: Function, call: Calls, constants: dict[str, Constant], prefix: str,
+        form: Form | None = None,
+    ) -> None:  # fmt: skip
+        self.function = function
+        self.expressions = Expressions(function, call, constants, prefix, form)
+        self.once = assigned_once(function.tree) if form is not None else frozenset()
         self.lines: list[str] = []
         self.depth = 1
         self.temporaries = 0
@@ -51,8 +56,12 @@ class Statements:
         elif isinstance(node.targets[0], ast.Tuple):
             self._tuple(node.targets[0], node)
         else:
+            target, value = node.targets[0], self.expressions.value(node.value)
+            if isinstance(target, ast.Name) and target.id in self.once and isinstance(value, bool):
+                self.expressions.told[target.id] = value
+                return
             text, kind = self.expressions.emit(node.value)
-            self._store(node.targets[0], bare(text), kind)
+            self._store(target, bare(text), kind)
 
     def _store(self, target: ast.expr, text: str, kind: Kind) -> None:
         if isinstance(target, ast.Subscript):
@@ -145,9 +154,13 @@ class Statements:
             raise self.function.error(node, "a call that does nothing")
         self._mark_callee_writes(node.value, callee)
         cast = "" if callee.returns is None else "(void)"
-        self._put(f"{cast}{self.prefix}{callee.name}({', '.join(texts)});")
+        self._put(f"{cast}{callee.c_name}({', '.join(texts)});")
 
     def _If(self, node: ast.If, word: str = "if") -> None:
+        known = self.expressions.value(node.test) if word == "if" else None
+        if known is not None:
+            self._block(node.body if known else node.orelse)
+            return
         self._put(f"{word} ({self.expressions.condition(node.test)}) {{")
         self._indented(node.body)
         if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
@@ -220,7 +233,7 @@ class Statements:
             self._put(f"return {bare(emitted[0][0])};")
         else:
             texts = ", ".join(bare(text) for text, _ in emitted)
-            self._put(f"return ({result_type(self.prefix, self.function)}){{{texts}}};")
+            self._put(f"return ({result_type(self.function)}){{{texts}}};")
 
     def _passed_on(self, call: ast.Call) -> bool:
         """Return the several results of another function; False where it has one."""
@@ -235,20 +248,20 @@ class Statements:
         self._mark_callee_writes(call, callee)
         name = self._named_result(callee, texts)
         fields = ", ".join(f"{name}.r{n}" for n in range(len(callee.returns)))
-        self._put(f"return ({result_type(self.prefix, self.function)}){{{fields}}};")
+        self._put(f"return ({result_type(self.function)}){{{fields}}};")
         return True
 
     def _named_result(self, callee: Function, texts: list[str]) -> str:
         self.temporaries += 1
         name = f"result_{self.temporaries}"
-        called = f"{self.prefix}{callee.name}({', '.join(texts)})"
-        self._put(f"const {result_type(self.prefix, callee)} {name} = {called};")
+        called = f"{callee.c_name}({', '.join(texts)})"
+        self._put(f"const {result_type(callee)} {name} = {called};")
         return name
 
 
-def result_type(prefix: str, function: Function) -> str:
+def result_type(function: Function) -> str:
     """Name of the structure that a function with several results returns."""
-    return f"{prefix}{function.name}_result"
+    return f"{function.c_name}_result"
 
 
 def check_order(function: Function, node: ast.stmt, expressions: Expressions) -> None:
@@ -317,6 +330,12 @@ def _overlap(targets: ast.Tuple, values: ast.Tuple) -> bool:
 
 def _loaded(target: ast.expr) -> ast.expr:
     return ast.parse(ast.unparse(target), mode="eval").body
+
+
+def assigned_once(tree: ast.FunctionDef) -> frozenset[str]:
+    """Variables that a function assigns at one place alone."""
+    names = [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+    return frozenset(name for name in names if names.count(name) == 1)
 
 
 def _without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
+from actuator_lti.compiled.kernel import kernel, seldom
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.elastic import elastic_motion
 from nonlinear._kernels.energy import energy_stick, energy_whole
@@ -107,6 +107,7 @@ def quick(p, s, part, u):  # type: ignore[no-untyped-def]
     return quick_stick(p, s, part, u)
 
 
+@seldom
 @kernel
 def closely(p, s, part, u, events):  # type: ignore[no-untyped-def]
     """One segment by the general way; the events of this tick so far, -1 where there are too many."""
@@ -119,6 +120,7 @@ def closely(p, s, part, u, events):  # type: ignore[no-untyped-def]
     return segment(p, s, part, u, events)
 
 
+@seldom
 @kernel
 def count_events(s, events):  # type: ignore[no-untyped-def]
     """Add the events of a tick; -1 marks a failed one."""

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from actuator_lti.compiled.kernel import kernel
+from actuator_lti.compiled.kernel import kernel, seldom
 from nonlinear._kernels import layout
 
 LIMITER_BITS = np.array(layout.LIMITER_BITS)
@@ -74,6 +74,7 @@ def step_figures(y, y_last, k, band, out):  # type: ignore[no-untyped-def]
     out[at + layout.STEP_LAST] = y
 
 
+@seldom
 @kernel
 def note_limits(p, flags, first, until, out):  # type: ignore[no-untyped-def]
     """Count the ticks from ``first`` to ``until`` (exclusive), in which the same limiters acted."""

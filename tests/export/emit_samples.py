@@ -2,7 +2,7 @@
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
+from actuator_lti.compiled.kernel import kernel, seldom
 
 FIRST, SECOND, THIRD = range(3)
 GAIN = 1.0 / 3.0
@@ -66,6 +66,33 @@ def everything(p, s, n):  # type: ignore[no-untyped-def]
     bits = ((n << 2) | 1) + int((n + 2) / 3)
     wave = math.sin(a) + math.exp(-abs(b)) + math.atan2(a, 1.0 + b * b) + math.sqrt(abs(a)) + math.pi
     return total + old + floor + float(bits) + wave if n > 1 else -total - old + min(n, 2) * wave
+
+
+@seldom
+@kernel
+def dear(p, x):  # type: ignore[no-untyped-def]
+    """Called where something happens."""
+    return x * p[SECOND] + GAIN
+
+
+@kernel
+def gated(p, x):  # type: ignore[no-untyped-def]
+    """Parts that a row may rule out."""
+    wanted = p[FIRST] > 0.0 and p[SECOND] > 0.0
+    y = p[THIRD] * x if p[FIRST] > 0.0 else x
+    if wanted:
+        y = math.sin(y)
+    if not p[FIRST] > 0.0:
+        y += dear(p, y)
+    elif y > 1.0:
+        y -= 1.0
+    return y + p[FIRST]
+
+
+@kernel
+def through(p, x):  # type: ignore[no-untyped-def]
+    """Calls it."""
+    return gated(p, x)
 
 
 @kernel

@@ -18,6 +18,8 @@ from actuator_lti.compiled import compiler
 from actuator_lti.compiled.library import Library
 from actuator_lti.errors import InputError
 from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native, simulate, simulate_many
+from nonlinear._kernels.forms import forms
+from nonlinear.parameters import design_row
 
 quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
 
@@ -45,6 +47,30 @@ def test_runs_have_the_bits_of_the_kernels_as_written(seed: int) -> None:
     assert ours.status == theirs.status
     assert repr((ours.final, ours.energy)) == repr((theirs.final, theirs.energy))  # NaN where a run failed
     assert ours.limits == theirs.limits
+
+
+@quiet
+@pytest.mark.parametrize("law", ["coulomb", "tanh"])
+@pytest.mark.parametrize("delay_ticks", [0.0, 0.3, 1.0, 1.7])
+def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(law: str, delay_ticks: float) -> None:
+    """Through stick, slip and limits; one form has just the numbers of this drive."""
+    design = load_design("ilr33-amber")
+    control = replace(design.controller, computing_delay_s=delay_ticks * design.controller.period_s)
+    friction = replace(design.friction, law=law)
+    design = replace(design, controller=control, friction=friction)
+    p, _ = native.parameters(design_row(design))
+    assert sum(all(p[place] == value for place, value in form.known.items()) for form in forms()) == 1
+
+    def work() -> Trajectory:
+        return simulate(design, commands.triangle(2e-3, 40.0), 600 * control.period_s, loads.constant(3.0))
+
+    ours = work()
+    with native.LIBRARY.written():
+        theirs = work()
+    assert law == "tanh" or ours.events > 3
+    assert ours.limit_flags.any()
+    for name, values in ours.columns().items():
+        assert values.tobytes() == theirs.columns()[name].tobytes(), name
 
 
 @quiet
