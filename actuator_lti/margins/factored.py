@@ -97,11 +97,6 @@ class Response:
         rate = (above[1] / above[0] - below[1] / below[0]) / 1j if above[0] else math.inf
         return -0.5 * complex(rate) - 1j * self.delay
 
-    def distance(self, w: float, disk: bool) -> float:
-        """Distance to -1."""
-        L = complex(self.at(np.array([w]))[0])
-        return abs(2.0 * (1.0 + L) / (1.0 - L)) if disk else abs(1.0 + L)
-
     def polished(self, w: Real, gain: bool) -> tuple[Real, Complex]:
         """Newton from crossings of the factors to those of the loop; their x, and L there.
 

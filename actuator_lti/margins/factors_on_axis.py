@@ -118,6 +118,15 @@ class Factored:
         turning = self._turning[:2, :, 0].tolist()
         return list(zip(self.roots.tolist(), *turning, self._off_axis.tolist(), strict=True))
 
+    def log_at(self, w: float) -> tuple[float, float]:
+        """Log gain and phase at one frequency."""
+        gain, phase = self.log_gain, self.phase - self.delay * w
+        for root, weight, turning, off in self._listed:
+            y = w - root.imag
+            gain += weight * math.log(math.hypot(y, off)) if y or off else -math.copysign(math.inf, -weight)
+            phase += turning * math.atan2(y, off)
+        return gain, phase
+
     def jet(self, w: float) -> tuple[complex, complex, complex]:
         """L at one frequency, and the first two derivatives of log L by w."""
         gain, phase, l1, l2 = self.log_gain, self.phase - self.delay * w, 0j, 0j
@@ -172,8 +181,11 @@ class Factored:
         done: list[Intervals] = []
         for _ in range(_ROUNDS):
             good = clear(here)
-            done.append(here.taken(good))
-            if good.all():
+            whole = bool(good.all())
+            if whole and not done:
+                return here
+            done.append(here if whole else here.taken(good))
+            if whole:
                 return _joined(done)
             low, high = here.low[~good], here.high[~good]
             if low.size > _MOST or (high - low <= _NARROWEST * high).any():

@@ -15,7 +15,7 @@ import numpy as np
 
 from actuator_lti.margins.factors_on_axis import Factored, Intervals, half_turns, parted
 from actuator_lti.margins.loop import Complex, Mask, Real
-from actuator_lti.margins.trust import Doubtful
+from actuator_lti.margins.trust import EPS, Doubtful
 
 _ROUNDS = 60
 _MOST = 100_000
@@ -45,7 +45,7 @@ def nearest(loop: Factored, known: Intervals, start: tuple[Place, Place]) -> tup
                 best[disk] = _polished(loop, float(distance[k]), float(here.low[k]), bool(disk))
             if best[disk][0] < _SMALL:
                 raise Doubtful("the loop all but meets -1")
-        nearer = _nearer(best[0][0], best[1][0])
+        nearer = _nearer(*(value * (1.0 - _FINEST) - _rounding(loop, w) for value, w in best))
         inside = _may_reach(here, *nearer)
         which: Any = np.flatnonzero(inside.any(axis=0))
         low, high = here.low[which], here.high[which]
@@ -70,9 +70,14 @@ def _distances(L: Complex) -> Real:
     return np.array((np.abs(1.0 + L), np.where(inner == 1.0, np.inf, balanced)))
 
 
+def _rounding(loop: Factored, w: float) -> float:
+    """What rounding of the phase makes of a distance there."""
+    return 4.0 * EPS * (loop.delay * w if w < math.inf else 0.0)
+
+
 def _nearer(modulus: float, alpha: float) -> tuple[Real, Real, Real]:
     """(a, b, e), two rows each: L is nearer than these where f = a abs(L)^2 + 2 b Re L + e < 0."""
-    m, k = (modulus * (1.0 - _FINEST)) ** 2, 0.25 * (alpha * (1.0 - _FINEST)) ** 2
+    m, k = modulus**2, 0.25 * alpha**2
     a, b, e = np.array((((1.0,), (1.0 - k,)), ((1.0,), (1.0 + k,)), ((1.0 - m,), (1.0 - k,))))
     return a, b, e
 
