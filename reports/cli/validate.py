@@ -28,7 +28,9 @@ FolderOption = Annotated[
 ]
 QuickOption = Annotated[
     bool,
-    typer.Option("--quick", help="All checks; a coarser map, no margins by amplitude, no friction."),
+    typer.Option(
+        "--quick", help="Checks and verdict only, as without --out and --json."
+    ),
 ]
 
 
@@ -43,8 +45,8 @@ def validate(
     """Check every prediction against the derivative of the nonlinear simulator, and show where it ends.
 
     Each row is met, not met or not proven. Exit status 1 if one is not met or not proven, if the drive does
-    not come to rest, or if a command within full deflection makes it diverge. What is large, starts from
-    rest, or is shaken by counts is shown with figures.
+    not come to rest, or if a command within full deflection makes it diverge. The page (--out) and --json
+    also show what is large, starts from rest, or is shaken by counts.
     """
     from analyses.isolation import isolated
     from analyses.validation import QUICK, Settings
@@ -54,7 +56,8 @@ def validate(
 
     drive = load_drive(design, changes)
     with progress(f"validating {drive.name}", quiet=quiet) as report, isolated() as missing:
-        result = run(drive, QUICK if quick else Settings(), report)
+        shown = not quick and (out is not None or as_json)
+        result = run(drive, Settings() if shown else QUICK, report)
     made = _document(result, missing)
     paths = _write(made, out, quiet) if out is not None else ()
     if as_json:
