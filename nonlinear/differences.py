@@ -56,7 +56,9 @@ class Differences:
         self.updates, self.size = self.base // self.hold, self.drive.start.size
         self.watched = places_of(self.drive.p, FLAG, COUNTER)
         self.start = np.concatenate([self.drive.start, np.full(self.updates, self.injected.steady)])
-        self.calm = self._runs(self.start[None])[2]
+        after, _, self.calm = self._runs(self.start[None])
+        if after[0, at.S_EVENTS] != self.start[at.S_EVENTS]:
+            raise NumericalError(f"{self.where}: an event happens on the operating motion itself")
         self.moved, scale, self.kick = self._reached()
         self.places = np.concatenate([self.moved, self.size + np.arange(self.updates)])
         self.scale = np.concatenate([scale, np.full(self.updates, self.kick)])

@@ -57,6 +57,8 @@ class Analysis:
         What the bar says while the function works, which then takes ``progress``.
     study : bool
         Whether it is asked of a study (a file, or a design with variants), not of a design.
+    written : str
+        A flag of the request that is set where the answer is written as a page or as JSON.
     keeps : bool
         Whether the function takes ``out`` as well, the folder, and keeps there what it finds.
     warns : bool
@@ -79,6 +81,7 @@ class Analysis:
     doing: str = ""
     study: bool = False
     keeps: bool = False
+    written: str = ""
     warns: bool = False
     stem: str = ""
     out: str = ""
@@ -218,13 +221,14 @@ ANALYSES = (
         function="analyses.validation.validate",
         shown="validation",
         doing="validating",
+        written="large",
         stem="validation",
         words="""
         Check every prediction against the derivative of the nonlinear simulator, and show where it ends.
 
         Each row is met, not met or not proven. Exit status 1 if one is not met, or not proven and not waived,
-        if the drive does not come to rest, or if a command within full deflection makes it diverge. What is
-        large, starts from rest, or is shaken by counts is shown with figures.
+        if the drive does not come to rest, or if a command within full deflection makes it diverge. The page
+        (--out), --json and --large also show what is large, starts from rest, or is shaken by counts.
         """,
     ),
     Analysis(

@@ -15,10 +15,10 @@ from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.loops.assemble import loops_at
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.grid import frequency_range_hz, tone
+from analyses.large_signal.nonlinear_parts import nonlinear_parts
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
 from analyses.responses import response_at
-from analyses.validation.from_rest import nonlinear_parts
 from nonlinear import LIMITERS
 from nonlinear.on_the_bench import on_the_bench
 

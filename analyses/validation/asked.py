@@ -16,13 +16,14 @@ if TYPE_CHECKING:
 class Asked:
     """How much is looked at beside the checks."""
 
-    quick: Annotated[
-        bool, Option(words="All checks; a coarser map, no margins by amplitude, no friction.")
+    quick: Annotated[bool, Option(words="Checks and verdict only, on the page and in JSON, too.")] = False
+    large: Annotated[
+        bool, Option(words="What is large, starts from rest or is shaken by counts, on the terminal, too.")
     ] = False
 
     @classmethod
-    def of(cls, design: Design, *, quick: bool = False) -> Settings:
+    def of(cls, design: Design, *, quick: bool = False, large: bool = False) -> Settings:
         """The settings of `analyses.validation.validate`."""
         from analyses.validation.settings import QUICK, Settings
 
-        return QUICK if quick else Settings()
+        return Settings() if large and not quick else QUICK

@@ -168,22 +168,20 @@ def _pole_equation(t: Tangent, gain: complex, point: complex) -> complex:
 
 def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | None:
     """Gain and angle of the closed-loop pole on the circle nearest to those given, by Newton's method."""
+    if angle == 0.0 or abs(angle - pi) < 1e-12:
+        return _real_crossing(t, gain, -1.0 if angle else 1.0), angle
     log_gain, step = float(np.log(gain)), 1e-6
-    turn = 0.0 if angle == 0.0 or abs(angle - pi) < 1e-12 else 1.0
     for _ in range(NEWTON_STEPS):
         value, by_gain, by_angle = (
             _pole_equation(t, np.exp(log_gain + a), np.exp(1j * (angle + b)))
             for a, b in ((0.0, 0.0), (step, 0.0), (0.0, step))
         )
         gains, angles = (by_gain - value) / step, (by_angle - value) / step
-        if turn:
-            slope = np.array([[gains.real, angles.real], [gains.imag, angles.imag]])
-            try:
-                move = np.linalg.solve(slope, [-value.real, -value.imag])
-            except np.linalg.LinAlgError:
-                return None
-        else:
-            move = np.array([-value.real / gains.real, 0.0]) if gains.real else np.array([np.nan, 0.0])
+        slope = np.array([[gains.real, angles.real], [gains.imag, angles.imag]])
+        try:
+            move = np.linalg.solve(slope, [-value.real, -value.imag])
+        except np.linalg.LinAlgError:
+            return None
         if not np.isfinite(move).all() or abs(log_gain + move[0]) > 50.0:
             return None
         move[1] = np.clip(move[1], -0.1, 0.1)
@@ -191,6 +189,19 @@ def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | No
         if abs(move[0]) < 1e-14 and abs(move[1]) < 1e-13:
             break
     return float(np.exp(log_gain)), angle
+
+
+def _real_crossing(t: Tangent, gain: float, end: float) -> float:
+    """The gain at which a pole crosses at z = 1 or -1, from beside it: there a mode at rest may stand.
+
+    What is real is even in the angle: from a tenth of a radian by tens, where two successive agree best.
+    """
+    found = []
+    for decade in range(1, 13):
+        values = np.linalg.eigvals(t.lifted(end * np.exp(1j * 10.0**-decade)))
+        nearest = values[int(np.argmin(np.abs(1.0 - 1.0 / values - gain)))]
+        found.append(1.0 - 1.0 / float(nearest.real))
+    return found[int(np.argmin(np.abs(np.diff(found)))) + 1]
 
 
 def pole_near(equation: Callable[[complex], complex], point: complex) -> complex:
@@ -219,8 +230,9 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
     if found is None:
         return place.judged(name, ratio, None, allowed * ratio, "1", "no closed-loop pole crosses there")
     gain, turned = found
+    start = np.exp(1j * turned) * (1.0 - ROUNDING)  # not on a mode at rest
     sides = [
-        abs(pole_near(partial(_pole_equation, t, ratio * x), np.exp(1j * turned))) - 1.0
+        abs(pole_near(partial(_pole_equation, t, ratio * x), start)) - 1.0
         for x in (1.0 - BESIDE, 1.0 + BESIDE)
     ]
     hertz = turned / (2.0 * pi * t.period_s)

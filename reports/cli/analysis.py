@@ -108,6 +108,8 @@ def answer(
     for warning in warnings_of(drive) if one.warns else ():
         print_warning(f"{drive.name}: {warning}")
     values = {name: _read(name, option, chosen[name], drive) for name, (_, option) in _options(one).items()}
+    if one.written and (as_json or out is not None):
+        values[one.written] = True
     asked = one.asked(subject, values)
     for each in asked:
         if isinstance(each, OnMachines) and each.engine.caution:

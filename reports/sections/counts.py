@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from analyses.limit_cycles import Confirmation
-from analyses.validation.counts import WITHIN, Counts
+from analyses.limit_cycles.counts import WITHIN, Counts
 from reports import document as doc
 from reports.document_schema import Block, FactItem, Section, Status
 from reports.findings import Finding

@@ -12,6 +12,7 @@ from actuator_lti.design import shipped_designs
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.loops import Loops, periodic_loop
+from analyses.validation import CHECKS, validate
 from nonlinear import tangent
 from nonlinear.derivative import Tangent
 from nonlinear.lifted import GRID, relative
@@ -112,6 +113,13 @@ def test_python_control_draws_it() -> None:
     assert found.system(np.exp(1j * w * found.period_s)) == pytest.approx(
         found.closed(np.exp(1j * w * found.hold_s))
     )
+
+
+@pytest.mark.parametrize("seed", [710_132, 710_235, 710_141])
+def test_drives_that_failed_once(seed: int) -> None:
+    """A filter of the command lags behind a ramp; margins at rest lie on a mode at rest, on an angle."""
+    result = validate(full_drive(seed), CHECKS)
+    assert result.passed, [str(row) for row in result.not_met]
 
 
 def test_a_place_that_there_is_not() -> None:

@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.errors import TooManyTicks
-from analyses.validation.settling import full_range
+from analyses.large_signal.settling_ticks import full_range
 from nonlinear import LIMITERS, Rows
 from nonlinear.loop_setup import points_of
 from nonlinear.operating_motion import lasting_torque_Nm
@@ -110,8 +110,6 @@ class Conditional:
     ending : {"diverges", "keeps oscillating", "is held by a limit", ""}
     end_rad : float or None
         Half of the output's span at that end.
-    lasting_rad : float
-        Half of the span of an output that goes on moving after a step although no limit acts; 0 if none does.
     """
 
     margins: dict[str, ExactMargins]
@@ -125,7 +123,6 @@ class Conditional:
     limiter_share: float = 0.0
     ending: Ending | Literal[""] = ""
     end_rad: float | None = None
-    lasting_rad: float = 0.0
 
     @property
     def diverges(self) -> bool:
@@ -206,7 +203,6 @@ def conditional_stability(
         limiter_share=0.0 if end is None else end.share,
         ending="" if end is None else end.words,
         end_rad=None if end is None else end.output_rad,
-        lasting_rad=lasting_rad(design, settle_ticks),
     )
 
 
@@ -327,8 +323,8 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
 
     A controller without an integral comes to rest beside its target where the load has a slope; a drive that
     stands because a limit holds it has not settled.  What goes on moving without growing while no limit acts
-    is kept going by something else (`lasting_rad`).  A swing against a limit dies out by a constant amount a
-    period, not by a share of itself: only windows of many periods (``longer``) tell it from one that stays.
+    is kept going by something else (`nonlinear.rest`).  A swing against a limit dies out by a constant amount
+    a period, not by a share of itself: only windows of many periods (``longer``) tell it from one that stays.
 
     Raises
     ------
@@ -356,21 +352,6 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
 def _limited(result: BatchResult) -> Floats:
     """Part of the last window in which a limit of the drive acts: the one that acts longest."""
     return np.asarray(np.max([result.window_limit_fraction(name) for name in OWN], axis=0))
-
-
-def lasting_rad(design: Design, settle_ticks: int) -> float:
-    """Half of the output's span at the end of a step that goes on moving although no limit acts; 0 if none.
-
-    Dry friction under an integral (hunting), play or gravity keep such a motion up, at small steps as well as
-    at large ones: it is no conditional stability.
-    """
-    full = design.validation.full_deflection_rad
-    sizes = full * np.geomspace(SMALLEST_PART, LARGEST_PART, 3)
-    result = step_rows(design, sizes, settle_ticks, AGAIN[1]).run()
-    spans = [np.subtract(*result.span("output_angle_rad", last)[::-1]) for last in (0, 1)]
-    limited = _limited(result)
-    goes_on = result.ok & (limited == 0.0) & (spans[0] > RESTING * sizes) & (spans[0] > LASTING * spans[1])
-    return float(0.5 * np.max(spans[0], where=goes_on, initial=0.0))
 
 
 def _standing(design: Design) -> float:

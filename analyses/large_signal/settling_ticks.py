@@ -6,15 +6,12 @@ from math import ceil, isfinite, log
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 
-Floats = npt.NDArray[np.float64]
 TIME_CONSTANTS = 14.0  # of the slowest pole
 LONGEST_TICKS = 400_000
-EVER_TICKS = 10**12
 
 
 def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str, longest: int = LONGEST_TICKS) -> int:
@@ -26,14 +23,6 @@ def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str, longest: in
     if slowest <= 0.0:
         return 20 * hold_ticks
     return int(min(ceil(TIME_CONSTANTS / -log(slowest) + 20.0) * hold_ticks, longest))
-
-
-def carried_on(change: Floats, window: npt.ArrayLike, slowest: float) -> Floats:
-    """What a transient that changes by d from one window W to the next still holds.
-
-    ``d/(1 - exp(-W/tau))`` with its time constant tau.
-    """
-    return change / -np.expm1(-np.asarray(window) / slowest)
 
 
 def full_range(design: Design) -> dict[str, float]:

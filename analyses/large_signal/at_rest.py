@@ -17,8 +17,8 @@ from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
+from analyses.large_signal.coherent import coherent
 from analyses.responses import response_at
-from analyses.validation.coherent import coherent
 from nonlinear import LIMITERS, Rows
 from nonlinear.reduced import BatchResult
 

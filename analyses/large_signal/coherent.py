@@ -1,4 +1,4 @@
-"""Frequencies of which a whole number of periods fills whole ticks, and what a held signal does to them."""
+"""Frequencies of which a whole number of periods fills whole ticks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
-Complexes = npt.NDArray[np.complex128]
 LEAST_SAMPLES = 400
 
 
@@ -27,10 +26,6 @@ class Coherent:
     frequency_hz: Floats
     ticks: npt.NDArray[np.int64]
     cycles: npt.NDArray[np.int64]
-
-    def part(self, which: npt.NDArray[np.int64]) -> Coherent:
-        """Some of them."""
-        return Coherent(self.frequency_hz[which], self.ticks[which], self.cycles[which])
 
 
 def coherent(
@@ -63,23 +58,3 @@ def coherent(
     cycles = np.maximum(least_cycles, np.ceil(np.asarray(least_samples) * asked * period)).astype(np.int64)
     samples = np.rint(cycles / (asked * period)).astype(np.int64)
     return Coherent(cycles / (samples * period), samples * base_ticks, cycles)
-
-
-def hold_factor(frequency_hz: npt.ArrayLike, tick_s: float, hold_ticks: int) -> Complexes:
-    """Fundamental of a sine sampled every ``hold_ticks`` ticks and held between, seen at every tick.
-
-    Examples
-    --------
-    >>> bool(abs(hold_factor(100.0, 1e-4, 1)[0] - 1.0) < 1e-15)
-    True
-    """
-    turn = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=float)) * tick_s
-    return np.exp(-1j * np.outer(turn, np.arange(hold_ticks))).mean(axis=1)
-
-
-def ramp_phasor(slope_per_tick: npt.ArrayLike, window: Coherent, start_tick: npt.ArrayLike) -> Complexes:
-    """What a ramp leaves in a correlation over whole periods, as `BatchResult.phasor` defines phasors."""
-    step = 2.0 * np.pi * window.cycles / window.ticks
-    total = window.ticks / (np.exp(-1j * step) - 1.0)  # sum of k exp(-j step k)
-    turned = np.exp(-1j * step * np.asarray(start_tick))
-    return 2j / window.ticks * np.asarray(slope_per_tick) * total * turned

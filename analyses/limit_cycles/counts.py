@@ -21,11 +21,11 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
+from analyses.large_signal.coherent import coherent
+from analyses.large_signal.conditional import step_rows
+from analyses.large_signal.settling_ticks import LONGEST_TICKS, full_range
 from analyses.loop_figures import loop_figures
 from analyses.responses import response_at
-from analyses.validation.coherent import coherent
-from analyses.validation.conditional import step_rows
-from analyses.validation.settling import LONGEST_TICKS, full_range
 from nonlinear import Rows
 
 if TYPE_CHECKING:

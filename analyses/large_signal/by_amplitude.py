@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
+from analyses.large_signal.settling_ticks import full_range, settling_ticks_of
 from analyses.validation.places import Bench
-from analyses.validation.settling import full_range, settling_ticks_of
 from nonlinear import LIMITERS, Rows
 from nonlinear.operating_motion import OperatingMotion, full_torque_Nm
 from nonlinear.reduced import BatchResult
