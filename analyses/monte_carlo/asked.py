@@ -75,7 +75,8 @@ def study(
     InputError
         If nothing has a tolerance, or what is asked is no study.
     """
-    from analyses.monte_carlo import monte_carlo, replay, sample_folder
+    from analyses.monte_carlo.run import monte_carlo, sample_folder
+    from analyses.monte_carlo.task import replay
     from analyses.sampling import sampler_of
 
     settings = asked.settings(design)

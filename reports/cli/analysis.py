@@ -13,6 +13,7 @@ import typer
 
 from actuator_lti.verdict import Verdict
 from analyses.request import OnMachines, Option, flag, options
+from analyses.study_asked import study_with
 from reports.analyses import Analysis
 from reports.cli.drive import SetOption, command_quantity, load_drive, output_quantity, read_changes
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption, on_axis, read_load
@@ -137,8 +138,6 @@ def answer(
 
 
 def _study(path: str | None, changes: list[str] | None) -> Study | None:
-    from analyses.study_asked import study_with
-
     return (
         None if path is None else study_with(path, {words: read_changes([words]) for words in changes or ()})
     )

@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.design import write_design
+from actuator_lti.design.model import Design
 from actuator_lti.verdict import Verdict
 from reports import document as doc
 from reports.charts import style
@@ -16,7 +18,6 @@ from reports.sections.requirements import label
 from reports.terminal import Brief
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from analyses.monte_carlo import ColumnStatistics, MonteCarloResult, Odds, WorstCase
     from analyses.verdicts import RequirementVerdict
 
@@ -83,9 +84,6 @@ def brief(result: MonteCarloResult) -> Brief:
 
 def text(result: MonteCarloResult | Design) -> str | None:
     """One sample as a design file."""
-    from actuator_lti.design import write_design
-    from actuator_lti.design.model import Design
-
     return write_design(result).rstrip("\n") if isinstance(result, Design) else None
 
 

@@ -55,7 +55,7 @@ def test_every_view_is_looked_at(fin: Design, survey: LoopSurvey) -> None:
         assert (place, "position", "") in seen
     assert any(place.startswith("at rest, load ") for place, _, _ in seen)
     assert {cut for place, _, cut in seen if place == "all loops closed"} == set(survey.break_points)
-    assert ("worst phase margin", "velocity", "") in seen
+    assert ("tolerances of the worst phase margin", "velocity", "") in seen
     assert not any("speed amplitude" in place for place, _, _ in seen)
 
 
