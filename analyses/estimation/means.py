@@ -1,4 +1,4 @@
-"""Means of a correlated series, with an uncertainty that respects the correlation."""
+"""Correlation of series: means with an uncertainty that respects it, and the lag of one behind another."""
 
 from __future__ import annotations
 
@@ -81,3 +81,11 @@ def correlation_time(values: FloatArray) -> float:
     enough = np.arange(len(tau)) >= 5.0 * tau
     last = int(np.argmax(enough)) if enough.any() else len(tau) - 1
     return max(float(tau[last]), 1.0)
+
+
+def best_lag(a: FloatArray, b: FloatArray) -> int:
+    """Steps by which b is to be moved later to fit a, by the normalised cross-correlation."""
+    size = next_fast_len(len(a) + len(b) - 1, real=True)
+    cross = irfft(rfft(a, size) * np.conj(rfft(b, size)), size)
+    lag = int(np.argmax(cross))
+    return lag if lag < len(a) else lag - size

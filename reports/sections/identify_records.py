@@ -56,6 +56,10 @@ def _result(result: BenchResult, axis: str) -> str:
     main = [n for n in model.names if n.partition("_")[0] in ("inertia", "dry", "viscous") or n == "map_0"]
     labels = {name: parameter(name, axis).label.partition(",")[0].lower() for name in main[:3]}
     parts = [f"{label} {value_words(model, name, axis)}" for name, label in labels.items()]
+    if result.refined is not None:  # these are the design's
+        keys = result.refined.names[:3]
+        parts = [f"{key} {value_words(result.refined, key, axis)}" for key in keys]
+        parts[0] = f"refined by simulation: {parts[0]}"
     worst = max(result.resimulated, key=lambda one: one.relative_error)
     met = "The written design meets "
     met += "its records" if len(result.resimulated) > 1 else worst.record

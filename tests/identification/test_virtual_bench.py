@@ -16,12 +16,11 @@ from analyses.identification.surface import fit_surface
 from analyses.identification.surface_fit import PATHS
 from analyses.identification.to_design import design_with_fit
 from analyses.records import import_campaign, load_campaign
-from analyses.records.campaign_file import Campaign, Instruments, Join, RunEntry
+from analyses.records.campaign_file import Campaign, Join, RunEntry
 from analyses.records.campaign_import import ImportedCampaign, assemble_run
 from examples.virtual_bench import (
     BenchInstruments,
     BenchPlan,
-    RunLogs,
     TrueRun,
     measure_bench,
     simulate_bench,
@@ -44,41 +43,23 @@ def runs(design: Design) -> tuple[TrueRun, ...]:
     return simulate_bench(design, BenchPlan(duration_s=2.5))
 
 
-def bench_campaign(logs: tuple[RunLogs, ...], design: str, bounds: Instruments) -> Campaign:
-    """The campaign that the files describe, without the files: for runs that are in memory."""
-    folder = Path()
-    runs = [
-        RunEntry(
-            id=log.id,
-            drive=folder / f"run{log.id}_drive.csv",
-            sensor=folder / f"run{log.id}_torque.csv",
-            speed_rad_s=log.speed_setting_rad_s,
-            load_Nm=log.load_setting_Nm,
-            offset_s=None,
-        )
-        for log in logs
-    ]
-    return Campaign(
-        name="virtual bench",
-        design=design,
-        drive=DRIVE_SPEC,
-        sensor=SENSOR_SPEC,
-        join=Join(method="given"),
-        instruments=bounds,
-        runs=tuple(runs),
-        origin=str(folder),
-    )
-
-
 def _imported(runs: tuple[TrueRun, ...], seed: int) -> ImportedCampaign:
     """A campaign in memory, with the sensor's clock known: the joining has tests of its own."""
     logs, _ = measure_bench(runs, seed, INSTRUMENTS)
-    campaign = bench_campaign(logs, "ilr33-amber", INSTRUMENTS.bounds)
-    joined = [
-        assemble_run(campaign, replace(entry, offset_s=log.sensor_offset_s), log.drive, log.sensor)
-        for entry, log in zip(campaign.runs, logs, strict=True)
-    ]
-    return ImportedCampaign(campaign=campaign, runs=tuple(joined), set_aside=())
+    entries = tuple(
+        RunEntry(
+            id=log.id, drive=Path(), offset_s=log.sensor_offset_s,
+            speed_rad_s=log.speed_setting_rad_s, load_Nm=log.load_setting_Nm,
+        )
+        for log in logs
+    )  # fmt: skip
+    campaign = Campaign(
+        name="virtual bench", drive=DRIVE_SPEC, sensor=SENSOR_SPEC, join=Join(method="given"),
+        instruments=INSTRUMENTS.bounds, runs=entries, origin="",
+    )  # fmt: skip
+    pairs = zip(entries, logs, strict=True)
+    joined = tuple(assemble_run(campaign, entry, log.drive, log.sensor) for entry, log in pairs)
+    return ImportedCampaign(campaign=campaign, runs=joined, set_aside=())
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +67,6 @@ def from_files(
     design: Design, runs: tuple[TrueRun, ...], tmp_path_factory: pytest.TempPathFactory
 ) -> CampaignResult:
     """All the way: files written, read by the importers, joined by correlation, one file broken."""
-    "broken."
     folder = tmp_path_factory.mktemp("bench")
     logs, _ = measure_bench(runs, 11, INSTRUMENTS)
     path = write_bench(folder, logs, design="ilr33-amber", seed=11)

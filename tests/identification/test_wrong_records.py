@@ -95,6 +95,16 @@ def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
         inertia_share(design, 1e-6, "gear.worm.ratio")
 
 
+def test_a_load_in_another_unit_shows_in_the_load_friction(tmp_path: Path, command: Command) -> None:
+    """N m written as kN m: all else is right, and the load friction comes out a thousand times too large."""
+    free, loaded = columns_of(motion(2), 1, load_Nm=0.0), columns_of(motion(5, load_Nm=5.0), 3, load_Nm=5e-3)
+    files = [write(tmp_path / name, table) for name, table in (("free.csv", free), ("loaded.csv", loaded))]
+    ran = command("identify", *files, "--design", "ilr33-amber", "--json")
+    size = {check["id"]: check for check in ran.data["items"]}["size"]
+    assert ran.status == 1
+    assert "times the design's: factor 1000" in size["reason"]
+
+
 def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
     right: Columns, tmp_path: Path, command: Command
 ) -> None:
