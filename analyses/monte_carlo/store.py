@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError
 from actuator_lti.tree import Tree
@@ -86,23 +84,13 @@ class Store:
         pq.write_table(pa.table(dict(arrays)), sink, compression="zstd")
         write_bytes(self.path(chunk), sink.getvalue().to_pybytes())
 
-    def blocks(self, total: int, columns: list[str] | None = None, size: int = 4096) -> Iterator[Arrays]:
-        """Columns in blocks of a fixed size in order of number, however the chunks were cut."""
+    def blocks(self, total: int) -> Iterator[Arrays]:
+        """The columns of one chunk after the other."""
         import pyarrow.parquet as pq
 
-        held: Arrays = {}
-        filled = 0
         for chunk in self.chunks(total):
-            part = pq.read_table(self.path(chunk), columns=columns, partitioning=None)
-            arrays = {name: part.column(name).to_numpy() for name in part.column_names}
-            held = {k: np.concatenate([held[k], v]) for k, v in arrays.items()} if filled else arrays
-            filled += chunk[1]
-            while filled >= size:
-                yield {name: values[:size] for name, values in held.items()}
-                held = {name: values[size:] for name, values in held.items()}
-                filled -= size
-        if filled:
-            yield held
+            part = pq.read_table(self.path(chunk), partitioning=None)
+            yield {name: part.column(name).to_numpy() for name in part.column_names}
 
 
 def _read_manifest(path: Path) -> Tree:
