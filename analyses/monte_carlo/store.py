@@ -31,10 +31,13 @@ class Store:
     folder : Path
     chunk : int
         Numbers a file.
+    manifest : bytes
+        Says of what study the folder is; written before the first chunk.
     """
 
     folder: Path
     chunk: int
+    manifest: bytes
 
     @classmethod
     def open(cls, folder: Path, identity: Mapping[str, Any], chunk: int = CHUNK) -> Store:
@@ -50,7 +53,6 @@ class Store:
         InputError
             If the folder holds another study.
         """
-        folder.mkdir(parents=True, exist_ok=True)
         path = folder / "manifest.json"
         wanted = {"schema": SCHEMA, "version": VERSION, "identity": dict(identity)}
         if path.exists():
@@ -58,10 +60,16 @@ class Store:
             if {key: result.get(key) for key in wanted} != wanted:
                 raise InputError("holds another study (design, seed, settings or code); take another folder",
                                  where=str(folder))  # fmt: skip
-            return cls(folder, int(result["chunk"]))
+            chunk = int(result["chunk"])
         text = json.dumps({**wanted, "chunk": chunk}, indent=1, sort_keys=True)
-        write_bytes(path, text.encode())
-        return cls(folder, chunk)
+        return cls(folder, chunk, text.encode())
+
+    def put(self, path: Path, data: bytes) -> None:
+        """Put a file of the study on disk, in a folder that says of what it is."""
+        manifest = self.folder / "manifest.json"
+        if not manifest.exists():
+            write_bytes(manifest, self.manifest)
+        write_bytes(path, data)
 
     def path(self, chunk: Chunk) -> Path:
         """File of a chunk."""
@@ -82,7 +90,7 @@ class Store:
 
         sink = pa.BufferOutputStream()
         pq.write_table(pa.table(dict(arrays)), sink, compression="zstd")
-        write_bytes(self.path(chunk), sink.getvalue().to_pybytes())
+        self.put(self.path(chunk), sink.getvalue().to_pybytes())
 
     def blocks(self, total: int) -> Iterator[Arrays]:
         """The columns of one chunk after the other."""
