@@ -184,7 +184,7 @@ def _reduced(
     noted = time.monotonic()
 
     def note() -> None:
-        write_bytes(path, whole.packed(done))
+        store.put(path, whole.packed(done))
 
     def take(chunk: Chunk, part: Reduction) -> None:
         nonlocal whole, noted

@@ -32,13 +32,6 @@ class Change:
         """How far it moved."""
         return None if self.before is None or self.after is None else self.after - self.before
 
-    @property
-    def size(self) -> float:
-        """How far it moved in tolerances; what appeared or vanished counts most."""
-        if self.delta is None:
-            return float("inf")
-        return abs(self.delta) / self.tolerance if self.tolerance else float("inf")
-
 
 @dataclass(frozen=True, kw_only=True)
 class Cause:
@@ -49,11 +42,6 @@ class Cause:
     libraries: tuple[tuple[str, str, str], ...] = ()
     commits: tuple[tuple[str, str], ...] = ()
     code: bool = False
-
-    @property
-    def known(self) -> bool:
-        """Whether anything differs at all."""
-        return bool(self.parameters or self.settings or self.libraries or self.commits or self.code)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,6 +28,7 @@ from reports.nightly.records import Result
 from reports.nightly.text import now, one_line
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.view import Overview, overview
+from reports.visible import visible
 
 DESIGNS_A_LIMIT = 50  # of a comparison, within one time limit
 Progress = Callable[[int, int], None]
@@ -321,7 +322,7 @@ def _built(cache: Cache, job: Job, done: Done) -> Outcome:
                 job=job, key=done.key, status=_status(entry.meta), meta=entry.meta, seconds=done.seconds
             )
     status = done.status if done.status in ("error", "timeout", "crash") else "crash"
-    message = done.message + (f"\n{done.detail}" if done.detail else "")
+    message = visible(done.message + (f"\n{done.detail}" if done.detail else ""))
     return Outcome(job=job, key=done.key, status=status, seconds=done.seconds, message=message)  # type: ignore[arg-type]
 
 

@@ -18,6 +18,7 @@ import pytest
 from nightly_fakes import BUILD, CODE, job, study
 
 from actuator_lti.errors import InputError, NumericalError
+from analyses import cluster as clusters
 from analyses import engine, proof
 from analyses.engine import Engine
 from reports.cli.main import main
@@ -76,7 +77,7 @@ def test_the_local_cluster_opens_no_door() -> None:
     import distributed
 
     before = set(listening())
-    with engine._local_cluster(1) as cluster:
+    with clusters.local_cluster(1) as cluster:
         doors = set(listening()) - before
         assert doors
         assert {ip for ip, _ in doors} == {"127.0.0.1"}
@@ -97,7 +98,7 @@ def test_two_local_clusters_do_not_ask_for_the_same_port() -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             before = set(listening())
-            with engine._local_cluster(1), engine._local_cluster(1):
+            with clusters.local_cluster(1), clusters.local_cluster(1):
                 doors = set(listening()) - before
                 assert {ip for ip, _ in doors} == {"127.0.0.1"}
                 assert [page for _, port in doors for page in pages(port)] == []
@@ -172,7 +173,7 @@ def bare(tmp_path, monkeypatch):
         ({"OPENBLAS_NUM_THREADS": "3"}, "start it with .*OPENBLAS_NUM_THREADS=1"),
     ],
 )
-def test_a_worker_that_adds_up_otherwise_gets_no_work(bare, environment, words, monkeypatch) -> None:
+def test_a_worker_that_adds_up_otherwise_gets_no_work(bare, environment, words, tmp_path, capsys) -> None:
     address, _, worker = bare
     worker(**environment)
     got: list[int] = []
@@ -180,6 +181,10 @@ def test_a_worker_that_adds_up_otherwise_gets_no_work(bare, environment, words, 
         Engine(scheduler=address).map(doubled, range(3), lambda item, _: got.append(item))
     assert "\n" not in str(caught.value)
     assert got == []
+    command = ["montecarlo", "ilr33-amber", "--out", str(tmp_path / "out"), "--quiet", "--scheduler", address]
+    assert main(command) == 2
+    assert "is refused" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_worker_that_joins_late_proves_itself_first(bare) -> None:
@@ -275,7 +280,7 @@ def test_certificates_that_are_none_are_named(tmp_path) -> None:
     for made in range(3):
         with pytest.raises(InputError, match=r"\.pem"):
             Engine(scheduler="tls://127.0.0.1:9", tls=tmp_path).map(doubled, [1], lambda *_: None)
-        (tmp_path / list(engine._TLS_FILES.values())[made]).write_text("no certificate")
+        (tmp_path / list(clusters.TLS_FILES.values())[made]).write_text("no certificate")
     with pytest.raises((InputError, NumericalError)):
         Engine(scheduler="tls://127.0.0.1:9", tls=tmp_path).map(doubled, [1], lambda *_: None)
 
@@ -295,7 +300,7 @@ def cluster(tmp_path, monkeypatch):
     made = Security.temporary()
     tls = tmp_path / "tls"
     tls.mkdir()
-    for key, name in engine._TLS_FILES.items():
+    for key, name in clusters.TLS_FILES.items():
         (tls / name).write_text(getattr(made, key))
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, host="127.0.0.1", protocol="tls://", security=made,

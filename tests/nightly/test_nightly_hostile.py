@@ -56,7 +56,7 @@ def hostile_site(tmp_path_factory):
         jobs.append(
             job("surrogate", margin, title=half, label=half, requirement=half, loop=half, revision=half)
         )
-        jobs.append(job("raises", mode="raise", words=" ".join(HOSTILE[:15])))
+        jobs.append(job("raises", mode="raise", words=" ".join((*HOSTILE[:15], half))))
         made = study(*jobs, title="".join(HOSTILE[:5]))
         run_night(made, site, INLINE, code=CODE, clock=clock.next())
     approve(made, site, by=HOSTILE[0], reason=HOSTILE[1], settings=INLINE, clock=clock)

@@ -13,7 +13,6 @@ from analyses.engine import Engine
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
 from analyses.monte_carlo.reduction import Reduction, reduced, unpacked
 from analyses.monte_carlo.sketch import MOST
-from analyses.monte_carlo.store import Store
 from analyses.sampling import sampler_of
 
 
@@ -105,15 +104,6 @@ def test_an_interrupted_study_goes_on(study, design, tmp_path):
 def test_another_study_does_not_mix_into_a_folder(study, design):
     with pytest.raises(InputError, match="another study"):
         monte_carlo(design, study.folder, MonteCarloSettings(samples=1000, seed=4))
-
-
-def test_blocks_do_not_follow_the_chunks(tmp_path):
-    store = Store.open(tmp_path, {}, 7)
-    for first, count in store.chunks(50):
-        store.write((first, count), {"x": np.arange(first, first + count, dtype=float)})
-    blocks = [b["x"] for b in store.blocks(50, size=16)]
-    assert [len(b) for b in blocks] == [16, 16, 16, 2]
-    assert np.array_equal(np.concatenate(blocks), np.arange(50.0))
 
 
 @pytest.mark.parametrize("engine", [Engine(threads=2), Engine(workers=1)])
