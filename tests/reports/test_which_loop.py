@@ -20,11 +20,11 @@ from actuator_lti.errors import InputError
 from actuator_lti.limiters import onset
 from actuator_lti.step import step_figures
 from analyses.isolation import isolated
+from analyses.large_signal.at_rest import free_amplitude, sweep_from_rest
 from analyses.large_signal.map import amplitude_map
 from analyses.loop_figures import all_loop_figures
 from analyses.requirements import evaluate_requirements
 from analyses.responses import answer_curve, response_at
-from analyses.validation.at_rest import free_amplitude, sweep_from_rest
 from nonlinear import commands, simulate
 from reports.sections.requirements import label
 
