@@ -4,7 +4,6 @@ Light to import; python-control is loaded when loops are assembled.
 """
 
 from actuator_lti.loops.assemble import assemble_loops
-from actuator_lti.loops.bare_plant import plant
 from actuator_lti.loops.periodic import ExactMargins, PeriodicLoop, exact_margins, periodic_loop
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
@@ -18,5 +17,4 @@ __all__ = [
     "assemble_loops",
     "exact_margins",
     "periodic_loop",
-    "plant",
 ]

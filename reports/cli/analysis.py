@@ -11,8 +11,16 @@ import typer
 
 from analyses.request import Option, flag, options
 from reports.analyses import Analysis
-from reports.cli.drive import SetOption, command_quantity, load_drive, output_quantity
-from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption, on_axis, read_load
+from reports.cli.drive import SetOption, load_drive, output_quantity
+from reports.cli.options import (
+    DEFAULT_DESIGN,
+    DesignArgument,
+    JsonOption,
+    QuietOption,
+    command_quantity,
+    on_axis,
+    read_load,
+)
 from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
