@@ -4,7 +4,6 @@ Light to import; python-control is loaded when loops are assembled.
 """
 
 from actuator_lti.loops.assemble import assemble_loops
-from actuator_lti.loops.bare_plant import plant
 from actuator_lti.loops.periodic import (
     ExactMargins,
     PeriodicLoop,
@@ -25,5 +24,4 @@ __all__ = [
     "exact_margins",
     "periodic_loop",
     "periodic_loop_of",
-    "plant",
 ]

@@ -15,8 +15,16 @@ from actuator_lti.verdict import Verdict
 from analyses.request import OnMachines, Option, flag, options
 from analyses.study_asked import study_with
 from reports.analyses import Analysis
-from reports.cli.drive import SetOption, command_quantity, load_drive, output_quantity, read_changes
-from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption, on_axis, read_load
+from reports.cli.drive import SetOption, load_drive, output_quantity, read_changes
+from reports.cli.options import (
+    DEFAULT_DESIGN,
+    DesignArgument,
+    JsonOption,
+    QuietOption,
+    command_quantity,
+    on_axis,
+    read_load,
+)
 from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
@@ -106,8 +114,6 @@ def answer(
     from reports.cli.progress import progress
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
-    for warning in warnings_of(drive) if one.warns else ():
-        print_warning(f"{drive.name}: {warning}")
     values = {name: _read(name, option, chosen[name], drive) for name, (_, option) in _options(one).items()}
     if one.written and (as_json or out is not None):
         values[one.written] = True
@@ -115,6 +121,8 @@ def answer(
     for each in asked:
         if isinstance(each, OnMachines) and each.engine.caution:
             print_note(f"actuator-lti: {each.engine.caution}")
+    for warning in warnings_of(drive) if one.warns else ():
+        print_warning(f"{drive.name}: {warning}")
     with progress(f"{one.doing} {getattr(subject, 'name', '')}", quiet=quiet) as doing, isolated() as missing:
         more: dict[str, Any] = {"progress": doing} if one.doing else {}
         more |= {"out": out} if one.keeps else {}

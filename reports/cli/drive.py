@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
-from math import isfinite
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -63,36 +62,6 @@ def output_quantity(option: str, words: str | None, drive: Design) -> float | No
     except InputError as error:
         reason = error.message.partition("; allowed")[0]
         raise InputError(f'{option} {words!r}: {reason}; allowed: a value such as "{example}"') from None
-
-
-def command_quantity(option: str, words: str | None, drive: Design) -> float | None:
-    """An amount of the outermost loop's command in its usual unit: a plain number, or one with its unit.
-
-    Raises
-    ------
-    InputError
-        For no number, or a unit of something else.
-    """
-    from actuator_lti.design.units import parse_quantity
-    from actuator_lti.errors import InputError
-    from nonlinear.trajectory import COMMAND_UNITS
-
-    if words is None:
-        return None
-    unit, per_SI = COMMAND_UNITS[drive.axis, drive.controller.outermost]
-    try:
-        value = float(words)
-    except ValueError:
-        pass
-    else:
-        if not isfinite(value):
-            raise InputError(f"{option} {words}: must be a finite number")
-        return value
-    try:
-        return parse_quantity(words, unit.replace("deg", "rad").replace("mm", "m")) * per_SI
-    except InputError as error:
-        reason = error.message.partition("; allowed")[0]
-        raise InputError(f'{option} {words!r}: {reason}; allowed: "5 {unit}", or 5 in {unit}') from None
 
 
 def read_changes(changes: Sequence[str]) -> Tree:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -70,6 +71,36 @@ def read_load(text: str) -> float:
             return load
     reason = message.partition("; allowed")[0]
     raise typer.BadParameter(f'{reason}; allowed: a torque such as "4 N*m" (linear axis: a force, "40 N")')
+
+
+def command_quantity(option: str, words: str | None, drive: Design) -> float | None:
+    """An amount of the outermost loop's command in its usual unit: a plain number, or one with its unit.
+
+    Raises
+    ------
+    InputError
+        For no number, or a unit of something else.
+    """
+    from actuator_lti.design.units import parse_quantity
+    from actuator_lti.errors import InputError
+    from nonlinear.trajectory import COMMAND_UNITS
+
+    if words is None:
+        return None
+    unit, per_SI = COMMAND_UNITS[drive.axis, drive.controller.outermost]
+    try:
+        value = float(words)
+    except ValueError:
+        pass
+    else:
+        if not isfinite(value):
+            raise InputError(f"{option} {words}: must be a finite number")
+        return value
+    try:
+        return parse_quantity(words, unit.replace("deg", "rad").replace("mm", "m")) * per_SI
+    except InputError as error:
+        reason = error.message.partition("; allowed")[0]
+        raise InputError(f'{option} {words!r}: {reason}; allowed: "5 {unit}", or 5 in {unit}') from None
 
 
 SchedulerOption = Annotated[

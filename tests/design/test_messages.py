@@ -153,7 +153,7 @@ def test_a_load_with_its_unit_is_the_load(capsys: pytest.CaptureFixture[str]) ->
     result = []
     for words in ("4 N*m", "4", "4000 mN*m"):
         assert main(["margins", "--load", words, "--json"]) == 0
-        result.append(json.loads(capsys.readouterr().out)["load_Nm"])
+        result.append(json.loads(capsys.readouterr().out)["asked"]["load_Nm"])
     assert result == pytest.approx([4.0] * 3, rel=1e-12)
 
 
