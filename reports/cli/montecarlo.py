@@ -76,7 +76,8 @@ def montecarlo(
 ) -> None:
     """Sample the tolerances: distributions, odds of every requirement, worst cases.
 
-    Every sample is kept as Parquet under --out; an interrupted run goes on where it stopped.
+    Up to 1000000 samples, each is kept as Parquet under --out; of more, only what they come to. An
+    interrupted run goes on where it stopped.
     """
     from analyses.monte_carlo import MonteCarloSettings, StepCheck, monte_carlo, sample_folder
     from analyses.sampling import read_table
