@@ -97,11 +97,11 @@ def code_version(packages: Sequence[str] = CODE) -> str:
     digest = hashlib.sha256()
     for name in packages:
         try:
-            package = import_module(name)
-        except ImportError:
-            digest.update(f"{name}: absent\0".encode())
+            source = import_module(name).__file__
+        except (ImportError, AttributeError):  # not there, or part of Python itself
+            digest.update(f"{name}: no file\0".encode())
             continue
-        file = Path(package.__file__ or "")
+        file = Path(source or "")
         whole = file.name == "__init__.py"
         for path in sorted(file.parent.rglob("*.py")) if whole else [file]:
             digest.update(f"{name}/{path.relative_to(file.parent)}\0".encode() + path.read_bytes() + b"\0")

@@ -100,7 +100,7 @@ class MonteCarloResult:
         One a requirement, in the order of the design file; then all together (id ``"all"``).
     worst : tuple of WorstCase
     folder : Path
-        Every sample, as Parquet.
+        Every sample as Parquet, up to `KEPT`; the worst designs.
     nominal : mapping of str to float
         The figures of the nominal design, by column.
     left_out : tuple of RequirementVerdict
