@@ -197,7 +197,7 @@ class _Columns:
     @property
     def free(self) -> npt.NDArray[np.bool_]:
         """Which have three successive steps without an event."""
-        there = np.isfinite(self.off).all(axis=2)
+        there = np.asarray(np.isfinite(self.off).all(axis=2))
         return np.asarray((there[:-1] & there[1:]).any(axis=0))
 
     def best(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:

@@ -28,9 +28,7 @@ FolderOption = Annotated[
 ]
 QuickOption = Annotated[
     bool,
-    typer.Option(
-        "--quick", help="Checks and verdict only, as without --out and --json."
-    ),
+    typer.Option("--quick", help="Checks and verdict only, as without --out and --json."),
 ]
 
 
