@@ -2,7 +2,7 @@
 
 Which numbers take part, a kick at the place shows: those that it moves.  A first estimate, by steps as large
 as no event forbids, says how far a large sine at the place moves each number.  From ten times that motion on
-steps fall by tens.  Each column is taken where two successive steps agree best, by what their difference does
+steps fall by tens.  Each column is taken where successive steps agree best, by what their difference does
 to the response: larger steps bend, smaller ones are lost in rounding.  The sum of these differences is the
 stated error.
 """
@@ -153,7 +153,7 @@ class Differences:
         raise self._refused(free)
 
     def _tried(self, largest: Floats) -> _Columns:
-        """Columns by steps that fall by tens, until each has two successive ones without an event."""
+        """Columns by steps that fall by tens, until each has three successive ones without an event."""
         tried: list[tuple[Floats, Floats]] = []
         for decade in range(MOST_DECADES):
             tried.append(self._differences(largest * 10.0**-decade))
@@ -196,16 +196,22 @@ class _Columns:
 
     @property
     def free(self) -> npt.NDArray[np.bool_]:
-        """Which have two successive steps without an event."""
-        return np.asarray(np.isfinite(self.off).all(axis=2).any(axis=0))
+        """Which have three successive steps without an event."""
+        there = np.asarray(np.isfinite(self.off).all(axis=2))
+        return np.asarray((there[:-1] & there[1:]).any(axis=0))
 
     def best(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:
-        """Each column by the step whose error does least to the response; and that error."""
+        """Each column by the step whose error does least to the response; and that error.
+
+        Of a step counts what its neighbours are off by as well: a step that is lost in rounding changes
+        nothing, and agrees with the next smaller one by that.
+        """
         felt = np.max((self.off @ left.T) * right.T, axis=2)
-        chosen, columns = (
-            np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0),
-            np.arange(len(right.T)),
-        )
+        larger = np.nan_to_num(np.vstack([0.0 * felt[:1], felt[:-1]]), nan=0.0)
+        smaller = np.vstack([felt[1:], np.full_like(felt[:1], np.inf)])
+        felt = np.maximum(np.maximum(felt, smaller), larger)
+        chosen = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
+        columns = np.arange(chosen.size)
         return self.values[chosen, columns].T, self.off[chosen, columns].T
 
 

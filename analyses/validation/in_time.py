@@ -120,7 +120,9 @@ def _agreed(run: Callable[[float], Numbers | None], setup: LoopSetup, enough: fl
     best: tuple[Numbers, float] | None = None
     for size in large * SIZES:
         course = run(size)
-        now = None if course is None or calm is None else (course - calm) / size
+        now = None
+        if course is not None and calm is not None and (course != calm).any():  # else lost in rounding
+            now = (course - calm) / size
         if now is not None and last is not None:
             off = float(np.max(np.abs(now - last)))
             if best is None or off < best[1]:
