@@ -328,7 +328,8 @@ ANALYSES = (
         words="""
         Sample the tolerances: distributions, odds of every requirement, worst cases.
 
-        Every sample is kept as Parquet under --out; an interrupted run goes on where it stopped.
+        Up to 1000000 samples, each is kept as Parquet under --out; of more, only what they come to. An
+        interrupted run goes on where it stopped.
         """,
     ),
     Analysis(
