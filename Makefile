@@ -17,7 +17,7 @@ EXTRAS := $(patsubst %,--extra %,cluster dev docs export nightly pdf plot tables
 COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
   --no-emit-options --no-emit-index-url --no-emit-find-links --constraint constraints.txt
 
-.PHONY: differential newest installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
+.PHONY: page differential newest installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
 
 # The main job.
 report: $(CORE)
@@ -42,7 +42,8 @@ $(CORE): pyproject.toml requirements.lock
 	@echo "3/4 toolkit: actuator-lti, from here"
 	@$(PIP) install --no-deps --no-build-isolation --editable .
 	@echo "4/4 simulator: compiled"
-	@$(BIN)/python -m nonlinear.native
+	@$(BIN)/python -m nonlinear.native || \
+	  { $(PIP) install --constraint constraints.txt ziglang && $(BIN)/python -m nonlinear.native; }
 	@touch $@
 
 $(ALL): $(CORE) requirements-all.lock
@@ -66,7 +67,13 @@ machines: $(ALL)
 	@set -e; for seed in $(PROCESSORS); do \
 	  echo "OTHER_PROCESSOR=$$seed"; OTHER_PROCESSOR=$$seed $(AS_MACHINE); done
 
-check: $(ALL)
+# The page's scripts: types, rules, and their pure parts by node's own runner.
+page:
+	@if command -v npm >/dev/null 2>&1; then npm ci --silent --no-audit --no-fund && \
+	  npx tsc -p jsconfig.json && npx eslint && node --test tests/page/; \
+	else echo "no npm here: the page's scripts are not checked"; fi
+
+check: $(ALL) page
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -114,13 +121,16 @@ lock: $(RELEASE)
 	$(COMPILE) $(EXTRAS) --all-build-deps --output-file $(VENV)/all.lock pyproject.toml
 	awk '/^[^ ]/ {new = !($$1 in core)} NR == FNR {core[$$1]; next} new' requirements.lock $(VENV)/all.lock > requirements-all.lock
 
-# Wheel, sources and the bill of materials of what they need to run.
+# A wheel for each kind of machine with the compiled simulator inside, sources, and the bill of materials of what
+# they need to run.
 release: $(RELEASE)
 	rm -rf dist && mkdir dist
 	$(COMPILE) --output-file dist/runtime.lock pyproject.toml
 	$(BIN)/cyclonedx-py requirements --output-reproducible --pyproject pyproject.toml \
 	  --output-file dist/actuator-lti.cdx.json dist/runtime.lock
-	$(BIN)/python -m build --no-isolation --outdir dist
+	$(BIN)/python -m build --sdist --no-isolation --outdir dist
+	set -e; for target in $$($(BIN)/python -m actuator_lti.compiled.compiler); do \
+	  ACTUATOR_LTI_TARGET=$$target $(BIN)/python -m build --wheel --no-isolation --outdir dist; done
 
 wasm: $(ALL)
 	$(BIN)/python -m nonlinear.export.wasm_module

@@ -12,7 +12,6 @@ arithmetic.settle()
 os.environ.setdefault("PYTHONWARNINGS", "error::RuntimeWarning")  # of numpy, in processes that tests start
 for name in (
     "COLUMNS", "LINES", "TERMINAL_WIDTH", "FORCE_COLOR", "NO_COLOR", "PY_COLORS", "CLICOLOR_FORCE",
-    "TTY_COMPATIBLE", "TTY_INTERACTIVE", "GITHUB_ACTIONS", "SOURCE_DATE_EPOCH", "ACTUATOR_LTI_KERNEL",
-    "MPLBACKEND", "CC",
+    "TTY_COMPATIBLE", "TTY_INTERACTIVE", "GITHUB_ACTIONS", "SOURCE_DATE_EPOCH", "MPLBACKEND", "CC",
 ):  # fmt: skip
     os.environ.pop(name, None)

@@ -34,6 +34,7 @@ _PUBLIC = {
     "sweep": "actuator_lti.design",
     "SweepPoint": "actuator_lti.design",
     "assemble_loops": "actuator_lti.loops",
+    "plant": "actuator_lti.loops.bare_plant",
     "Loop": "actuator_lti.loops",
     "Loops": "actuator_lti.loops",
     "DelaySystem": "actuator_lti.delay_system",

@@ -169,7 +169,7 @@ AXIS_POINTS = Bound(
     what="values of an axis", most=1000, asked_by="points", reason="as many as a picture shows"
 )
 SAMPLES = Bound(
-    what="Monte Carlo samples", most=100_000_000, asked_by="--samples", reason="a week of one machine"
+    what="Monte Carlo samples", most=1_000_000_000, asked_by="--samples", reason="three days of one processor"
 )
 NIGHTLY_JOBS = Bound(
     what="reports of a night", most=20_000, reason="every variant of the largest study, twice"

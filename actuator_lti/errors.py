@@ -1,5 +1,9 @@
 """The ways in which a calculation is refused."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+
 LONGEST = 1000  # characters of a refusal; what stands in a file may be longer
 
 
@@ -25,6 +29,26 @@ class InputError(ValueError):
         super().__init__("".join(c if c.isprintable() else "?" for c in line))
         self.message = message
         self.where = where
+
+
+class Mistakes(InputError):
+    """Several mistakes of one file, each on a line of its own as its `InputError` has it.
+
+    Attributes
+    ----------
+    mistakes : tuple of InputError
+        At least two, in the order of the file.
+    """
+
+    def __init__(self, mistakes: Sequence[InputError]) -> None:
+        super().__init__(mistakes[0].message, mistakes[0].where)
+        self.mistakes = tuple(mistakes)
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.mistakes))
+
+    def __reduce__(self) -> tuple[type[Mistakes], tuple[tuple[InputError, ...]]]:
+        return Mistakes, (self.mistakes,)
 
 
 class UnstableError(InputError):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.drive.profile import command_mean
+from actuator_lti.drive.profile import command_mean, profile_onset_rad
 from actuator_lti.drive.signals import CLAMP_OF, LIMITERS, Limiter
 from actuator_lti.errors import InputError
 
@@ -121,7 +121,8 @@ class Onset:
 def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = None) -> Onset:
     """Border of linear validity of a drive over frequency (see `LimiterPath.onset_amplitude_rad`).
 
-    Of the command as the user gives it: the mean of a limited jerk comes before all limiters.
+    Of the command as the user gives it: its rate and acceleration limit (``"profile"``) and the mean of a
+    limited jerk come before all other limiters.
     """
     omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=float))
     used = bias or {}
@@ -132,6 +133,9 @@ def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = Non
             name: path.onset_amplitude_rad(omega, used.get(name, 0.0)) / before
             for name, path in loops.limiters.items()
         }
+    profile = profile_onset_rad(loops.design, omega)
+    if np.isfinite(profile).any():
+        each["profile"] = profile
     if not each:
         return Onset(omega, np.full(omega.shape, np.inf), ("",) * len(omega), {})
     names, table = list(each), np.array(list(each.values()))

@@ -7,6 +7,8 @@ from html import escape
 from math import isinf
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.faces import face
+
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from actuator_lti.loops.result import Loops
@@ -27,6 +29,7 @@ def html_table(head: str, columns: Iterable[str], rows: Iterable[Iterable[str]])
     return f"<table>{caption}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 
+@face
 def design_html(design: Design) -> str:
     """Every value of a design as it was written, with source, grade and tolerance."""
     rows = [
@@ -44,6 +47,7 @@ def design_html(design: Design) -> str:
     return html_table(title, ("key", "symbol", "value", "tolerance", "grade", "source"), rows)
 
 
+@face
 def loops_html(loops: Loops) -> str:
     """The loops that there are: where each is cut, its unit and its period."""
     rows = [
@@ -59,6 +63,7 @@ def loops_html(loops: Loops) -> str:
     return html_table(head, ("loop", "cut at", "unit", "period"), rows)
 
 
+@face
 def run_html(run: Any) -> str:
     """What came of a run (`nonlinear.Trajectory`): how far it went, which limits acted, how it ended."""
     linear = run.axis == "linear"
@@ -91,6 +96,7 @@ def _every(run: Any) -> float:
     return float(round((run.time_s[1] - run.time_s[0]) / run.period_s)) if run.time_s.size > 1 else 1.0
 
 
+@face
 def margins_html(margins: StabilityMargins) -> str:
     """The figures to quote, and how they are known."""
     result = [

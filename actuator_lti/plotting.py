@@ -15,6 +15,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.extras import need
+from actuator_lti.faces import face
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -126,6 +127,7 @@ def _phase_deg(system: Any, omega_rad_s: np.ndarray, L: np.ndarray) -> np.ndarra
     )
 
 
+@face
 def plot_bode(
     system: Any, *, label: str = "", margins: StabilityMargins | None = None, axes: Any = None
 ) -> list[Axes]:
@@ -183,6 +185,7 @@ def _mark_margins(
         phase.axhline(here - margin.deg, color=INK, linewidth=0.8)
 
 
+@face
 def plot_nyquist(system: Any, *, label: str = "", axes: Any = None) -> Axes:
     """The locus of an open loop near -1, in the square that holds the unit circle twice.
 
@@ -205,6 +208,7 @@ def plot_nyquist(system: Any, *, label: str = "", axes: Any = None) -> Axes:
     return panel
 
 
+@face
 def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", axes: Any = None) -> Axes:
     """Unit step response of a closed loop; without a duration, eight times 1/bandwidth (in rad/s).
 
@@ -242,6 +246,7 @@ def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", 
     return panel
 
 
+@face
 def loop_bode(loop: Loop, axes: Any = None) -> list[Axes]:
     """Bode figure of the open loop of a `Loop`, its margins drawn; see `Loop.plot_bode`."""
     from actuator_lti.margins import stability_margins
@@ -249,6 +254,7 @@ def loop_bode(loop: Loop, axes: Any = None) -> list[Axes]:
     return plot_bode(loop.open_loop, label=loop.name, margins=stability_margins(loop.open_loop), axes=axes)
 
 
+@face
 def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     """Angle, speed, current, voltage of a run over time; grey: the rotor rests, red: a limit acts.
 
@@ -290,6 +296,7 @@ def _shade(panel: Axes, time: np.ndarray, where: np.ndarray, colour: str) -> Non
                            transform=panel.get_xaxis_transform())  # fmt: skip
 
 
+@face
 def plot_onset(onset: Onset, *, linear_axis: bool = False, axes: Any = None) -> Axes:
     """The border of linear validity: the command amplitude over frequency at which each limiter sets in.
 
@@ -313,6 +320,7 @@ def plot_onset(onset: Onset, *, linear_axis: bool = False, axes: Any = None) -> 
     return panel
 
 
+@face
 def plot_map(
     frequency_hz: np.ndarray,
     amplitude_rad: np.ndarray,

@@ -11,12 +11,13 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from actuator_lti.compiled import compiler
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.verdict import Verdict
 from analyses.validation import CHECKS, validate
 from analyses.validation.row import Row
-from nonlinear.native import borrowed
+from nonlinear.native import LIBRARY
 
 
 @dataclass(frozen=True)
@@ -60,23 +61,21 @@ def check_code(design: Design) -> CodeCheck:
     CodeCheck
         With a reason in place of entries where there is no C compiler, or the design cannot be tested.
     """
-    from nonlinear.export.build import FLAGS, compile_files, system_compiler
-    from nonlinear.export.run_library import run_sources
-
-    compiler = system_compiler()
-    if compiler is None or not sys.platform.startswith(("linux", "darwin")):
+    command = compiler.system_compiler()
+    if command is None or not sys.platform.startswith(("linux", "darwin")):
         return CodeCheck(reason="no C compiler on the machine of the export")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.so"
         try:
             flags = ("-shared", "-fPIC")
+            texts = {"run.c": LIBRARY.text()}
             path.write_bytes(
-                compile_files(run_sources(), path.name, "this machine", flags, command=[compiler])
+                compiler.compile_files(texts, path.name, "this machine", flags, command=[command])
             )
-            with borrowed(path):
+            with LIBRARY.borrowed(path):
                 validation = validate(design, CHECKS)
         except (InputError, NumericalError) as error:
             return CodeCheck(reason=str(error))
     if not validation.rows:
         return CodeCheck(reason="; ".join(validation.notes) or "nothing is judged of this design")
-    return CodeCheck(validation.rows, " ".join([Path(compiler).name, *FLAGS]))
+    return CodeCheck(validation.rows, " ".join([Path(command).name, *compiler.FLAGS]))

@@ -8,6 +8,7 @@ from math import inf, log10, pi
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.profile import profile_onset_rad
 from actuator_lti.loops import assemble_loops
 
 
@@ -58,9 +59,9 @@ def command_limits(design: Design, frequency_hz: float) -> CommandLimits | None:
     frequency_hz : float
         Such as the bandwidth of the response to the command.
     """
-    command, omega, full = design.command, 2.0 * pi * frequency_hz, design.validation.full_deflection_rad
-    onset = min(command.rate_rad_s / omega, command.acceleration_rad_s2 / omega**2)
-    if design.controller.position is None or onset == inf:
+    full = design.validation.full_deflection_rad
+    onset = float(profile_onset_rad(design, np.array([2.0 * pi * frequency_hz]))[0])
+    if onset == inf:
         return None
     if onset >= full:
         return CommandLimits(frequency_hz, onset, full, None, 0.0)

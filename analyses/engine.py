@@ -3,21 +3,16 @@
 Parts are chunks of a numbered study (`Engine.run`) or any items (`Engine.map`). What comes of a part must not
 depend on where it is computed; results come in any order and are given to a sink one by one, so that memory
 holds only a few, whatever their number.
-
-Whoever can talk to a Dask scheduler can run code on it. The local cluster therefore listens on this machine
-only, under TLS with certificates that are made for the run and never leave it, and shows no dashboard.
 """
 
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
@@ -26,29 +21,24 @@ import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.extras import need
+from analyses import cluster
 
 if TYPE_CHECKING:
-    from distributed import Client, LocalCluster
-    from distributed.security import Security
+    from distributed import Client
 
 Chunk = tuple[int, int]
 Arrays = dict[str, np.ndarray]
-Sink = Callable[[Chunk, Arrays], None]
 Progress = Callable[[int, int], None]
 Item = TypeVar("Item")
+Part = TypeVar("Part", covariant=True)
 Result = TypeVar("Result")
-_IN_FLIGHT = 3  # parts a worker that are under way or waiting to be written
-CONNECT_S = 10.0
-_RETRIES = 20  # workers that may die over one part before the run gives up
-_TLS_FILES = {"tls_ca_file": "ca.pem", "tls_client_cert": "cert.pem", "tls_client_key": "key.pem"}
-_CODE = ("actuator_lti", "nonlinear", "analyses")
 
 
-class Task(Protocol):
+class Task(Protocol[Part]):
     """What is evaluated for numbers first to first + count - 1."""
 
-    def evaluate(self, first: int, count: int) -> Arrays:
-        """Columns by name, each of shape (count,)."""
+    def evaluate(self, first: int, count: int) -> Part:
+        """What they come to: columns by name, each of shape (count,), say."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +62,16 @@ class Engine:
     threads: int | None = None
     tls: Path | None = None
 
+    @property
+    def caution(self) -> str:
+        """What to know of the connection before it is used; empty where nothing."""
+        if self.scheduler is None or not cluster.is_open(self.scheduler):
+            return ""
+        return (
+            f"--scheduler {self.scheduler}: not encrypted, and whoever reaches it can run code on its workers"
+            " and here; use tls:// with --tls"
+        )
+
     def __post_init__(self) -> None:
         if self.workers is not None and self.scheduler is not None:
             raise InputError("--workers and --scheduler: one of them")
@@ -81,7 +81,7 @@ class Engine:
             raise InputError("--tls: goes with --scheduler tls://HOST:PORT")
         if self.tls is None and (self.scheduler or "").startswith("tls://"):
             raise InputError(
-                f"--scheduler {self.scheduler}: needs --tls DIR with {', '.join(_TLS_FILES.values())}"
+                f"--scheduler {self.scheduler}: needs --tls DIR with {', '.join(cluster.TLS_FILES.values())}"
             )
 
     @property
@@ -89,19 +89,27 @@ class Engine:
         """Whether parts go to other processes."""
         return self.workers is not None or self.scheduler is not None
 
-    def run(self, task: Task, chunks: Iterable[Chunk], sink: Sink, progress: Progress | None = None) -> None:
+    def run(
+        self,
+        task: Task[Result],
+        chunks: Iterable[Chunk],
+        sink: Callable[[Chunk, Result], None],
+        progress: Progress | None = None,
+    ) -> None:
         """Evaluate every chunk once and give each result to the sink, in any order.
 
         Raises
         ------
         NumericalError
-            If workers keep dying, or the scheduler cannot be reached.
+            If workers keep dying, or the scheduler cannot be reached or is lost.
+        InputError
+            If a worker computes otherwise than this process (`analyses.proof`).
         """
         todo = list(chunks)
         counted = _Counted(progress, sum(count for _, count in todo))
 
-        def take(chunk: Chunk, arrays: Arrays) -> None:
-            sink(chunk, arrays)
+        def take(chunk: Chunk, part: Result) -> None:
+            sink(chunk, part)
             counted.add(chunk[1])
 
         self._each(_evaluate, task, todo, take)
@@ -140,14 +148,19 @@ class Engine:
         finished = False
         try:
             with self._client() as client:
-                _submit(client, call, held, todo, sink)
+                cluster.submit(client, call, held, todo, sink)
                 finished = True
-        except (OSError, TimeoutError) as error:
+        except (OSError, TimeoutError, CancelledError) as error:
             if isinstance(error, InputError):
                 raise
             if not finished:  # a cluster too slow to close takes no result back
-                said = str(error) or "no answer in time"
-                raise NumericalError(f"Dask scheduler {self.scheduler or 'here'}: {said}") from error
+                said = " ".join(str(error).split()) or "no answer in time"
+                if isinstance(error, CancelledError):
+                    said = "the connection is lost"
+                raise NumericalError(
+                    f"Dask scheduler {self.scheduler or 'here'}: {said}; what is done is kept: the same"
+                    " command goes on with it, on this scheduler or another"
+                ) from error
 
     @contextmanager
     def _client(self) -> Iterator[Client]:
@@ -155,75 +168,15 @@ class Engine:
         import distributed
 
         if self.scheduler is not None:
-            with _connected(self.scheduler, self.tls) as client:
+            with cluster.quiet(), cluster.connected(self.scheduler, self.tls) as client:
                 yield client
             return
-        with _local_cluster(self.workers or 1) as cluster, distributed.Client(cluster) as client:
+        with (
+            cluster.quiet(),
+            cluster.local_cluster(self.workers or 1) as here,
+            distributed.Client(here) as client,
+        ):
             yield client
-
-
-def _connected(address: str, tls: Path | None) -> Client:
-    """Connect to a running scheduler.
-
-    Raises
-    ------
-    InputError
-        If the address is none, or a certificate cannot be used.
-    """
-    import ssl
-
-    import distributed
-
-    security = None if tls is None else _security(tls)
-    try:
-        return distributed.Client(address, timeout=CONNECT_S, security=security)
-    except ssl.SSLError as error:
-        raise InputError(
-            f"--tls {tls}: {error.reason or error}: certificates that fit the scheduler"
-        ) from error
-    except ValueError as error:
-        raise InputError(f"--scheduler {address!r}: an address such as tcp://host:8786") from error
-
-
-def _security(folder: Path) -> Security:
-    """The certificates of a folder."""
-    from distributed.security import Security
-
-    files = {key: folder / name for key, name in _TLS_FILES.items()}
-    for path in files.values():
-        if not path.is_file():
-            raise InputError("no such file; allowed: a certificate in PEM", where=str(path))
-    return Security(require_encryption=True, **{key: str(path) for key, path in files.items()})
-
-
-def _local_cluster(workers: int) -> LocalCluster:
-    """Start worker processes that leave Ctrl-C to this one: each would print its own traceback."""
-    from multiprocessing import resource_tracker
-
-    import dask
-    import distributed
-    from distributed.security import Security
-
-    resource_tracker.ensure_running()  # its start would take the mask away again
-    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # what is started now inherits it
-    silent: dict[str, list[str]] = {
-        f"distributed.{part}.http.routes": [] for part in ("scheduler", "worker", "nanny")
-    }
-    try:
-        with dask.config.set(silent):
-            return distributed.LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                protocol="tls://",
-                security=Security.temporary(),
-                dashboard_address=None,
-                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # or it asks for 8787, and warns
-                silence_logs=50,
-            )
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, held)
 
 
 @dataclass
@@ -247,7 +200,7 @@ def _threads(
     waiting = iter(todo)
     pool = ThreadPoolExecutor(threads)
     try:
-        running = {pool.submit(call, part): part for part in islice(waiting, threads * _IN_FLIGHT)}
+        running = {pool.submit(call, part): part for part in islice(waiting, threads * cluster.IN_FLIGHT)}
         while running:
             finished, _ = wait(running, return_when=FIRST_COMPLETED)
             for future in sorted(finished, key=lambda one: one.exception() is not None):  # keep the good
@@ -258,82 +211,9 @@ def _threads(
         pool.shutdown(wait=False, cancel_futures=True)  # who holds a part that never ends can end it now
 
 
-def _submit(
-    client: Any, call: Callable[[Any, Any], Any], held: Any, todo: list[Any], sink: Callable[[Any, Any], None]
-) -> None:
-    """Compute on a Dask cluster, with a few parts a worker under way; a lost worker's parts run again."""
-    import distributed
-
-    client.wait_for_workers(1, timeout=30)
-    _same_code(client, _packages(held))
-    sent = client.scatter(held, broadcast=True, hash=False)
-    width = max(2, sum(client.nthreads().values())) * _IN_FLIGHT
-    waiting = iter(todo)
-    parts: dict[str, Any] = {}
-
-    def start(part: Any) -> Any:
-        future = client.submit(_answered, call, sent, part, pure=False, retries=_RETRIES)
-        parts[future.key] = part
-        return future
-
-    running = distributed.as_completed([start(part) for part in islice(waiting, width)])
-    for future in running:
-        result, error = future.result()
-        future.release()
-        if error is not None:
-            raise error
-        sink(parts.pop(future.key), result)
-        for following in islice(waiting, 1):
-            running.add(start(following))
-
-
-def _answered(call: Callable[[Any, Any], Any], held: Any, part: Any) -> tuple[Any, Exception | None]:
-    """The result or the error of a part: tried again is only what a dying worker took along."""
-    try:
-        return call(held, part), None
-    except Exception as error:  # noqa: BLE001 - raised again where it was asked for
-        return None, error
-
-
-def _evaluate(task: Task, chunk: Chunk) -> Arrays:
+def _evaluate(task: Task[Result], chunk: Chunk) -> Result:
     return task.evaluate(*chunk)
 
 
 def _applied(work: Callable[[Any], Any], item: Any) -> Any:
     return work(item)
-
-
-def _packages(held: Any) -> tuple[str, ...]:
-    """The packages that a task needs: those of all calculations, and its own."""
-    owner = getattr(held, "func", held)  # a partial function is what it calls
-    own = (getattr(owner, "__module__", None) or type(held).__module__).partition(".")[0]
-    return _CODE if own in _CODE else (*_CODE, own)
-
-
-def code_version(packages: Sequence[str] = _CODE) -> str:
-    """Content hash of the code that computes parts: workers must have the same."""
-    import hashlib
-
-    digest = hashlib.sha256()
-    for name in packages:
-        try:
-            package = import_module(name)
-        except ImportError:
-            digest.update(f"{name}: absent\0".encode())
-            continue
-        file = Path(package.__file__ or "")
-        whole = file.name == "__init__.py"
-        for path in sorted(file.parent.rglob("*.py")) if whole else [file]:
-            digest.update(f"{name}/{path.relative_to(file.parent)}\0".encode() + path.read_bytes() + b"\0")
-    return digest.hexdigest()[:16]
-
-
-def _same_code(client: Any, packages: tuple[str, ...]) -> None:
-    """Refuse workers that run another version of the code."""
-    here = code_version(packages)
-    others = {
-        address: result for address, result in client.run(code_version, packages).items() if result != here
-    }
-    if others:
-        address = next(iter(others))
-        raise InputError(f"worker {address} runs other code ({others[address]}, here {here})")

@@ -11,6 +11,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.faces import draw
 from analyses.isolation import attempt
 from analyses.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
@@ -122,11 +123,9 @@ class LoopSurvey:
 
     def plot_map(self, axes: Any = None) -> Axes:
         """Draw over frequency the command amplitude at which each limiter sets in; gives the axes."""
-        from actuator_lti.plotting import plot_onset
-
         if self.onset is None:
             raise InputError(f"{self.design.name}: nothing limits, so there is no map")
-        return plot_onset(self.onset, linear_axis=self.design.axis == "linear", axes=axes)
+        return draw("plot_onset", self.onset, linear_axis=self.design.axis == "linear", axes=axes)
 
     def to_pandas(self) -> pandas.DataFrame:
         """A data frame with one row for each form and loop: margins, bandwidth, peaks (pandas needed)."""

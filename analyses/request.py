@@ -8,9 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
-Kind = Literal["plain", "output", "load"]
+if TYPE_CHECKING:
+    from analyses.engine import Engine
+
+Kind = Literal["plain", "output", "load", "command"]
 UNITS = ("_rad_s", "_rad", "_hz", "_Nm", "_s", "_degC", "_V", "_A")
 
 
@@ -26,8 +30,9 @@ class Option:
         What stands for the value in the help.
     flag : str
         The option, without dashes; the field's name without its unit where empty.
-    kind : {"plain", "output", "load"}
-        ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without.
+    kind : {"plain", "output", "load", "command"}
+        ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without;
+        ``"command"``: of the command of the outermost loop, with or without.
     argument : bool
         Whether it stands by its place, without a flag, and has to be given.
     """
@@ -65,3 +70,35 @@ def flag(name: str) -> str:
 def given(*layers: Mapping[str, Any]) -> dict[str, Any]:
     """Values by field, the later ones before the earlier ones; None is no value."""
     return {name: value for layer in layers for name, value in layer.items() if value is not None}
+
+
+LOAD = Option(
+    words='Load torque at the output, such as "4 N*m" or 4 (N m; linear axis: N); 0.',
+    metavar="LOAD",
+    kind="load",
+)
+POINT = Option(
+    words="Friction: sliding, rest or describing-function; behind a coupling also driving and driven (the "
+    "load's share of the friction) and gap (in the play); sliding.",
+    metavar="POINT",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnMachines:
+    """Where a study is computed, a part of its request."""
+
+    workers: Annotated[int | None, Option(words="Processes of a local Dask cluster.", metavar="N")] = None
+    scheduler: Annotated[str | None, Option(words="A Dask scheduler that is running.", metavar="ADDRESS")] = (
+        None
+    )
+    tls: Annotated[
+        Path | None, Option(words="ca.pem, cert.pem and key.pem for a tls:// scheduler.", metavar="DIR")
+    ] = None
+
+    @property
+    def engine(self) -> Engine:
+        """Where to compute."""
+        from analyses.engine import Engine
+
+        return Engine(self.workers, self.scheduler, tls=self.tls)

@@ -55,8 +55,10 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
 
 
 def largest_swing(settlings: Iterable[Settling]) -> Settling | None:
-    """The one of those that do not come to rest that moves most; None: all do."""
-    return max((one for one in settlings if one.hunting), key=lambda one: one.swing_rad, default=None)
+    """The one of those that do not come to rest that moves most, known ends first; None: all do."""
+    hunting = (one for one in settlings if one.hunting)
+    known = ("limit cycle", "diverging")
+    return max(hunting, key=lambda one: (one.rest.verdict in known, one.swing_rad), default=None)
 
 
 def words(rest: Rest, factor: float, unit: str) -> str:

@@ -21,9 +21,9 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.reading import decode, read_bytes
 from actuator_lti.tree import Tree
-from analyses.engine import code_version
+from analyses.proof import code_version
 
-LIBRARIES = ("numpy", "scipy", "numba")
+LIBRARIES = ("numpy", "scipy")
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,10 @@ from actuator_lti.batch import Population, variable_paths
 from actuator_lti.design import design_tree, parameter_value
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import assemble_loops
+from actuator_lti.verdict import Tally, Verdict
 from analyses.engine import Engine
 from analyses.loop_figures import all_loop_figures
-from analyses.requirements import RequirementVerdict, evaluate_requirements
+from analyses.requirements import RequirementVerdict, evaluate_requirements, tally
 from analyses.study import Study, Variant
 from analyses.validation import CHECKS, validate
 from analyses.validation.row import Row
@@ -133,6 +134,21 @@ class Comparison:
     def all(self) -> tuple[Compared, ...]:
         """Base first."""
         return (self.base, *self.variants)
+
+    @property
+    def tally(self) -> Tally:
+        """The requirements of all designs, counted."""
+        return sum((tally(one.verdicts) for one in self.everything.all), Tally())
+
+    @property
+    def unconfirmed(self) -> bool:
+        """Whether the simulator contradicts a prediction of a design."""
+        return any(row.verdict is Verdict.NOT_MET for one in self.everything.all for row in one.checks)
+
+    @property
+    def verdict(self) -> Verdict:
+        """That of all requirements of all designs; not met also where one is refused, or contradicted."""
+        return Verdict.NOT_MET if self.refused or self.unconfirmed else self.tally.verdict
 
     def ends(self, name: FigureName) -> tuple[float, float] | None:
         """Best and worst value of a figure over all designs; ``None`` if they hardly differ (0.005 %)."""

@@ -97,7 +97,8 @@ def views(survey: LoopSurvey, corners: Corners | None = None) -> Iterator[View]:
         if one.kind != "describing-function":
             yield from _loops(one.place, one.figures)
     for corner in corners.corners[1:] if corners else ():
-        yield from _loops(corner.name, corner.figures)
+        place = corner.name.replace("worst ", "tolerances of the worst ", 1)
+        yield from _loops(place, corner.figures)
 
 
 def _loops(place: str, loops: Mapping[str, LoopFigures]) -> Iterator[View]:

@@ -39,9 +39,7 @@ def _campaign(quick: bool) -> Iterable[Row]:
     from actuator_lti import load_design
     from analyses.identification.campaign import identify_campaign
     from analyses.records import import_campaign, load_campaign
-    from analyses.virtual_bench import BenchPlan, simulate_bench
-    from analyses.virtual_bench_files import write_bench
-    from analyses.virtual_bench_instruments import measure_bench
+    from examples.virtual_bench import BenchPlan, measure_bench, simulate_bench, write_bench
 
     design = load_design("ilr33-amber")
     plan = BenchPlan(duration_s=4.0 if quick else 20.0)

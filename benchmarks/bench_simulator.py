@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -16,13 +14,12 @@ import numpy as np
 
 from actuator_lti import load_design
 from actuator_lti.design.model import Coupling, Design, Filter, LoadFriction
-from benchmarks.c_simulator import CSimulator
 from benchmarks.control_cascade import seconds_per_second
+from benchmarks.plain_servo import PlainServo
 from benchmarks.row import Row
-from nonlinear import Rows
+from nonlinear import Rows, commands, loads, simulate
 from nonlinear._kernels import layout as at
-from nonlinear._kernels.call import call
-from nonlinear.native import SWITCH
+from nonlinear.native import call
 
 GROUP = "simulator"
 DURATION_S = 10.0
@@ -39,8 +36,8 @@ print(time.perf_counter() - start, time.process_time())
 def rows(quick: bool = False) -> Iterator[Row]:
     """The rows of the table."""
     row = sawtooth_row()
-    best = numba_seconds(row, 3 if quick else 20)
-    yield against_c(row, 2 if quick else 8)
+    best = seconds_of(row, 3 if quick else 20)
+    yield from against_plain_c(3 if quick else 15)
     yield against_control(best)
     yield Row(
         group=GROUP,
@@ -55,7 +52,7 @@ def rows(quick: bool = False) -> Iterator[Row]:
     yield two_mass_with_play(best, quick)
     yield two_threads(quick)
     yield from constant_cost(quick)
-    yield from first_calls()
+    yield first_call()
 
 
 def sawtooth_row() -> np.ndarray:
@@ -72,7 +69,7 @@ def sawtooth(design: Design | None = None) -> Rows:
     return rows
 
 
-def numba_seconds(row: np.ndarray, repeats: int) -> float:
+def seconds_of(row: np.ndarray, repeats: int) -> float:
     """Best time of the compiled run with its history."""
     history, flags = room(row)
     out, shared, tables = np.zeros(at.OUT_SIZE), np.zeros(2), np.zeros(1)
@@ -96,23 +93,32 @@ def best_of(work: Callable[[], object], repeats: int, clock: Callable[[], float]
     return min(times)
 
 
-def against_c(row: np.ndarray, repeats: int) -> Row:
-    """The same run in C, in turns, each with its own arrays."""
-    reference, history, flags = CSimulator(), *room(row)
-    pairs = []
-    for _ in range(4):
-        here = numba_seconds(row, repeats)
-        there = best_of(lambda: reference.run(row, history, flags), repeats)
-        pairs.append((here, there))
-    here, there = np.array(pairs).min(axis=0)
-    return Row(
-        group=GROUP,
-        name="time over that of the emitted C (-O3 -march=native), 10 s run",
-        measured=float(here / there),
-        unit="x",
-        target=1.2,
-        note=f"C: {1e9 * there / row[at.TICKS]:.1f} ns a tick",
-    )
+PLAIN_RUNS = ((5.0, 1.0, 4.0), (0.05, 10.0, 2.0), (10.0, 3.0, 0.0))  # deg, Hz, N m
+
+
+def against_plain_c(repeats: int) -> Iterator[Row]:
+    """`simulate` against a plain C program of the same cascade, in turns; each allocates its history.
+
+    The program has its reference and its load worked out before.
+    """
+    design = load_design("ilr33-amber")
+    peer, ticks = PlainServo(design), round(DURATION_S / design.controller.period_s)
+    for size_deg, frequency_hz, load_Nm in PLAIN_RUNS:
+        command, load = commands.sine(np.radians(size_deg), frequency_hz), loads.constant(load_Nm)
+        reference = design.total_ratio * command.values(design.controller.period_s, ticks)
+        moment = np.full(ticks, load_Nm)
+        ours = partial(simulate, design, command, DURATION_S, load)
+        theirs = partial(peer.run, reference, moment)
+        pairs = [(best_of(ours, repeats), best_of(theirs, repeats)) for _ in range(3)]
+        here, there = np.array(pairs).min(axis=0)
+        yield Row(
+            group=GROUP,
+            name=f"time over that of a plain C program, {size_deg:g} deg {frequency_hz:g} Hz {load_Nm:g} N m",
+            measured=float(here / there),
+            unit="x",
+            target=1.2,
+            note=f"{1e9 * here / ticks:.1f} ns a tick, C {1e9 * there / ticks:.1f}",
+        )
 
 
 def against_control(best: float) -> Row:
@@ -148,7 +154,7 @@ def wider_drives(repeats: int) -> Iterator[Row]:
     for name, without, design, energy, target in cases:
         plain, rows = sawtooth(without).values[0], sawtooth(design)
         rows["with_energy"] = energy
-        pairs = [[numba_seconds(row, repeats) for row in (rows.values[0], plain)] for _ in range(4)]
+        pairs = [[seconds_of(row, repeats) for row in (rows.values[0], plain)] for _ in range(4)]
         measured, reference = np.array(pairs).min(axis=0)
         name = f"time with {name}, over that without"
         yield Row(group=GROUP, name=name, measured=float(measured / reference), unit="x", target=target)
@@ -239,20 +245,9 @@ def constant_cost(quick: bool) -> Iterator[Row]:
     )
 
 
-FIRST_CALLS = (
-    ("first call after installation, without a C compiler", "numba", 10.0),
-    ("first call of a later process, without a C compiler", "numba", 1.0),
-    ("first call, with the C library of the installation", "auto", 1.0),
-)
-
-
-def first_calls() -> Iterator[Row]:
-    """First call with an empty cache, then in a new process; and with the library."""
-    with tempfile.TemporaryDirectory() as folder:
-        for name, kernel, target in FIRST_CALLS:
-            environment = {**os.environ, "NUMBA_CACHE_DIR": folder, SWITCH: kernel}
-            command = [sys.executable, "-c", FIRST_CALL]
-            done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-            wall, cpu = (float(word) for word in done.stdout.split())
-            note = f"{cpu:.2f} s of processor time"
-            yield Row(group=GROUP, name=name, measured=wall, unit="s", target=target, note=note)
+def first_call() -> Row:
+    """The first run of a new process, imports and all."""
+    done = subprocess.run([sys.executable, "-c", FIRST_CALL], capture_output=True, text=True, check=True)
+    wall, cpu = (float(word) for word in done.stdout.split())
+    note = f"{cpu:.2f} s of processor time"
+    return Row(group=GROUP, name="first call of a process", measured=wall, unit="s", target=1.0, note=note)

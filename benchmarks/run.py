@@ -1,13 +1,11 @@
-"""Run every ``bench_*.py`` of this folder and print one table: ``python -m benchmarks.run [NAME ...]``."""
+"""Run every ``bench_*.py`` of this folder, a line a figure: ``python -m benchmarks.run [NAME ...]``."""
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
 import sys
-
-from rich.console import Console
-from rich.table import Table
+import time
 
 import benchmarks
 from benchmarks.row import Row
@@ -15,25 +13,24 @@ from benchmarks.row import Row
 
 def main(names: list[str]) -> int:
     """Measure the named groups (all where none is named); 1 if a target is missed."""
-    console = Console()
     modules = [m.name for m in pkgutil.iter_modules(benchmarks.__path__) if m.name.startswith("bench_")]
-    wanted = [m for m in modules if not names or m.removeprefix("bench_") in names]
-    rows: list[Row] = []
-    for name in wanted:
-        with console.status(f"measuring {name.removeprefix('bench_')}"):
-            rows += importlib.import_module(f"benchmarks.{name}").rows()
-    console.print(table(rows))
-    return 1 if any(row.met is False for row in rows) else 0
+    missed, start = 0, time.perf_counter()
+    for name in (m for m in modules if not names or m.removeprefix("bench_") in names):
+        sys.stdout.write(f"{name.removeprefix('bench_')}\n")
+        for row in importlib.import_module(f"benchmarks.{name}").rows():
+            missed += row.met is False
+            sys.stdout.write(f"{line(row)}\n")
+            sys.stdout.flush()
+    sys.stdout.write(f"{missed} missed, {time.perf_counter() - start:.0f} s\n")
+    return 1 if missed else 0
 
 
-def table(rows: list[Row]) -> Table:
-    """Lay the rows out as a table."""
-    out = Table("group", "what", "measured", "target", "met", "note")
-    for row in rows:
-        target = "" if row.target is None else f"{row.comparison} {row.target:g} {row.unit}"
-        met = {True: "yes", False: "NO", None: ""}[row.met]
-        out.add_row(row.group, row.name, f"{row.measured:.4g} {row.unit}", target, met, row.note)
-    return out
+def line(row: Row) -> str:
+    """One figure: whether its target is met, the figure, the target, what it is, a note."""
+    met = {True: "met", False: "NOT", None: ""}[row.met]
+    target = "" if row.target is None else f"{row.comparison} {row.target:g}"
+    note = f" ({row.note})" if row.note else ""
+    return f"  {met:<4}{row.measured:>10.4g} {row.unit:<4} {target:<9} {row.name}{note}"
 
 
 if __name__ == "__main__":

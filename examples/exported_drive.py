@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout
 from nonlinear.export import c_export
-from nonlinear.export.build import compile_files
 
 
 class ExportedDrive:

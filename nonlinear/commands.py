@@ -123,12 +123,12 @@ class Command:
 
     def values(self, period_s: float, ticks: int) -> Floats:
         """Value at each of the first ``ticks`` ticks, as the simulator sees it."""
-        from nonlinear._kernels.signals import fill
+        from nonlinear.native import fill
 
         row, table = np.zeros(at.SIGNAL_SIZE), self.table(period_s, ticks)
         write(self, row, 0, 0, 0 if table is None else table.size)
         out = np.empty(ticks)
-        fill(row, 0, np.zeros(1) if table is None else table, 0, ticks, 1, period_s, out, 0)
+        fill(row, np.zeros(1) if table is None else np.ascontiguousarray(table), period_s, out)
         return out
 
 

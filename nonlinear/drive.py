@@ -8,9 +8,7 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from nonlinear._kernels import layout as at
-from nonlinear._kernels.call import parameters
-from nonlinear._kernels.control import control_tick
-from nonlinear._kernels.tick import tick
+from nonlinear.native import control_tick, parameters, tick
 from nonlinear.parameters import design_row
 from nonlinear.setup import put_state
 from nonlinear.trajectory import ADVICE, STATUS, State
@@ -90,7 +88,7 @@ class Drive:
         if load_Nm or torque_Nm or self._p[at.RARE_LOAD]:
             self._p[at.RARE_LOAD] = 1.0
             self._io[at.IN_LOAD], self._io[at.IN_TORQUE] = load_Nm, torque_Nm
-        status = STATUS[int(tick(self._p, self._s, self._io))]
+        status = STATUS[tick(self._p, self._s, self._io)]
         if status != "ok":
             raise NumericalError(f"tick {self.value('tick'):.0f} ({status}): {ADVICE[status]}")
 
@@ -117,7 +115,7 @@ class Drive:
         self._io[at.IN_COMMAND] = command
         self._io[at.IN_CURRENT : at.IN_OUTPUT_SPEED + 1] = measured
         self._io[at.IN_BUS] = self.design.limits.voltage_V if bus_V is None else bus_V
-        return float(control_tick(self._p, self._s, self._io))
+        return control_tick(self._p, self._s, self._io)
 
     def get(self) -> Floats:
         """A copy of the whole state."""

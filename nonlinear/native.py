@@ -1,223 +1,112 @@
-"""Which compiled form of the kernels runs: the emitted C built at installation, or numba's.
+"""The compiled tick: runs, single ticks and signals, by the library of the kernels.
 
-Both give the same bits.  numba compiles at the first call, which takes some twenty seconds; the C library is
-there from the start.  ``python -m nonlinear.native`` builds it (``make install`` does); it is used as long
-as the kernels' source is the one that it was made of.  ``ACTUATOR_LTI_KERNEL`` chooses: ``auto`` (the library
-where there is one), ``c`` (or an error), ``numba``.
+``python -m nonlinear.native`` compiles it, and the library of many designs' figures beside it; an
+installation does so (`actuator_lti.compiled.library`).
 """
 
 from __future__ import annotations
 
-import ctypes
-import hashlib
-import os
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import cache
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.compiled.library import Entry, Library, source_files
+from actuator_lti.drive import signals
 from actuator_lti.errors import InputError
-from nonlinear._kernels import layout
-from nonlinear._kernels.lengths import lengthened
-from nonlinear.waiting import told_if_slow
+from nonlinear._kernels import elastic_layout, layout
+from nonlinear._kernels.forms import forms
 
 Floats = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.uint16]
 
-SWITCH = "ACTUATOR_LTI_KERNEL"
-CHOICES = ("auto", "c", "numba")
-COMPILING = (
-    "numba compiles the simulator, once on this machine; python -m nonlinear.native spares it where a "
-    "C compiler is"
-)
-_HERE = Path(__file__).parent
-_FOLDER = _HERE / "_native"
-_SOURCES = ("_kernels", "emit")
-_FLAGS = ("-O3", "-shared", "-fPIC", "-fvisibility=default")
-
-
-class _Bytes(ctypes.Structure):
-    _fields_ = (("at", ctypes.c_void_p), ("length", ctypes.c_int))
-
-
-def chosen() -> str:
-    """What the switch says.
-
-    Raises
-    ------
-    InputError
-        For anything but ``auto``, ``c`` and ``numba``.
-    """
-    text = os.environ.get(SWITCH, "auto")
-    if text not in CHOICES:
-        raise InputError(f"{SWITCH} = {text}: allowed: {', '.join(CHOICES)}")
-    return text
+_FOLDER = Path(__file__).parent
+_START, _TICK = "nonlinear._kernels.start", "nonlinear._kernels.tick"
+_ENTRIES = (
+    Entry(_START, "prepare_sizes", ("row",)),
+    Entry(_START, "derive", ("row", "row")),
+    Entry(_START, "init", ("row", "row")),
+    Entry(_TICK, "tick", ("row", "row", "row"), "int"),
+    Entry("nonlinear._kernels.control", "control_tick", ("row", "row", "row"), "float"),
+    Entry("nonlinear._kernels.signals", "fill",
+          ("row", "int", "row", "int", "int", "int", "float", "row", "int")),
+    Entry("nonlinear._kernels.run", "run",
+          ("row", "row", "row", "row", "row", "row", "bytes", "row", "row"), "int"),
+)  # fmt: skip
+LIBRARY = Library("run", _FOLDER, _ENTRIES, source_files(_FOLDER / "_kernels", Path(signals.__file__)), forms)
 
 
-@cache
-def library_path() -> Path:
-    """Where the library of today's kernels lies, or would lie."""
-    digest = hashlib.sha256(" ".join(_FLAGS).encode())
-    paths = [path for folder in _SOURCES for path in sorted((_HERE / folder).glob("*.py"))]
-    for path in (*paths, _HERE / "export/entries.py", Path(__file__)):
-        digest.update(path.read_bytes())
-    return _FOLDER / f"run-{digest.hexdigest()[:16]}-{sys.platform}.so"
-
-
-@cache
-def _opened(choice: str) -> ctypes.CDLL | None:
-    path = library_path()
-    if choice == "numba" or not path.is_file():
-        if choice == "c":
-            raise InputError(
-                f"{SWITCH} = c: no library of these kernels; allowed: python -m nonlinear.native first"
-            )
-        return None
-    try:
-        return loaded(path)
-    except OSError:  # made for another machine
-        if choice == "c":
-            raise InputError(f"{path.name}: does not load; allowed: python -m nonlinear.native") from None
-        return None
-
-
-def loaded(path: Path) -> ctypes.CDLL:
-    """Open a library of `nonlinear.export.run_library`."""
-    opened = ctypes.CDLL(str(path))
-    pointers = (ctypes.c_void_p,) * 6
-    opened.drive_run.argtypes = [*pointers, _Bytes, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double]
-    return opened
-
-
-_borrowed: list[ctypes.CDLL] = []
-
-
-@contextmanager
-def borrowed(path: Path) -> Iterator[None]:
-    """Let every run of this process go through another library of `nonlinear.export.run_library`."""
-    _borrowed.append(loaded(path))
-    try:
-        yield
-    finally:
-        _borrowed.pop()
-
-
-def _running() -> ctypes.CDLL | None:
-    return _borrowed[-1] if _borrowed else _opened(chosen())
-
-
-def kernel_name() -> str:
-    """What runs, for the provenance of a report."""
-    return "C library" if _running() is not None else "numba"
-
-
-def call(
-    row: Floats, tables: Floats, history: Floats, flags: npt.NDArray[np.uint16], out: Floats, shared: Floats
-) -> int:
+def call(row: Floats, tables: Floats, history: Floats, flags: Flags, out: Floats, shared: Floats) -> int:
     """Run one row, see `nonlinear._kernels.run`; ``history`` is (columns, rows) or empty."""
     return resume(*parameters(row), tables, history, flags, out, shared)
 
 
 def resume(
-    p: Floats, s: Floats, tables: Floats, history: Floats, flags: npt.NDArray[np.uint16], out: Floats,
-    shared: Floats,
-) -> int:  # fmt: skip
-    """Go on from the state ``s``, which is changed, until tick ``p[TICKS]``; see `call`."""
-    opened = _running()
-    if opened is None:
-        with told_if_slow(COMPILING):
-            from nonlinear._kernels.call import resume as numba_resume
-
-            return numba_resume(p, s, tables, history, flags, out, shared)
-    return _resume_library(opened, p, s, tables, history, flags, out, shared)
-
-
-def call_library(
-    opened: Any, row: Floats, tables: Floats, history: Floats, flags: Any, out: Floats, shared: Floats
+    p: Floats, s: Floats, tables: Floats, history: Floats, flags: Flags, out: Floats, shared: Floats
 ) -> int:
-    """Run one row by an opened library; see `call`."""
-    return _resume_library(opened, *_prepared(opened, row), tables, history, flags, out, shared)
-
-
-def _resume_library(
-    opened: Any, p: Floats, s: Floats, tables: Floats, history: Floats, flags: Any, out: Floats,
-    shared: Floats,
-) -> int:  # fmt: skip
+    """Go on from the state ``s``, which is changed, until tick ``p[TICKS]``; see `call`."""
     io, block = np.zeros(layout.IO_SIZE), np.zeros(layout.BLOCK_SIZE)
-    rows = _Bytes(flags.ctypes.data, flags.size)
-    ours = (_at(p), _at(s), _at(io), _at(block), _at(tables), _at(history), rows, _at(out), _at(shared))
-    return int(opened.drive_run(*ours, 1.0))
+    return int(LIBRARY.functions.run(p, s, io, block, tables, history.reshape(-1), flags, out, shared))
 
 
 def resumed(
-    p: Floats, s: Floats, io: Floats, block: Floats, tables: Floats, history: Floats, flags: Any, out: Floats,
-    shared: Floats,
+    p: Floats, s: Floats, io: Floats, block: Floats, tables: Floats, history: Floats, flags: Flags,
+    out: Floats, shared: Floats,
 ) -> Callable[[], int]:  # fmt: skip
     """A call that runs the state ``s`` on to tick ``p[TICKS]``; the caller keeps all the rows."""
-    opened = _running()
-    if opened is None:
-        from nonlinear._kernels.run import run as numba_run
-
-        return lambda: int(numba_run(p, s, io, block, tables, history, flags, out, shared, 1.0))
-    rows = _Bytes(flags.ctypes.data, flags.size)
-    places = (_at(p), _at(s), _at(io), _at(block), _at(tables), _at(history), rows, _at(out), _at(shared))
-    return lambda: int(opened.drive_run(*places, 1.0))
-
-
-def _prepared(opened: Any, row: Floats) -> tuple[Floats, Floats]:
-    p = lengthened(row, lambda head: opened.drive_prepare_sizes(_at(head)))
-    s = np.zeros(int(p[layout.STATE_SIZE]))
-    opened.drive_derive(_at(p), _at(s))
-    opened.drive_init(_at(p), _at(s))
-    return p, s
+    bound: Callable[[], int] = LIBRARY.functions.run.bound(
+        p, s, io, block, tables, history, flags, out, shared
+    )
+    return bound
 
 
 def parameters(row: Floats) -> tuple[Floats, Floats]:
     """All parameters of a row with what is derived from them, and the state at t_0."""
-    opened = _running()
-    if opened is not None:
-        return _prepared(opened, row)
-    with told_if_slow(COMPILING):
-        from nonlinear._kernels.call import parameters as numba_parameters
+    functions = LIBRARY.functions
+    head = np.zeros(elastic_layout.EL_LEAST)
+    head[: layout.SIZE] = row
+    functions.prepare_sizes(head)
+    p = np.zeros(int(head[layout.PARAMETER_SIZE]))
+    known = min(p.size, head.size)
+    p[:known] = head[:known]
+    s = np.zeros(int(p[layout.STATE_SIZE]))
+    functions.derive(p, s)
+    functions.init(p, s)
+    return p, s
 
-        return numba_parameters(row)
+
+def tick(p: Floats, s: Floats, io: Floats) -> int:
+    """One tick; returns its status."""
+    return int(LIBRARY.functions.tick(p, s, io))
 
 
-def _at(row: npt.NDArray[Any]) -> ctypes.c_void_p:
-    assert row.flags.c_contiguous
-    return ctypes.c_void_p(row.ctypes.data)
+def control_tick(p: Floats, s: Floats, io: Floats) -> float:
+    """One tick of the controller alone; returns the voltage."""
+    return float(LIBRARY.functions.control_tick(p, s, io))
 
 
-def build() -> Path:
-    """Emit, compile and keep the library; older ones go.
+def fill(signal: Floats, table: Floats, period_s: float, out: Floats) -> None:
+    """Sample a signal at every tick, see `nonlinear._kernels.signals`."""
+    LIBRARY.functions.fill(signal, 0, table, 0, out.size, 1, period_s, out, 0)
+
+
+def build() -> tuple[Path, ...]:
+    """Compile what is not there yet: this library, and that of many designs' figures.
 
     Raises
     ------
     InputError
-        Without a C compiler, or where the folder cannot be written.
+        Without a C compiler, or where the package cannot be written.
     """
-    from actuator_lti.atomic import write_bytes
-    from nonlinear.export.build import compile_files, system_compiler
-    from nonlinear.export.run_library import run_sources
+    from actuator_lti.batch.library import LIBRARY as figures
 
-    compiler = system_compiler()
-    if compiler is None:
-        raise InputError("no C compiler; allowed: gcc or clang, or leave it to numba")
-    data = compile_files(run_sources(), "run.so", "this machine", _FLAGS, command=[compiler])
-    path = library_path()
-    write_bytes(path, data)
-    for old in _FOLDER.glob("run-*.so"):
-        if old != path:
-            old.unlink(missing_ok=True)
-    return path
+    return LIBRARY.build(), figures.build()
 
 
 if __name__ == "__main__":
     try:
-        sys.stdout.write(f"{build().name}: the simulator starts without compiling\n")
+        sys.stdout.write("".join(f"{path.name}\n" for path in build()))
     except InputError as error:
-        sys.stdout.write(f"the simulator will compile at its first call: {error}\n")
+        sys.exit(f"the simulator is not compiled: {error}")

@@ -105,7 +105,7 @@ def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
     >>> result.speed_rad_s > 100.0, result.voltage_V < 0.5 * 12.0
     (True, True)
     """
-    if has_to_stand(design):
+    if follows_angle(design):
         return standing(design)
     loads = [load_Nm]
     if needs_press(design):
@@ -130,11 +130,6 @@ def needs_press(design: Design) -> bool:
     return coupling is not None and (coupling.play_rad > 0.0 or design.friction.load_coefficient > 0.0)
 
 
-def has_to_stand(design: Design) -> bool:
-    """Whether no constant speed is a steady motion: a torque changes with the angle."""
-    return follows_angle(design)
-
-
 def bent_about_rest(design: Design) -> bool:
     """Whether play or friction gives a drive at rest another slope than a moving one has."""
     friction = design.friction
@@ -144,7 +139,7 @@ def bent_about_rest(design: Design) -> bool:
 
 def may_stand(design: Design) -> bool:
     """Whether the drive has one slope about rest once its dry friction is left out."""
-    return has_to_stand(design) or not bent_about_rest(design)
+    return follows_angle(design) or not bent_about_rest(design)
 
 
 def on_its_stand(design: Design, like: Design | None = None) -> Design:
@@ -154,7 +149,7 @@ def on_its_stand(design: Design, like: Design | None = None) -> Design:
     grows with the speed and is no part of its loops.  ``like`` is the drive that is tested, if another.
     """
     tested, friction = like or design, design.friction
-    if has_to_stand(tested):
+    if follows_angle(tested):
         friction = replace(friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
     elif tested.coupling is None and tested.load.moment_damping_Nms_rad:
         friction = replace(friction, load_coefficient=0.0)

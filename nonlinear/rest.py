@@ -6,8 +6,10 @@ question is asked of the whole state, and the drive is followed until it is answ
 - *at rest*: over `DRIFT` periods nothing changes by more than `STILL` of the largest value that it had;
 - held by friction while an integral grows is not rest.  Then every period adds the same to the state; the
   state is set forward to just before breakaway (`nonlinear.drift`), and the drive is followed from there;
-- *limit cycle*: of `PERIODS` swings or more the later half is as large as the earlier to `ALIKE`, and an
-  event, a limit or a sensor's counts are in it, as a linear drive has none;
+- *limit cycle*: held by friction it stands a third time where it stood before, after equal times and swings
+  (to `ALIKE`): what follows from standing there is known, so it does so for ever.  Or of `PERIODS` swings or
+  more the later half is as large as the earlier, and an event, a limit or a sensor's counts are in it, as a
+  linear drive has none.  Which one a drive ends in may depend on the step;
 - *diverging*: no finite state, or a motion that still grows at the end of the work;
 - *still moving*: none of these within `MOST_TICKS` ticks of work.
 """
@@ -48,7 +50,7 @@ class Rest:
         Command less what follows it, at the end; of a limit cycle the mean between its ends.
     amplitude, motor_amplitude : float
         Half the span of what follows the command, and of the motor's own angle over the reduction (speed, for
-        a speed drive), in the last half of the work; 0 at rest.
+        a speed drive), over the cycle that returned, else in the last half of the work; 0 at rest.
     frequency_hz : float or None
         Of a limit cycle.
     periods : int
@@ -133,6 +135,7 @@ class _Watch:
     seen: list[Floats] = field(default_factory=list)  # per piece: reference, followed, motor
     ranges: list[tuple[Floats, Floats]] = field(default_factory=list)  # per piece, of _RANGED
     acted: list[tuple[int, int, int]] = field(default_factory=list)  # entries, flags, events
+    stood: list[_Stand] = field(default_factory=list)  # before it broke away
     scales: Scales = field(init=False)
     period_s: float = field(init=False)
 
@@ -148,8 +151,11 @@ class _Watch:
             piece = self._advance(periods)
             if piece.status != "ok":
                 return self._rest("diverging")
+            stood = len(self.stood)
             if self.quiet():
                 return self._rest("at rest")
+            if len(self.stood) > stood and (cycle := self._returns()) is not None:
+                return self._rest("limit cycle", *cycle)
             if len(self.seen) >= due:
                 due += due // 2
                 swing = self._swing()
@@ -201,7 +207,37 @@ class _Watch:
             return False
         windows, ticks = leap(drive, places, step, before, scale)
         self.periods, self.ticks = self.periods + windows * DRIFT, self.ticks + ticks
+        if windows:
+            followed, motor = (float(values[-1]) for values in self.seen[-1][1:])
+            self.stood.append(_Stand(self.period_s * self.periods, len(self.seen), followed, motor))
         return windows >= MOST_LEAPS
+
+    def _returns(self) -> tuple[_Swing, int] | None:
+        """The swing between two returns to where the drive stands, and its first piece; None: not yet known.
+
+        As near as a count of the sensors, or `STILL` of the largest angle, is the same place.
+        """
+        last, p = self.stood[-1], self.drive.p
+        counts = p[at.COUNTS_PER_RAD] * p[at.RATIO], p[at.POSITION_COUNTS]
+        far = max([STILL * float(self.scales.signals[1]), *(1.0 / each for each in counts if each > 0.0)])
+        away, visits = True, list[_Stand]()
+        for one in reversed(self.stood):
+            near = max(abs(one.followed - last.followed), abs(one.motor - last.motor)) <= far
+            if near and away:
+                visits.append(one)
+            away = not near
+        for turns in range(1, (len(visits) - 1) // 2 + 1):
+            now, before, first = (visits[k * turns] for k in range(3))
+            if not _alike(now.time_s - before.time_s, before.time_s - first.time_s):
+                continue
+            span = self._span(before.piece, now.piece)
+            if span > far and _alike(span, self._span(first.piece, before.piece)):
+                return _Swing(2, 1.0 / (now.time_s - before.time_s), alike=True), before.piece
+        return None
+
+    def _span(self, start: int, end: int) -> float:
+        """Of what moves most between two pieces."""
+        return float(np.ptp(np.concatenate(self.seen[start:end], axis=1)[1:], axis=1).max())
 
     def _still(self, piece: Piece) -> bool:
         """Whether all signals keep their values; of a speed drive, all but the angles."""
@@ -249,9 +285,10 @@ class _Watch:
         spans = np.ptp(seen[1:, half], axis=1)
         return _swing_of(times[half], seen[1 + int(np.argmax(spans)), half])
 
-    def _rest(self, verdict: Verdict, swing: _Swing | None = None) -> Rest:
-        seen = np.concatenate(self.seen, axis=1)
-        command, followed, motor = seen[:, seen.shape[1] // 2 :]
+    def _rest(self, verdict: Verdict, swing: _Swing | None = None, since: int | None = None) -> Rest:
+        """What is known by now; of the last half of the entries, or of the pieces ``since`` one."""
+        seen = np.concatenate(self.seen[since:], axis=1)
+        command, followed, motor = seen[:, seen.shape[1] // 2 if since is None else 0 :]
         still, p = verdict == "at rest", self.drive.p
         acted = self._late()[: 1 if still else None]
         end = followed[-1] if still else 0.5 * (followed.max() + followed.min())
@@ -276,6 +313,16 @@ class _Watch:
 
 
 @dataclass(frozen=True)
+class _Stand:
+    """Where a drive stands that friction holds: when, after how many pieces, what follows, the motor."""
+
+    time_s: float
+    piece: int
+    followed: float
+    motor: float
+
+
+@dataclass(frozen=True)
 class _Swing:
     """Swings of a signal."""
 
@@ -295,5 +342,10 @@ def _swing_of(times: Floats, values: Floats) -> _Swing:
         return _Swing(n, None, alike=False)
     sizes = np.array([np.ptp(values[a:b]) for a, b in pairwise(up)])
     first, second = (float(half.mean()) for half in np.array_split(sizes, 2))
-    alike = n >= PERIODS and abs(second - first) <= ALIKE * first
+    alike = n >= PERIODS and _alike(first, second)
     return _Swing(n, float(n / (times[up[-1]] - times[up[0]])), alike)
+
+
+def _alike(first: float, second: float) -> bool:
+    """Whether two swings, or their times, are as large as each other."""
+    return abs(second - first) <= ALIKE * first

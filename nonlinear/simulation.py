@@ -198,7 +198,7 @@ def _load(row: Floats, history: Floats) -> Floats | None:
     """The moment on the output shaft at the recorded ticks; ``None`` where there is none in the whole run."""
     if not row[at.LOAD : at.TORQUE_TABLE].any():
         return None
-    return history[-1] if row[at.VARYING_LOAD].any() else np.full(history.shape[1], row[at.LOAD])
+    return history[-1] if row[at.VARYING_LOAD].any() else np.broadcast_to(row[at.LOAD], history.shape[1])
 
 
 def _call(

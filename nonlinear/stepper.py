@@ -60,6 +60,16 @@ class Stepper:
         self.p[at.TICKS] = self.s[at.S_TICK] + ticks
         self._tick()
 
+    def each(self, states: Floats, ticks: int, place: int, values: Floats) -> None:
+        """Run every row of ``states`` so many ticks on, with its own value of one parameter at ``place``."""
+        self.p[at.TICKS] = states[0, at.S_TICK] + ticks
+        p, s, tick = self.p, self.s, self._tick
+        for state, value in zip(states, values, strict=True):
+            p[place] = value
+            s[:] = state
+            tick()
+            state[:] = s
+
     @property
     def happened(self) -> tuple[float, float]:
         """Events so far, and the status: equal in two runs on the same piece of the map."""

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.control import Stage
 from actuator_lti.design.model import Axis
+from actuator_lti.faces import draw
 from nonlinear._kernels import layout as at
 
 if TYPE_CHECKING:
@@ -337,15 +338,11 @@ class Trajectory:
         >>> [panel.get_ylabel() for panel in panels]
         ['output, deg', 'motor, rad/s', 'current, A', 'voltage, V']
         """
-        from actuator_lti.plotting import plot_run
-
-        return plot_run(self, axes)
+        return draw("plot_run", self, axes)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        from actuator_lti.notebook import run_html
-
-        return run_html(self)
+        return draw("run_html", self)
 
     def __repr__(self) -> str:
         used = [f"{name} {100.0 * use.fraction:.3g} %" for name, use in self.limits.items() if use.active]

@@ -17,12 +17,19 @@ from analyses.corners.asked import Asked as CornersAsked
 from analyses.correlation.asked import Asked as CorrelationAsked
 from analyses.duty.asked import Asked as DutyAsked
 from analyses.failures.asked import Asked as FailuresAsked
+from analyses.identification.asked import Asked as IdentificationAsked
+from analyses.margins.asked import Asked as MarginsAsked
+from analyses.monte_carlo.asked import Asked as MonteCarloAsked
 from analyses.motion.asked import Asked as MotionAsked
+from analyses.study_asked import Asked as StudyAsked
 from analyses.tuning.asked import Asked as TuningAsked
+from analyses.validation.asked import Asked as ValidationAsked
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
+    from analyses.study import Study
     from reports.document_schema import Section
+    from reports.terminal import Brief
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +39,7 @@ class Analysis:
     Attributes
     ----------
     name : str
-        Of the command and of the section's module in `reports.sections`, whose ``section(result)`` shows it.
+        Of the command, and of the section's module where that has no name of its own.
     group : str
         Panel of the help in which the command stands.
     words : str
@@ -42,14 +49,26 @@ class Analysis:
     function : str
         ``package.name`` of ``(design, request) -> result``; ``analyses.NAME.NAME`` where empty. Where the
         result says ``passed``, that is the exit status.
+    shown : str
+        The section's module in `reports.sections`, whose ``section(result)`` shows the result.
     also : bool
         Whether a report has the section where it is asked for (``--also``).
     doing : str
         What the bar says while the function works, which then takes ``progress``.
+    study : bool
+        Whether it is asked of a study (a file, or a design with variants), not of a design.
+    written : str
+        A flag of the request that is set where the answer is written as a page or as JSON.
+    keeps : bool
+        Whether the function takes ``out`` as well, the folder, and keeps there what it finds.
+    warns : bool
+        Whether what is suspicious about the design is said first.
     stem : str
         Name of the page's files; that of the command where empty.
     out : str
         Folder of the page where none is given; without it, a page is made only where ``--out`` says so.
+    example : str
+        Module whose docstring holds a file to start from, behind ``::``; ``--example`` prints it.
     """
 
     name: str
@@ -57,12 +76,18 @@ class Analysis:
     words: str
     request: type | None = None
     function: str = ""
+    shown: str = ""
     also: bool = False
     doing: str = ""
+    study: bool = False
+    keeps: bool = False
+    written: str = ""
+    warns: bool = False
     stem: str = ""
     out: str = ""
+    example: str = ""
 
-    def asked(self, design: Design, chosen: Tree) -> tuple[Any, ...]:
+    def asked(self, design: Design | Study | None, chosen: Tree) -> tuple[Any, ...]:
         """What the function is given beside the design: nothing, or the request with what is chosen."""
         if self.request is None:
             return ()
@@ -70,7 +95,7 @@ class Analysis:
         values = {name: value for name, value in chosen.items() if value is not None}
         return (made(design, **values) if made else self.request(**values),)
 
-    def run(self, design: Design, *asked: Any, **more: Any) -> Any:
+    def run(self, design: Design | Study | None, *asked: Any, **more: Any) -> Any:
         """Ask."""
         package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
         return getattr(import_module(package), name)(design, *asked, **more)
@@ -79,6 +104,16 @@ class Analysis:
         """Show: ``section(result)`` of the section's module, one or several."""
         made = self._shown.section(result)
         return made if isinstance(made, list) else [made]
+
+    def text(self, result: Any) -> str | None:
+        """The result where it is nothing but a text to print (``text`` of the section's module)."""
+        made: str | None = getattr(self._shown, "text", lambda _result: None)(result)
+        return made
+
+    def brief(self, result: Any) -> Brief | None:
+        """What the terminal prints where the sections are too long (``brief`` of their module)."""
+        made: Brief | None = getattr(self._shown, "brief", lambda _result: None)(result)
+        return made
 
     def data(self, result: Any) -> Any:
         """The result as plain data: what the section's module says (``data``), else by its names."""
@@ -93,10 +128,21 @@ class Analysis:
 
     @property
     def _shown(self) -> ModuleType:
-        return import_module(f"reports.sections.{self.name}")
+        return import_module(f"reports.sections.{self.shown or self.name}")
 
 
 ANALYSES = (
+    Analysis(
+        name="margins",
+        group="Linear loops",
+        request=MarginsAsked,
+        warns=True,
+        words="""
+        Print margins, bandwidths and verdicts of every loop; the margins are certified.
+
+        Requirements are judged on the sampled loops with sliding friction, whatever form is printed.
+        """,
+    ),
     Analysis(
         name="stiffness",
         group="Linear loops",
@@ -161,11 +207,60 @@ ANALYSES = (
         also=True,
         function="analyses.limit_cycles.limit_cycles",
         words="""
-        Foresee limit cycles of play and of a quantised output sensor, and seek them in the simulator.
+        Predict limit cycles of play and of a quantised output sensor, and seek them in the simulator.
 
-        Each is foreseen by describing function in the exact sampled loop, then the simulator is
+        Each is predicted by describing function in the exact sampled loop, then the simulator is
         started in its shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are
         waited for. The exit status is 1 where such a step ends in a cycle.
+        """,
+    ),
+    Analysis(
+        name="validate",
+        group="Nonlinear checks",
+        request=ValidationAsked,
+        function="analyses.validation.validate",
+        shown="validation",
+        doing="validating",
+        written="large",
+        stem="validation",
+        words="""
+        Check every prediction against the derivative of the nonlinear simulator, and show where it ends.
+
+        Each row is met, not met or not proven. Exit status 1 if one is not met, or not proven and not waived,
+        if the drive does not come to rest, or if a command within full deflection makes it diverge. The page
+        (--out), --json and --large also show what is large, starts from rest, or is shaken by counts.
+        """,
+    ),
+    Analysis(
+        name="identify",
+        group="Bench records",
+        request=IdentificationAsked,
+        function="analyses.identification.run.identify",
+        doing="identifying",
+        stem="identification",
+        example="analyses.records.campaign_file",
+        words="""
+        Identify a drive from bench records, and write the result as a design with
+        tolerances.
+
+        Three ways to call it:
+
+        identify campaign.toml --out result: C0, Cv and CM from the steady parts
+        of many runs. A bad run is set aside and named, the others go on.
+        --example prints a campaign file.
+
+        identify A.csv B.csv --validate C.csv --design my.toml: inertia, friction
+        and offset from records of a motion together, by the inverse dynamic
+        model; --refine simulates the drive as well. The EMPS benchmark's file is
+        known as it is.
+
+        identify --frequency-response chirp.csv --play reversal.csv --design my.toml:
+        inertias, stiffness, damping and play of a two-mass drive.
+
+        Every column of every file is accounted for. Each record is held against
+        itself and against the design's limits, and the written design against the
+        record that it came from. Where a check fails the status is 1, and no
+        design is written without --accept; with --out, page and JSON are.
         """,
     ),
     Analysis(
@@ -183,7 +278,8 @@ ANALYSES = (
         error, delay; over several records also all together, and the worst; with
         --out pictures of both and the difference. Where a record contradicts
         itself or the design's limits (a wrong unit, swapped columns, a clock that
-        is off), or a signal is off by more than --error-limit, the status is 1.
+        is off), a motion fits no better than its mean, or a signal is off by
+        more than --error-limit, the status is 1.
 
         The outermost command that is recorded drives the model: reference of the
         output angle, speed, current (or torque), or voltage; loops outside it do
@@ -203,6 +299,37 @@ ANALYSES = (
         With --predict the records are steps of a motor on a voltage (ODrive
         recorder): gain and time constant are fitted to them and predict the speed
         over a chirp.
+        """,
+    ),
+    Analysis(
+        name="compare",
+        group="Variants and history",
+        request=StudyAsked,
+        function="analyses.study_asked.compared",
+        doing="comparing",
+        study=True,
+        keeps=True,
+        out="out/compare",
+        words="""
+        Compare variants with their base: margins, bandwidths, verdicts, large signals, cause of each change.
+
+        What is found of each design is kept under --out; an interrupted comparison goes on where it stopped.
+        """,
+    ),
+    Analysis(
+        name="montecarlo",
+        group="Variants and history",
+        request=MonteCarloAsked,
+        function="analyses.monte_carlo.asked.study",
+        shown="monte_carlo",
+        doing="sampling",
+        keeps=True,
+        out="out/montecarlo",
+        words="""
+        Sample the tolerances: distributions, odds of every requirement, worst cases.
+
+        Up to 1000000 samples, each is kept as Parquet under --out; of more, only what they come to. An
+        interrupted run goes on where it stopped.
         """,
     ),
     Analysis(

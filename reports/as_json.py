@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from math import degrees
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
+from actuator_lti.reading import shown_path
 from reports.document import plain
 
 
@@ -34,18 +36,21 @@ def as_json(value: Any) -> Any:
         return {str(key): as_json(item) for key, item in value.items()}
     if isinstance(value, np.ndarray) and not np.iscomplexobj(value):
         return plain(value)
+    if isinstance(value, PurePath):
+        return shown_path(value)
     if isinstance(value, tuple | list | np.ndarray):
         return [as_json(item) for item in value]
     return plain(value)
 
 
 def _named(value: Any) -> Any:
-    """A result by its names; of a loop the figures, not its systems."""
+    """A result by its names, but the fields that ``repr`` leaves out; of a loop the figures."""
     from analyses.loop_figures import LoopFigures
     from reports.loop_json import loop_json
 
     if isinstance(value, LoopFigures):
         return plain(loop_json(value))
-    names = [each.name for each in fields(value)]
-    names += [name for name, one in vars(type(value)).items() if isinstance(one, property)]
-    return {name: as_json(getattr(value, name)) for name in names}
+    names = [each.name for each in fields(value) if each.repr]
+    for kind in type(value).__mro__:
+        names += [name for name, one in vars(kind).items() if isinstance(one, property)]
+    return {name: as_json(getattr(value, name)) for name in dict.fromkeys(names)}

@@ -204,7 +204,7 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     design, figures, onset = survey.design, survey.figures, survey.onset
     makers: dict[str, Callable[[], doc.Section]] = {
         "Requirements": lambda: requirements.section(verdicts, load_unit(design)),
-        "Margins": lambda: margins.section(figures, survey.operating_points),
+        "Margins": lambda: margins.of_loops(figures, survey.operating_points),
     }
     for name, result in figures.items():
         makers[f"Loop {name}"] = partial(loop.section, name, design, result)

@@ -20,7 +20,9 @@ from markupsafe import Markup
 from actuator_lti.tree import Tree
 from reports.document import figures
 from reports.drawing import Progress, draw_all
+from reports.glossary import meaning
 from reports.numbers import MISSING, show, significant
+from reports.scripts import asset, bundled
 from reports.verdict_summary import role, verdict_lines, why
 from reports.visible import visible
 
@@ -110,7 +112,14 @@ def environment() -> Environment:
     )
     made.filters["show"] = show
     made.filters["show_signed"] = show_signed
+    made.globals["term"] = _term
     return made
+
+
+def _term(heading: str) -> Markup:
+    """The attribute by which a heading says its line of the glossary; nothing for a word that has none."""
+    line = meaning(heading)
+    return Markup(' title="{}"').format(line) if line else Markup("")
 
 
 def _seen(value: Any) -> Any:
@@ -119,16 +128,9 @@ def _seen(value: Any) -> Any:
 
 
 @cache
-def asset(name: str) -> str:
-    """Give the text of a style sheet or script that stands beside the templates."""
-    source, _, _ = PackageLoader("reports").get_source(Environment(autoescape=True), name)
-    return source
-
-
-@cache
 def script(*, live: bool = False) -> str:
     """Give the one script of a page: folds and printing, the live figures, and sliders where it has any."""
-    return asset("page.js") + asset("live.js") + (asset("hands_map.js") + asset("hands.js") if live else "")
+    return bundled("folds", "figures", "hands") if live else bundled("folds", "figures")
 
 
 def security_policy(*scripts: str, wasm: bool = False) -> str:

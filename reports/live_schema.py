@@ -56,7 +56,7 @@ class FollowedLimit(TypedDict):
     minimum: float | None
     maximum: float | None
     load: NotRequired[float]
-    lines: NotRequired[list[str]]
+    lines: NotRequired[list[list[str | float]]]
 
 
 class NotFollowed(TypedDict):
@@ -98,7 +98,7 @@ class LiveData(TypedDict):
     axis: str
     keys: list[SliderKey]
     fixed: list[FixedKey]
-    lines: list[str]
+    lines: list[list[str | float]]
     row: list[float | str]
     places: dict[str, int]
     loops: list[str]

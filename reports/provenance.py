@@ -12,9 +12,8 @@ from pathlib import Path
 
 from actuator_lti.errors import InputError
 from actuator_lti.tree import Tree
-from nonlinear.native import kernel_name
 
-LIBRARIES = ("control", "numpy", "scipy", "numba", "matplotlib", "jinja2")
+LIBRARIES = ("control", "numpy", "scipy", "matplotlib", "jinja2")
 
 
 def package_version() -> str:
@@ -43,7 +42,6 @@ def provenance(design_hash: str | None = None) -> Tree:
         "time": build_time(),
         "python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
-        "kernel": kernel_name(),
         "libraries": {name: version(name) for name in LIBRARIES},
     }
 

@@ -32,6 +32,15 @@ class SideBySide:
     blocks: Sequence[Mapping[str, Any]]
 
 
+@dataclass(frozen=True)
+class Brief:
+    """What the terminal prints of an analysis whose sections are too long for it."""
+
+    words: str
+    blocks: Sequence[Mapping[str, Any] | SideBySide]
+    notes: Sequence[str] = ()
+
+
 def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequence[str] = ()) -> None:
     """Print the tables and verdicts among the blocks; figures are for pages."""
     out = console()
@@ -69,6 +78,8 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
     """Print one block; a table that is too wide for the terminal is stacked."""
     if block["kind"] == "table":
         laid = table(block)
+        if Measurement.get(out, out.options.update(width=10_000), laid).maximum > out.width:
+            laid = table(block, narrow=True)
         out.print(laid if _fits(laid, out) else stacked(block))
         if block.get("note"):
             out.print(Text(block["note"], style="dim"))
@@ -84,8 +95,8 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
             _print(inner, out)
 
 
-def table(block: Mapping[str, Any]) -> Table:
-    """Lay a table block out."""
+def table(block: Mapping[str, Any], *, narrow: bool = False) -> Table:
+    """Lay a table block out; ``narrow``: each word of a heading longer than its column on its own line."""
     made = _empty(block["caption"])
     for column in block["columns"]:
         label = " ".join(
@@ -95,6 +106,7 @@ def table(block: Mapping[str, Any]) -> Table:
         longest = max((cell.cell_len for cell in cells), default=0)
         least = longest if column["align"] == "right" else min(longest, WRAPPED)
         least = max(least, *map(len, label.split(" ")))
+        label = label.replace(" ", "\n") if narrow and len(label) > least else label
         made.add_column(Text(label), justify=_side(column["align"]), min_width=least)
     for row in block["rows"]:
         made.add_row(*(_cell(row.get(column["key"]), column["format"]) for column in block["columns"]))

@@ -18,10 +18,12 @@ from actuator_lti.margins.delay_distance import delayed_extreme
 from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, delay_form, from_rational
 from actuator_lti.margins.delay_setting import low_frequency
 from actuator_lti.margins.delayed import delayed_gain_crossings
-from actuator_lti.margins.extremes import COMPLEMENTARY, MODULUS, PEAK
+from actuator_lti.margins.distances import complementary, inverse, modulus
+from actuator_lti.margins.exact_extremes import complementary_margin, modulus_margin
+from actuator_lti.margins.exact_loop import exact_loop
+from actuator_lti.margins.given import Given, given_of
 from actuator_lti.margins.loop import Mask, RationalLoop, rational_loop
 from actuator_lti.margins.measured_data import is_measured
-from actuator_lti.margins.rational import rational_extreme
 from actuator_lti.margins.sweep import subdivided, variation
 from actuator_lti.plain_system import PlainSystem
 from actuator_lti.rest_mode import without_rest_mode
@@ -114,10 +116,10 @@ def _bandwidth(
 
 
 @overload
-def _unwarped(w: float, loop: RationalLoop) -> float: ...
+def _unwarped(w: float, loop: RationalLoop | Given) -> float: ...
 @overload
-def _unwarped(w: float | None, loop: RationalLoop) -> float | None: ...
-def _unwarped(w: float | None, loop: RationalLoop) -> float | None:
+def _unwarped(w: float | None, loop: RationalLoop | Given) -> float | None: ...
+def _unwarped(w: float | None, loop: RationalLoop | Given) -> float | None:
     """From the s-plane of an exact sampled system to rad/s."""
     if w is None or loop.period_s is None:
         return w
@@ -128,7 +130,7 @@ def _of_delays(system: Any, delay_s: float, level: Level) -> Bandwidth:
     form = delay_form(system, delay_s)
     dc = _dc(form)
     falls = delayed_gain_crossings(form.without_series(), abs(dc) * math.sqrt(SQUARES[level]))
-    least, place = delayed_extreme(form.without_series(), PEAK)
+    least, place = delayed_extreme(form.without_series(), inverse)
     peak_db = -20.0 * math.log10(least * abs(dc)) if least > 0.0 else math.inf
     return _bandwidth(list(falls), _first_turn(form, dc), peak_db, place, dc, level)
 
@@ -154,12 +156,15 @@ def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
             if hasattr(system, "delays_s")
             else from_rational(rational_loop(system), delay_s)
         )
-        result = [delayed_extreme(form, criterion) for criterion in (MODULUS, COMPLEMENTARY)]
+        result = [delayed_extreme(form, distance) for distance in (modulus, complementary)]
         unit = 1.0 if form.period_s is None else 1.0 / form.period_s
     else:
-        loop = rational_loop(system.to_state_space() if hasattr(system, "delays_s") else system)
-        result = [rational_extreme(loop, criterion) for criterion in (MODULUS, COMPLEMENTARY)]
-        unit = 1.0 if loop.period_s is None else 1.0 / loop.period_s
+        given = given_of(system.to_state_space() if hasattr(system, "delays_s") else system)
+        loop = exact_loop(given)
+        result = [
+            (value, _unwarped(w, given)) for value, w in (modulus_margin(loop), complementary_margin(loop))
+        ]
+        unit = 1.0
     (s_value, s_place), (t_value, t_place) = result
     return Peaks(_db(s_value), s_place * unit, _db(t_value), t_place * unit)
 

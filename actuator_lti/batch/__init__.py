@@ -1,18 +1,20 @@
-"""Linear figures of many designs at once, compiled: what sampling studies and optimisers call.
+"""Margins, bandwidths and step figures of many designs at once, compiled: what studies and optimisers call.
 
 `Population` says which designs; `linear_figures` gives margins, bandwidths and step figures of all their
 sampled loops; `drive_figures` the static figures that requirements may ask for.
 """
 
-from actuator_lti.batch.figures import Crossovers, LinearFigures, linear_figures
-from actuator_lti.batch.parameters import Population, variable_paths
-from actuator_lti.batch.static import drive_figures
+from actuator_lti.on_first_use import on_first_use
 
-__all__ = [
-    "Crossovers",
-    "LinearFigures",
-    "Population",
-    "drive_figures",
-    "linear_figures",
-    "variable_paths",
-]
+_PUBLIC = {
+    "Crossovers": "actuator_lti.batch.figures",
+    "LinearFigures": "actuator_lti.batch.figures",
+    "Population": "actuator_lti.batch.parameters",
+    "drive_figures": "actuator_lti.batch.static",
+    "linear_figures": "actuator_lti.batch.figures",
+    "variable_paths": "actuator_lti.batch.parameters",
+}
+
+__all__ = sorted(_PUBLIC)
+
+__getattr__, __dir__ = on_first_use(__name__, _PUBLIC)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 
-from ._compiled import kernel
+from actuator_lti.compiled.kernel import kernel
 
 
 @kernel

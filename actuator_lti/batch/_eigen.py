@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 
-from ._compiled import kernel
+from actuator_lti.compiled.kernel import kernel
+
 from ._linalg import balance, hessenberg
 
 EPS = 2.220446049250313e-16

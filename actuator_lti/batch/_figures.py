@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 
-from ._compiled import kernel
+from actuator_lti.compiled.kernel import kernel
+
 from ._complex import distance_at, over, size_at
 from ._response import (
     BANDWIDTH,

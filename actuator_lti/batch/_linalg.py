@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from ._compiled import kernel
+from actuator_lti.compiled.kernel import kernel
 
 LOG_2 = 0.6931471805599453
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 
-from ._compiled import kernel
+from actuator_lti.compiled.kernel import kernel
+
 from ._complex import over, times
 
 GAIN, PHASE, SENSITIVITY, BANDWIDTH, QUARTER, RESONANCE = range(6)

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
+from actuator_lti.compiled.kernel import kernel
 
-from ._compiled import kernel
 from ._figures import (
+    COLUMNS,
     DC_GAIN,
     FINAL,
     GAIN_CROSSOVERS,
@@ -143,8 +143,11 @@ def _closed_figures(count, n, a, b, c, lead, poles, dc, row, xs, rs, ss, work, s
     row[DC_GAIN] = dc
     for i in range(n):
         if math.hypot(poles[2 * n + i] - 1.0, poles[3 * n + i]) <= HIDDEN:
-            real, _imaginary = closed_loop(rs[0], rs[1], xs[0], math.nan if math.isnan(lead) else 0.0)
-            row[DC_GAIN] = real
+            still = math.nan if math.isnan(lead) else 0.0
+            real, _imaginary = closed_loop(rs[0], rs[1], xs[0], still)
+            half_r, half_i = response_at(n, a, b, c, 0.5 * xs[0], work, state, exchanged)
+            nearer, _imaginary = closed_loop(half_r, half_i, 0.5 * xs[0], still)
+            row[DC_GAIN] = nearer + (nearer - real) / 3.0  # even in the angle
     row[FINAL] = row[DC_GAIN]
     resonance(count, xs, rs, ss, lead, row, n, a, b, c, work, state, exchanged)
     if abs(row[DC_GAIN]) < NO_GAIN * row[PEAK_T]:  # speed against a spring: nothing to measure a fall from
@@ -185,14 +188,14 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
     figures are written. The other rows lend their space: see `many_loops`.
     """
     balance(n, a, b, c)
-    hessenberg(n, a, b, c, state)
     for i in range(n):
         a[i * n + i] -= 1.0
+    dc = _closed_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, work, state)
+    hessenberg(n, a, b, c, state)
     kept = _grid(n, poles, points)
     count = scan(n, a, b, c, points, kept, SMOOTH, stack, xs, rs, ss, work, state, exchanged)
     row[RADIUS] = _radius(n, poles)
     row[STABLE] = 1.0 if row[RADIUS] < 1.0 else 0.0
-    dc = _closed_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, work, state)
     _closed_figures(count, n, a, b, c, lead, poles, dc, row, xs, rs, ss, work, state, exchanged)
     if not math.isnan(lead):
         _open_figures(count, n, a, b, c, row, xs, rs, ss, work, state, exchanged)
@@ -204,20 +207,39 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
 
 
 @kernel
-def many_loops(A, B, C, poles, lead, time_figures, out):
-    """Fill out[k] for every open loop A[k], B[k], C[k] by `one_loop`; each by itself."""
-    n = A.shape[1]
-    points, stack = np.empty(POINTS), np.empty(DEEPEST)
-    xs, rs, ss = np.empty(CAPACITY), np.empty(2 * CAPACITY), np.empty(2 * CAPACITY)
-    work, state, exchanged = np.zeros(2 * n * n + 2 * n), np.zeros(2 * n), np.zeros(n)
-    for k in range(A.shape[0]):
-        if np.isnan(poles[k, 0, 0]):
+def _copied(count, source, first, to):
+    """Copy some numbers of a row to the beginning of another."""
+    for i in range(count):
+        to[i] = source[first + i]
+
+
+@kernel
+def many_loops(
+    count, n, A, B, C, poles, leads, time_figures, out,
+    a, b, c, own, row, points, stack, xs, rs, ss, work, state, exchanged,
+):  # fmt: skip
+    """Fill the k-th row of ``out`` for every open loop by `one_loop`, each by itself.
+
+    The loops lie in A, B, C and poles one after the other; those whose first pole is NaN are left as they
+    are. The rows behind ``out`` lend their space, see `room`.
+    """
+    for k in range(count):
+        if math.isnan(poles[4 * n * k]):
             continue
-        a, b, c = np.empty(n * n), B[k].copy(), C[k].copy()
-        for i in range(n):
-            for j in range(n):
-                a[i * n + j] = A[k, i, j]
+        _copied(n * n, A, n * n * k, a)
+        _copied(n, B, n * k, b)
+        _copied(n, C, n * k, c)
+        _copied(4 * n, poles, 4 * n * k, own)
+        _copied(COLUMNS, out, COLUMNS * k, row)
         one_loop(
-            n, a, b, c, poles[k].copy().reshape(-1), lead[k], time_figures, out[k],
+            n, a, b, c, own, leads[k], time_figures > 0, row,
             points, stack, xs, rs, ss, work, state, exchanged,
         )  # fmt: skip
+        for j in range(COLUMNS):
+            out[COLUMNS * k + j] = row[j]
+
+
+def room(n):
+    """Lengths of the rows that `many_loops` works in, from ``a`` on."""
+    loop = (n * n, n, n, 4 * n, COLUMNS)
+    return (*loop, POINTS, DEEPEST, CAPACITY, 2 * CAPACITY, 2 * CAPACITY, 2 * n * n + 2 * n, 2 * n, n)

@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import math
 
-from ._compiled import kernel
+from actuator_lti.compiled.kernel import kernel
+
 from ._figures import FINAL, HIDDEN, OVERSHOOT, RADIUS, RISE, SETTLING
 
 LONGEST = 4_000_000  # ticks

@@ -294,10 +294,9 @@ def _fill(
 
 def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -> None:
     """Write the figures of a stacked open loop (lead NaN: of a closed loop's response)."""
+    from actuator_lti.batch.library import many_loops
     from actuator_lti.batch.rest import at_rest
     from actuator_lti.batch.withheld import withhold
-
-    from ._run import many_loops
 
     A, B, C = _stacked(block, len(rows))
     leads = np.array(np.broadcast_to(np.asarray(lead, dtype=float), len(rows)))
@@ -306,7 +305,7 @@ def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -
     result = [np.linalg.eigvals(np.where(finite[:, None, None], each, 0.0)) for each in (A, closed)]
     poles = np.stack([part for each in result for part in (each.real, each.imag)], axis=1)
     poles[~finite] = np.nan
-    many_loops(A.copy(), B.copy(), C.copy(), poles, leads, time_figures, rows)
+    many_loops(A, B, C, poles, leads, time_figures, rows)
     if not np.isnan(leads).any():
         at_rest(A, B, C, rows)
         withhold(A, B, C, poles, rows)

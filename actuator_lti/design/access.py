@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from difflib import get_close_matches
 from math import inf
 from typing import Any
 
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in
+from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design, Parameter
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.sections import part_at, parts_of, with_part
 from actuator_lti.design.tolerances import rescaled
+from actuator_lti.design.units import si_text
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 
@@ -41,10 +42,12 @@ def located(design: Design, path: str) -> tuple[Field, Any]:
     InputError
         If there is no such key, or the design has no such stage.
     """
+    if not isinstance(design, Design) or not isinstance(path, str):
+        given = f"design = {shown(design)}, key = {shown(path)}"
+        raise InputError(f"{given}: allowed: a Design (load_design) and a dotted key")
     field = field_of(path)
     if field is None or field.kind not in ("quantity", "integer"):
-        near = get_close_matches(path, paths_of(design), 1, 0.5)
-        hint = f' (nearest known: "{near[0]}")' if near else ""
+        hint = nearest(path, paths_of(design))
         raise InputError(f"{shown(path)}: unknown parameter{hint}; allowed: a numeric key of the design file")
     part = part_at(design, path.rpartition(".")[0])
     if part is None:
@@ -125,23 +128,17 @@ def _allowed(field: Field, path: str, value: float, structure: Structure) -> flo
 
 
 def _changed(old: Parameter | None, field: Field, path: str, value: float, structure: Structure) -> Parameter:
-    unit = field.unit(structure)
-    text = repr(value) if unit == "1" else f"{value!r} {unit}"
-    if old is None:
-        return Parameter(path=path, text=text, value=value, unit=unit, symbol=field.symbol, source="changed")
-    if old.value == value:
+    if old is not None and old.value == value:
         return old
-    tolerance = None if old.tolerance is None else rescaled(old.tolerance, value)
-    return Parameter(
-        path=path,
-        text=text,
-        value=value,
-        unit=unit,
-        symbol=field.symbol,
-        source=f"changed from {old.text}",
-        grade=old.grade if old.source.startswith("changed") else "",
-        tolerance=tolerance,
+    unit = field.unit(structure)
+    new = Parameter(
+        path=path, text=si_text(value, unit), value=value, unit=unit, symbol=field.symbol, source="changed"
     )
+    if old is None:
+        return new
+    grade = old.grade if old.source.startswith("changed") else ""
+    tolerance = None if old.tolerance is None else rescaled(old.tolerance, value)
+    return replace(new, source=f"changed from {old.text}", grade=grade, tolerance=tolerance)
 
 
 def _replaced(
@@ -159,12 +156,10 @@ def pedigrees(design: Design) -> tuple[Parameter, ...]:
     for path in paths_of(design):
         known = design.parameters.get(path)
         if known is None:
-            field, _ = located(design, path)
-            value, unit = parameter_value(design, path), field.unit(structure)
-            text = f"{value:g}" if unit == "1" else f"{value:g} {unit}"
-            known = Parameter(
-                path=path, text=text, value=value, unit=unit, symbol=field.symbol, source="default"
-            )
+            value, field = parameter_value(design, path), located(design, path)[0]
+            known = _changed(None, field, path, value, structure)
+            text = f"{value:g}" if known.unit == "1" else f"{value:g} {known.unit}"
+            known = replace(known, text=text, source="default")
         result.append(known)
     return tuple(result)
 

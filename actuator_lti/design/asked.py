@@ -4,7 +4,19 @@ from dataclasses import dataclass
 from math import inf
 from typing import Annotated, Literal
 
-from actuator_lti.design.field import BIG, Axis, positive, quantities, quantity
+from actuator_lti.design.field import (
+    BIG,
+    Axis,
+    choice,
+    day,
+    label,
+    limit,
+    positive,
+    quantities,
+    quantity,
+    text,
+)
+from actuator_lti.quantities import QUANTITIES
 
 # fmt: off
 Rotor = Literal["free", "locked"]
@@ -28,13 +40,13 @@ class Failure:
         "detection_time", "s", "", "from a failure to its detection; default 0.1 s", high=1e4,
         example="50 ms")] = None
     load_Nm: Annotated[float | None, quantity(
-        "load", "{torque}", "", "moment that pushes the output forward; default none",
+        "load", "{torque}", "", "load torque that pushes the output forward; default none",
         example="4 N*m")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class DutyCycle:
-    """The duty that the drive has to do for ever; ``None`` is what `analyses.duty.Asked` takes for it."""
+    """The duty within the continuous rating; ``None`` is what `analyses.duty.Asked` takes for it."""
 
     amplitude_rad: Annotated[float | None, positive(
         "amplitude", "{angle}", "", "peak of the sine, output side; default half the full deflection",
@@ -42,7 +54,7 @@ class DutyCycle:
     frequency_rad_s: Annotated[float | None, positive(
         "frequency", "rad/s", "", "of the sine; default 1 Hz", example="0.5 Hz")] = None
     load_Nm: Annotated[float | None, quantity(
-        "load", "{torque}", "", "moment at the output, all the time; default the largest of validation.loads",
+        "load", "{torque}", "", "load torque, all the time; default the largest of validation.loads",
         example="4 N*m")] = None
     share: Annotated[float | None, positive(
         "share", "1", "", "share of the time in motion; default 1", high=1.0, example="0.4")] = None
@@ -65,29 +77,26 @@ class Validation:
         "amplitude_fractions", "1", "amplitudes as fractions of the full deflection", low=1e-09,
         high=1.0)] = (0.05, 0.1, 0.25, 0.5, 1.0)
     loads_Nm: Annotated[tuple[float, ...], quantities(
-        "loads", "{torque}", "load moments to look at", low=-BIG, high=BIG)] = (0.0,)
+        "loads", "{torque}", "load torques to look at", low=-BIG, high=BIG)] = (0.0,)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Requirement:
-    """A limit on a figure; ``loop`` is a loop name, ``"every"``, or ``None`` for the whole drive.
+    """A limit on a figure; ``loop`` is a loop name, ``"every"``, or ``None`` for the whole drive."""
 
-    ``rotor`` says which current loop is meant: ``"free"`` (default) or ``"locked"``. ``to`` says which
-    response of the position loop a bandwidth, resonance or step is of: to the user's ``"command"`` (default),
-    profile and filter of the command included, or to the ``"reference"`` behind them.
-    """
-
-    id: str
-    quantity: str
+    id: Annotated[str, label("what reports call it")]
+    quantity: Annotated[str, choice("quantity", "the figure that is limited", tuple(QUANTITIES))]
+    loop: Annotated[str | None, text("name of a loop, or every; not for a figure of the drive")] = None
+    rotor: Annotated[Rotor | None, choice("rotor", "which current loop is meant; default free")] = None
+    to: Annotated[ResponseTo | None, choice(
+        "to", "which response of the position loop: to the user's command (default), its profile and filter "
+        "included, or to the reference behind them")] = None
+    minimum: Annotated[float | None, limit("smallest value allowed")] = None
+    maximum: Annotated[float | None, limit("largest value allowed")] = None
+    load_Nm: Annotated[float | None, quantity("load", "{torque}", "", "load torque at which it holds")] = None
+    source: Annotated[str, text("where the limit comes from")] = ""
+    note: Annotated[str, text("any remark")] = ""
     unit: str
-    minimum: float | None = None
-    maximum: float | None = None
-    loop: str | None = None
-    rotor: Rotor | None = None
-    to: ResponseTo | None = None
-    load_Nm: float | None = None
-    source: str = ""
-    note: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,14 +106,33 @@ class Waiver:
     ``requirement`` is the id as reports have it, ``id/loop`` of a requirement on every loop.
     """
 
-    requirement: str
-    reason: str
-    date: str
+    requirement: Annotated[str, text("id of the requirement or check")]
+    reason: Annotated[str, label("why it is waived")]
+    date: Annotated[str, day("when it was waived")]
 
     @property
     def words(self) -> str:
         """As reports write it."""
         return f"waived {self.date}: {self.reason}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Correlation:
+    """Correlation coefficient between two toleranced parameters, named by their dotted keys."""
+
+    first: Annotated[str, text("dotted key with a tolerance")]
+    second: Annotated[str, text("another one")]
+    coefficient: Annotated[float, quantity("coefficient", "1", "", "their correlation", low=-1.0, high=1.0)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fact:
+    """Something known of the drive that no equation needs, as text with its pedigree."""
+
+    label: Annotated[str, text("what is known")]
+    value: Annotated[str, text("as text")]
+    source: Annotated[str, text("where it comes from")] = ""
+    grade: Annotated[str, text("A to D or X")] = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,25 +163,6 @@ class Parameter:
     source: str = ""
     grade: str = ""
     tolerance: Tolerance | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Correlation:
-    """Correlation coefficient between two toleranced parameters, named by their dotted keys."""
-
-    first: str
-    second: str
-    coefficient: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fact:
-    """Something known of the drive that no equation needs, as text with its pedigree."""
-
-    label: str
-    value: str
-    source: str = ""
-    grade: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,202 +2,170 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from math import inf, pi
 
 from actuator_lti.design.control import stable_pair
+from actuator_lti.design.fields import fields_in
+from actuator_lti.design.mistakes import Refusal
 from actuator_lti.design.model import FILTER_KEYS, Design, Filter
-from actuator_lti.errors import InputError
 
 MAX_FILTERS = 8  # of each place; the running drive has room for so many second-order sections
 MAX_MAP_POINTS = 16  # of each direction
+_BELOW_NYQUIST = ("frequency_rad_s", "zero_rad_s", "pole_rad_s")
 TRACKING_LIMIT = 0.828  # w0 T at which the tracking loop of model.md section 7 becomes unstable: 2 sqrt 2 - 2
-Refuse = Callable[[str, object, str], InputError]
-
-_KEY_OF = {"frequency_rad_s": "frequency", "width_rad_s": "width", "zero_rad_s": "zero", "pole_rad_s": "pole"}
 
 
-def check_control(design: Design, where: str) -> None:
-    """Refuse settings of the controller that contradict each other.
-
-    Raises
-    ------
-    InputError
-        One line: key, value and what is allowed.
-    """
-
-    def refuse(key: str, value: object, allowed: str) -> InputError:
-        return InputError(f"{key} = {value}: {allowed}", where=where)
-
-    for check in (
-        _filters, _speed_sensor, _anti_windup, _position, _overload, _supply, _temperature, _command,
-        _gravity, _friction_map, _instruments,
-    ):  # fmt: skip
-        check(design, refuse)
-
-
-def _filters(design: Design, refuse: Refuse) -> None:
+def _filters(design: Design) -> Iterator[Refusal]:
     velocity = design.controller.velocity
     if velocity is None:
         return
     for place in ("torque", "speed"):
-        if len(velocity.filters_on(place)) > MAX_FILTERS:
-            count = len(velocity.filters_on(place))
-            raise refuse("control.velocity.filter", f"{count} on {place}", f"allowed: at most {MAX_FILTERS}")
+        count = len(velocity.filters_on(place))
+        if count > MAX_FILTERS:
+            yield "control.velocity.filter", f"{count} on {place}", f"allowed: at most {MAX_FILTERS}"
     nyquist = pi / (velocity.every * design.controller.period_s)
     for number, item in enumerate(velocity.filters, 1):
-        _filter(item, f"control.velocity.filter.{number}", nyquist, refuse)
+        yield from _filter(item, f"control.velocity.filter.{number}", nyquist)
 
 
-def _filter(item: Filter, path: str, nyquist: float, refuse: Refuse) -> None:
+def _filter(item: Filter, path: str, nyquist: float) -> Iterator[Refusal]:
     needed, optional = FILTER_KEYS[item.kind]
     fresh = Filter(kind=item.kind)
-    for name in (*_KEY_OF, "b", "a", "order", "damping", "depth"):
-        value, key = getattr(item, name), _KEY_OF.get(name, name)
+    for field in fields_in("control.velocity.filter.*"):
+        name, value, key = field.attribute, getattr(item, field.attribute), f"{path}.{field.key}"
+        if name in ("kind", "on"):
+            continue
         if name in needed and value in (None, ()):
-            raise refuse(f"{path}.{key}", "nothing", f'missing; a "{item.kind}" needs it')
-        if name not in needed | optional and value != getattr(fresh, name):
-            raise refuse(f"{path}.{key}", value, f'not allowed with kind = "{item.kind}"')
-        if key != name and name != "width_rad_s" and value is not None and value >= nyquist:
-            raise refuse(
-                f"{path}.{key}",
-                f"{value:.6g} rad/s",
-                f"allowed: below the velocity loop's Nyquist frequency, {nyquist:.6g} rad/s",
-            )
+            yield key, "nothing", f'missing; a "{item.kind}" needs it'
+        elif name not in needed | optional and value != getattr(fresh, name):
+            yield key, value, f'not allowed with kind = "{item.kind}"'
+        elif name in _BELOW_NYQUIST and value is not None and value >= nyquist:
+            allowed = f"allowed: below the velocity loop's Nyquist frequency, {nyquist:.6g} rad/s"
+            yield key, f"{value:.6g} rad/s", allowed
     if item.kind == "biquad":
-        _biquad(item, path, refuse)
+        yield from _biquad(item, path)
 
 
-def _biquad(item: Filter, path: str, refuse: Refuse) -> None:
-    if not 1 <= len(item.b) <= 3:
-        raise refuse(f"{path}.b", f"{len(item.b)} values", "allowed: 1 to 3, b0 b1 b2")
-    if not 1 <= len(item.a) <= 2:
-        raise refuse(f"{path}.a", f"{len(item.a)} values", "allowed: 1 or 2, a1 a2, after a leading 1")
-    if not stable_pair(*(*item.a, 0.0)[:2]):
-        raise refuse(f"{path}.a", f"{list(item.a)}", "allowed: poles inside the unit circle")
+def _biquad(item: Filter, path: str) -> Iterator[Refusal]:
+    if len(item.b) > 3:
+        yield f"{path}.b", f"{len(item.b)} values", "allowed: 1 to 3, b0 b1 b2"
+    if len(item.a) > 2:
+        yield f"{path}.a", f"{len(item.a)} values", "allowed: 1 or 2, a1 a2, after a leading 1"
+    elif not stable_pair(*(*item.a, 0.0, 0.0)[:2]):
+        yield f"{path}.a", f"{list(item.a)}", "allowed: poles inside the unit circle"
 
 
-def _speed_sensor(design: Design, refuse: Refuse) -> None:
+def _speed_sensor(design: Design) -> Iterator[Refusal]:
     encoder, velocity = design.encoder, design.controller.velocity
-    if encoder.speed != "tracking":
-        if encoder.bandwidth_rad_s is not None:
-            raise refuse(
-                "encoder.bandwidth", f"{encoder.bandwidth_rad_s:g}", 'allowed with speed = "tracking"'
-            )
-        return
-    if encoder.bandwidth_rad_s is None:
-        raise refuse("encoder.speed", '"tracking"', 'needs encoder.bandwidth, such as bandwidth = "300 Hz"')
-    period = design.controller.period_s * (velocity.every if velocity else 1)
-    if encoder.bandwidth_rad_s * period >= TRACKING_LIMIT:
-        raise refuse(
-            "encoder.bandwidth",
-            f"{encoder.bandwidth_rad_s:.6g} rad/s",
-            f"too fast for its period of {period:g} s; allowed: below {TRACKING_LIMIT / period:.6g} rad/s",
-        )
+    w0 = encoder.bandwidth_rad_s
+    most = TRACKING_LIMIT / (design.controller.period_s * (velocity.every if velocity else 1))
+    if encoder.speed != "tracking" and w0 is not None:
+        yield "encoder.bandwidth", f"{w0:g}", 'allowed with speed = "tracking"'
+    elif encoder.speed == "tracking" and w0 is None:
+        yield "encoder.speed", '"tracking"', 'needs encoder.bandwidth, such as bandwidth = "300 Hz"'
+    elif w0 is not None and w0 >= most:
+        allowed = f"too fast for its period of {TRACKING_LIMIT / most:g} s; allowed: below {most:.6g} rad/s"
+        yield "encoder.bandwidth", f"{w0:.6g} rad/s", allowed
 
 
-def _anti_windup(design: Design, refuse: Refuse) -> None:
+def _anti_windup(design: Design) -> Iterator[Refusal]:
     for name in ("velocity", "current"):
-        loop = getattr(design.controller, name)
+        loop, path = getattr(design.controller, name), f"control.{name}"
         if loop is None:
             continue
         if loop.tracking_time_s is not None and loop.anti_windup != "back-calculation":
-            raise refuse(
-                f"control.{name}.tracking_time",
-                f"{loop.tracking_time_s:g} s",
-                'allowed with anti_windup = "back-calculation"',
-            )
+            allowed = 'allowed with anti_windup = "back-calculation"'
+            yield f"{path}.tracking_time", f"{loop.tracking_time_s:g} s", allowed
         if loop.anti_windup != "conditional" and loop.integral_time_s is None:
-            raise refuse(f"control.{name}.anti_windup", f'"{loop.anti_windup}"', "needs integral_time")
+            yield f"{path}.anti_windup", f'"{loop.anti_windup}"', "needs integral_time"
 
 
-def _position(design: Design, refuse: Refuse) -> None:
+def _position(design: Design) -> Iterator[Refusal]:
     position = design.controller.position
-    if position is None or design.controller.velocity is not None:
-        return
-    for key in ("feedforward", "acceleration_feedforward", "friction_feedforward"):
-        value = getattr(position, key)
-        if value:
-            raise refuse(f"control.position.{key}", f"{value:g}", "allowed: 0 without a velocity loop")
+    if position is not None and design.controller.velocity is None:
+        for key in ("feedforward", "acceleration_feedforward", "friction_feedforward"):
+            value = getattr(position, key)
+            if value:
+                yield f"control.position.{key}", f"{value:g}", "allowed: 0 without a velocity loop"
 
 
-def _overload(design: Design, refuse: Refuse) -> None:
+def _overload(design: Design) -> Iterator[Refusal]:
     limits = design.limits
+    peak, continuous = limits.peak_current_A, limits.continuous_current_A
     if limits.peak_time_s is None:
         return
-    shown = f"{limits.peak_time_s:g} s"
-    if design.controller.current is None:
-        raise refuse("limits.peak_time", shown, "needs a current loop, [control.current]")
-    if not (limits.peak_current_A < inf and limits.continuous_current_A < inf):
-        raise refuse("limits.peak_time", shown, "needs limits.peak_current and limits.continuous_current")
-    if limits.peak_current_A <= limits.continuous_current_A:
-        raise refuse("limits.peak_time", shown, "allowed: with peak_current above continuous_current")
+    needs = [
+        ("needs a current loop, [control.current]", design.controller.current is not None),
+        ("needs limits.peak_current and limits.continuous_current", peak < inf and continuous < inf),
+        ("allowed: with peak_current above continuous_current", continuous < peak or continuous == inf),
+    ]
+    for words, met in needs:
+        if not met:
+            yield "limits.peak_time", f"{limits.peak_time_s:g} s", words
 
 
-def _supply(design: Design, refuse: Refuse) -> None:
+def _supply(design: Design) -> Iterator[Refusal]:
     supply, voltage = design.supply, design.limits.voltage_V
     if supply is None:
         return
+    brake = supply.brake_voltage_V
     if not design.motor.has_electrical_dynamics:
-        raise refuse("supply", "a table", "not allowed with motor.source_gain, which draws no current")
-    if supply.brake_voltage_V is not None and supply.brake_voltage_V < voltage:
-        raise refuse(
-            "supply.brake_voltage",
-            f"{supply.brake_voltage_V:g} V",
-            f"allowed: at least limits.voltage = {voltage:g} V",
-        )
+        yield "supply", "a table", "not allowed with motor.source_gain, which draws no current"
+    if brake is not None and brake < voltage:
+        yield "supply.brake_voltage", f"{brake:g} V", f"allowed: at least limits.voltage = {voltage:g} V"
     if supply.regenerative:
-        for key, value in (("capacitance", supply.capacitance_F), ("brake_voltage", supply.brake_voltage_V)):
+        for key, value in (("capacitance", supply.capacitance_F), ("brake_voltage", brake)):
             if value is not None:
-                raise refuse(f"supply.{key}", f"{value:g}", "allowed with regenerative = false")
+                yield f"supply.{key}", f"{value:g}", "allowed with regenerative = false"
     elif supply.capacitance_F is None:
-        raise refuse("supply.regenerative", "false", "needs supply.capacitance, which takes the energy")
+        yield "supply.regenerative", "false", "needs supply.capacitance, which takes the energy"
 
 
-def _temperature(design: Design, refuse: Refuse) -> None:
+def _temperature(design: Design) -> Iterator[Refusal]:
     heat = design.temperature
     if heat is None:
         return
     if not design.motor.has_electrical_dynamics:
-        raise refuse("temperature", "a table", "not allowed with motor.source_gain, which has no winding")
-    resistance = 1.0 + heat.resistance_per_K * (heat.winding_degC - heat.reference_degC)
-    magnet = 1.0 + heat.magnet_per_K * (heat.magnet_degC - heat.reference_degC)
-    for key, value, factor in (
-        ("winding", heat.winding_degC, resistance),
-        ("magnet", heat.magnet_degC, magnet),
+        yield "temperature", "a table", "not allowed with motor.source_gain, which has no winding"
+    for key, value, per_K in (
+        ("winding", heat.winding_degC, heat.resistance_per_K),
+        ("magnet", heat.magnet_degC, heat.magnet_per_K),
     ):
-        if factor < 0.05:
-            raise refuse(f"temperature.{key}", f"{value:g} degC", "R, kM and kE must keep 5 % of their value")
+        if 1.0 + per_K * (value - heat.reference_degC) < 0.05:
+            yield f"temperature.{key}", f"{value:g} degC", "R, kM and kE must keep 5 % of their value"
 
 
-def _command(design: Design, refuse: Refuse) -> None:
-    command, limits, ratio = design.command, design.limits, design.total_ratio
-    profile = {
-        "rate": command.rate_rad_s,
-        "acceleration": command.acceleration_rad_s2,
-        "jerk": command.jerk_rad_s3,
+def _command(design: Design) -> Iterator[Refusal]:
+    limits, ratio = design.limits, design.total_ratio
+    given = {
+        field.key: value
+        for field in fields_in("command")
+        if field.key in _PROFILE and (value := getattr(design.command, field.attribute)) < inf
     }
-    given = {key: value for key, value in profile.items() if value < inf}
-    if given and design.controller.position is None:
-        key, value = next(iter(given.items()))
-        raise refuse(f"command.{key}", _written(design, key, value), "allowed with a position loop")
-    for key, outer in (("acceleration", "rate"), ("jerk", "acceleration")):
-        if key in given and outer not in given:
-            raise refuse(f"command.{key}", _written(design, key, given[key]), f"needs command.{outer}")
-    for key, limit in (("rate", limits.speed_rad_s), ("acceleration", limits.acceleration_rad_s2)):
-        if key in given and given[key] * ratio > limit * (1 + 1e-9):
-            name = {"rate": "speed", "acceleration": "acceleration"}[key]
+    for key, value in given.items():
+        power, outer, limiter = _PROFILE[key]
+        limit = getattr(limits, f"{limiter}_rad_s{power.strip('^')}") if limiter else inf
+        path, text = f"command.{key}", _written(design, key, value)
+        if design.controller.position is None:
+            yield path, text, "allowed with a position loop"
+        if outer and outer not in given:
+            yield path, text, f"needs command.{outer}"
+        if value * ratio > limit * (1 + 1e-9):
             most = f"{limit / ratio:.6g} {_unit(design, key)}"
             if design.axis == "rotary":
                 most += f" ({limit / ratio * (180.0 / pi):.6g} {_unit(design, key).replace('rad', 'deg')})"
-            words = f"faster than limits.{name}; allowed: at most {most} at the output"
-            raise refuse(f"command.{key}", _written(design, key, given[key]), words)
+            yield path, text, f"faster than limits.{limiter}; allowed: at most {most} at the output"
+
+
+# of a key of the profile: power of its unit, the key that it needs, the limit that it has to keep
+_PROFILE = {"rate": ("", "", "speed"), "acceleration": ("^2", "rate", "acceleration"),
+            "jerk": ("^3", "acceleration", "")}  # fmt: skip
 
 
 def _unit(design: Design, key: str) -> str:
     """SI unit of a profile's limit."""
-    power = {"rate": "", "acceleration": "^2", "jerk": "^3"}[key]
-    return ("m/s" if design.axis == "linear" else "rad/s") + power
+    return ("m/s" if design.axis == "linear" else "rad/s") + _PROFILE[key][0]
 
 
 def _written(design: Design, key: str, value: float) -> str:
@@ -206,40 +174,41 @@ def _written(design: Design, key: str, value: float) -> str:
     return f"{value:.6g} {_unit(design, key)}" if parameter is None else parameter.text
 
 
-def _gravity(design: Design, refuse: Refuse) -> None:
+def _gravity(design: Design) -> Iterator[Refusal]:
     if design.load.gravity is not None and design.axis == "linear":
-        raise refuse(
-            "load.gravity", "a table", "allowed on a rotary axis; a linear one takes a constant load"
-        )
+        yield "load.gravity", "a table", "allowed on a rotary axis; a linear one takes a constant load"
 
 
-def _friction_map(design: Design, refuse: Refuse) -> None:
+def _friction_map(design: Design) -> Iterator[Refusal]:
     friction = design.friction
     if not friction.points:
         return
     if friction.law != "coulomb":
-        raise refuse("friction.law", f'"{friction.law}"', 'allowed with friction.point: "coulomb"')
+        yield "friction.law", f'"{friction.law}"', 'allowed with friction.point: "coulomb"'
     for key, value in (("dry_torque", friction.dry_torque_Nm), ("viscous", friction.viscous_Nms_rad)):
         if value:
-            raise refuse(f"friction.{key}", f"{value:g}", "not allowed beside friction.point")
+            yield f"friction.{key}", f"{value:g}", "not allowed beside friction.point"
     for name, direction in (("forward", 1), ("reverse", -1)):
-        speeds = [point.speed_rad_s for point in friction.map(direction)]
+        points = friction.map(direction)
+        speeds, torques = [point.speed_rad_s for point in points], [point.torque_Nm for point in points]
         if not speeds or speeds[0] != 0.0:
-            raise refuse("friction.point", f"{name}", "allowed: the first point at speed 0")
+            yield "friction.point", name, "allowed: the first point at speed 0"
         if any(speed in speeds[:k] for k, speed in enumerate(speeds)):
-            raise refuse("friction.point", f"{name}", "allowed: each speed once")
+            yield "friction.point", name, "allowed: each speed once"
         if len(speeds) > MAX_MAP_POINTS:
-            raise refuse("friction.point", f"{len(speeds)} points", f"allowed: at most {MAX_MAP_POINTS}")
-        last = friction.map(direction)[-2:]
-        if len(last) == 2 and last[1].torque_Nm < last[0].torque_Nm:
-            raise refuse(
-                "friction.point", f"{name}", "allowed: not falling at the end, as the last slope continues"
-            )
+            yield "friction.point", f"{len(speeds)} points", f"allowed: at most {MAX_MAP_POINTS}"
+        if len(torques) > 1 and torques[-1] < torques[-2]:
+            yield "friction.point", name, "allowed: not falling at the end, as the last slope continues"
 
 
-def _instruments(design: Design, refuse: Refuse) -> None:
-    jitter, period = design.instruments.jitter_s, design.controller.period_s
-    if jitter > period / 10:
-        raise refuse(
-            "instruments.jitter", f"{jitter:g} s", f"allowed: at most a tenth of a tick, {period / 10:g} s"
-        )
+def _instruments(design: Design) -> Iterator[Refusal]:
+    jitter, most = design.instruments.jitter_s, design.controller.period_s / 10
+    if jitter > most:
+        yield "instruments.jitter", f"{jitter:g} s", f"allowed: at most a tenth of a tick, {most:g} s"
+
+
+CONTROL_CHECKS = (
+    _filters, _speed_sensor, _anti_windup, _position, _overload, _supply, _temperature, _command,
+    _gravity, _friction_map, _instruments,
+)  # fmt: skip
+"""Each gives the settings that contradict each other: key, value, what is allowed."""

@@ -4,75 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from actuator_lti.design.mistakes import Refusal
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 
 
-def check_place(design: Design, where: str) -> None:
-    """Refuse a coupling after a gear that is none; whatever asks for an inertia needs its place.
-
-    Raises
-    ------
-    InputError
-    """
+def check_place(design: Design) -> Iterator[Refusal]:
+    """Refuse names of gears that are none; whatever asks for an inertia needs the coupling's place."""
     after = None if design.coupling is None else design.coupling.after
     names = [gear.name for gear in design.gears]
-    if after is not None and after not in names:
-        known = ", ".join(names) or "none, as there are no gears; leave it out"
-        raise InputError(f"coupling.after = {shown(after)}: is no gear; allowed: {known}", where=where)
+    for key, name in (("coupling.after", after), ("load.locking_gear", design.load.locking_gear)):
+        if name is not None and name not in names:
+            known = ", ".join(names) or "none, as there are no gears; leave it out"
+            yield key, shown(name), f"is no gear; allowed: {known}"
 
 
-def check_elastic(design: Design, where: str) -> None:
+def check_elastic(design: Design) -> Iterator[Refusal]:
     """Refuse a drive train that the event-driven plant cannot be.
 
-    Raises
-    ------
-    InputError
-        One line: a coupling or play without an inertia behind it, with the tanh law, or before the
-        self-locking stage; a self-locking stage whose friction would give energy; friction of a load that
-        has no coupling before it; a breakaway ratio below 1.
+    A coupling or play without an inertia behind it, with the tanh law, or before the self-locking stage; a
+    self-locking stage whose friction would give energy; friction of a load that has no coupling before it.
     """
-
-    def refuse(key: str, value: object, allowed: str) -> InputError:
-        return InputError(f"{key} = {value}: {allowed}", where=where)
-
     coupling, friction = design.coupling, design.load.friction
-    if friction is not None and friction.breakaway_ratio < 1.0:
-        raise refuse("load.friction.breakaway_ratio", f"{friction.breakaway_ratio:g}", "allowed: at least 1")
+    if friction is not None and coupling is None:
+        yield "load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone"
     if coupling is None:
-        if friction is not None:
-            raise refuse(
-                "load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone"
-            )
         return
     if design.load_side_inertia_kgm2 <= 0.0:
-        raise refuse(
-            "coupling.stiffness",
-            f"{coupling.stiffness_Nm_rad:g}",
-            "allowed with an inertia behind it; load.inertia, or that of a gear behind it, is missing",
-        )
+        allowed = "allowed with an inertia behind it; load.inertia, or that of a gear behind it, is missing"
+        yield "coupling.stiffness", f"{coupling.stiffness_Nm_rad:g}", allowed
     if design.friction.law == "tanh":
-        raise refuse("friction.law", '"tanh"', 'allowed with a coupling: "coulomb"')
-    if design.load.path == "self-locking":
-        _self_locking(design, where)
-
-
-def _self_locking(design: Design, where: str) -> None:
-    """The self-locking stage is the last gear; the coupling comes behind it."""
-    if design.ratio_behind_coupling != 1.0 or design.gears_before_coupling < len(design.gears):
-        raise InputError(
-            f'coupling.after = "{design.coupling.after if design.coupling else ""}": lies before the '
-            "self-locking stage; allowed: the last gear, or load.path = back-drivable",
-            where=where,
+        yield "friction.law", '"tanh"', 'allowed with a coupling: "coulomb"'
+    names, locking = [gear.name for gear in design.gears], design.load.locking_gear
+    locks = names.index(locking) + 1 if locking else len(names)
+    if design.load.path != "self-locking":
+        if locking is not None:
+            yield "load.locking_gear", f'"{locking}"', 'allowed with load.path = "self-locking"'
+        return
+    least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
+    if design.gears_before_coupling < locks:
+        allowed = (
+            f"lies before the self-locking stage; allowed: {', '.join(names[locks - 1 :])}, "
+            "load.locking_gear with a gear before the coupling, or load.path = back-drivable"
         )
-    least = 1.0 / design.ratio_to_coupling
-    if design.friction.load_coefficient < least * (1 - 1e-12):
-        raise InputError(
-            f"friction.load_coefficient = {design.friction.load_coefficient:g}: a self-locking stage "
-            f"with less than 1/N_c gives energy; allowed: at least {least:g}",
-            where=where,
-        )
+        yield "coupling.after", f'"{coupling.after or ""}"', allowed
+    elif coefficient < least * (1 - 1e-12):
+        allowed = f"a self-locking stage with less than 1/N gives energy; allowed: at least {least:g}"
+        yield "friction.load_coefficient", f"{coefficient:g}", allowed
 
 
 def elastic_warnings(design: Design) -> Iterator[str]:
@@ -81,7 +59,7 @@ def elastic_warnings(design: Design) -> Iterator[str]:
     if design.coupling is not None and design.coupling.damping_Nms_rad == 0.0:
         free = behind is None or not (behind.viscous_Nms_rad or behind.dry_torque_Nm)
         if free:
-            yield "coupling.damping: 0, and no load.friction: with the motor at rest the load rings for ever"
+            yield "coupling.damping: 0, and no load.friction: with the motor at rest the load keeps ringing"
     least = 1.0 / design.total_ratio
     loaded = design.load.moment_max_Nm > 0.0
     rigid = design.coupling is None and design.load.path == "self-locking"

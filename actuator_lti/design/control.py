@@ -330,7 +330,7 @@ class Limits:
         "current_rate", "A/s", "", "largest change of the current command (torque slope)",
         example="2000 A/s")] = inf
     continuous_current_A: Annotated[float, positive(
-        "continuous_current", "A", "i_cont", "current allowed for ever (no clamp)", example="4 A")] = inf
+        "continuous_current", "A", "i_cont", "current allowed continuously (no clamp)", example="4 A")] = inf
     peak_time_s: Annotated[float | None, positive(
         "peak_time", "s", "t_peak",
         "time that the peak current is allowed for, from cold; then the overload protection (I2t) acts",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,10 +12,12 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
 Axis = Literal["rotary", "linear"]
-Kind = Literal["quantity", "integer", "quantities", "choice", "flag", "text"]
+Kind = Literal["quantity", "integer", "quantities", "choice", "flag", "text", "label", "day", "limit"]
 
 BIG = 1e12
 SMALL = 1e-18
+MANY = 12  # choices, from which on they are not listed
+_WORDS = {"flag": "true or false", "text": "text", "label": "a text", "day": "a day, YYYY-MM-DD"}
 _AXES: dict[str, dict[str, str]] = {
     "rotary": {"angle": "rad", "torque": "N*m", "inertia": "kg*m^2"},
     "linear": {"angle": "m", "torque": "N", "inertia": "kg"},
@@ -95,8 +98,10 @@ class Field:
 
     def allowed(self, unit: str) -> str:
         """The allowed range in words."""
-        if self.kind == "flag":
-            return "true or false"
+        if self.kind in _WORDS:
+            return _WORDS[self.kind]
+        if len(self.choices) > MANY:
+            return f"one of {len(self.choices)}, see Requirement quantities in the documentation"
         if self.choices:
             return " or ".join(f'"{choice}"' for choice in self.choices)
         shown = "" if unit == "1" else f" {unit}"
@@ -125,14 +130,10 @@ def quantity(key: str, unit: str, symbol: str, words: str, **more: Any) -> Field
     return Field(path=key, kind="quantity", unit_template=unit, symbol=symbol, description=words, **settings)
 
 
-def positive(key: str, unit: str, symbol: str, words: str, **more: Any) -> Field:
-    """A number above 0."""
-    return quantity(key, unit, symbol, words, **{"low": SMALL, **more})
-
-
-def not_negative(key: str, unit: str, symbol: str, words: str, **more: Any) -> Field:
-    """A number of at least 0."""
-    return quantity(key, unit, symbol, words, **{"low": 0.0, **more})
+positive = partial(quantity, low=SMALL)
+"""A number above 0."""
+not_negative = partial(quantity, low=0.0)
+"""A number of at least 0."""
 
 
 def degrees(key: str, words: str, example: str) -> Field:
@@ -160,6 +161,12 @@ def flag(key: str, words: str) -> Field:
     return Field(path=key, kind="flag", description=words)
 
 
-def text(words: str) -> Field:
-    """Any text; the key is the attribute's name."""
-    return Field(path="", kind="text", description=words)
+def _named(kind: Kind, words: str) -> Field:
+    """A value whose key is the attribute's name."""
+    return Field(path="", kind=kind, description=words)
+
+
+text, label = partial(_named, "text"), partial(_named, "label")
+"""Any text; one that is not empty."""
+day, limit = partial(_named, "day"), partial(_named, "limit")
+"""A date; a limit of a requirement, in the unit of its quantity."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import MISSING, fields, replace
 from functools import cache
-from typing import get_args
+from typing import Any, get_args
 
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.model import Design
-from actuator_lti.design.sections import SECTIONS, template_of
+from actuator_lti.design.sections import RECORDS, SECTIONS, template_of
 
 __all__ = ["ALL_FIELDS", "FIELDS", "Field", "Structure", "field_of", "fields_in"]
 
@@ -24,8 +24,14 @@ def _declared(kind: type, template: str) -> Iterator[Field]:
                 path=f"{template}.{field.path or item.name}",
                 attribute=item.name,
                 required=item.default is MISSING and item.default_factory is MISSING,
-                choices=field.choices or (get_args(annotated) if field.kind == "choice" else ()),
+                choices=field.choices or (_words(annotated) if field.kind == "choice" else ()),
             )
+
+
+def _words(kind: Any) -> tuple[str, ...]:
+    """Those of a Literal, which may be optional."""
+    parts = get_args(kind)
+    return parts if all(isinstance(part, str) for part in parts) else get_args(parts[0])
 
 
 ALL_FIELDS: tuple[Field, ...] = (
@@ -51,5 +57,6 @@ def field_of(path: str) -> Field | None:
 
 @cache
 def fields_in(section: str) -> tuple[Field, ...]:
-    """All keys of a section such as ``"control.velocity"`` or ``"gear.*"``."""
-    return tuple(field for field in ALL_FIELDS if field.section == section)
+    """All keys of a section such as ``"control.velocity"``, ``"gear.*"`` or ``"requirement"``."""
+    listed = (field for record in RECORDS for field in _declared(record.kind, record.template))
+    return tuple(field for field in (*ALL_FIELDS, *listed) if field.section == section)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 from math import inf
 
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import ALL_FIELDS
 from actuator_lti.design.model import Axis
 from actuator_lti.design.sections import SECTIONS
-from actuator_lti.tree import Tree
 
 
 @dataclass(frozen=True)
@@ -27,10 +26,6 @@ class KeyEntry:
     description: str
     example: str
 
-    def as_dict(self) -> Tree:
-        """Plain values, for JSON."""
-        return asdict(self)
-
 
 def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
     """All keys in the order of a design file, with the units of a full cascade on this axis.
@@ -47,18 +42,10 @@ def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
 
 
 def _entry(field: Field, kind: type | None, structure: Structure) -> KeyEntry:
-    unit = "1" if field.kind in ("text", "choice", "flag") else field.unit(structure)
+    unit = "1" if field.kind in ("text", "label", "choice", "flag") else field.unit(structure)
+    same = {item.name: getattr(field, item.name) for item in fields(KeyEntry) if hasattr(field, item.name)}
     return KeyEntry(
-        path=field.path,
-        section=field.section,
-        key=field.key,
-        symbol=field.symbol,
-        unit=unit,
-        default=_default(field, kind, unit),
-        allowed=_allowed(field, unit),
-        required=field.required,
-        description=field.description,
-        example=field.example,
+        **{**same, "unit": unit, "default": _default(field, kind, unit), "allowed": _allowed(field, unit)}
     )
 
 
@@ -78,7 +65,7 @@ def _default(field: Field, kind: type | None, unit: str) -> str:
 
 
 def _allowed(field: Field, unit: str) -> str:
-    if field.kind == "text":
+    if field.kind in ("text", "label"):
         return ""
     if field.kind in ("quantity", "quantities") and field.low == -BIG and field.high == BIG:
         return ""

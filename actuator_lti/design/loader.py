@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from difflib import get_close_matches
+from collections.abc import Mapping
 from functools import lru_cache
 from os import PathLike, fspath
 from pathlib import Path
 
 from actuator_lti.design.checks import check_design
+from actuator_lti.design.mistakes import Findings, lines_of, nearest
 from actuator_lti.design.model import Design
+from actuator_lti.design.reader import read_tree
 from actuator_lti.design.shipped import shipped_designs, shipped_path
 from actuator_lti.errors import InputError
 from actuator_lti.reading import decode, parse_toml, read_bytes, shown
@@ -38,7 +40,7 @@ def load_design(name_or_path: str | PathLike[str]) -> Design:
     >>> load_design("ilr33-amber").total_ratio
     2376.0
     """
-    name = fspath(name_or_path)
+    name = _name_of(name_or_path)
     if name in shipped_designs():
         return _shipped(name)
     return read_design_text(design_text(name), shown(name, 200)[1:-1])
@@ -52,13 +54,16 @@ def as_design(design: Design | str | PathLike[str]) -> Design:
     InputError
         As :func:`load_design`, and for anything else that is no design.
     """
-    if isinstance(design, Design):
-        return design
-    if isinstance(design, str | PathLike):
-        return load_design(design)
-    raise InputError(
-        f"design = {shown(design)}: allowed: a Design, a shipped name, or the path of a design file"
-    )
+    return design if isinstance(design, Design) else load_design(design)
+
+
+def _name_of(given: object) -> str:
+    """A name or path as text."""
+    name = fspath(given) if isinstance(given, str | PathLike) else None
+    if not isinstance(name, str):
+        allowed = "allowed: a Design, a shipped name, or the path of a design file"
+        raise InputError(f"design = {shown(given)}: {allowed}")
+    return name
 
 
 def design_text(name_or_path: str | PathLike[str]) -> str:
@@ -69,13 +74,12 @@ def design_text(name_or_path: str | PathLike[str]) -> str:
     InputError
         If there is no such design, or the file is too large or not UTF-8.
     """
-    name = fspath(name_or_path)
+    name = _name_of(name_or_path)
     if name in shipped_designs():
         return shipped_path(name).read_text(encoding="utf-8")
     path = Path(name)
     if not path.suffix and "/" not in name and "\\" not in name and not _exists(path):
-        near = get_close_matches(name, shipped_designs(), 1, 0.4)
-        hint = f' (nearest known: "{near[0]}")' if near else ""
+        hint = nearest(name, shipped_designs())
         names = ", ".join(shipped_designs())
         raise InputError(f"{shown(name)}: no such design{hint}; allowed: {names}, or a design file")
     return decode(read_bytes(path), shown(name, 200)[1:-1])
@@ -101,17 +105,16 @@ def read_design_text(text: str, origin: str = "design") -> Design:
     InputError
         As :func:`load_design`.
     """
+    if not isinstance(text, str):
+        raise InputError(f"text = {shown(text)}: allowed: the text of a design file", where=origin)
     tree = parse_toml(text, origin)
     if not tree:
         raise InputError("is empty; allowed: a design file (actuator-lti init writes one)", where=origin)
-    return design_from_tree(tree, origin)
+    return design_from_tree(tree, origin, lines_of(text, tree))
 
 
-def design_from_tree(tree: Tree, origin: str) -> Design:
-    """Build and check a design from a parsed TOML tree."""
-    from actuator_lti.design.build import Builder
-    from actuator_lti.design.refusals import validated
-
-    design = Builder(validated(tree, origin), origin).design(origin)
-    check_design(design, origin)
+def design_from_tree(tree: Tree, origin: str, lines: Mapping[str, int] | None = None) -> Design:
+    """Build and check a design from a parsed TOML tree, whose keys stand on these lines of a text."""
+    design = read_tree(tree, origin, Findings(origin, lines))
+    check_design(design, origin, lines)
     return design

@@ -46,7 +46,7 @@ from actuator_lti.design.control import (
     Supply,
     VelocityLoop,
 )
-from actuator_lti.design.field import Axis, choice, text
+from actuator_lti.design.field import Axis, choice, label, text
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.plant import (
     Coupling,
@@ -65,65 +65,14 @@ from actuator_lti.design.plant import (
     STANDARD_GRAVITY_m_s2,
     Temperature,
 )
-
-__all__ = [
-    "FILTER_KEYS",
-    "AntiWindup",
-    "Axis",
-    "Command",
-    "Controller",
-    "ControllerObject",
-    "ControllerObjects",
-    "Correlation",
-    "Coupling",
-    "CurrentLoop",
-    "Design",
-    "Direction",
-    "DutyCycle",
-    "Encoder",
-    "Fact",
-    "Failure",
-    "Filter",
-    "FilterKind",
-    "FilterPlace",
-    "Friction",
-    "FrictionLaw",
-    "FrictionPoint",
-    "Gear",
-    "Gravity",
-    "Instruments",
-    "Limits",
-    "Load",
-    "LoadFriction",
-    "LoadPath",
-    "Motor",
-    "MotorConstants",
-    "ObjectFamily",
-    "OutputEncoder",
-    "Overload",
-    "Parameter",
-    "PositionLoop",
-    "Requirement",
-    "STANDARD_GRAVITY_m_s2",
-    "Screw",
-    "Sensor",
-    "SpeedSource",
-    "Stage",
-    "Supply",
-    "Temperature",
-    "Tolerance",
-    "Validation",
-    "VelocityLoop",
-    "Waiver",
-    "default_deflection",
-]
+from actuator_lti.faces import draw
 
 
 @dataclass(frozen=True, kw_only=True)
 class Design:
     """A drive: plant, controller, limits, requirements, and where each value came from."""
 
-    name: Annotated[str, text("short name, used in file names")]
+    name: Annotated[str, label("short name, used in file names")]
     title: Annotated[str, text("one line for the title page")] = ""
     motor: Motor
     controller: Controller
@@ -184,11 +133,35 @@ class Design:
 
         return with_overrides(self, with_units(self, values))
 
+    def add_filter(self, stage: str, **keys: Any) -> "Design":
+        """A copy with one more filter, the last of its place.
+
+        Parameters
+        ----------
+        stage : {"velocity"}
+            The stage whose filter it is.
+        **keys
+            ``kind`` and its keys as a design file has them: text with units, or numbers in SI.
+
+        Raises
+        ------
+        InputError
+            As `with_values`, and for a stage that has no filters.
+
+        Examples
+        --------
+        >>> from actuator_lti import load_design
+        >>> notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz", "depth": 0.1}
+        >>> load_design("ilr33-amber").add_filter("velocity", **notch).controller.velocity.filters[0].kind
+        'notch'
+        """
+        from actuator_lti.design.writing import with_filter
+
+        return with_filter(self, stage, keys)
+
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        from actuator_lti.notebook import design_html
-
-        return design_html(self)
+        return draw("design_html", self)
 
     def waiver_of(self, id: str) -> Waiver | None:
         """The waiver of a requirement or check by its id; one for ``id`` holds for every ``id/loop`` too."""

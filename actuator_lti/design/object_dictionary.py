@@ -5,7 +5,6 @@ Grades as in a design file: A the maker's documents, B a file of a real device, 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, isfinite, pi
 
@@ -92,45 +91,20 @@ _LIST = (
 OBJECTS: dict[tuple[int, int], KnownObject] = {(item.index, item.subindex): item for item in _LIST}
 """Known objects by index and subindex."""
 
-VELOCITY_GAIN = (0x2344, 1)
-LOAD_INERTIA = (0x2329, 10)
-
 
 def step_of(known: KnownObject, velocity_gain_factor: float) -> float:
     """The SI value of one step of an object."""
-    is_gain = (known.index, known.subindex) == VELOCITY_GAIN
+    is_gain = (known.index, known.subindex) == (0x2344, 1)
     return known.scale * (velocity_gain_factor if is_gain else 1.0)
-
-
-def _load_inertia(design: Design) -> float:
-    return design.inertia_kgm2 - design.motor.rotor_inertia_kgm2
 
 
 def model_value(design: Design, known: KnownObject) -> float | None:
     """What the design says for an object, in SI; None if nothing."""
-    if (known.index, known.subindex) == LOAD_INERTIA:
-        return _load_inertia(design)
-    path = known.paths[0] if known.paths else ""
-    if known.alias_of is not None:
-        path = OBJECTS[known.alias_of].paths[0]
-    if not path:
-        return None
+    if (known.index, known.subindex) == (0x2329, 10):  # all inertia but the rotor's
+        return design.inertia_kgm2 - design.motor.rotor_inertia_kgm2
+    paths = known.paths if known.alias_of is None else OBJECTS[known.alias_of].paths
     try:
-        value = parameter_value(design, path)
+        value = parameter_value(design, paths[0]) if paths else inf
     except InputError:
         return None
     return value if isfinite(value) else None
-
-
-def in_range(known: KnownObject, value: int) -> bool:
-    """Whether an integer is allowed for an object."""
-    return known.low <= value <= known.high
-
-
-def rounded_value(known: KnownObject, value: float, step: float, refuse: Callable[[str], Exception]) -> int:
-    """The nearest integer of an object for an SI value, refused outside the object's range."""
-    exact = value / step
-    number = round(exact) if abs(exact) < inf else -1
-    if not in_range(known, number):
-        raise refuse(f"allowed: {known.low} to {known.high} {known.unit}")
-    return number

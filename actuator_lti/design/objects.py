@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from actuator_lti.design.access import with_values
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.model import ControllerObject, ControllerObjects, Design
-from actuator_lti.design.object_dictionary import (
-    OBJECTS,
-    PER_RPM,
-    KnownObject,
-    in_range,
-    model_value,
-    rounded_value,
-    step_of,
-)
+from actuator_lti.design.object_dictionary import OBJECTS, PER_RPM, KnownObject, model_value, step_of
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 __all__ = ["PER_RPM", "Exported", "Imported", "Rounding", "export_objects", "import_objects"]
 
+MAX_OBJECTS = 5000
 _TOLERATED = 1e-9
+_Values = dict[tuple[int, int], int]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,41 +75,30 @@ def import_objects(objects: ControllerObjects, base: Design, where: str = "setti
         If a value leaves its object's range, an object appears twice, or the design cannot hold it.
     """
     _check_cascade(base)
-    check_objects(objects.values, where)
-    factor = objects.velocity_gain_factor
+    given = _checked(objects.values, where)
     changes: dict[str, float] = {}
     kept: list[ControllerObject] = []
-    given = {(item.index, item.subindex): item.value for item in objects.values}
     for item in objects.values:
         known = OBJECTS.get((item.index, item.subindex))
         if known is None or not known.paths:
             kept += [] if known is not None and _follows(known, item.value, given) else [item]
             continue
-        step = step_of(known, factor)
+        step = step_of(known, objects.velocity_gain_factor)
         current = model_value(base, known)
         if current is None or round(current / step) != item.value:
             changes.update(dict.fromkeys(known.paths, item.value * step))
     design = with_values(base, changes, check=False) if changes else base
-    if changes:
-        design = _sourced(design, changes, where)
-    design = replace(design, objects=objects)
+    source, old = f"controller settings {where}", design.parameters
+    named = {path: replace(old[path], source=source, grade="B") for path in changes}
+    design = replace(design, objects=objects, parameters=FrozenMap({**old, **named}))
     check_design(design, where)
-    return Imported(
-        design=design, changed=tuple(changes), kept=tuple(kept), notes=_import_notes(objects, given, design)
-    )
+    notes = _import_notes(given, objects.velocity_gain_factor, design)
+    return Imported(design=design, changed=tuple(changes), kept=tuple(kept), notes=notes)
 
 
-def _follows(known: KnownObject, value: int, given: dict[tuple[int, int], int]) -> bool:
+def _follows(known: KnownObject, value: int, given: _Values) -> bool:
     """Whether an object only repeats another one (deceleration and acceleration)."""
     return known.alias_of is not None and given.get(known.alias_of) == value
-
-
-def _sourced(design: Design, changes: Iterable[str], where: str) -> Design:
-    named = {
-        path: replace(design.parameters[path], source=f"controller settings {where}", grade="B")
-        for path in changes
-    }
-    return replace(design, parameters=FrozenMap({**design.parameters, **named}))
 
 
 def _check_cascade(design: Design) -> None:
@@ -126,67 +110,58 @@ def _check_cascade(design: Design) -> None:
         )
 
 
-def check_objects(values: tuple[ControllerObject, ...], where: str) -> None:
-    """Refuse duplicates and values out of their object's range."""
-    seen: set[tuple[int, int]] = set()
+def _checked(values: tuple[ControllerObject, ...], where: str) -> _Values:
+    """Values by index and subindex; duplicates and values out of their object's range are refused."""
+    seen: _Values = {}
     for item in values:
-        key = (item.index, item.subindex)
-        if key in seen:
-            raise InputError(f"{item.label} = {item.value}: allowed: each object once", where=where)
-        seen.add(key)
-        known = OBJECTS.get(key)
-        if known is not None and not in_range(known, item.value):
-            raise InputError(
-                f"{item.label} = {item.value}: allowed: {known.low} to {known.high} {known.unit}, "
-                f"the {known.meaning}",
-                where=where,
-            )
-        if (
-            not -(2**63) <= item.value < 2**64
-            or not 0 <= item.index <= 0xFFFF
-            or not 0 <= item.subindex <= 0xFF
-        ):
-            raise InputError(
-                f"{item.label} = {item.value}: allowed: an integer of at most 64 bits", where=where
-            )
+        known, allowed = OBJECTS.get((item.index, item.subindex)), ""
+        if (item.index, item.subindex) in seen:
+            allowed = "each object once"
+        elif known is not None and not known.low <= item.value <= known.high:
+            allowed = f"{known.low} to {known.high} {known.unit}, the {known.meaning}"
+        elif not (-(2**63) <= item.value < 2**64 and item.index <= 0xFFFF and item.subindex <= 0xFF):
+            allowed = "an integer of at most 64 bits"
+        if allowed:
+            raise InputError(f"{item.label} = {item.value}: allowed: {allowed}", where=where)
+        seen[item.index, item.subindex] = item.value
+    return seen
 
 
-def _import_notes(
-    objects: ControllerObjects, given: dict[tuple[int, int], int], design: Design
-) -> tuple[str, ...]:
-    notes = []
-    if (0x2344, 1) in given:
-        per = "per rad/s" if objects.velocity_gain_factor == 1.0 else "per rpm"
-        notes.append(
-            f"velocity gain 0x2344.01 read as A s {per} "
-            f"(calibration factor {objects.velocity_gain_factor:.4g})"
+def checked_objects(values: tuple[ControllerObject, ...], factor: Any, where: str) -> ControllerObjects:
+    """Settings from their parts as every file of them is held to: each in its range, the factor positive."""
+    if len(values) > MAX_OBJECTS:
+        raise InputError(f"{len(values)} objects; allowed: at most {MAX_OBJECTS}", where=where)
+    _checked(values, where)
+    if isinstance(factor, bool) or not isinstance(factor, int | float) or not 1e-6 <= factor <= 1e6:
+        raise InputError(
+            f"velocity_gain_factor = {shown(factor)}: allowed: 1 (per rad/s) or 9.549 (per rpm)", where=where
         )
-    if given.get((0x2349, 1)):
-        notes.append(
-            "torque feed-forward 0x2349.01 read as the share of J/kM times the command's acceleration"
-        )
-    if (0x232A, 2) in given or (0x232A, 3) in given:
-        notes.append(
-            "friction of 0x232A read as that of the whole drive at the motor; "
-            "check that it is not the motor's alone"
-        )
-    rated = given.get((0x2329, 1))
-    for key in ((0x60E0, 0), (0x60E1, 0)):
-        if rated is not None and key in given:
-            limit = given[key] * 1e-3 * rated * 1e-3
-            if limit < design.limits.peak_current_A:
-                notes.append(
-                    f"{OBJECTS[key].label} limits the torque to that of {limit:.4g} A, below the peak current"
-                )
+    return ControllerObjects(velocity_gain_factor=float(factor), values=values)
+
+
+def _import_notes(given: _Values, factor: float, design: Design) -> tuple[str, ...]:
+    """What a reader of the import has to know."""
     first, second = given.get((0x6083, 0)), given.get((0x6084, 0))
-    if first is not None and second is not None and first != second:
-        notes.append(
-            f"deceleration 0x6084 = {second} differs from acceleration 0x6083 = {first}, "
-            "which the model uses for both"
-        )
-    if given.get((0x2347, 1), 128) != 128:
-        notes.append("0x2347.01 changes the velocity gain at target; the model leaves it out")
-    return tuple(notes)
+    per = "per rad/s" if factor == 1.0 else "per rpm"
+    notes = {
+        f"velocity gain 0x2344.01 read as A s {per} (calibration factor {factor:.4g})": (0x2344, 1) in given,
+        "torque feed-forward 0x2349.01 read as the share of J/kM times the command's acceleration": bool(
+            given.get((0x2349, 1))
+        ),
+        "friction of 0x232A read as that of the whole drive at the motor; check that it is not the motor's "
+        "alone": (0x232A, 2) in given or (0x232A, 3) in given,
+    }
+    rated = given.get((0x2329, 1), 0) * 1e-3
+    for key in ((0x60E0, 0), (0x60E1, 0)):
+        limit = given.get(key, 0) * 1e-3 * rated
+        words = f"limits the torque to that of {limit:.4g} A, below the peak current"
+        low = (0x2329, 1) in given and key in given and limit < design.limits.peak_current_A
+        notes[f"{OBJECTS[key].label} {words}"] = low
+    words = f"deceleration 0x6084 = {second} differs from acceleration 0x6083 = {first}, "
+    notes[words + "which the model uses for both"] = None not in (first, second) and first != second
+    words = "0x2347.01 changes the velocity gain at target; the model leaves it out"
+    notes[words] = given.get((0x2347, 1), 128) != 128
+    return tuple(note for note, holds in notes.items() if holds)
 
 
 def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
@@ -227,9 +202,8 @@ def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
         if value is not None:
             written.append(ControllerObject(index=known.index, subindex=known.subindex, value=value))
     notes = [f"velocity gain 0x2344.01 written with calibration factor {before.velocity_gain_factor:.4g}"]
-    if not complete and missing:
-        left = ", ".join(known.label for known in missing if known.paths)
-        notes += [f"not in the imported settings, so not written: {left}"] if left else []
+    left = [] if complete else [known.label for known in missing if known.paths]
+    notes += [f"not in the imported settings, so not written: {', '.join(left)}"] if left else []
     return Exported(
         objects=replace(before, values=tuple(written)), rounded=tuple(rounded), notes=tuple(notes)
     )
@@ -243,13 +217,11 @@ def _encode(design: Design, known: KnownObject, rounded: list[Rounding]) -> int 
         if path in ("control.current.integral_time", "control.velocity.integral_time"):
             raise InputError(f"{path}: missing; {known.label} needs {known.low} to {known.high} {known.unit}")
         return None
-    step = step_of(known, design.objects.velocity_gain_factor)
-    exact = value / step
-
-    def refuse(allowed: str) -> InputError:
-        return InputError(f"{path} = {exact:.6g} {known.unit}: object {known.label}: {allowed}")
-
-    number = rounded_value(known, value, step, refuse)
+    exact = value / step_of(known, design.objects.velocity_gain_factor)
+    number = round(exact)
+    if not known.low <= number <= known.high:
+        allowed = f"allowed: {known.low} to {known.high} {known.unit}"
+        raise InputError(f"{path} = {exact:.6g} {known.unit}: object {known.label}: {allowed}")
     if abs(exact - number) > _TOLERATED * max(1.0, abs(exact)):
         rounded.append(Rounding(label=known.label, path=path, exact=exact, written=number, unit=known.unit))
     return number

@@ -40,7 +40,3 @@ class FrozenMap(Mapping[str, Any]):
 
     def __reduce__(self) -> tuple[type[FrozenMap], tuple[dict[str, Any]]]:
         return FrozenMap, (self._items,)
-
-    def updated(self, changes: Mapping[str, Any]) -> FrozenMap:
-        """A copy with some items replaced or added."""
-        return FrozenMap({**self._items, **changes})

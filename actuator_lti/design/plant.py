@@ -202,7 +202,7 @@ def _largest_damping(design: "Design") -> tuple[float, str]:
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
-    """What hangs on the output shaft, and how its moment reaches the motor.
+    """What hangs on the output shaft, and how its torque reaches the motor.
 
     M_ext = constant or series (given with the run) + ``moment_slope_Nm_rad`` * output angle
     - ``moment_damping_Nms_rad`` * output speed + gravity + the gear error, which a drive in motion passes so
@@ -212,18 +212,20 @@ class Load:
     inertia_kgm2: Annotated[float, not_negative(
         "inertia", "{inertia}", "J_load", "inertia at the output shaft", example="2e-4 kg*m^2")] = 0.0
     path: Annotated[LoadPath, choice(
-        "path", "whether the load moment only adds friction, or also drives the motor")] = "self-locking"
+        "path", "whether the load torque only adds friction, or also drives the motor")] = "self-locking"
+    locking_gear: Annotated[str | None, text(
+        "name of the gear that locks itself, which stands before the coupling; default the last gear")] = None
     moment_max_Nm: Annotated[float, not_negative(
-        "moment_max", "{torque}", "M_ext", "largest load moment at the output", example="8 N*m")] = 0.0
+        "moment_max", "{torque}", "M_ext", "largest load torque at the output", example="8 N*m")] = 0.0
     moment_slope_Nm_rad: Annotated[float, quantity(
-        "moment_slope", "{torque}/{angle}", "", "load moment per output deflection",
+        "moment_slope", "{torque}/{angle}", "", "load torque per output deflection",
         example="0 N*m/rad")] = 0.0
     moment_damping_Nms_rad: Annotated[float, not_negative(
-        "moment_damping", "{torque}*s/{angle}", "D", "load moment against the motion, per output speed",
+        "moment_damping", "{torque}*s/{angle}", "D", "load torque against the motion, per output speed",
         most=_largest_damping, example="0.02 N*m*s/rad")] = 0.0
     gear_error_Nm: Annotated[float, not_negative(
         "gear_error", "{torque}", "A",
-        "kinematic error of a gear as a moment on the output, A sin(n angle + phase)",
+        "kinematic error of a gear as a torque on the output, A sin(n angle + phase)",
         example="0.1 N*m")] = 0.0
     gear_error_periods: Annotated[float, positive(
         "gear_error_periods", "rad/{angle}", "n",
@@ -237,12 +239,12 @@ class Load:
     gravity: Gravity | None = None
 
     def moment_Nm(self, angle_rad: Any, rate_rad_s: Any = 0.0) -> Any:
-        """The load's own moment on the output shaft at an angle and a speed of it; floats or arrays."""
+        """The load's own torque on the output shaft at an angle and a speed of it; floats or arrays."""
         return self.over_angle.at(angle_rad) - self.moment_damping_Nms_rad * rate_rad_s
 
     @property
     def over_angle(self) -> OverAngle:
-        """What of its own moment depends on the output angle."""
+        """What of its own torque depends on the output angle."""
         gear = Wave(self.gear_error_Nm, self.gear_error_periods, self.gear_error_phase_rad, averages=True)
         pendulum = () if self.gravity is None else (Wave(self.gravity.peak_Nm, 1.0, self.gravity.offset_rad),)
         return OverAngle(self.moment_slope_Nm_rad, (gear, *pendulum))
@@ -298,7 +300,7 @@ class Friction:
         "viscous", "{torque}*s/{angle}", "Cv", "viscous friction", example="5.25e-6 N*m*s/rad")] = 0.0
     load_coefficient: Annotated[float, not_negative(
         "load_coefficient", "{torque}/({torque})", "CM",
-        "dry friction at the motor per load moment at the output", example="1.34 mN*m/(N*m)")] = 0.0
+        "dry friction at the motor per load torque at the output", example="1.34 mN*m/(N*m)")] = 0.0
     breakaway_ratio: Annotated[float, quantity(
         "breakaway_ratio", "1", "", "breakaway torque over dry friction", low=1.0, high=100.0,
         example="1")] = 1.0

@@ -6,7 +6,7 @@ from actuator_lti.design.units import convert, parse_quantity, parse_unit, split
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import QUANTITIES
 
-__all__ = ["QUANTITIES", "parse_limit", "write_limit"]
+__all__ = ["QUANTITIES", "parse_limit"]
 
 
 def parse_limit(text: str | float | int, unit: str) -> float:
@@ -50,8 +50,3 @@ def _decibel(text: str | float | int) -> float:
     if written != "dB":
         raise InputError('allowed: a number in dB such as "6 dB"')
     return number
-
-
-def write_limit(value: float, unit: str) -> str | float:
-    """A limit as text (a plain number where dimensionless) that :func:`parse_limit` reads back."""
-    return value if unit == "1" else f"{value!r} {unit}"

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from actuator_lti.design import model
 
-Many = Literal["", "named", "numbered"]
+Many = Literal["", "named", "numbered", "listed"]
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,12 @@ class Section:
         Dataclass of the part.
     required : bool
         Whether a file must have it.
-    many : {"", "named", "numbered"}
-        Repeated tables, known by their key ``name`` (gears) or by their number from 1.
+    many : {"", "named", "numbered", "listed"}
+        Repeated tables, known by their key ``name`` (gears), by their number from 1, or by ``label``.
     rare : bool
         Whether lists of values pass over it while all its values are the defaults.
+    label : str
+        The key that a listed table is known by; its number from 1 where empty.
     asked : bool
         Whether it says what is asked of the drive and not what the drive is: the hash of a design without it
         does not know it.
@@ -44,11 +46,12 @@ class Section:
     many: Many = ""
     rare: bool = False
     asked: bool = False
+    label: str = ""
 
     @property
     def template(self) -> str:
         """The path under which the fields of this section are registered, such as ``"gear.*"``."""
-        return f"{self.path}.*" if self.many else self.path
+        return f"{self.path}.*" if self.many in ("named", "numbered") else self.path
 
     @property
     def parent(self) -> str:
@@ -97,6 +100,14 @@ SECTIONS: tuple[Section, ...] = (
     Section("duty", "duty", model.DutyCycle, asked=True),
 )
 """Every section, in the order of a design file."""
+
+RECORDS: tuple[Section, ...] = (
+    Section("requirement", "requirements", model.Requirement, many="listed", label="id"),
+    Section("waiver", "waivers", model.Waiver, many="listed", label="requirement"),
+    Section("correlation", "correlations", model.Correlation, many="listed"),
+    Section("fact", "facts", model.Fact, many="listed"),
+)
+"""What is asked and known of a drive, at the end of its file: lists without numeric keys of the drive."""
 
 BY_PATH: dict[str, Section] = {section.path: section for section in SECTIONS}
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
-from actuator_lti.design.model import ControllerObject, ControllerObjects
+from actuator_lti.design.model import ControllerObject, ControllerObjects, ObjectFamily
 from actuator_lti.design.object_dictionary import OBJECTS
-from actuator_lti.design.settings_checks import checked_objects
+from actuator_lti.design.objects import checked_objects
 from actuator_lti.design.settings_xml import read_settings_xml
 from actuator_lti.errors import InputError
 from actuator_lti.reading import decode, parse_toml, read_bytes, shown
@@ -68,22 +69,36 @@ def object_entry(item: ControllerObject) -> Any:
     return {"value": item.value, **more} if more else item.value
 
 
+def objects_from(
+    raw: Any, where: str, factor: float | None = None, values: str = "values"
+) -> ControllerObjects:
+    """Settings as a table: the calibration of the velocity gain, the family, and the objects.
+
+    ``values`` is the key of the objects: in ``[objects]`` of a design file ``"values"``.
+    """
+    known = ("velocity_gain_factor", "family", values)
+    table = raw if isinstance(raw, dict) else {"": raw}
+    for key in table:
+        if key not in known:
+            raise InputError(f"{shown(key)}: unknown key; allowed: {', '.join(known)}", where=where)
+    entries, family = table.get(values, {}), table.get("family", "")
+    if not isinstance(entries, dict):
+        raise InputError(f"{values} = {shown(entries)}: allowed: a table", where=where)
+    if family not in get_args(ObjectFamily):
+        allowed = " or ".join(f'"{one}"' for one in get_args(ObjectFamily))
+        raise InputError(f"family = {shown(family)}: allowed: {allowed}", where=where)
+    read = tuple(object_from(label, entry, where) for label, entry in entries.items())
+    factor = table.get("velocity_gain_factor", 1.0) if factor is None else factor
+    return replace(checked_objects(read, factor, where), family=family)
+
+
 def read_settings_toml(text: str, where: str, velocity_gain_factor: float | None = None) -> ControllerObjects:
     """Settings from TOML: ``velocity_gain_factor``, and ``"0x2344.01" = 120000`` in a table ``[objects]``."""
-    tree = parse_toml(text, where)
-    for key in tree:
-        if key not in ("velocity_gain_factor", "objects"):
-            raise InputError(
-                f"{shown(key)}: unknown key; allowed: velocity_gain_factor, objects", where=where
-            )
-    entries = tree.get("objects")
-    if not isinstance(entries, dict) or not entries:
-        raise InputError(
-            'objects: missing; allowed: a table with entries such as "0x2344.01" = 344', where=where
-        )
-    factor = tree.get("velocity_gain_factor", 1.0) if velocity_gain_factor is None else velocity_gain_factor
-    values = tuple(object_from(label, raw, where) for label, raw in entries.items())
-    return checked_objects(values, factor, where)
+    result = objects_from(parse_toml(text, where), where, velocity_gain_factor, "objects")
+    if not result.values:
+        allowed = 'allowed: a table with entries such as "0x2344.01" = 344'
+        raise InputError(f"objects: missing; {allowed}", where=where)
+    return result
 
 
 def write_settings_toml(objects: ControllerObjects) -> str:

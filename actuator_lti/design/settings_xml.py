@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element, ParseError, SubElement, indent, regis
 
 from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH
 from actuator_lti.design.model import ControllerObject, ControllerObjects
-from actuator_lti.design.settings_checks import checked_objects
+from actuator_lti.design.objects import checked_objects
 from actuator_lti.errors import InputError
 from actuator_lti.reading import decode, read_bytes, shown
 
@@ -39,9 +39,7 @@ def _parsed(text: str, where: str) -> Element:
         root: Element = fromstring(text.encode(), forbid_dtd=True)
     except DefusedXmlException:
         raise InputError("holds a DTD or an entity; allowed: plain XML", where=where) from None
-    except ParseError as error:
-        raise InputError(f"not XML: {shown(str(error), 200)[1:-1]}", where=where) from None
-    except (ValueError, LookupError, RecursionError) as error:
+    except (ParseError, ValueError, LookupError, RecursionError) as error:
         raise InputError(f"not XML: {shown(str(error), 200)[1:-1]}", where=where) from None
     return root
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from math import isfinite, pi
 
 from actuator_lti.design.checks_elastic import elastic_warnings
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 
+_BARE_AMPERE = re.compile(r"[0-9 /](?:[kmuµ]?A)\b(?![ _]?(?:rms|eff|peak|pk|dc)\b)", re.IGNORECASE)
 GRADES = {"", "A", "B", "C", "D", "X"}  # of a source, or several with "/" between
 
 
@@ -20,21 +23,11 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     >>> warnings_of(load_design("ilr33-amber"))
     ()
     """
-    result: list[str] = []
+    design = as_design(design)
     checks = (
-        _sampling,
-        _crossovers,
-        _limits,
-        _unused,
-        _loads,
-        _pedigree,
-        _encoder,
-        _ac_motor,
-        elastic_warnings,
-    )
-    for check in checks:
-        result.extend(check(design))
-    return tuple(result)
+        _sampling, _crossovers, _limits, _unused, _loads, _pedigree, _encoder, _ac_motor, elastic_warnings,
+    )  # fmt: skip
+    return tuple(line for check in checks for line in check(design))
 
 
 def _loops(design: Design) -> Iterator[tuple[str, object, float]]:
@@ -112,31 +105,18 @@ def _unused(design: Design) -> Iterator[str]:
         yield "friction.breakaway_ratio: not used by the tanh law"
 
 
-def _holding_torque(design: Design) -> float | None:
-    """Largest torque at the output without losses: peak current (or stall current) times kM times N."""
-    motor, limits = design.effective_motor, design.limits
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V * limits.voltage_V * design.total_ratio
-    if motor.torque_constant_Nm_A is None or motor.resistance_ohm is None:
-        return None
-    current = limits.voltage_V / motor.resistance_ohm
-    if design.controller.current is not None:
-        current = min(current, limits.peak_current_A)
-    return motor.torque_constant_Nm_A * current * design.total_ratio
-
-
 def _loads(design: Design) -> Iterator[str]:
-    largest = design.load.moment_max_Nm
-    unit = "N" if design.axis == "linear" else "N*m"
-    holding = _holding_torque(design)
-    if design.load.path == "back-drivable" and holding is not None and largest > holding:
+    from actuator_lti.drive.facts import stall_torque_Nm
+
+    largest, given = design.load.moment_max_Nm, stall_torque_Nm(design)
+    unit, holding = "N" if design.axis == "linear" else "N*m", given * design.total_ratio
+    if design.load.path == "back-drivable" and largest > holding:
         yield (
             f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {holding:.3g} {unit} "
             "at its peak current without losses"
         )
     needed = max(design.friction.dry_Nm(largest, direction) for direction in (1, -1))
-    given = None if holding is None else holding / design.total_ratio
-    if design.load.path != "back-drivable" and given is not None and needed > given:
+    if design.load.path != "back-drivable" and needed > given:
         yield (
             f"load.moment_max: {largest:g} {unit} holds the drive fast: its friction at the motor, "
             f"{needed:.3g} {unit}, is more than the motor gives, {given:.3g} {unit}"
@@ -177,10 +157,14 @@ def _ac_motor(design: Design) -> Iterator[str]:
     rms = {"rms-line": 1.5**0.5, "peak-phase": 3**0.5 / 2}.get(design.motor.constants)
     if rms is None:
         return
-    unit = "A rms" if design.motor.constants == "rms-line" else "A peak of a phase"
-    for key, value in (
-        ("peak_current", design.limits.peak_current_A),
-        ("continuous_current", design.limits.continuous_current_A),
-    ):
-        if isfinite(value):
-            yield f"limits.{key}: {value:g} A of the equivalent DC motor, that is {value / rms:.4g} {unit}"
+    unit = "A rms" if design.motor.constants == "rms-line" else "A peak"
+    for path, item in design.parameters.items():
+        si = item.unit
+        if not path.startswith(("limits.", "control.")) or not _BARE_AMPERE.search(item.text):
+            continue
+        factor = rms if "A" in si.partition("/")[2] else 1.0 / rms
+        other = si.replace("A", unit)
+        yield (
+            f"{path}: {item.value:g} {si} of the equivalent DC motor, that is {item.value * factor:.4g} "
+            f"{other}; say which it is: A rms, A peak or A dc"
+        )

@@ -9,6 +9,8 @@ from typing import Any
 
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 
 
 @dataclass(frozen=True)
@@ -48,4 +50,6 @@ def sweep(design: Design | str | PathLike[str], path: str, values: Iterable[Any]
     [('12 V', 12.0), (14.0, 14.0)]
     """
     base = as_design(design)
+    if not isinstance(values, Iterable):
+        raise InputError(f"values = {shown(values)}: allowed: several, such as [12.0, 14.0]")
     return tuple(SweepPoint(value, base.with_values({path: value})) for value in values)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
-from typing import Any
+from dataclasses import replace
+from typing import Any, get_args, get_type_hints
 
 from actuator_lti.design.fields import Field
 from actuator_lti.design.model import Design, Tolerance
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
+from actuator_lti.tree import Tree
 
 Parse = Callable[[Any], float]
+_KEYS = ("kind", "half_width", "std", "lower", "upper")
+_KINDS: tuple[str, ...] = get_args(get_type_hints(Tolerance)["kind"])
 
 
 def _width(text: str | float | int, nominal: float, parse: Parse) -> float:
@@ -33,33 +36,40 @@ def read_tolerance(raw: Any, nominal: float, parse: Parse, field: Field, unit: s
     Raises
     ------
     InputError
-        If a part is missing or too many, or the tolerance leaves the allowed range of the key.
+        If a part is missing or too many, or the tolerance leaves the allowed range of the key; ``where`` is
+        the key of a table that is wrong.
     """
-    if isinstance(raw, str | int | float):
-        text = raw if isinstance(raw, str) else repr(raw)
-        tolerance = Tolerance(kind="uniform", half_width=_width(raw, nominal, parse), text=text)
-    else:
-        tolerance = _from_table(raw, nominal, parse)
+    table = raw if isinstance(raw, dict) else {"half_width": raw}
+    if isinstance(raw, bool | list) or not isinstance(raw, dict | str | int | float):
+        raise InputError('allowed: a half width such as "50 %", or a table')
+    for key, value in table.items():
+        if key not in _KEYS:
+            raise InputError(f"unknown key; allowed: {', '.join(_KEYS)}", where=key)
+        if key != "kind" and (isinstance(value, bool) or not isinstance(value, str | int | float)):
+            raise InputError("allowed: a number with its unit, as text", where=key)
+    tolerance = _from_table(table, nominal, parse)
     check_tolerance(tolerance, nominal, unit, field)
     return tolerance
 
 
-def _from_table(raw: Any, nominal: float, parse: Parse) -> Tolerance:
-    wanted, unwanted = ("half_width", "std") if raw.kind == "uniform" else ("std", "half_width")
-    given = getattr(raw, wanted)
-    bounds = {key: getattr(raw, key) for key in ("lower", "upper") if getattr(raw, key) is not None}
-    if given is None:
-        raise InputError(f'missing {wanted}; a "{raw.kind}" tolerance needs it')
-    if getattr(raw, unwanted) is not None:
-        raise InputError(f'a "{raw.kind}" tolerance has {wanted}, no {unwanted}')
-    if bool(bounds) != (raw.kind == "truncated-normal"):
+def _from_table(table: Tree, nominal: float, parse: Parse) -> Tolerance:
+    kind = table.get("kind", "uniform")
+    if kind not in _KINDS:
+        raise InputError("allowed: " + " or ".join(f'"{one}"' for one in _KINDS), where="kind")
+    wanted, unwanted = ("half_width", "std") if kind == "uniform" else ("std", "half_width")
+    bounds = {key: table[key] for key in ("lower", "upper") if key in table}
+    if wanted not in table:
+        raise InputError(f'missing {wanted}; a "{kind}" tolerance needs it')
+    if unwanted in table:
+        raise InputError(f'a "{kind}" tolerance has {wanted}, no {unwanted}')
+    if bool(bounds) != (kind == "truncated-normal"):
         raise InputError('allowed: lower or upper with kind "truncated-normal", and only there')
+    given = table[wanted]
     return Tolerance(
-        kind=raw.kind,
-        lower=parse(bounds["lower"]) if "lower" in bounds else -inf,
-        upper=parse(bounds["upper"]) if "upper" in bounds else inf,
+        kind=kind,
         text=given if isinstance(given, str) else repr(given),
         **{wanted: _width(given, nominal, parse)},
+        **{key: parse(text) for key, text in bounds.items()},
     )
 
 
@@ -79,16 +89,8 @@ def rescaled(tolerance: Tolerance, nominal: float) -> Tolerance:
     if not tolerance.text.strip().endswith("%"):
         return tolerance
     width = _width(tolerance.text, nominal, lambda text: parse_quantity(text, "1"))
-    wide = width if tolerance.kind == "uniform" else None
-    std = None if tolerance.kind == "uniform" else width
-    return Tolerance(
-        kind=tolerance.kind,
-        half_width=wide,
-        std=std,
-        lower=tolerance.lower,
-        upper=tolerance.upper,
-        text=tolerance.text,
-    )
+    uniform = tolerance.kind == "uniform"
+    return replace(tolerance, half_width=width) if uniform else replace(tolerance, std=width)
 
 
 def tolerances(design: Design) -> tuple[tuple[str, float, Tolerance], ...]:

@@ -14,8 +14,9 @@ from decimal import Decimal
 from difflib import get_close_matches
 from fractions import Fraction
 from functools import lru_cache
-from math import isfinite
+from math import isfinite, pi
 
+from actuator_lti.design.spellings import LONGEST, split_quantity, tidy
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown
 
@@ -41,8 +42,17 @@ _DERIVED = {
     "N newton": ("1", "kg*m/s^2"),
     "lbf pound_force": ("4.4482216152605", "N"),
     "ozf ounce_force": ("0.27801385095378125", "N"),
+    "kgf kp kilogram_force": ("9.80665", "N"),
+    "gf gram_force": ("0.00980665", "N"),
     "J joule": ("1", "N*m"),
     "Nm newton_meter": ("1", "N*m"),
+    "Ncm": ("0.01", "N*m"),
+    "Nmm": ("0.001", "N*m"),
+    "Nms": ("1", "N*m*s"),
+    "ozin": ("1", "ozf*in"),
+    "lbin inlb": ("1", "lbf*in"),
+    "lbft ftlb": ("1", "lbf*ft"),
+    "kgcm": ("1", "kgf*cm"),
     "W watt": ("1", "J/s"),
     "V volt": ("1", "W/A"),
     "ohm Ω Ohm": ("1", "V/A"),
@@ -52,18 +62,18 @@ _DERIVED = {
     "arcmin arcminute": ("0.0002908882086657216", "rad"),
     "arcsec arcsecond": ("4.84813681109536e-06", "rad"),
     "rev turn revolution": ("6.283185307179586", "rad"),
-    "rpm": ("0.10471975511965977", "rad/s"),
+    "rpm RPM": ("0.10471975511965977", "rad/s"),
     "Hz hertz": ("6.283185307179586", "rad/s"),
+    "count cpr": ("1", "1"),
 }
-_WORD = 4  # letters from which a name may stand in the plural: "volts", but "Nms" and "As" are no units
-_PLURALS = ("sec", "min", "rev", "amp", "ohm")
+_WORD = 4  # letters from which a name may stand in the plural: "volts", but "As" is no unit
+_PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")
+_MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
 
-_TOKEN = re.compile(r"\s*(?:(?P<name>[A-Za-z_µΩ]+|1(?![0-9.]))|(?P<power>\^-?[1-6])|(?P<sign>[*/()]))")
-_NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
-_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
-_BARE_POWER = re.compile(r"(?<=[A-Za-z])([23])(?![0-9])")
-_RUN_TOGETHER = re.compile(r"\b(k?g)(c?m\^2)")
-_MAX_TEXT = 120
+_TOKEN = re.compile(
+    r"\s*(?:(?P<name>[A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))|(?P<power>\^-?[1-6])|(?P<sign>[*/()]))"
+)
+_WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)(?=[* ]c?m\b)")
 
 Dimension = tuple[tuple[str, int], ...]
 Exact = tuple[Fraction, Counter[str]]  # a factor to SI, and exponents
@@ -72,10 +82,11 @@ Units = dict[str, Exact]
 
 @dataclass(frozen=True)
 class UnitValue:
-    """A unit in SI: what to multiply by, and its dimension with the angle counted."""
+    """A unit in SI: what to multiply by, its dimension with the angle counted, and the power of minutes."""
 
     factor: float
     dimension: Dimension
+    minutes: int = 0
 
     @property
     def angle(self) -> int:
@@ -87,19 +98,9 @@ class UnitValue:
         return tuple(item for item in self.dimension if item[0] != "[angle]")
 
 
-def _tidy(unit: str) -> str:
-    text = unit.strip()
-    for old, new in (("²", "^2"), ("³", "^3"), ("·", "*"), ("⋅", "*"), ("×", "*"), ("μ", "µ"), ("**", "^")):
-        text = text.replace(old, new)
-    text = (
-        text.replace("°C", " degC").replace("°", " deg").replace("%", " percent").replace("\N{OHM SIGN}", "Ω")
-    )
-    return _RUN_TOGETHER.sub(r"\1*\2", _BARE_POWER.sub(r"^\1", text)).rstrip()
-
-
 def _tokens(unit: str) -> deque[str]:
     """Names, powers, signs and parentheses, with a sign between two factors."""
-    text, position = _tidy(unit), 0
+    text, position = tidy(unit), 0
     found: deque[str] = deque()
     while position < len(text):
         match = _TOKEN.match(text, position)
@@ -155,7 +156,12 @@ def _units() -> Units:
     for names, (number, definition) in _DERIVED.items():
         factor, powers = _product(_tokens(definition), units)
         units |= dict.fromkeys(names.split(), (Fraction(number) * factor, powers))
-    return units
+    minute = units["min"][1] + Counter({_MINUTE: 1})
+    return (
+        units
+        | dict.fromkeys(("min", "minute"), (Fraction(60), minute))
+        | {"1000": (Fraction(1000), Counter())}
+    )
 
 
 def _named(name: str, units: Units) -> Exact:
@@ -182,7 +188,7 @@ def parse_unit(unit: str) -> UnitValue:
     ValueError
         If it is no unit, with the nearest known one where there is one.
     """
-    if len(unit) > _MAX_TEXT:
+    if len(unit) > LONGEST:
         raise ValueError("a unit of more than 120 characters")
     if unit.strip() in ("", "1"):
         return UnitValue(1.0, ())
@@ -193,6 +199,7 @@ def parse_unit(unit: str) -> UnitValue:
         raise ValueError(f"{shown(unit)} is not a unit") from None
     if tokens:
         raise ValueError(f"{shown(unit)} is not a unit")
+    minutes = powers.pop(_MINUTE, 0)
     dimension = tuple(sorted((name, power) for name, power in powers.items() if power))
     try:
         size = float(factor)
@@ -200,11 +207,11 @@ def parse_unit(unit: str) -> UnitValue:
         size = 0.0
     if size == 0.0:
         raise ValueError(f"{shown(unit)} is beyond the range of floats")
-    return UnitValue(size, dimension)
+    return UnitValue(size, dimension, minutes)
 
 
 def _unknown(name: str, units: Units) -> str:
-    near = get_close_matches(name, [known for known in units if known != "1"], 1, 0.5)
+    near = get_close_matches(name, [known for known in units if known[0] != "1"], 1, 0.5)
     return f'unknown unit "{name}"' + (f' (nearest known: "{near[0]}")' if near else "")
 
 
@@ -251,6 +258,10 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
     pair = (_kinds().get(value.dimension, ""), _kinds().get(wanted.dimension, ""))
     if pair == ("speed or angular frequency", "gain or rate"):
         return f"; a frequency in Hz becomes a gain in 1/s times 2 pi: {number * value.factor:.6g} 1/s"
+    if pair == ("speed or angular frequency", "time"):
+        return f"; a period of {1.0 / (number * value.factor / (2.0 * pi)):.6g} s" if number > 0 else ""
+    if pair == ("mass", "force"):
+        return "; a weight is written kgf"
     if pair == ("moment of inertia", "mass"):
         return "; a screw of lead p carries J as the mass J (2 pi/p)^2"
     if pair == ("mass", "moment of inertia"):
@@ -260,24 +271,28 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
     return ""
 
 
-def split_quantity(text: str) -> tuple[float, str]:
-    """Number and unit of a written quantity."""
-    match = _NUMBER.match(text) if len(text) <= _MAX_TEXT else None
-    if match is None:
-        raise ValueError("a number and a unit are wanted")
-    if _COMMA.match(text):
-        raise ValueError(f"a decimal comma; use a decimal point: {shown(text.replace(',', '.', 1))}")
-    number = float(match.group(1))
-    if not isfinite(number):
-        raise ValueError("must be finite")
-    return number, match.group(2).strip()
-
-
 def compatible(value: UnitValue, wanted: UnitValue) -> bool:
     """Whether a unit may stand for another; a radian in the denominator may be left out."""
     if value.dimension == wanted.dimension:
         return True
     return wanted.angle < 0 and value.angle == 0 and value.without_angle() == wanted.without_angle()
+
+
+def _as_meant(written: str, wanted: UnitValue) -> UnitValue:
+    """A unit, as data sheets mean it where another one is wanted.
+
+    Minutes without an angle are those of a speed in revolutions per minute (``mV/(1/min)``); ounces, pounds
+    and kilograms are weights where no mass is wanted (``oz-in``, ``lb-in-s2``, ``kg-cm``).
+    """
+    value = parse_unit(written)
+    if value.minutes and wanted.angle and not value.angle:
+        turns = -value.minutes
+        dimension = tuple(sorted((*value.dimension, ("[angle]", turns))))
+        value = UnitValue(value.factor * (2.0 * pi) ** turns, dimension)
+    if not compatible(value, wanted) and _WEIGHTS.search(tidy(written)):
+        force = parse_unit(_WEIGHTS.sub(r"\1\2f", tidy(written)))
+        return force if compatible(force, wanted) else value
+    return value
 
 
 def parse_quantity(text: str | float | int, unit: str) -> float:
@@ -313,7 +328,7 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
         number, written = (float(text), "") if isinstance(text, int | float) else split_quantity(text)
         if not isfinite(number):
             raise ValueError("must be finite")
-        result = parse_unit(written)
+        result = _as_meant(written, wanted)
     except (ValueError, OverflowError) as error:
         raise InputError(f"{error}; allowed: {example}") from None
     if not compatible(result, wanted):
@@ -324,6 +339,17 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     if not isfinite(value):
         raise InputError(f"must be finite; allowed: {example}")
     return value
+
+
+def si_text(value: float, unit: str) -> str:
+    """A value in its own SI unit as text.
+
+    Examples
+    --------
+    >>> si_text(0.06, "ohm"), si_text(66.0, "1")
+    ('0.06 ohm', '66.0')
+    """
+    return repr(value) if unit == "1" else f"{value!r} {unit}"
 
 
 def convert(value: float, unit: str, to: str) -> float:

@@ -12,7 +12,7 @@ from math import inf, isfinite
 from typing import Any
 
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in
-from actuator_lti.design.loader import design_from_tree
+from actuator_lti.design.loader import as_design, design_from_tree
 from actuator_lti.design.model import (
     Controller,
     ControllerObjects,
@@ -20,15 +20,15 @@ from actuator_lti.design.model import (
     Limits,
     Motor,
     Parameter,
-    Requirement,
     Tolerance,
     Validation,
     default_deflection,
 )
-from actuator_lti.design.quantities import write_limit
-from actuator_lti.design.sections import SECTIONS, at_place, parts_of
+from actuator_lti.design.sections import RECORDS, SECTIONS, at_place, parts_of
 from actuator_lti.design.settings_file import object_entry
+from actuator_lti.design.units import si_text
 from actuator_lti.errors import InputError
+from actuator_lti.reading import shown
 from actuator_lti.tree import Tree
 
 # what a design has that its file does not mention: a section absent here must be written even when empty
@@ -42,7 +42,7 @@ _BARE = Design(
 )
 
 
-_WHICH = ("rotor", "to")  # of a requirement: which of two loops or responses; mostly not said
+_WHICH = ("rotor", "to", "locking_gear")  # which of several is meant: mostly not said
 
 
 def write_design(design: Design) -> str:
@@ -52,7 +52,7 @@ def write_design(design: Design) -> str:
     """
     import tomli_w
 
-    return tomli_w.dumps(design_tree(design))
+    return tomli_w.dumps(design_tree(as_design(design)))
 
 
 def design_tree(design: Design) -> Tree:
@@ -71,10 +71,9 @@ def design_tree(design: Design) -> Tree:
             here.setdefault(section.key, []).append({**named, **table})
         elif table or section.required or at_place(_BARE, section.place) is None:
             here[section.key] = table
-    tree["requirement"] = [_requirement(item, structure) for item in design.requirements]
-    tree["waiver"] = [asdict(item) for item in design.waivers]
-    tree["correlation"] = [asdict(item) for item in design.correlations]
-    tree["fact"] = [asdict(item) for item in design.facts]
+    for record in RECORDS:
+        items = getattr(design, record.attribute)
+        tree[record.key] = [_section(design, item, "", record.template, structure) for item in items]
     if design.objects != ControllerObjects():
         tree["objects"] = {
             "velocity_gain_factor": design.objects.velocity_gain_factor,
@@ -93,17 +92,19 @@ def _section(design: Design, part: Any, name: str, template: str, structure: Str
         if known is not None and known.value == value:
             section[field.key] = _entry(known)
         elif value is not None and value != inf and value != defaults[field.attribute]:
-            section[field.key] = _bare(field, value, field.unit(structure))
+            section[field.key] = _bare(field, value, part, structure)
     unsaid = name == "validation" and not any(path.startswith("validation.") for path in design.parameters)
     if unsaid and len(section) == 1 and part.full_deflection_rad == default_deflection(design.axis):
         return {}
     return section
 
 
-def _bare(field: Field, value: Any, unit: str) -> Any:
+def _bare(field: Field, value: Any, part: Any, structure: Structure) -> Any:
+    """A value without a pedigree."""
     if isinstance(value, tuple):
-        return [_bare(field, item, unit) for item in value]
-    return value if isinstance(value, str | bool) or unit == "1" else f"{value!r} {unit}"
+        return [_bare(field, item, part, structure) for item in value]
+    unit = part.unit if field.kind == "limit" else field.unit(structure)
+    return value if isinstance(value, str | bool) or unit == "1" else si_text(value, unit)
 
 
 def _written(text: str) -> str | int | float:
@@ -135,20 +136,8 @@ def _tolerance(tolerance: Tolerance, unit: str) -> Any:
     return {"kind": tolerance.kind, "std": text, **{key: _si(value, unit) for key, value in bounds.items()}}
 
 
-def _si(value: float | None, unit: str) -> Any:
-    return value if unit == "1" else f"{value!r} {unit}"
-
-
-def _requirement(item: Requirement, structure: Structure) -> Tree:
-    tree: Tree = {"id": item.id, "quantity": item.quantity}
-    tree |= {key: value for key in ("loop", *_WHICH) if (value := getattr(item, key)) is not None}
-    for key in ("minimum", "maximum"):
-        value = getattr(item, key)
-        if value is not None:
-            tree[key] = write_limit(value, item.unit)
-    if item.load_Nm is not None:
-        tree["load"] = f"{item.load_Nm!r} {'N' if structure.axis == 'linear' else 'N*m'}"
-    return tree | {key: getattr(item, key) for key in ("source", "note") if getattr(item, key)}
+def _si(value: Any, unit: str) -> Any:
+    return value if unit == "1" else si_text(value, unit)
 
 
 def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
@@ -173,6 +162,18 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     return design_from_tree(tree, design.origin or design.name)
 
 
+def with_filter(design: Design, stage: str, keys: Mapping[str, Any]) -> Design:
+    """A copy of a design with one more filter of the velocity loop, see `Design.add_filter`."""
+    if stage != "velocity" or design.controller.velocity is None:
+        known = '"velocity"' if design.controller.velocity is not None else "none: no velocity loop"
+        raise InputError(f"stage = {shown(stage)}: has no filters; allowed: {known}")
+    path = "control.velocity.filter"
+    there = design_tree(design)["control"]["velocity"].get("filter", [])
+    units = with_units(design, {f"{path}.1.{key}": value for key, value in keys.items()})
+    new = {at.rpartition(".")[2]: value for at, value in units.items()}
+    return with_overrides(design, {path: [*there, new]})
+
+
 def overridden_text(design: Design, path: str, value: Any) -> str:
     """The design file with one key changed as `with_overrides` does, without a look at the value."""
     import tomli_w
@@ -184,20 +185,22 @@ def overridden_text(design: Design, path: str, value: Any) -> str:
 
 def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
     """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
+    if not isinstance(values, Mapping) or not all(isinstance(path, str) for path in values):
+        raise InputError(f"values = {shown(values)}: allowed: dotted keys with their values, in a mapping")
     structure = Structure.of(design)
     result: Tree = {}
     for path, value in values.items():
         field = field_of(path)
         unit = "1" if field is None or field.kind != "quantity" else field.unit(structure)
         plain = isinstance(value, int | float) and not isinstance(value, bool)
-        result[path] = f"{float(value)!r} {unit}" if plain and unit != "1" else value
+        result[path] = si_text(float(value), unit) if plain and unit != "1" else value
     return result
 
 
 def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
     parts = path.split(".")
     here: Any = tree
-    lists = ("requirement", "waiver", *(section.path for section in SECTIONS if section.many))
+    lists = [section.path for section in (*SECTIONS, *RECORDS) if section.many]
     for depth, part in enumerate(parts[:-1]):
         if isinstance(here, list):
             here = next((item for k, item in enumerate(here, 1) if _label(item, k) == part), None)
@@ -233,6 +236,7 @@ def design_hash(design: Design) -> str:
 
     It does not depend on comments, order of keys, spelling of units, titles, sources, grades or facts.
     """
+    design = as_design(design)
     parts = [section for section in SECTIONS if not section.parent]
     top = {part.place for part in parts if not part.asked or getattr(design, part.place) is not None}
     content = {key: _canonical(getattr(design, key)) for key in ("axis", *sorted(top))}

@@ -20,11 +20,6 @@ def follows_angle(design: Design) -> bool:
     return load or design.motor.over_angle.follows
 
 
-def bends_with_angle(design: Design) -> bool:
-    """Whether such a torque is no straight line: the linear loops hold about one angle only."""
-    return design.load.over_angle.bends or design.motor.over_angle.bends
-
-
 def holding_moment_Nm(design: Design, angle_rad: float = 0.0) -> float:
     """Moment on the output shaft that holds the load's own one at an output angle."""
     return -float(design.load.over_angle.at(angle_rad))

@@ -1,6 +1,6 @@
-"""Controllers, filters and estimators as small linear blocks with a sampled and a continuous face.
+"""Controllers, filters and estimators as small linear blocks with a sampled and a continuous realisation.
 
-A face is ``x+ = A x + B e`` (sampled) or ``dx/dt = A x + B e`` (continuous) with ``y = C x + D e``.
+A realisation is ``x+ = A x + B e`` (sampled) or ``dx/dt = A x + B e`` (continuous) with ``y = C x + D e``.
 Coefficients are floats, or arrays of shape (K,) stacked over designs. What the running tick computes block
 by block stands in model.md sections 2 and 7; here is what it is as a linear system.
 """
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Polynomial = tuple[Any, ...]
 
 
-class Face(NamedTuple):
+class Realisation(NamedTuple):
     """``A`` (n by n), ``B`` (n), ``C`` (n) and ``D`` of a SISO block, as nested tuples of coefficients."""
 
     A: tuple[tuple[Any, ...], ...] = ()
@@ -45,27 +45,27 @@ class Block:
 
     Attributes
     ----------
-    sampled, continuous : Face
+    sampled, continuous : Realisation
     states : tuple of str
-        Names of the sampled face's states, told apart by the place of the block.
+        Names of the sampled realisation's states, told apart by the place of the block.
     period_s : float
-        T of the sampled face.
+        T of the sampled realisation.
     age_s : float
-        Delay that the continuous face needs besides (a difference over m T is m T/2 old).
+        Delay that the continuous realisation needs besides (a difference over m T is m T/2 old).
     """
 
-    sampled: Face
-    continuous: Face
+    sampled: Realisation
+    continuous: Realisation
     states: tuple[str, ...] = ()
     period_s: Any = 0.0
     age_s: Any = 0.0
 
     def at_z(self, omega_rad_s: np.ndarray) -> np.ndarray:
-        """Frequency response of the sampled face."""
+        """Frequency response of the sampled realisation."""
         return self.sampled.response(np.exp(1j * np.asarray(omega_rad_s) * self.period_s))
 
     def at_s(self, omega_rad_s: np.ndarray) -> np.ndarray:
-        """Frequency response of the continuous face, its age left out."""
+        """Frequency response of the continuous realisation, its age left out."""
         return self.continuous.response(1j * np.asarray(omega_rad_s))
 
 
@@ -75,12 +75,12 @@ def pi(gain: Any, integral_time_s: Any, period_s: Any) -> Block:
     In continuous time Kp (1 + 1/(Tn s)).
     """
     if integral_time_s is None:
-        return Block(Face(D=gain), Face(D=gain), (), period_s)
+        return Block(Realisation(D=gain), Realisation(D=gain), (), period_s)
     rate = gain / integral_time_s
     step = rate * period_s
     return Block(
-        Face(((1.0,),), (step,), (1.0,), gain + step),
-        Face(((0.0,),), (rate,), (1.0,), gain),
+        Realisation(((1.0,),), (step,), (1.0,), gain + step),
+        Realisation(((0.0,),), (rate,), (1.0,), gain),
         ("I",),
         period_s,
     )
@@ -90,8 +90,8 @@ def lag(time_s: Any, period_s: Any) -> Block:
     """First-order filter ``y_k = y_{k-1} + T/(T_F + T) (x_k - y_{k-1})``; continuous 1/(T_F s + 1)."""
     share = period_s / (time_s + period_s)
     return Block(
-        Face(((1.0 - share,),), (share,), (1.0 - share,), share),
-        Face(((-1 / time_s,),), (1 / time_s,), (1.0,), 0.0),
+        Realisation(((1.0 - share,),), (share,), (1.0 - share,), share),
+        Realisation(((-1 / time_s,),), (1 / time_s,), (1.0,), 0.0),
         ("filter",),
         period_s,
     )
@@ -103,8 +103,8 @@ def difference(samples: int, period_s: Any) -> Block:
     shift = tuple(tuple(1.0 if c == r - 1 else 0.0 for c in range(m - 1)) for r in range(m - 1))
     C = tuple(1 / span if c == m - 2 else 0.0 for c in range(m - 1))
     # D_j: angle gained over the last j periods; D_j' = gained + D_{j-1}
-    sampled = Face(shift, (1.0,) * (m - 1), C, 1 / span)
-    return Block(sampled, Face(), tuple(f"D{j}" for j in range(1, m)), period_s, span / 2)
+    sampled = Realisation(shift, (1.0,) * (m - 1), C, 1 / span)
+    return Block(sampled, Realisation(), tuple(f"D{j}" for j in range(1, m)), period_s, span / 2)
 
 
 def tracking(bandwidth_rad_s: Any, period_s: Any) -> Block:
@@ -115,8 +115,8 @@ def tracking(bandwidth_rad_s: Any, period_s: Any) -> Block:
     """
     w0, T = bandwidth_rad_s, period_s
     keep, pull = 1 - 2 * w0 * T, w0**2 * T
-    sampled = Face(((keep, -keep * T), (pull, 1 - pull * T)), (keep, pull), (pull, 1 - pull * T), pull)
-    flow = Face(((-2 * w0, -1.0), (w0**2, 0.0)), (1.0, 0.0), (0.0, 1.0), 0.0)
+    sampled = Realisation(((keep, -keep * T), (pull, 1 - pull * T)), (keep, pull), (pull, 1 - pull * T), pull)
+    flow = Realisation(((-2 * w0, -1.0), (w0**2, 0.0)), (1.0, 0.0), (0.0, 1.0), 0.0)
     return Block(sampled, flow, ("lag", "estimate"), period_s)
 
 
@@ -213,7 +213,7 @@ def _tustin(p: Polynomial, c: Any) -> Polynomial:
     return (square + middle + p[2], 2 * (p[2] - square), square - middle + p[2])
 
 
-def _canonical(num: Polynomial, den: Polynomial) -> Face:
+def _canonical(num: Polynomial, den: Polynomial) -> Realisation:
     """Observer form (direct form II transposed) of num/den, both highest power first and of equal length."""
     b, a = [value / den[0] for value in num], [value / den[0] for value in den]
     n = len(a) - 1
@@ -221,7 +221,7 @@ def _canonical(num: Polynomial, den: Polynomial) -> Face:
         tuple(-a[r + 1] if c == 0 else (1.0 if c == r + 1 else 0.0) for c in range(n)) for r in range(n)
     )
     B = tuple(b[r + 1] - a[r + 1] * b[0] for r in range(n))
-    return Face(A, B, (1.0, 0.0)[:n], b[0])
+    return Realisation(A, B, (1.0, 0.0)[:n], b[0])
 
 
 def _back(p: Polynomial, h: Any) -> Polynomial:
@@ -232,9 +232,9 @@ def _back(p: Polynomial, h: Any) -> Polynomial:
 
 
 def _given(item: Filter, period_s: Any) -> Block:
-    """A biquad by its sampled coefficients; its continuous face by the inverse of Tustin's rule."""
+    """A biquad by its sampled coefficients; its continuous realisation by the inverse of Tustin's rule."""
     b, a = item.polynomials
     if len(a) == 1:
-        return Block(Face(D=b[0]), Face(D=b[0]), (), period_s)
+        return Block(Realisation(D=b[0]), Realisation(D=b[0]), (), period_s)
     num, den = (_back(p, period_s / 2) for p in (b, a))
     return Block(_canonical(b, a), _canonical(num, den), ("1", "2")[: len(a) - 1], period_s)

@@ -69,8 +69,9 @@ class Operating:
         if self.rotor not in get_args(RotorState):
             raise InputError(f"rotor = {self.rotor!r}: free or locked")
         for name in ("load_Nm", "speed_rad_s", "angle_rad", "twist_rad"):
-            if not isfinite(getattr(self, name)):
-                raise InputError(f"{name} = {getattr(self, name)}: must be finite")
+            value = getattr(self, name)
+            if isinstance(value, str) or not isfinite(value):
+                raise InputError(f"{name} = {value!r}: must be a finite number, in SI")
         amplitude = self.speed_amplitude_rad_s
         if self.point == "describing-function" and (amplitude is None or not 0 < amplitude < float("inf")):
             raise InputError(f"speed_amplitude_rad_s = {amplitude}: must be positive (motor side)")

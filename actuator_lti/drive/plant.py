@@ -39,12 +39,12 @@ class Plant:
         th/N_c - phi in rad, both at its own shaft: so the absolute angle is one state, which no inner loop
         sees.
     A : ndarray, shape (..., n, n)
-        Without the load's own moments, see `moment`.
+        Without the load's own torques, see `moment`.
     B_u, B_T, B_M : ndarray, shape (..., n)
         Effect of the voltage (V, or the drive signal of a torque source), of a torque in N m that accelerates
         the motor, and of a moment in N m that pushes the output shaft forward.
     torque, moment : dict of str to float
-        The motor's own torque, and the load's own moment on the output shaft, as combinations of states and
+        The motor's own torque, and the load's own torque on the output shaft, as combinations of states and
         rows; both are held over a tick. Empty where there is none, or it does not reach the plant.
     rows : dict of str to dict of str to float
         Angles and torques as combinations of states: ``output_angle``, ``phi`` and ``T_s`` (angle

@@ -15,6 +15,8 @@ import numpy as np
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
+RESOLVED = 1e-13  # of the command: what sin(k pi) leaves of a zero of the mean
+
 
 @dataclass(frozen=True)
 class CommandMean:
@@ -42,6 +44,7 @@ class CommandMean:
             gain = np.where(
                 np.sin(half) == 0.0, 1.0, np.sin(self.samples * half) / (self.samples * np.sin(half))
             )
+        gain = np.where(np.abs(gain) < RESOLVED, 0.0, gain)
         return np.asarray(gain * np.exp(-1j * half * (self.samples - 1)))
 
     @property
@@ -63,6 +66,19 @@ def command_mean(design: Design) -> CommandMean | None:
     period = control.position.every * control.period_s
     samples = ceil(2.0 * command.acceleration_rad_s2 / (command.jerk_rad_s3 * period) - 1e-9)
     return CommandMean(samples, period) if samples > 1 else None
+
+
+def profile_onset_rad(design: Design, omega_rad_s: np.ndarray) -> np.ndarray:
+    """Peak of a sine command from which on its rate or acceleration limit acts; ``inf`` where neither does.
+
+    The largest difference of samples T apart is 2 sin(w T/2) of the peak, the second one its square.
+    """
+    command, control = design.command, design.controller
+    if control.position is None:
+        return np.full(np.shape(omega_rad_s), inf)
+    period = control.position.every * control.period_s
+    per_peak = 2.0 * np.sin(0.5 * np.asarray(omega_rad_s, dtype=float) * period) / period
+    return np.asarray(np.minimum(command.rate_rad_s / per_peak, command.acceleration_rad_s2 / per_peak**2))
 
 
 def profile_note(design: Design) -> str:

@@ -37,7 +37,7 @@ _SIGNALS = (
     Signal("W", "speed behind the coupling", "rad/s", "m/s"),
     Signal("T_s", "coupling torque", "N m", "N"),
     Signal("output", "output angle", "rad", "m"),
-    Signal("moment", "moment on the output shaft", "N m", "N"),
+    Signal("moment", "load torque on the output shaft", "N m", "N"),
     Signal("w_cmd", "speed command before its limits", "rad/s", "m/s"),
     Signal("torque_command", "velocity controller's output", "A"),
     Signal("w_meas", "measured speed", "rad/s", "m/s"),
@@ -50,7 +50,7 @@ SIGNALS = {signal.name: signal for signal in _SIGNALS}
 
 @dataclass(frozen=True)
 class Limiter:
-    """A limiter: where it acts and how it is told of.
+    """A limiter: where it acts and how reports call it.
 
     Attributes
     ----------

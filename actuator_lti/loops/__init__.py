@@ -4,7 +4,13 @@ Light to import; python-control is loaded when loops are assembled.
 """
 
 from actuator_lti.loops.assemble import assemble_loops
-from actuator_lti.loops.periodic import ExactMargins, PeriodicLoop, exact_margins, periodic_loop
+from actuator_lti.loops.periodic import (
+    ExactMargins,
+    PeriodicLoop,
+    exact_margins,
+    periodic_loop,
+    periodic_loop_of,
+)
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
 __all__ = [
@@ -17,4 +23,5 @@ __all__ = [
     "assemble_loops",
     "exact_margins",
     "periodic_loop",
+    "periodic_loop_of",
 ]

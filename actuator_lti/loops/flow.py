@@ -99,13 +99,13 @@ class FlowWalk(Walk):
         return self.late(name, value, delay)
 
     def apply(self, name: str, block: Block, value: Row) -> Row:
-        """The continuous face."""
-        face = block.continuous
-        names = [f"{name}.{k}" for k in range(len(face.B))]
+        """The continuous realisation."""
+        realisation = block.continuous
+        names = [f"{name}.{k}" for k in range(len(realisation.B))]
         x = [self.state(each) for each in names]
-        for each, row, gain in zip(names, face.A, face.B, strict=True):
+        for each, row, gain in zip(names, realisation.A, realisation.B, strict=True):
             self.rate[each] = total(a * s for a, s in zip(row, x, strict=True)) + gain * value
-        return total(c * s for c, s in zip(face.C, x, strict=True)) + face.D * value
+        return total(c * s for c, s in zip(realisation.C, x, strict=True)) + realisation.D * value
 
     def derivative(self, name: str, value: Row, period_s: Any) -> Row:
         """The difference over the period; ideal: the derivative, by the chain rule."""

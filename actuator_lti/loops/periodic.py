@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -177,7 +178,11 @@ class PeriodicLoop:
 
 def periodic_loop(loops: Loops, point: str) -> PeriodicLoop:
     """The loop at a break point of sampled loops, what no gain moves left out."""
-    wired = wire(loops.design, loops.operating)
+    return periodic_loop_of(wire(loops.design, loops.operating), point)
+
+
+def periodic_loop_of(wired: Drive, point: str) -> PeriodicLoop:
+    """The same of a wired drive."""
     return _moved(_parts(point_blocks(wired, point))[0], wired.interval[wired.producer(point)] * wired.tick_s)
 
 
@@ -193,6 +198,12 @@ def _parts(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
     apart, its eigenvalues do not disturb those of the loop: two slow ones that coincide are known to the root
     of a rounding only.
     """
+    moved, others = _split(blocks)
+    return _without_rest(moved), _without_rest(others)
+
+
+def _split(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
+    """The same with the modes at rest."""
     A, B, C = (np.stack([getattr(block, name) for block in blocks]) for name in "ABC")
     depends = (A != 0.0).any(axis=0)
     used = seen(depends, (C != 0.0).any(axis=(0, 1))) & seen(depends.T, (B != 0.0).any(axis=(0, 2)))
@@ -200,8 +211,7 @@ def _parts(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
         [(a[np.ix_(part, part)], b[part], c[:, part]) for a, b, c in zip(A, B, C, strict=True)]
         for part in (used, ~used)
     )
-    nothing = [(a, np.zeros_like(b), np.zeros_like(c)) for a, b, c in others]
-    return _without_rest(moved), _without_rest(nothing)
+    return moved, [(a, np.zeros_like(b), np.zeros_like(c)) for a, b, c in others]
 
 
 def _without_rest(systems: list[System]) -> list[System]:
@@ -250,17 +260,36 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
         return ExactMargins(False, nan, nan, nan if point == "u" else None, radius)
     upper = _first_border(lambda g: moved.radius(g) - 1, list(_GAINS), float("inf"))
     lower = _first_border(lambda g: moved.radius(g) - 1, list(1 / _GAINS), 0.0)
-    delay = _delay_border(wired, longest_delay_ticks, moved.hidden) if point == "u" else None
+    delay = _delay_border(wired, longest_delay_ticks, moved) if point == "u" else None
     return ExactMargins(True, upper, lower, delay, radius)
 
 
-def _delay_border(wired: Drive, longest_ticks: float, hidden: int) -> float:
-    Ts = wired.tick_s
+def _delay_border(wired: Drive, longest_ticks: float, now: PeriodicLoop) -> float:
+    """The first computing delay at which a mode comes to the unit circle; whole updates are a queue."""
+    Ts, every = wired.tick_s, wired.interval[wired.producer("u")]
+    resting = len(_split(point_blocks(wired, "u"))[0][0][0]) != len(now.systems[0][0])  # whatever the delay
+
+    @cache
+    def part(ticks: float) -> list[System]:
+        later, _ = _split(point_blocks(wired.later(ticks * Ts), "u"))
+        return _without_rest(later) if resting else later
 
     def excess(ticks: float) -> float:
-        later, _ = _parts(point_blocks(wired.later(ticks * Ts), "u"))
-        return PeriodicLoop(later, Ts, hidden).radius() - 1
+        updates, rest = divmod(ticks, every)
+        return PeriodicLoop(_queued(part(rest), int(updates)), Ts, now.hidden).radius() - 1
 
     step = 1 / _DELAY_STEPS_A_TICK
     grid = [0.0, *np.arange(step, longest_ticks, step)]
     return _first_border(excess, grid, float("inf")) * Ts
+
+
+def _queued(systems: list[System], updates: int) -> list[System]:
+    """With what enters delayed by whole updates."""
+    n, queued = len(systems[0][0]), []
+    for A, B, C in systems if updates else ():
+        over = np.eye(n + updates, k=-1)  # what enters is the first of the queue
+        over[:n, :n], over[n, : n + 1], over[:n, -1:] = A, 0.0, B
+        enters = np.zeros((n + updates, 1))
+        enters[n] = 1.0
+        queued.append((over, enters, np.hstack([C, np.zeros((1, updates))])))
+    return queued or systems

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 from actuator_lti.as_control import as_control
+from actuator_lti.faces import draw
 
 Form = Literal["sampled", "continuous", "ideal"]
 InnerLoops = Literal["closed", "open"]
@@ -67,7 +68,11 @@ class Loop:
 
     @cached_property
     def closed_loop(self) -> Any:
-        """T = L/(1 + L) as a python-control system, without the feed-forward."""
+        """T = L/(1 + L) as a python-control system: the feedback loop alone, without the feed-forward.
+
+        Its bandwidth is not that of the drive: see ``Loops.reference_to_output`` for the response to the
+        reference, and `actuator_lti.commanded` for that to the command, behind the mean of its profile.
+        """
         return as_control(self.plain_closed)
 
     @cached_property
@@ -85,21 +90,15 @@ class Loop:
         >>> magnitude.get_ylabel()
         'magnitude, dB'
         """
-        from actuator_lti.plotting import loop_bode
-
-        return loop_bode(self, axes)
+        return draw("loop_bode", self, axes)
 
     def plot_nyquist(self, axes: Any = None) -> Axes:
         """Draw the locus of the open loop near -1; gives matplotlib's axes."""
-        from actuator_lti.plotting import plot_nyquist
-
-        return plot_nyquist(self.open_loop, label=self.name, axes=axes)
+        return draw("plot_nyquist", self.open_loop, label=self.name, axes=axes)
 
     def plot_step(self, duration_s: float | None = None, axes: Any = None) -> Axes:
         """Draw the step response of the closed loop; gives matplotlib's axes."""
-        from actuator_lti.plotting import plot_step
-
-        return plot_step(self.closed_loop, duration_s=duration_s, label=self.name, axes=axes)
+        return draw("plot_step", self.closed_loop, duration_s=duration_s, label=self.name, axes=axes)
 
     def __repr__(self) -> str:
         kind = "continuous" if self.period_s is None else f"every {1e3 * self.period_s:g} ms"
@@ -185,17 +184,13 @@ class Loops:
 
     def plot_bode(self, axes: Any = None) -> list[Axes]:
         """Draw the open loops of all stages in one Bode figure; gives matplotlib's axes."""
-        from actuator_lti.plotting import plot_bode
-
         for loop in self.present.values():
-            axes = plot_bode(loop.open_loop, label=loop.name, axes=axes)
+            axes = draw("plot_bode", loop.open_loop, label=loop.name, axes=axes)
         return list(axes)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        from actuator_lti.notebook import loops_html
-
-        return loops_html(self)
+        return draw("loops_html", self)
 
     def __repr__(self) -> str:
         names = ", ".join(self.present)

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.drive.blocks import Block, Face
+from actuator_lti.drive.blocks import Block, Realisation
 from actuator_lti.loops.rows import Row, table, total
 from actuator_lti.loops.walk import INPUTS, Program, Walk
 
@@ -102,16 +102,16 @@ class TickWalk(Walk):
         return value
 
     def apply(self, name: str, block: Block, value: Row) -> Row:
-        """The sampled face."""
-        return self.face(name, block.states, block.sampled, value)
+        """The sampled realisation."""
+        return self.realisation(name, block.states, block.sampled, value)
 
-    def face(self, name: str, states: tuple[str, ...], face: Face, value: Row) -> Row:
-        """Put a face's states on and give its output."""
+    def realisation(self, name: str, states: tuple[str, ...], realisation: Realisation, value: Row) -> Row:
+        """Put a realisation's states on and give its output."""
         names = [f"{name}.{state}" for state in states]
         x = [self.state(each) for each in names]
-        for each, row, gain in zip(names, face.A, face.B, strict=True):
+        for each, row, gain in zip(names, realisation.A, realisation.B, strict=True):
             self.next[each] = total(a * s for a, s in zip(row, x, strict=True)) + gain * value
-        return total(c * s for c, s in zip(face.C, x, strict=True)) + face.D * value
+        return total(c * s for c, s in zip(realisation.C, x, strict=True)) + realisation.D * value
 
     def derivative(self, name: str, value: Row, period_s: Any) -> Row:
         """(x_k - x_{k-1})/T."""

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.margins.assemble import FARTHEST
-from actuator_lti.margins.factors_on_axis import Factored, Intervals, halves
+from actuator_lti.margins.factors_on_axis import Factored, Intervals, half_turns, halves
 from actuator_lti.margins.loop import Mask, Real
 
 FAR_LOG = math.log(FARTHEST)
-_TURN = 2.0 * math.pi
 _REAL = 1e-9  # rad
 _STEPS = 60
 _STEP = 1e-5  # relative: near enough for the loop itself to go on
@@ -68,7 +68,7 @@ def last_above(loop: Factored, low: float, high: float, level: float) -> float:
 
     def clear(here: Intervals) -> Mask:
         one_way = (here.least[2] > 0.0) | (here.most[2] < 0.0)
-        least, most = here.bounds()
+        least, most = here.bounds
         return np.asarray(one_way | (least[0] > level) | (most[0] < level))
 
     known = loop.covered([low, high], clear)
@@ -78,46 +78,43 @@ def last_above(loop: Factored, low: float, high: float, level: float) -> float:
     at = above[-1:]
     if known.last[0, at] >= level:
         return float(known.high[at[0]])
-    kind = np.zeros(1, dtype=int)
-    return float(_roots(loop, kind, known.low[at], known.high[at], np.full(1, level))[0])
+    return float(_roots(loop, np.zeros(1, dtype=int), known, at, np.full(1, level))[0])
 
 
 def _clear(here: Intervals, listed_to: float, slack: float) -> Mask:
     one_way = (here.least[2:] > 0.0) | (here.most[2:] < 0.0)
-    least, most = here.bounds()
+    least, most = here.bounds
     off_circle = (least[0] > slack) | (most[0] < -slack)
-    off_axis = _half_turns(least[1] - slack) == _half_turns(most[1] + slack)
+    off_axis = half_turns(least[1] - slack) == half_turns(most[1] + slack)
     out_of_sight = (most[0] < -FAR_LOG) | (here.low >= listed_to)
     clear: Mask = (one_way[0] | off_circle) & (one_way[1] | off_axis | out_of_sight)
     return clear
 
 
-def _half_turns(phase: Real) -> Real:
-    """How many odd multiples of pi lie below."""
-    return np.floor((phase + math.pi) / _TURN)
-
-
 def _read(loop: Factored, known: Intervals, from_zero: bool, listed_to: float) -> Found:
-    hit = np.flatnonzero((known.first[0] > 0.0) != (known.last[0] > 0.0))
-    first, last = _half_turns(known.first[1]), _half_turns(known.last[1])
+    first, last = half_turns(known.first[1]), half_turns(known.last[1])
     if from_zero and abs(math.sin(known.first[1, 0])) < _REAL:  # it leaves the real axis there, one way
-        first[0] = _half_turns(known.first[1, 0] + math.copysign(2.0 * _REAL, known.first[3, 0]))
-    least, most = known.bounds()
+        first[0] = half_turns(known.first[1, 0] + math.copysign(2.0 * _REAL, known.first[3, 0]))
     listed = known.low < listed_to
+    least, most = known.bounds
     seen = (most[0] >= -FAR_LOG) & listed
     step = (last - first).astype(int)
-    count = np.where(seen, np.abs(step), 0)
-    which = np.repeat(np.arange(count.size), count)
-    number = np.arange(which.size) - np.repeat(np.cumsum(count) - count, count)
+    hit = ((known.first[0] > 0.0) != (known.last[0] > 0.0)).nonzero()[0]
+    turned = (seen & (step != 0)).nonzero()[0]
+    which = turned.repeat(np.abs(step[turned]))
     rising = step[which] > 0
-    level = np.where(rising, first[which] + 1 + number, first[which] - number) * _TURN - math.pi
-    kind = np.repeat((0, 1), (hit.size, which.size))
-    both = np.concatenate((hit, which))
-    w = _roots(loop, kind, known.low[both], known.high[both], np.concatenate((np.zeros(hit.size), level)))
-    order = w[hit.size :].argsort()
+    number = np.arange(which.size) - np.searchsorted(which, which)
+    level = np.where(rising, first[which] + 1 + number, first[which] - number) * 2.0 * math.pi - math.pi
+    kind = np.zeros(hit.size + which.size, dtype=int)
+    kind[hit.size :] = 1
+    level = np.concatenate((np.zeros(hit.size), level))
+    w = _roots(loop, kind, known, np.concatenate((hit, which)), level)
+    gain_w, real_w = w[: hit.size], w[hit.size :]
+    gain_w.sort()
+    order = real_w.argsort()
     return Found(
-        np.sort(w[: hit.size]),
-        w[hit.size :][order],
+        gain_w,
+        real_w[order],
         rising[order],
         int(np.abs(step[~seen & listed]).sum()),
         int(step[~seen & (least[0] > 0.0)].sum()),
@@ -125,20 +122,21 @@ def _read(loop: Factored, known: Intervals, from_zero: bool, listed_to: float) -
     )
 
 
-def _roots(loop: Factored, kind: Real, low: Real, high: Real, level: Real) -> Real:
-    """Where gain (0) or phase (1), monotone in each bracket, takes a level: Newton held by bisection."""
+def _roots(loop: Factored, kind: Any, known: Intervals, which: Any, level: Real) -> Real:
+    """Where gain (0) or phase (1), monotone in each interval, takes a level: Newton held by bisection."""
+    low, high = known.low[which], known.high[which]
     if not low.size:
         return low
-    each = np.arange(low.size)
-    above = loop.log_value(low)[kind, each] > level
-    at = halves(low, high)
+    each = np.arange(which.size)
+    first, last = known.first[kind, which] - level, known.last[kind, which] - level
+    above = first > 0.0
+    at = low + (high - low) * (first / (first - last))
     for _ in range(_STEPS):
         total = loop.log_value(at)
         here = total[kind, each] - level
         before = (here > 0.0) == above
         low, high = np.where(before, at, low), np.where(before, high, at)
-        with np.errstate(all="ignore"):
-            ahead = at - here / total[kind + 2, each]
+        ahead = at - here / total[kind + 2, each]
         ahead = np.where((ahead >= low) & (ahead <= high), ahead, halves(low, high))
         small = np.abs(ahead - at) <= _STEP * at
         at = ahead

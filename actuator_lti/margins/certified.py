@@ -9,7 +9,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
 from actuator_lti.margins.determined import FAR_DB, Settled, settled
 from actuator_lti.margins.exact_extremes import disk_alpha, modulus_margin
-from actuator_lti.margins.exact_findings import Crossing, Findings, findings
+from actuator_lti.margins.exact_findings import Crossing, Findings
 from actuator_lti.margins.exact_loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.given import ULP, Given
 from actuator_lti.margins.results import (
@@ -38,15 +38,8 @@ def certified_margins(given: Given) -> StabilityMargins:
     loop = exact_loop(given)
     _refuse_ill_posed(loop)
     others = neighbours(given, loop)
-    base, result = _compared(loop, others, merge=False)
-    if result.problem is not None:
-        base, result = _compared(loop, others, merge=True)
-    return _margins(given, base, result)
-
-
-def _compared(loop: ExactLoop, others: list[ExactLoop], merge: bool) -> tuple[Findings, Settled]:
-    base = findings(loop, merge)
-    return base, settled(base, [findings(other, merge) for other in others])
+    base = Findings(loop)
+    return _margins(given, base, settled(base, [Findings(other) for other in others]))
 
 
 def _refuse_ill_posed(loop: ExactLoop) -> None:

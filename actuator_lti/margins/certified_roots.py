@@ -90,11 +90,14 @@ class HalfPlanes:
         Multiplicity of the root zero.
     border : tuple of (arb, int)
         w > 0 of the roots +-j w, with their multiplicity.
+    values : tuple of complex
+        All of them, in double precision.
     """
 
     right: int
     at_zero: int
     border: tuple[tuple[arb, int], ...]
+    values: tuple[complex, ...]
 
     @property
     def pairs(self) -> tuple[tuple[float, int], ...]:
@@ -107,7 +110,7 @@ class HalfPlanes:
         return self.at_zero + 2 * sum(times for _, times in self.border)
 
 
-NOTHING_HIDDEN = HalfPlanes(0, 0, ())
+NOTHING_HIDDEN = HalfPlanes(0, 0, (), ())
 
 
 def half_planes(p: fmpz_poly) -> HalfPlanes:
@@ -121,28 +124,34 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
         p, at_zero = p.right_shift(1), at_zero + 1
     parts = split(p)
     symmetric = parts.even.gcd(parts.odd) if parts.odd.degree() >= 0 else parts.even
-    border = []
-    right = 0
+    border: list[tuple[arb, int]] = []
+    right, values = 0, [0j] * at_zero
     if symmetric.degree() > 0:
+        mirrored = _exact(symmetric(_SQUARE))
         border = [(v.sqrt(), times) for v, times in positive_roots(all_roots(symmetric))]
         right = symmetric.degree() - sum(times for _, times in border)
-        p = p // _exact(symmetric(_SQUARE))
-    return HalfPlanes(right + _right(p), at_zero, tuple(border))
+        values += _in_doubles(all_roots(mirrored))
+        p = p // mirrored
+    roots = _told_from_axis(p)
+    right += sum(times for root, times in roots if root.real > 0)
+    return HalfPlanes(right, at_zero, tuple(border), (*values, *_in_doubles(roots)))
+
+
+def _in_doubles(roots: list[tuple[acb, int]]) -> list[complex]:
+    return [complex(root) for root, times in roots for _ in range(times)]
 
 
 def _exact(p: fmpz_poly) -> fmpz_poly:
     return p // p.content()
 
 
-def _right(p: fmpz_poly) -> int:
-    """How many roots are right of the axis."""
-    if sign_changes(p) == 0 and p.degree() < 3:
-        return 0
+def _told_from_axis(p: fmpz_poly) -> list[tuple[acb, int]]:
+    """All roots of a polynomial that has none on the axis, each known to lie left or right of it."""
     bits = ctx.prec
     while bits <= _MOST_BITS:
         with ctx.workprec(bits):
             roots = all_roots(p)
             if all(root.real > 0 or root.real < 0 for root, _ in roots):
-                return sum(times for root, times in roots if root.real > 0)
+                return roots
         bits *= 2
     raise NumericalError("a closed-loop pole could not be told from the border of stability")

@@ -18,7 +18,7 @@ from actuator_lti.margins.factors_on_axis import Factored
 from actuator_lti.margins.loop import Complex, Mask, RationalLoop, Real
 from actuator_lti.margins.nearest import nearest
 from actuator_lti.margins.nyquist import angle_about, angle_between
-from actuator_lti.margins.poles import SortedPoles, sorted_poles
+from actuator_lti.margins.poles import SortedPoles, polynomial_roots, sorted_poles
 from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
 from actuator_lti.margins.trust import MOST_ERROR, Doubtful, error_bound, hardly_placed
 
@@ -27,7 +27,7 @@ _WIDEST = 1e6  # ratio of poles and zeros up to which double precision is asked
 _NEAR_ONE = 1e-6
 _LEAST = math.exp(-FAR_LOG)
 _HARDLY = 1e-12  # rad
-FLOOR = 0.01  # gain below which, behind a delay, no crossing of the real axis is listed: 40 dB
+_FLOORS = (0.01, 0.1, 0.5, 0.9)  # gain below which, behind a delay, no crossing of the real axis is listed
 _LEAST_GAIN = 1e-8
 _MOST_TURNS = 100_000  # of the delay that are listed, about a second's work
 _LOW, _HIGH = 1e-3, 1e3  # of the smallest and largest root: where the ends of the axis begin
@@ -67,7 +67,7 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
         closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
     _trust_poles(loop, poles, closed)
     factors = factored(response, poles)
-    parts, listed_to = _parts(factors, band)
+    parts, listed_to, floor = _parts(factors, band)
     ends = _ends(factors, response)
     gain_w, real_w, rising, far = _merged(parts)
     gain_x, gain_L = response.polished(gain_w, gain=True)
@@ -80,7 +80,7 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
     listed = np.log(np.abs(real_L)) >= -FAR_LOG
     far += int(np.count_nonzero(~listed)) + sum(value.real < 0.0 and out_of_sight(value) for value in ends)
     if math.isfinite(listed_to) and band is None and factors.at_infinity:
-        listed &= np.abs(real_L) >= FLOOR
+        listed &= np.abs(real_L) >= floor
     figures = Figures(
         _gain_margins(response, real_x[listed], real_L[listed], ends),
         tuple(
@@ -95,28 +95,13 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
         Agreement(second, count, 0),
         figures,
         method=_METHOD,
-        notes=(*far_note(far), *_tail_note(factors, top, band)),
+        notes=(*far_note(far), *_tail_note(factors, top, band, floor)),
         evidence="checked",
         reason=_reason(real_L[listed], second is not None, closed is not None),
         delay_s=delay_s,
         band_rad_s=None if top is None else (0.0, top),
     )
     return within(result, band)
-
-
-def gain_crossovers(loop: RationalLoop) -> Real:
-    """Where the gain is one (x of the loop), in order.
-
-    Raises
-    ------
-    Doubtful
-        It could not be checked.
-    """
-    with np.errstate(all="ignore"):
-        response = Response(loop)
-        factors = factored(response, sorted_poles(loop.A, loop.in_z))
-        parts, _ = _parts(factors, None)
-        return response.polished(_merged(parts)[0], gain=True)[0]
 
 
 def _refuse(loop: RationalLoop, delay_s: float) -> None:
@@ -133,7 +118,9 @@ def _refuse(loop: RationalLoop, delay_s: float) -> None:
         raise Doubtful("no dynamics, or hardly well posed")
 
 
-def _tail_note(factors: Factored, top: float | None, band: tuple[float, float] | None) -> tuple[str, ...]:
+def _tail_note(
+    factors: Factored, top: float | None, band: tuple[float, float] | None, floor: float
+) -> tuple[str, ...]:
     if top is None or band is not None:
         return ()
     if not factors.at_infinity:
@@ -142,7 +129,7 @@ def _tail_note(factors: Factored, top: float | None, band: tuple[float, float] |
             f"gain margins beyond {top:.4g} rad/s, every {every:.4g} rad/s without end, are not listed: "
             f"their ratio is {math.exp(-factors.log_gain):.6g}",
         )
-    return (f"gain margins above 40 dB beyond {top:.4g} rad/s are not listed",)
+    return (f"gain margins above {-20.0 * math.log10(floor):.4g} dB beyond {top:.4g} rad/s are not listed",)
 
 
 def _poles_behind_delay(loop: RationalLoop, delay_s: float, gain_x: Real) -> int | None:
@@ -176,7 +163,7 @@ def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | N
         raise Doubtful("rounding of the coefficients moves a closed-loop pole over the border")
     size = np.abs(poles.values - 1.0) if loop.in_z else np.abs(poles.values)
     if loop.numerator is not None:
-        size = np.concatenate((size, np.abs(np.roots(loop.numerator))))
+        size = np.concatenate((size, np.abs(polynomial_roots(loop.numerator))))
     size = size[size > 0.0]
     if size.size and float(size.max()) > _WIDEST * float(size.min()):
         raise Doubtful("poles and zeros over too many decades")
@@ -191,54 +178,66 @@ class _Part:
     beyond: bool
 
 
-def _parts(factors: Factored, band: tuple[float, float] | None) -> tuple[list[_Part], float]:
+def _parts(factors: Factored, band: tuple[float, float] | None) -> tuple[list[_Part], float, float]:
     """The axis in one part where the gain falls off or turns for ever, else in two: infinity is zero of 1/w.
 
-    With them, up to where crossings of the real axis are listed.
+    With them, up to where crossings of the real axis are listed, and above which gain.
     """
     size = np.abs(factors.roots[factors.roots != 0.0])
     scale = 1.0 / factors.delay if factors.delay else 1.0
     least, most = (float(size.min()), float(size.max())) if size.size else (scale, scale)
     low = _start(factors, _LOW * min(least, scale if factors.delay else least))
     if factors.delay:
-        high, listed_to = _turning_stop(factors, low, most)
+        most_turned = 2.0 * math.pi * _MOST_TURNS / factors.delay
+        high, listed_to, floor = _turning_stop(factors, low, most, most_turned)
         if band is not None:
             listed_to, high = float(band[1]), max(high, 2.0 * float(band[1]))
-        if factors.delay * listed_to > 2.0 * math.pi * _MOST_TURNS:
+        if listed_to > most_turned:
             turns = factors.delay * listed_to / (2.0 * math.pi)
             raise NumericalError(
                 f"the delay turns the loop {turns:.1e} times where margins are listed; "
                 "shorten the delay, or ask for a narrower band_rad_s"
             )
-        return [_Part(factors, search(factors, low, high, listed_to), False)], listed_to
+        return [_Part(factors, search(factors, low, high, listed_to), False)], listed_to, floor
     if factors.at_infinity:
-        return [_Part(factors, search(factors, low, _stop(factors, _HIGH * most)), False)], math.inf
+        return [_Part(factors, search(factors, low, _stop(factors, _HIGH * most)), False)], math.inf, 0.0
     middle, mirrored = 2.0 * most, factors.reciprocal()
-    return [
-        _Part(factors, search(factors, low, middle), False),
-        _Part(mirrored, search(mirrored, _start(mirrored, _LOW / most), 1.0 / middle), True),
-    ], math.inf
+    return (
+        [
+            _Part(factors, search(factors, low, middle), False),
+            _Part(mirrored, search(mirrored, _start(mirrored, _LOW / most), 1.0 / middle), True),
+        ],
+        math.inf,
+        0.0,
+    )
 
 
-def _turning_stop(factors: Factored, low: float, most: float) -> tuple[float, float]:
-    """Under a delay: a frequency above which |L| is next to nothing, and up to where crossings are listed."""
+def _turning_stop(
+    factors: Factored, low: float, most: float, most_turned: float
+) -> tuple[float, float, float]:
+    """Under a delay: a frequency above which |L| is next to nothing, and up to where crossings are listed.
+
+    With them the gain above which they are: the lowest of `_FLOORS` that does not list too many turns.
+    """
     slope, high = factors.at_infinity, _HIGH * most
     if not slope:
         listed_to = 10.0 * most + 8.0 * math.pi / factors.delay
-        return 10.0 * max(high, listed_to), listed_to
-    gain = float(factors.log_value(np.array([high]))[0, 0])
-    top = max(high, high * math.exp((math.log(_LEAST_GAIN) - gain) / slope))
-    return top, last_above(factors, low, top, math.log(FLOOR))
+        return 10.0 * max(high, listed_to), listed_to, 0.0
+    top = max(high, high * math.exp((math.log(_LEAST_GAIN) - factors.log_at(high)[0]) / slope))
+    for floor in _FLOORS:
+        listed_to = last_above(factors, low, top, math.log(floor))
+        if listed_to <= most_turned:
+            break
+    return top, listed_to, floor
 
 
 def _stop(factors: Factored, high: float) -> float:
     """A frequency above which gain and phase follow the slope at infinity."""
     slope = factors.at_infinity
-    gain = float(factors.log_value(np.array([high]))[0, 0])
-    high = max(high, 10.0 * high * math.exp(-gain / slope))
+    high = max(high, 10.0 * high * math.exp(-factors.log_at(high)[0] / slope))
     if not high < 1e150:
         raise Doubtful("too wide a range")
-    if slope % 2 == 0 and abs(math.sin(float(factors.log_value(np.array([high]))[1, 0]))) < _HARDLY:
+    if slope % 2 == 0 and abs(math.sin(factors.log_at(high)[1])) < _HARDLY:
         raise Doubtful("the phase hardly leaves the real axis at an end of the axis")
     return high
 
@@ -247,15 +246,13 @@ def _start(factors: Factored, low: float) -> float:
     """Zero, or a frequency below which gain and phase follow the roots at zero."""
     order = factors.at_zero
     if not order:
-        if abs(factors.log_value(np.zeros(1))[0][0]) < _NEAR_ONE:
+        if abs(factors.log_at(0.0)[0]) < _NEAR_ONE:
             raise Doubtful("the gain is one at an end of the axis")
         return 0.0
-    gain = float(factors.log_value(np.array([low]))[0][0])
-    low = min(low, 0.1 * low * math.exp(-gain / order))
+    low = min(low, 0.1 * low * math.exp(-factors.log_at(low)[0] / order))
     if not 1e-150 < low < 1e150:
         raise Doubtful("too wide a range")
-    phase = float(factors.log_value(np.array([low]))[1][0])
-    if order % 2 == 0 and abs(math.sin(phase)) < _HARDLY:
+    if order % 2 == 0 and abs(math.sin(factors.log_at(low)[1])) < _HARDLY:
         raise Doubtful("the phase hardly leaves the real axis at an end of the axis")
     return low
 
@@ -368,9 +365,11 @@ def _distances(
             for (v, w), b in zip((modulus, disk), best, strict=True)
         ]
         best = (found[0], found[1])
+    inside = [w if 0.0 < w < math.inf else 1.0 for _, w in best]
+    L = response.at(np.array(inside))
     return [
-        (response.distance(w, disk) if 0.0 < w < math.inf else value, response.frequency(w))
-        for disk, (value, w) in zip((False, True), best, strict=True)
+        (_at_end(complex(L[k]), bool(k)) if w == inside[k] else value, response.frequency(w))
+        for k, (value, w) in enumerate(best)
     ]
 
 

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, evaluate_intervals
 from actuator_lti.margins.delay_setting import Setting, dc_value, intervals_of, setting_of
-from actuator_lti.margins.extremes import COMPLEMENTARY, FAR, MODULUS, PEAK, Criterion
+from actuator_lti.margins.distances import FAR, Distance, complementary, inverse, modulus
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.sweep import variation
 
@@ -18,14 +18,14 @@ _FINEST = 1e-4  # how much lower the smallest distance may be, relative, before 
 _MOST = 400_000
 
 
-def delayed_extreme(form: DelayForm, criterion: Criterion) -> tuple[float, float]:
-    """Smallest value of a criterion over the axis, and where (x)."""
+def delayed_extreme(form: DelayForm, distance_of: Distance) -> tuple[float, float]:
+    """Smallest value of a distance over the axis, and where (x)."""
     setting = setting_of(form, None)
-    return smallest_distance(setting, intervals_of(setting), criterion)
+    return smallest_distance(setting, intervals_of(setting), distance_of)
 
 
-def smallest_distance(setting: Setting, intervals: Intervals, criterion: Criterion) -> tuple[float, float]:
-    """Smallest value of a criterion and its x, from intervals that cover the axis.
+def smallest_distance(setting: Setting, intervals: Intervals, distance_of: Distance) -> tuple[float, float]:
+    """Smallest value of a distance and its x, from intervals that cover the axis.
 
     Intervals in which the bound allows less than 0.9999 of the best so far are split; the best is polished.
 
@@ -36,17 +36,17 @@ def smallest_distance(setting: Setting, intervals: Intervals, criterion: Criteri
     """
     form, count = setting.form, 0
     ends_x, ends_L = _end_values(setting)
-    at_ends = criterion.distance(ends_L)
+    at_ends = distance_of(ends_L)
     best, place, half = float(at_ends.min()), float(ends_x[int(at_ends.argmin())]), 0.0
     while True:
-        distance = criterion.distance(intervals.L)
+        distance = distance_of(intervals.L)
         k = int(distance.argmin())
         if distance[k] < best * (1.0 - 1e-12):
             best, place, half = float(distance[k]), float(intervals.x[k]), float(intervals.half[k])
-        again = _lower_bound(criterion, intervals, variation(form, intervals)) < best * (1.0 - _FINEST)
+        again = _lower_bound(distance_of, intervals, variation(form, intervals)) < best * (1.0 - _FINEST)
         count += int(np.count_nonzero(again))
         if best < 1e-9 or not again.any():
-            return _polished(form, criterion, best, place, half)
+            return _polished(form, distance_of, best, place, half)
         if count > _MOST:
             raise NumericalError("the smallest distance to -1 was not settled: too many turns of the delay")
         low, high = (intervals.x - intervals.half)[again], (intervals.x + intervals.half)[again]
@@ -55,13 +55,13 @@ def smallest_distance(setting: Setting, intervals: Intervals, criterion: Criteri
 
 
 def _polished(
-    form: DelayForm, criterion: Criterion, best: float, place: float, half: float
+    form: DelayForm, distance_of: Distance, best: float, place: float, half: float
 ) -> tuple[float, float]:
     if not half:
         return best, place
 
     def at(x: float) -> float:
-        return float(criterion.distance(border_values(form, np.array([x])))[0])
+        return float(distance_of(border_values(form, np.array([x])))[0])
 
     low, high = max(place - 4.0 * half, 0.5 * place), place + 4.0 * half
     if form.sampled:
@@ -82,22 +82,22 @@ def _end_values(setting: Setting) -> tuple[list[float], Complex]:
     return x, np.array(L, dtype=complex)
 
 
-def _lower_bound(criterion: Criterion, intervals: Intervals, R: Real) -> Real:
-    """What the criterion cannot fall below inside each interval: by the disk about L, or by its gain."""
+def _lower_bound(distance_of: Distance, intervals: Intervals, R: Real) -> Real:
+    """What a distance cannot fall below inside each interval: by the disk about L, or by its gain."""
     size = np.abs(intervals.L)
     least, most = np.maximum(size - intervals.spread, 0.0), size + intervals.spread
-    distance, away = criterion.distance(intervals.L), np.abs(1.0 - intervals.L)
+    distance, away = distance_of(intervals.L), np.abs(1.0 - intervals.L)
     with np.errstate(divide="ignore", invalid="ignore"):
-        if criterion is PEAK:
+        if distance_of is inverse:
             return 1.0 / most
-        if criterion is COMPLEMENTARY:
+        if distance_of is complementary:
             by_disk = np.where(size > R, distance - R / (size * (size - R)), -np.inf)
             return np.maximum(by_disk, np.maximum(1.0 / most - 1.0, 1.0 - 1.0 / least))
         by_gain = np.maximum(1.0 - most, least - 1.0)
-        if criterion is MODULUS:
+        if distance_of is modulus:
             return np.maximum(distance - R, by_gain)
         by_disk = np.where(away > R, distance - 4.0 * R / (away * (away - R)), -np.inf)
-        # about L = 1, where the criterion has its pole: a servo whose gain at rest is one starts there
+        # about L = 1, where the disk's has its pole: a servo whose gain at rest is one starts there
         by_disk = np.maximum(by_disk, 2.0 * (np.abs(1.0 + intervals.L) - R) / (away + R))
         by_gain = np.maximum(2.0 * (1.0 - most) / (1.0 + most), 2.0 * (least - 1.0) / (least + 1.0))
         return np.maximum(by_disk, by_gain)

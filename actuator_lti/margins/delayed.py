@@ -12,7 +12,7 @@ from actuator_lti.margins.collocation import closed_loop_matrix, points_for
 from actuator_lti.margins.delay_distance import smallest_distance
 from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, values
 from actuator_lti.margins.delay_setting import FLOOR, Setting, dc_value, excluded, intervals_of, setting_of
-from actuator_lti.margins.extremes import DISK, MODULUS
+from actuator_lti.margins.distances import disk, modulus
 from actuator_lti.margins.loop import Mask, Real
 from actuator_lti.margins.nyquist import angle_about, angle_between
 from actuator_lti.margins.poles import SortedPoles, sorted_poles
@@ -34,7 +34,7 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
     phase_x, phase_touch = crossings(form, intervals, PHASE, no_phase)
     count = _nyquist(setting, intervals)
     agreement = _agreement(setting, count, float(gain_x.max()) if gain_x.size else 0.0)
-    modulus, disk = (smallest_distance(setting, intervals, criterion) for criterion in (MODULUS, DISK))
+    nearest = [smallest_distance(setting, intervals, distance) for distance in (modulus, disk)]
     gain_margins, far = _gain_margins(setting, phase_x, phase_touch, listed_all=band_rad_s is not None)
     notes = [*hidden_notes(setting.hidden), *far_note(far)]
     if band_rad_s is None:
@@ -42,7 +42,7 @@ def delayed_margins(form: DelayForm, band_rad_s: tuple[float, float] | None) -> 
     result = assembled(
         None,
         agreement,
-        Figures(gain_margins, _phase_margins(form, gain_x, gain_touch), modulus, disk),
+        Figures(gain_margins, _phase_margins(form, gain_x, gain_touch), *nearest),
         method="intervals split until a bound on the change of L shows that nothing hides between two points",
         notes=tuple(notes),
         evidence="checked",

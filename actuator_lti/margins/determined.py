@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_lti.margins.certified_roots import all_roots
-from actuator_lti.margins.exact_findings import Crossing, Findings
+from actuator_lti.margins.certified_roots import half_planes
+from actuator_lti.margins.exact_findings import Crossing, Findings, crossings
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import Complex, Mask, Real
 
@@ -18,6 +18,9 @@ _SAME_W = 0.05
 _SAME_GAIN = 0.5
 _SHARP = 1e-3  # a pole is placed where its own error is below this part of its modulus
 _TOLD = 1e-6
+Crossings = tuple[Crossing, ...]
+Lists = tuple[Crossings, Crossings]
+Compared = tuple[Crossings, Crossings, int, float, str | None]
 
 
 @dataclass(frozen=True)
@@ -53,19 +56,30 @@ class Settled:
 
 
 def settled(base: Findings, others: list[Findings]) -> Settled:
-    """Compare the findings of the given doubles with those of their neighbours."""
+    """Compare the findings of the given doubles with those of their neighbours: poles first."""
     unstable, border, hidden, problem = _poles(base, others)
-    reals, dropped = base.reals, 0
-    for other in others:
-        kept = tuple(c for c in reals if not _far(c) or _partner(c, other.reals))
+    compared: Compared = (), (), 0, 0.0, problem
+    if problem is None:
+        for merge in (False, True):
+            lists = [crossings(f.loop, merge) for f in (base, *others)]
+            compared = _compared(lists[0], lists[1:])
+            if compared[-1] is None:
+                break
+    return Settled(unstable, border, hidden, *compared)
+
+
+def _compared(ours: Lists, others: list[Lists]) -> Compared:
+    (gains, reals), dropped = ours, 0
+    for _, theirs in others:
+        kept = tuple(c for c in reals if not _far(c) or _partner(c, theirs))
         dropped, reals = dropped + len(reals) - len(kept), kept
-    moved = 0.0
-    for other in others:
-        problem = problem or difference(base.gains, other.gains, "|L| = 1")
-        problem = problem or difference(reals, other.reals, "the real axis")
-        moved = max([moved, *[_movement(c, other.gains) for c in base.gains]])
-        moved = max([moved, *[_movement(c, other.reals) for c in reals]])
-    return Settled(unstable, border, hidden, base.gains, reals, dropped, moved, problem)
+    moved, problem = 0.0, None
+    for their_gains, their_reals in others:
+        problem = problem or difference(gains, their_gains, "|L| = 1")
+        problem = problem or difference(reals, their_reals, "the real axis")
+        moved = max([moved, *[_movement(c, their_gains) for c in gains]])
+        moved = max([moved, *[_movement(c, their_reals) for c in reals]])
+    return gains, reals, dropped, moved, problem
 
 
 def _far(c: Crossing) -> bool:
@@ -110,22 +124,20 @@ def _poles(base: Findings, others: list[Findings]) -> tuple[int | None, int, int
     hidden = base.hidden.at_zero
     counts = {(f.unstable, f.on_border, f.hidden.at_zero) for f in (base, *others)}
     closed = _values(base, closed=True)
-    size = np.abs(closed)
+    size = np.sort(np.abs(closed))
     if len(counts) == 1 and not _some_near_zero(size[size > 0.0]):
         return base.unstable, base.on_border, hidden, None
     return _by_movement(base, others, closed)
 
 
 def _some_near_zero(size: Real) -> bool:
-    return bool(size.size) and bool((size < _TOLD * np.median(size)).any())
+    return bool(size.size) and bool(size[0] < _TOLD * size[size.size // 2])
 
 
 def _values(f: Findings, closed: bool) -> Complex:
     """Poles in the s-plane, hidden ones and those at zero among them."""
-    p = (f.loop.closed if closed else f.loop.D) * f.loop.hidden
-    zeros = next(k for k in range(p.degree() + 1) if p[k] != 0)
-    result = [complex(root) for root, times in all_roots(p) for _ in range(times)]
-    return np.array([0j] * zeros + result)
+    seen = f.closed if closed else half_planes(f.loop.D)
+    return np.array(seen.values + f.hidden.values, dtype=complex)
 
 
 def _by_movement(
@@ -142,9 +154,11 @@ def _by_movement(
     unstable = int(np.count_nonzero((closed.real > 0.0) & ~near & ~exact))
     beyond = [size[size > 10.0 * max(r, s)].min(initial=math.inf) for r, s in zip(radius, size, strict=True)]
     at_dc = near & ((radius > _SHARP * size) | (size == 0.0)) & (radius <= _SHARP * np.array(beyond))
-    shown = _values(base, closed=False)
-    spread = _movements(shown, [_values(f, closed=False) for f in others])
-    hidden = min(int(np.count_nonzero(at_dc)), int(np.count_nonzero(np.abs(shown) <= 10.0 * spread)))
+    hidden = int(np.count_nonzero(at_dc))
+    if hidden:
+        shown = _values(base, closed=False)
+        spread = _movements(shown, [_values(f, closed=False) for f in others])
+        hidden = min(hidden, int(np.count_nonzero(np.abs(shown) <= 10.0 * spread)))
     problem = None
     if hidden > 1:
         problem = f"{ULP} ulp of the entries decide about several modes at zero frequency"

@@ -19,6 +19,11 @@ def modulus_margin(loop: ExactLoop) -> tuple[float, float]:
     return _smallest(split(loop.closed).square, split(loop.D).square)
 
 
+def complementary_margin(loop: ExactLoop) -> tuple[float, float]:
+    """Smallest |(1 + L)/L|, one over the peak of T, and its w."""
+    return _smallest(split(loop.closed).square, split(loop.N).square)
+
+
 def disk_alpha(loop: ExactLoop) -> tuple[float, float]:
     """Smallest |2 (1 + L)/(1 - L)| and its w."""
     return _smallest(4 * split(loop.closed).square, split(loop.D - loop.N).square)

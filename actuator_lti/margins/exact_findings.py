@@ -38,11 +38,9 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Findings:
-    """All crossings of an exact loop, ends included, and where its closed-loop poles lie."""
+    """All crossings of an exact loop, ends included, and where its closed-loop poles lie: each on demand."""
 
     loop: ExactLoop
-    gains: tuple[Crossing, ...]
-    reals: tuple[Crossing, ...]
 
     @cached_property
     def closed(self) -> HalfPlanes:
@@ -70,8 +68,8 @@ class Findings:
         return self.closed.on_border + self.closed_at_end
 
 
-def findings(loop: ExactLoop, merge: bool = False) -> Findings:
-    """Find every crossing.
+def crossings(loop: ExactLoop, merge: bool = False) -> tuple[tuple[Crossing, ...], tuple[Crossing, ...]]:
+    """Every crossing of the unit circle, and of the negative real axis.
 
     Parameters
     ----------
@@ -104,7 +102,7 @@ def findings(loop: ExactLoop, merge: bool = False) -> Findings:
     reals = [c for c in _crossings(N, D, phase, off_axis) if c.L.real < 0.0]
     first, last = _end(0.0, loop.N[0], loop.D[0]), _end(math.inf, *loop.at_end)
     reals = [*([first] if first else []), *reals, *([last] if last and loop.degree else [])]
-    return Findings(loop, tuple(gains), tuple(reals))
+    return tuple(gains), tuple(reals)
 
 
 def _end(w: float, N: fmpz, D: fmpz) -> Crossing | None:

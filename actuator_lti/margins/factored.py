@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.margins.factors_on_axis import Factored, half_turn
-from actuator_lti.margins.level_crossings import shifted, unwarped
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
-from actuator_lti.margins.poles import SortedPoles, eigenvalues
+from actuator_lti.margins.poles import SortedPoles, eigenvalues, polynomial_roots
 from actuator_lti.margins.trust import Doubtful
 
 _LEAST_SLACK = 1e-8
@@ -40,7 +39,7 @@ class Response:
 
     def x(self, w: Real) -> Real:
         """The argument of the loop."""
-        return unwarped(w, self.loop.in_z)
+        return 2.0 * np.arctan(w) if self.loop.in_z else w
 
     def frequency(self, w: float) -> float:
         """Angular frequency in rad/s."""
@@ -97,11 +96,6 @@ class Response:
         above, below = loop.numerator, loop.denominator  # in u = 1/w: x = pi - 2 u, s = j/u
         rate = (above[1] / above[0] - below[1] / below[0]) / 1j if above[0] else math.inf
         return -0.5 * complex(rate) - 1j * self.delay
-
-    def distance(self, w: float, disk: bool) -> float:
-        """Distance to -1."""
-        L = complex(self.at(np.array([w]))[0])
-        return abs(2.0 * (1.0 + L) / (1.0 - L)) if disk else abs(1.0 + L)
 
     def polished(self, w: Real, gain: bool) -> tuple[Real, Complex]:
         """Newton from crossings of the factors to those of the loop; their x, and L there.
@@ -210,11 +204,16 @@ def _in_s(loop: RationalLoop, points: Complex) -> Complex:
 def _zeros(loop: RationalLoop, poles: Complex) -> Complex:
     """Zeros in the s-plane; those of a state space that lie at infinity come out far away."""
     if loop.numerator is not None:
-        return _in_s(loop, np.roots(np.trim_zeros(loop.numerator, "f")).astype(complex))
+        return _in_s(loop, polynomial_roots(loop.numerator))
     size = np.abs(poles[poles != 0.0])
     shift = 1.083 * math.exp(float(np.log(size).mean())) if size.size else 1.083
-    system = shifted(loop, shift)
-    sigma = eigenvalues(system.W_plus + np.outer(system.b_plus / system.l_plus, system.c_plus))
+    eye = np.eye(loop.order)
+    # sigma = 1/(s - shift): L = l - c inverse (sigma - W)^-1 inverse b, whose zeros are plain eigenvalues
+    scale = 1.0 - shift if loop.in_z else 1.0
+    inverse = np.linalg.inv(scale * loop.A - ((1.0 + shift) if loop.in_z else shift) * eye)
+    W, size = (inverse + loop.A @ inverse, 2.0) if loop.in_z else (inverse, 1.0)
+    b, c = inverse @ loop.b, loop.c @ inverse
+    sigma = eigenvalues(W + np.outer((size / (loop.d - scale * float(loop.c @ b))) * b, c))
     zeros = shift + 1.0 / sigma[sigma != 0.0]
     if loop.in_z or loop.d or zeros.size < loop.order:
         return zeros

@@ -9,6 +9,8 @@ is the factor ((1 - s)/(1 + s))^q.
 
 from __future__ import annotations
 
+import cmath
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,7 +24,9 @@ _NEXT_TO_AXIS = 1e-14  # relative: a root on the axis itself is held this far fr
 _ROUNDS = 60
 _MOST = 100_000
 _NARROWEST = 1e-14
-_SHARES = np.arange(7) / 6.0  # of an interval that is split
+_PARTS = 6  # of an interval that is split
+_MOST_PARTS = 12  # of one between neighbouring places
+_FIRST = 3000  # factors times points to begin with
 
 
 @dataclass(frozen=True)
@@ -96,8 +100,7 @@ class Factored:
         y, a = w[:, None] - self.roots.imag, self._off_axis
         size = y * y + a * a
         parts = np.empty((4, *size.shape))
-        with np.errstate(divide="ignore"):
-            parts[0], parts[1], parts[2], parts[3] = 0.5 * np.log(size), np.arctan2(y, a), y / size, a / size
+        parts[0], parts[1], parts[2], parts[3] = 0.5 * np.log(size), np.arctan2(y, a), y / size, a / size
         total = (parts @ self._turning)[..., 0]
         total[0] += self.log_gain
         if self.delay:
@@ -110,19 +113,51 @@ class Factored:
         """Log gain, phase (continuous, less whole turns), and their rates; shape (4, points)."""
         return self._rows(w)[1]
 
-    def log_slopes(self, w: float) -> tuple[complex, complex]:
-        """First and second derivative of log L by w."""
-        over = 1.0 / (1j * w - self.roots)
-        return 1j * complex(over @ self.weights) - 1j * self.delay, complex((over * over) @ self.weights)
+    @cached_property
+    def _listed(self) -> list[tuple[complex, float, float, float]]:
+        turning = self._turning[:2, :, 0].tolist()
+        return list(zip(self.roots.tolist(), *turning, self._off_axis.tolist(), strict=True))
+
+    def log_at(self, w: float) -> tuple[float, float]:
+        """Log gain and phase at one frequency."""
+        gain, phase = self.log_gain, self.phase - self.delay * w
+        for root, weight, turning, off in self._listed:
+            y = w - root.imag
+            gain += weight * math.log(math.hypot(y, off)) if y or off else -math.copysign(math.inf, -weight)
+            phase += turning * math.atan2(y, off)
+        return gain, phase
+
+    def jet(self, w: float) -> tuple[complex, complex, complex]:
+        """L at one frequency, and the first two derivatives of log L by w."""
+        gain, phase, l1, l2 = self.log_gain, self.phase - self.delay * w, 0j, 0j
+        for root, weight, turning, off in self._listed:
+            y = w - root.imag
+            gain += weight * math.log(math.hypot(y, off))
+            phase += turning * math.atan2(y, off)
+            over = 1.0 / complex(-root.real, y)
+            l1 += weight * over
+            l2 += weight * over * over
+        return cmath.rect(math.exp(gain), phase), 1j * (l1 - self.delay), l2
+
+    def jets(self, low: Real, high: Real) -> tuple[Complex, Complex, Complex, Real]:
+        """Log L and its first two derivatives by w at low, middle and high; shape (3, k).
+
+        With them a bound of the third between these, which lie between places.
+        """
+        w = np.array((low, 0.5 * (low + high), high))
+        total = self.log_value(w.ravel()).reshape(4, *w.shape)
+        over = 1.0 / (1j * w[..., None] - self.roots)
+        third = 2.0 * np.maximum(np.abs(over[0]), np.abs(over[2])) ** 3 @ np.abs(self.weights)
+        return total[0] + 1j * total[1], total[2] + 1j * total[3], (over * over) @ self.weights, third
 
     def between_neighbours(self, w: Real) -> Intervals:
         """Bounds over the intervals between neighbours in each row of points, shape (k, n)."""
         k, n = w.shape
         parts, total = self._rows(w.ravel())
         parts, total = parts.reshape(4, k, n, -1), total.reshape(4, k, n)
-        spread = (np.abs(parts[:, :, 1:] - parts[:, :, :-1]) @ np.abs(self._turning[:, None]))[..., 0]
+        changes = np.abs(parts[:, :, 1:] - parts[:, :, :-1]).reshape(4, k * (n - 1), -1)
+        spread = (changes @ np.abs(self._turning))[..., 0]
         low, high = w[:, :-1].ravel(), w[:, 1:].ravel()
-        spread = spread.reshape(4, -1)
         spread[1] += self.delay * (high - low)
         first, last = total[:, :, :-1].reshape(4, -1), total[:, :, 1:].reshape(4, -1)
         return Intervals(low, high, first, last, 0.5 * spread)
@@ -138,12 +173,19 @@ class Factored:
         places = self.places
         edges = np.concatenate((ends, places[(places > ends[0]) & (places < ends[-1])]))
         edges.sort()
+        parts = int(_FIRST / (edges.size * (1 + self.roots.size)))
+        if parts > 1:
+            inner = parted(edges[:-1], edges[1:], min(parts, _MOST_PARTS))
+            edges = np.append(inner[:, :-1].ravel(), edges[-1])
         here = self.between_neighbours(edges[None])
         done: list[Intervals] = []
         for _ in range(_ROUNDS):
             good = clear(here)
-            done.append(here.taken(good))
-            if good.all():
+            whole = bool(good.all())
+            if whole and not done:
+                return here
+            done.append(here if whole else here.taken(good))
+            if whole:
                 return _joined(done)
             low, high = here.low[~good], here.high[~good]
             if low.size > _MOST or (high - low <= _NARROWEST * high).any():
@@ -175,6 +217,7 @@ class Intervals:
         """Largest value of each."""
         return np.asarray(0.5 * (self.first + self.last) + self.spread)
 
+    @cached_property
     def bounds(self) -> tuple[Real, Real]:
         """Least and most of log gain and phase (2, k): by the factors, and by the rate of their sum."""
         width = self.high - self.low
@@ -200,11 +243,13 @@ def half_turn(phase: float) -> float:
     return float(np.pi * round(phase / np.pi))
 
 
-def parted(low: Real, high: Real) -> Real:
+def parted(low: Real, high: Real, parts: int = _PARTS) -> Real:
     """The ends of the parts into which intervals are split, shape (k, parts + 1)."""
-    wide = ((high > 4.0 * low) & (low > 0.0))[:, None]
-    ratio = np.where(wide, high[:, None] / np.where(low > 0.0, low, 1.0)[:, None], 1.0)
-    w = np.where(wide, low[:, None] * ratio**_SHARES, low[:, None] + (high - low)[:, None] * _SHARES)
+    shares = np.arange(parts + 1) / parts
+    w: Real = low[:, None] + (high - low)[:, None] * shares
+    wide = (high > 4.0 * low) & (low > 0.0)
+    if wide.any():
+        w[wide] = low[wide, None] * (high[wide] / low[wide])[:, None] ** shares
     w[:, -1] = high
     return w
 
@@ -213,3 +258,8 @@ def halves(low: Real, high: Real) -> Real:
     """Where to halve intervals."""
     middle: Real = np.where((high > 4.0 * low) & (low > 0.0), np.sqrt(low * high), 0.5 * (low + high))
     return middle
+
+
+def half_turns(phase: Real) -> Real:
+    """How many odd multiples of pi lie below."""
+    return np.floor((phase + math.pi) / (2.0 * math.pi))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -47,15 +48,19 @@ class Given:
         return self._moved(1.0), self._moved(-1.0)
 
     def _moved(self, way: float) -> Given:
-        rng = np.random.default_rng(0)
+        names = ("numerator", "denominator") if self.A is None else ("A", "b", "c", "d")
+        entries = [np.asarray(getattr(self, name), dtype=float) for name in names]
+        signs = np.split(_signs(sum(x.size for x in entries)), np.cumsum([x.size for x in entries])[:-1])
+        moved: Any = {
+            name: x + way * ULP * np.spacing(x) * sign.reshape(x.shape) * (x != 0.0)
+            for name, x, sign in zip(names, entries, signs, strict=True)
+        }
+        return replace(self, **moved)
 
-        def moved(entries: Any) -> Real:
-            x = np.asarray(entries, dtype=float)
-            return x + way * ULP * np.spacing(x) * rng.choice([-1.0, 1.0], x.shape) * (x != 0.0)
 
-        if self.A is None:
-            return replace(self, numerator=moved(self.numerator), denominator=moved(self.denominator))
-        return replace(self, A=moved(self.A), b=moved(self.b), c=moved(self.c), d=float(moved(self.d)))
+@lru_cache
+def _signs(count: int) -> Real:
+    return np.random.default_rng(0).choice([-1.0, 1.0], count)
 
 
 def given_of(system: Any) -> Given:
@@ -72,8 +77,7 @@ def given_of(system: Any) -> Given:
         )
     period_s = _period(system.dt)
     if hasattr(system, "num"):
-        num = np.trim_zeros(np.asarray(system.num[0][0], dtype=float), "f")
-        den = np.trim_zeros(np.asarray(system.den[0][0], dtype=float), "f")
+        num, den = _trimmed(system.num[0][0]), _trimmed(system.den[0][0])
         given = Given(period_s, num, den)
         _refuse_coefficients(num, den)
     else:
@@ -84,6 +88,11 @@ def given_of(system: Any) -> Given:
     if not all(np.isfinite(part).all() for part in parts if part is not None):
         raise InputError("the loop holds a value that is not finite")
     return given
+
+
+def _trimmed(coefficients: Any) -> Real:
+    p = np.asarray(coefficients, dtype=float)
+    return p[p.nonzero()[0][0] :] if p.any() else p[:0]
 
 
 def _refuse_coefficients(num: Real, den: Real) -> None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dgebal, zgetrf, zgetrs
+from scipy.linalg.lapack import dgebal
 
 from actuator_lti.margins.given import Given, Real, given_of
 
@@ -86,12 +86,9 @@ class RationalLoop:
         p = self._variable(x)
         turn = 1j * self.point(x) if self.in_z else 1j
         if self.numerator is not None and self.denominator is not None:
-            num, den = self.numerator, self.denominator
-            below = np.polyval(den, p)
-            L = np.polyval(num, p) / below
-            d_num = np.polyval(num[:-1] * np.arange(num.size - 1, 0, -1), p)
-            d_den = np.polyval(den[:-1] * np.arange(den.size - 1, 0, -1), p)
-            return L, turn * (d_num / below - L * (d_den / below))
+            above, below, d_above, d_below = horner(self._with_slopes, p)
+            L = above / below
+            return L, turn * (d_above / below - L * (d_below / below))
         if self.order == 0:
             return np.full(p.shape, self.d, dtype=complex), np.zeros(p.shape, dtype=complex)
         matrix: Complex = self._resolvent(p)
@@ -117,27 +114,6 @@ class RationalLoop:
             X = X + np.linalg.solve(matrix, residual.astype(complex)[..., None])[..., 0]
         return (X @ np.asarray(self.c, np.longdouble) + self.d).astype(complex)
 
-    def derivatives(self, x: float) -> tuple[complex, complex, complex]:
-        """L and its first two derivatives by x at one point."""
-        if self.order == 0:
-            return complex(self.d), 0j, 0j
-        lu, pivots, _ = zgetrf(self._resolvent(self._variable(np.array([x])))[0], overwrite_a=1)
-        first = zgetrs(lu, pivots, self.b)[0]
-        second = zgetrs(lu, pivots, first)[0]
-        third = zgetrs(lu, pivots, second)[0]
-        L = complex(self.d + first @ self.c)
-        d_point, dd_point = -complex(second @ self.c), 2.0 * complex(third @ self.c)
-        if self.in_z:
-            point = cmath.exp(1j * x)
-            return L, 1j * point * d_point, -point * (d_point + point * dd_point)
-        return L, 1j * d_point, -dd_point
-
-    def given(self) -> Given:
-        """The same loop as data for exact arithmetic; a loop from z keeps its s-plane."""
-        if self.numerator is not None and self.denominator is not None:
-            return Given(None if not self.in_z else self.period_s, self.numerator, self.denominator)
-        return Given(self.period_s if self.in_z else None, A=self.A, b=self.b, c=self.c, d=self.d)
-
     def delayed(self, samples: int) -> RationalLoop:
         """The loop behind whole samples of delay (z-plane only), each a further state."""
         n = self.order
@@ -147,6 +123,15 @@ class RationalLoop:
         b, c = np.zeros(n + samples), np.zeros(n + samples)
         b[:n], b[n], c[-1] = self.b, self.d, 1.0
         return from_matrices(A, b, c, 0.0, self.period_s)
+
+    @cached_property
+    def _with_slopes(self) -> Real:
+        """Numerator, denominator and their derivatives."""
+        assert self.numerator is not None
+        rows = np.zeros((4, self.numerator.size))
+        rows[0], rows[1] = self.numerator, self.denominator
+        rows[2:, 1:] = rows[:2, :-1] * np.arange(rows.shape[1] - 1, 0, -1)
+        return rows
 
     def _variable(self, x: Real) -> Complex:
         """The number that stands on the diagonal: s, or z - 1, exact near z = 1."""
@@ -162,7 +147,8 @@ class RationalLoop:
     def _values(self, p: Any) -> Any:
         if self.numerator is not None and self.denominator is not None:
             with np.errstate(all="ignore"):
-                return np.polyval(self.numerator, p) / np.polyval(self.denominator, p)
+                above, below = horner(self._with_slopes[:2], p)
+                return above / below
         if self.order == 0:
             return np.full(p.shape, self.d, dtype=p.dtype)
         return self.d + np.linalg.solve(self._resolvent(p), self.b[:, None])[..., 0] @ self.c
@@ -174,6 +160,14 @@ class RationalLoop:
         index = np.arange(n)
         matrix[:, index, index] += p[:, None]
         return matrix
+
+
+def horner(rows: Real, p: Any) -> Any:
+    """Values of polynomials (k, n + 1), highest power first, at points; shape (k, points)."""
+    value = rows[:, :1] + 0.0 * p
+    for k in range(1, rows.shape[1]):
+        value = value * p + rows[:, k : k + 1]
+    return value
 
 
 def rational_loop(system: Any) -> RationalLoop:

@@ -1,19 +1,21 @@
 """The smallest distance of a factored loop to -1: modulus margin and balanced disk margin, none overlooked.
 
 What lies nearer than a given distance is a disk in the plane of L: about -1, or for the disk margin about a
-point beyond. Over an interval L is a segment but for what the range of its rate allows; intervals that may
-reach into the disk are split, and the smallest value found is polished by Newton's method on its slope.
+point beyond. An interval is done where the range of gain and phase keeps L out of both, or the way in which
+the squared distance to the centre bends between the ends; others are split. The smallest value found is
+polished by Newton's method on its slope, and is an end of intervals.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
-from actuator_lti.margins.factors_on_axis import Factored, Intervals, parted
+from actuator_lti.margins.factors_on_axis import Factored, Intervals, half_turns, parted
 from actuator_lti.margins.loop import Complex, Mask, Real
-from actuator_lti.margins.trust import Doubtful
+from actuator_lti.margins.trust import EPS, Doubtful
 
 _ROUNDS = 60
 _MOST = 100_000
@@ -37,71 +39,101 @@ def nearest(loop: Factored, known: Intervals, start: tuple[Place, Place]) -> tup
     best, here = list(start), known
     for _ in range(_ROUNDS):
         L = np.exp(here.first[0] + 1j * here.first[1])
-        for disk in (False, True):
-            value, _ = best[disk]
-            distance = _distance(L, disk)
+        for disk, distance in enumerate(_distances(L)):
             k = int(distance.argmin())
-            if distance[k] < value * (1.0 - _FINEST):
-                value, _ = best[disk] = _polished(loop, float(distance[k]), float(here.low[k]), disk)
-            if value < _SMALL:
+            if distance[k] < best[disk][0] * (1.0 - _FINEST):
+                best[disk] = _polished(loop, float(distance[k]), float(here.low[k]), bool(disk))
+            if best[disk][0] < _SMALL:
                 raise Doubtful("the loop all but meets -1")
-        inside = _may_reach(here, best[0][0], best[1][0])
-        if not inside.any():
+        nearer = _nearer(*(value * (1.0 - _FINEST) - _rounding(loop, w) for value, w in best))
+        inside = _may_reach(here, *nearer)
+        which: Any = np.flatnonzero(inside.any(axis=0))
+        low, high = here.low[which], here.high[which]
+        for _, w in best:
+            low, high, which = _cut(low, high, which, w)
+        if which.size:
+            left = (inside[:, which] & _bends_in(loop, low, high, *nearer)).any(axis=0)
+            low, high = low[left], high[left]
+        if not low.size:
             return best[0], best[1]
-        low, high = here.low[inside], here.high[inside]
         if low.size > _MOST:
             break
         here = loop.between_neighbours(parted(low, high))
     raise Doubtful("the smallest distance to -1 was not settled")
 
 
-def _distance(L: Complex, disk: bool) -> Real:
-    with np.errstate(all="ignore"):
-        if not disk:
-            return np.asarray(np.abs(1.0 + L))
-        inner = np.where(np.abs(L) > 1.0, 1.0 / L, L)  # the disk's distance is the same for both
-        return np.where(inner == 1.0, np.inf, 2.0 * np.abs((1.0 + inner) / (1.0 - inner)))
+def _distances(L: Complex) -> Real:
+    """Both distances, shape (2, k)."""
+    size = np.abs(L)
+    inner = np.where(size > 1.0, 1.0 / L, L)  # the disk's distance is the same for both
+    balanced = 2.0 * np.abs((1.0 + inner) / (1.0 - inner))
+    return np.array((np.abs(1.0 + L), np.where(inner == 1.0, np.inf, balanced)))
 
 
-def _may_reach(here: Intervals, modulus: float, alpha: float) -> Mask:
-    """Whether L may come nearer to -1 than these, anywhere in each interval."""
-    least, most = here.bounds()
-    width = here.high - here.low
-    with np.errstate(all="ignore"):
-        start = np.exp(here.first[0] + 1j * here.first[1])
-        rate = 0.5 * (here.first[2:] + here.last[2:])
-        turn = np.hypot(rate[0], rate[1]) * width
-        off = np.hypot(here.spread[2], here.spread[3]) * width
-        step = start * np.expm1((rate[0] + 1j * rate[1]) * width)
-        gain = np.exp(least[0]), np.exp(most[0])
-        error = gain[1] * (0.125 * turn**2 + np.expm1(off) * np.exp(turn))
-        segment = start, step, error
-        reach = _into(segment, gain, -1.0, modulus * (1.0 - _FINEST))
-        k = 0.25 * (alpha * (1.0 - _FINEST)) ** 2
-        centre, radius = -(1.0 + k) / (1.0 - k), 2.0 * math.sqrt(k) / (1.0 - k)
-        if k < 1.0:
-            return reach | _into(segment, gain, centre, radius)
-        far = np.maximum(np.abs(start - centre), np.abs(start + step - centre)) + error
-        return reach | ~(far < -radius)
+def _rounding(loop: Factored, w: float) -> float:
+    """What rounding of the phase makes of a distance there."""
+    return 4.0 * EPS * (loop.delay * w if w < math.inf else 0.0)
 
 
-def _into(
-    segment: tuple[Complex, Complex, Real], gain: tuple[Real, Real], centre: float, radius: float
-) -> Mask:
-    """Whether a bent segment may reach into a disk; not where its gain alone keeps it out."""
-    start, step, error = segment
-    share = np.clip(-((start - centre).conj() * step).real / np.abs(step) ** 2, 0.0, 1.0)
-    near = np.abs(start + np.where(np.isfinite(share), share, 0.0) * step - centre)
-    return np.asarray(~((near - error > radius) | (gain[0] > radius - centre) | (gain[1] < -centre - radius)))
+def _nearer(modulus: float, alpha: float) -> tuple[Real, Real, Real]:
+    """(a, b, e), two rows each: L is nearer than these where f = a abs(L)^2 + 2 b Re L + e < 0."""
+    m, k = modulus**2, 0.25 * alpha**2
+    a, b, e = np.array((((1.0,), (1.0 - k,)), ((1.0,), (1.0 + k,)), ((1.0 - m,), (1.0 - k,))))
+    return a, b, e
 
 
-def _polished(loop: Factored, value: float, w: float, disk: bool) -> tuple[float, float]:
+def _may_reach(here: Intervals, a: Real, b: Real, e: Real) -> Mask:
+    """Whether gain and phase allow L to come nearer, anywhere in each interval; shape (2, k)."""
+    least, most = here.bounds
+    gain = np.exp(np.array((least[0], most[0])))
+    cosine = np.cos(np.array((least[1], most[1]))).min(axis=0)
+    cosine[half_turns(least[1]) != half_turns(most[1])] = -1.0
+    b = b * cosine
+    lowest = np.minimum(np.maximum(-b / a, gain[0]), gain[1])
+    values = np.array([(a * at + 2.0 * b) * at for at in (*gain, lowest)])
+    return np.asarray(~(values.min(axis=0) + e > 0.0))
+
+
+def _bends_in(loop: Factored, low: Real, high: Real, a: Real, b: Real, e: Real) -> Mask:
+    """Whether it may, by how f bends between the ends of each interval; shape (2, k).
+
+    With l = log L half of its second derivative is abs(L)^2 (a abs(l')^2 + Re((a + b/L)* (l'^2 + l''))): what
+    stands there in the middle, less what the third derivative of l over the half width may change.
+    """
+    total, l1, l2, third = loop.jets(low, high)
+    half = 0.5 * (high - low)
+    L, two = np.exp(total), half * third
+    one = half * (np.abs(l2[1]) + two)
+    size, k, over = np.abs(l1[1]), l1[1] ** 2 + l2[1], b / L[1]
+    k_off = one * (2.0 * size + one) + two
+    grown = half * (size + one)
+    bend = np.minimum(a * np.maximum(size - one, 0.0) ** 2, a * (size + one) ** 2)
+    bend += ((a + over).conj() * k).real - np.abs(a + over) * k_off
+    bend -= np.abs(over) * np.expm1(grown) * (np.abs(k) + k_off)
+    bend *= 2.0 * np.abs(L[1]) ** 2 * np.exp(np.copysign(2.0 * grown, -bend))
+    ends = L[::2, None]
+    value = a * np.abs(ends) ** 2 + 2.0 * b * ends.real + e
+    slope = 2.0 * ((a * ends.conj() + b) * ends * l1[::2, None]).real
+    down = np.array((np.minimum(slope[0], 0.0), np.maximum(slope[1], 0.0)))
+    upwards = (value - down**2 / (2.0 * bend)).max(axis=0)
+    lowest = np.where(bend > 0.0, upwards, value.min(axis=0) + 0.5 * bend * half**2)
+    return np.asarray(~(lowest > 0.0))
+
+
+def _cut(low: Real, high: Real, which: Any, w: float) -> tuple[Real, Real, Any]:
+    """Intervals with one more end."""
+    within = (low < w) & (w < high)
+    if not within.any():
+        return low, high, which
+    ends = np.append(np.where(within, w, high), high[within])
+    return np.append(low, w), ends, np.append(which, which[within])
+
+
+def _polished(loop: Factored, value: float, w: float, disk: bool) -> Place:
     """Newton on the slope of the squared distance; never farther than where it started."""
     best, at = w, w
     for _ in range(_NEWTON_STEPS):
-        total = loop.log_value(np.array([at]))
-        L = complex(np.exp(total[0, 0] + 1j * total[1, 0]))
-        l1, l2 = loop.log_slopes(at)
+        L, l1, l2 = loop.jet(at)
         G, G1, G2 = 1.0 + L, L * l1, L * (l1 * l1 + l2)
         if disk:
             below = 1.0 - L

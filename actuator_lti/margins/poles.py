@@ -62,6 +62,20 @@ def eigenvalues(A: Real) -> Complex:
     return _eigen(A, vectors=False)[0]
 
 
+def polynomial_roots(p: Real) -> Complex:
+    """Roots of a polynomial (highest power first), as eigenvalues; those at zero exactly."""
+    used = p.nonzero()[0]
+    if not used.size:
+        return np.empty(0, dtype=complex)
+    inner = p[used[0] : used[-1] + 1]
+    n = inner.size - 1
+    companion = np.zeros((n, n))
+    if n:
+        companion.flat[n :: n + 1] = 1.0
+        companion[0] = -inner[1:] / inner[0]
+    return np.concatenate((eigenvalues(companion), np.zeros(p.size - 1 - used[-1])))
+
+
 def sorted_poles(A: Real, in_z: bool, gather: bool = False) -> SortedPoles:
     """Sort the eigenvalues of A (balanced) by the border of stability.
 
@@ -133,7 +147,7 @@ def _gathered(values: Complex, radius: Real, norm: float, in_z: bool) -> tuple[C
 def _with_error_bounds(A: Real) -> tuple[Complex, Real]:
     """Eigenvalues sharpened by a Rayleigh quotient v* A w / v* w, and their bounds from v* abs(A) w."""
     values, left, right = _eigen(A, vectors=True)
-    V, W = _complex_vectors(left, values.imag), _complex_vectors(right, values.imag)
+    V, W = _complex_vectors(np.array((left, right)), values.imag)
     overlap = (V.conj() * W).sum(axis=0)
     weight = (np.abs(V) * (np.abs(A) @ np.abs(W))).sum(axis=0)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # left and right nearly apart
@@ -159,9 +173,10 @@ def _eigen(A: Real, vectors: bool) -> tuple[Complex, Real, Real]:
 
 def _complex_vectors(packed: Real, im: Real) -> Complex:
     out = packed.astype(complex)
-    k = np.flatnonzero(im > 0.0)
-    out[:, k] += 1j * packed[:, k + 1]
-    out[:, k + 1] = out[:, k].conj()
+    k = (im > 0.0).nonzero()[0]
+    if k.size:
+        pairs = packed[..., k] + 1j * packed[..., k + 1]
+        out[..., k], out[..., k + 1] = pairs, pairs.conj()
     return out
 
 

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from actuator_lti.faces import draw
 from actuator_lti.margins.single import (
     Agreement,
     DelayMargin,
@@ -171,9 +172,7 @@ class StabilityMargins:
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        from actuator_lti.notebook import margins_html
-
-        return margins_html(self)
+        return draw("margins_html", self)
 
 
 def _within(result: tuple[float, float] | None) -> str:

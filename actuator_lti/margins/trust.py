@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.margins.given import ULP
-from actuator_lti.margins.loop import Complex, RationalLoop, Real
+from actuator_lti.margins.loop import Complex, RationalLoop, Real, horner
 
 EPS = float(np.finfo(float).eps)
 ZERO = 1e8  # L of less than so many of its own rounding errors is zero: true zeros gave 8e5 at most
@@ -67,14 +67,12 @@ def error_bound(loop: RationalLoop, x: Real) -> Real:
     ends = np.isinf(x)
     points[ends] = 1.0
     sizes = rounded_size(loop, points)
-    values = [np.where(ends, p[0], np.polyval(p, points)) for p in (loop.numerator, loop.denominator)]
+    rows = np.array((loop.numerator, loop.denominator))
+    values = np.where(ends, rows[:, :1], horner(rows, points))
     if loop.in_z_size is not None:
         sizes[:, ends] = loop.in_z_size.sum(axis=1)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
-        parts = [
-            np.where(size > 0.0, size / np.abs(value), 0.0) for size, value in zip(sizes, values, strict=True)
-        ]
-    return EPS * (parts[0] + parts[1])
+        return EPS * np.where(sizes > 0.0, sizes / np.abs(values), 0.0).sum(axis=0)
 
 
 def rounded_size(loop: RationalLoop, points: Complex) -> Real:
@@ -82,7 +80,7 @@ def rounded_size(loop: RationalLoop, points: Complex) -> Real:
     assert loop.numerator is not None
     assert loop.denominator is not None
     if loop.in_z_size is None:
-        return np.array([np.polyval(np.abs(p), np.abs(points)) for p in (loop.numerator, loop.denominator)])
+        return np.asarray(horner(np.abs((loop.numerator, loop.denominator)), np.abs(points)))
     up, down = np.abs(1.0 + points), np.abs(1.0 - points)
     n = loop.order
     k = np.arange(n, -1, -1)[:, None]

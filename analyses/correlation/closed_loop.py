@@ -22,8 +22,9 @@ from analyses.correlation.driving import (
     needed_command,
     supply_of,
 )
-from analyses.identification.differentiation import filtered_motion
 from analyses.records.consistency import Finding, check_record
+from analyses.records.differentiation import filtered_motion
+from analyses.records.inputs import InputUse, account
 from analyses.records.prepare import prepared
 from analyses.records.record import Record
 
@@ -62,22 +63,24 @@ class CorrelationResult:
 
     record: str
     design: str
-    signals: tuple[SignalComparison, ...]
+    signals: Mapping[str, SignalComparison]
     limits: dict[str, float]
     notes: tuple[str, ...]
     counts: str
     sha256: str
-    source: Record
-    used: Mapping[str, str] = field(default_factory=dict)
+    source: Record = field(repr=False)
+    used: Mapping[str, str] = field(default_factory=dict, repr=False)
     findings: tuple[Finding, ...] = ()
 
+    @property
+    def inputs(self) -> tuple[InputUse, ...]:
+        """The record's columns, and what each was used for."""
+        return account(self.source, self.used)
+
     def __getitem__(self, name: str) -> SignalComparison:
-        for signal in self.signals:
-            if signal.name == name:
-                return signal
-        raise InputError(
-            f'no signal "{name}"; there are: {", ".join(s.name for s in self.signals)}', self.record
-        )
+        if name not in self.signals:
+            raise InputError(f'no signal "{name}"; there are: {", ".join(self.signals)}', self.record)
+        return self.signals[name]
 
 
 def correlate_record(
@@ -121,10 +124,10 @@ def correlate_record(
         known = ", ".join(AXIS_SIGNALS[design.axis])
         raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
     modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
-    signals = tuple(
-        compare_signals(name, UNITS[name], record.time_s, values, modelled[name])
+    signals = {
+        name: compare_signals(name, UNITS[name], record.time_s, values, modelled[name])
         for name, values in measured.items()
-    )
+    }
     return CorrelationResult(
         record=record.name,
         design=design.name,

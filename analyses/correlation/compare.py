@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import isnan
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
 
 from actuator_lti.errors import InputError
+from analyses.estimation.means import best_lag
 
 FloatArray = NDArray[np.float64]
 
@@ -34,9 +35,14 @@ class SignalComparison:
     max_error: float
     max_error_time_s: float
     delay_s: float | None
-    time_s: FloatArray
-    measured: FloatArray
-    modelled: FloatArray
+    time_s: FloatArray = field(repr=False)
+    measured: FloatArray = field(repr=False)
+    modelled: FloatArray = field(repr=False)
+
+    @property
+    def share_of_motion(self) -> float:
+        """Norm of the difference over that of the measured about its mean; of a flat signal over its norm."""
+        return self.relative_error if isnan(self.fit_percent) else 1.0 - self.fit_percent / 100.0
 
 
 def compare_signals(
@@ -100,7 +106,7 @@ def delay_between(time_s: FloatArray, measured: FloatArray, modelled: FloatArray
         np.abs(b), initial=0.0
     ):
         return None
-    lag = _best_lag(a - a.mean(), b - b.mean())
+    lag = best_lag(a - a.mean(), b - b.mean())
     if abs(lag) >= len(grid) // 4:
         return None
     shift = lag * period
@@ -115,10 +121,3 @@ def delay_between(time_s: FloatArray, measured: FloatArray, modelled: FloatArray
         if abs(step) < 1e-6 * period:
             break
     return float(shift)
-
-
-def _best_lag(a: FloatArray, b: FloatArray) -> int:
-    size = next_fast_len(2 * len(a), real=True)
-    cross = irfft(rfft(a, size) * np.conj(rfft(b, size)), size)
-    lag = int(np.argmax(cross))
-    return lag if lag < len(a) else lag - size

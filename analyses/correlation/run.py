@@ -9,7 +9,7 @@ from actuator_lti.design.model import Design
 from analyses.correlation.asked import Asked
 from analyses.correlation.chirp import ChirpPrediction, predict_chirp
 from analyses.correlation.closed_loop import CorrelationResult, correlate_record
-from analyses.correlation.summary import agrees
+from analyses.correlation.summary import SignalSummary, agrees, summarise, worst_of
 from analyses.correlation.voltage_motor import VoltageMotor, fit_step
 from analyses.records import open_record
 from analyses.records.record import named_apart
@@ -21,7 +21,7 @@ class Correlation:
 
     design: Design
     asked: Asked
-    results: tuple[CorrelationResult, ...]
+    records: tuple[CorrelationResult, ...]
 
     @property
     def limit(self) -> float | None:
@@ -29,9 +29,19 @@ class Correlation:
         return None if self.asked.error_limit is None else self.asked.error_limit / 100.0
 
     @property
+    def summary(self) -> dict[str, SignalSummary]:
+        """The figures of every signal over all records."""
+        return summarise(self.records)
+
+    @property
+    def worst(self) -> str:
+        """The record whose motion is furthest off."""
+        return worst_of(self.records)[0].record
+
+    @property
     def passed(self) -> bool:
         """Whether no record contradicts itself or the design, and no error is above the limit."""
-        return agrees(self.results, self.limit)
+        return agrees(self.records, self.limit)
 
 
 @dataclass(frozen=True)

@@ -31,14 +31,13 @@ class SignalSummary:
     worst: str
 
 
-def summarise(results: Sequence[CorrelationResult]) -> tuple[SignalSummary, ...]:
+def summarise(results: Sequence[CorrelationResult]) -> dict[str, SignalSummary]:
     """The figures of every signal over all records, in the order in which the signals first occur."""
-    names = list(dict.fromkeys(signal.name for result in results for signal in result.signals))
-    return tuple(_of_signal(name, results) for name in names)
+    return {name: _of_signal(name, results) for result in results for name in result.signals}
 
 
 def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary:
-    outcome = [(result, signal) for result in results for signal in result.signals if signal.name == name]
+    outcome = [(result, result[name]) for result in results if name in result.signals]
     signals = [signal for _, signal in outcome]
     samples = np.array([signal.samples for signal in signals])
     squared = np.array([signal.rms_error**2 for signal in signals]) * samples
@@ -59,18 +58,24 @@ def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary
 
 def worst_of(results: Sequence[CorrelationResult]) -> tuple[CorrelationResult, SignalComparison]:
     """The record whose motion is furthest off, and the signal: the output's place where it is recorded."""
+    every = [(result, signal) for result in results for signal in result.signals.values()]
     for name in ("output_angle", "position", "angle", "speed", "velocity"):
-        held = [(result, signal) for result in results for signal in result.signals if signal.name == name]
-        if len(held) == len(results):
-            return max(held, key=lambda pair: pair[1].relative_error)
-    every = [(result, signal) for result in results for signal in result.signals]
-    return max(every, key=lambda pair: pair[1].relative_error)
+        if all(name in result.signals for result in results):
+            every = [(result, result[name]) for result in results]
+            break
+    return max(every, key=lambda pair: pair[1].share_of_motion)
+
+
+def moves_alike(result: CorrelationResult) -> bool:
+    """Whether the model's motion is nearer to the measured one than the mean of that is: a fit above 0 %."""
+    return worst_of([result])[1].share_of_motion <= 1.0
 
 
 def agrees(results: Sequence[CorrelationResult], error_limit: float | None) -> bool:
-    """Whether no record contradicts itself or the design and, with a limit, no error is above it."""
+    """Whether no record contradicts itself or the design, each motion fits and, with a limit, each signal is
+    within."""
     if any(finding.passed is False for result in results for finding in result.findings):
         return False
-    return error_limit is None or all(
-        signal.relative_error <= error_limit for result in results for signal in result.signals
-    )
+    signals = [signal for result in results for signal in result.signals.values()]
+    within = error_limit is None or all(signal.relative_error <= error_limit for signal in signals)
+    return within and all(moves_alike(result) for result in results)

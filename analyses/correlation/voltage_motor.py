@@ -14,21 +14,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from actuator_lti.errors import InputError, NumericalError
-from analyses.identification.least_squares import by_record, correlated_covariance
+from analyses.estimation.fit import Fit
+from analyses.estimation.least_squares import by_record, correlated_covariance
 from analyses.records.record import Record
-from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 
 FloatArray = NDArray[np.float64]
 
-ODRIVE_SPEC = RecordSpec(
-    format=CsvFormat(comment="%", row_end=";", names=("timestep", "voltage", "position", "velocity")),
-    time=TimeColumn(column="timestep", tick_s=1.0 / 8000.0, minimum=1.0),
-    signals=(
-        SignalColumn(name="voltage", column="voltage", unit="V"),
-        SignalColumn(name="angle", column="position", unit="turn"),
-        SignalColumn(name="speed", column="velocity", unit="turn/s"),
-    ),
-)
 ESTIMATOR_RAD_S = 1000.0
 GRID_S = 1.0 / 16000.0
 WINDOW_S = 1.0
@@ -83,11 +74,16 @@ def fit_step(records: Sequence[Record], estimator_rad_s: float = ESTIMATOR_RAD_S
     if len(steps) == 1:
         return joint
     alone = [_fit([step], estimator_rad_s) for step in steps]
+    names = ("gain", "time")
     told = [
-        {"gain": (m.gain_rad_sV, m.gain_std), "time": (m.time_constant_s, m.time_constant_std_s)}
+        Fit(
+            names=names,
+            values=np.array([m.gain_rad_sV, m.time_constant_s]),
+            covariance=np.diag([m.gain_std**2, m.time_constant_std_s**2]),
+        )
         for m in alone
     ]
-    scatter = by_record(told, ("gain", "time"))
+    scatter = by_record(told, names)
     return replace(
         joint,
         gain_std=float(np.hypot(joint.gain_std, scatter["gain"][1])),

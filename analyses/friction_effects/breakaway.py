@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Command, Design
 from analyses.static_threshold import StaticThreshold, static_threshold
 from nonlinear import Rows
 from nonlinear.rest import first_motion_s
@@ -48,12 +48,18 @@ class Threshold:
 
 
 def threshold(design: Design, load_Nm: float) -> Threshold | None:
-    """Simulate steps around the threshold; ``None`` where a forward step has none (or never moves)."""
+    """Simulate steps around the threshold; ``None`` where a forward step has none (or never moves).
+
+    Steps as they come behind profile and filter of the command, which let none through as it is.
+    """
+    design = replace(design, command=Command())
     static = static_threshold(design, load_Nm)
     if not 0.0 < static.forward_rad < math.inf:
         return None
     if static.integral_time_s is not None:
-        kicks = design.controller.position_loop.derivative_time_s > 0.0  # a step's own kick moves it at once
+        place = design.controller.position_loop  # a step's own kick moves it at once
+        kicks = any((place.derivative_time_s, place.feedforward, place.acceleration_feedforward,
+                     place.friction_feedforward))  # fmt: skip
         return Threshold(static, () if kicks else _waiting(design, static), None, 0.0)
     sizes = static.forward_rad * np.linspace(1.0 - WITHIN, 1.0 + WITHIN, COUNT)
     moved = _first_motion_s(design, load_Nm, sizes) < math.inf

@@ -1,48 +1,20 @@
-"""Limit cycles in the simulator: foreseen ones confirmed or refuted, others found by waiting after a step."""
+"""Limit cycles of friction at one load: predicted ones confirmed or refuted, others found by waiting."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.drive.operating import dry_torque
 from analyses.drive_figures import drive_figures
-from analyses.friction_effects.describing import ForeseenCycle, foreseen_cycles
 from analyses.friction_effects.stick_slip import StickSlipCycle
-from analyses.large_signal.steady_start import PLACES
+from analyses.limit_cycles.friction import cycles_of_friction
+from analyses.limit_cycles.result import Confirmation, Cycle
+from analyses.limit_cycles.run import confirm
 from analyses.settling import Settling, largest_swing, settle
-from nonlinear import Rows
 
 BELOW = 0.3
-SCALES = np.geomspace(0.4, 2.5, 41)
-CYCLES_WATCHED = 12.0
-
-
-@dataclass(frozen=True)
-class Confirmation:
-    """A foreseen cycle against the simulator, from initial states of its shape at several sizes.
-
-    Attributes
-    ----------
-    foreseen : ForeseenCycle
-    simulated_ratio : float or None
-        Size, relative to the foreseen, at which motion neither grows nor dies out; ``None``: refuted, as it
-        does one or the other at every size from 0.4 to 2.5.
-    simulated_hz : float or None
-        Frequency next to that size.
-    """
-
-    foreseen: ForeseenCycle
-    simulated_ratio: float | None
-    simulated_hz: float | None
-
-    @property
-    def confirmed(self) -> bool:
-        """Whether the simulator has it."""
-        return self.simulated_ratio is not None
 
 
 @dataclass(frozen=True)
@@ -79,15 +51,15 @@ class LimitCycles:
 
         A stable cycle is foreseen exactly where a step ends in one, and every foreseen one is confirmed.
         """
-        stable = any(item.foreseen.stable for item in self.confirmations)
-        return all(item.confirmed for item in self.confirmations) and stable == self.by_friction
+        stable = any(item.cycle.stable for item in self.confirmations)
+        return all(item.verdict == "confirmed" for item in self.confirmations) and stable == self.by_friction
 
     @property
-    def as_foreseen(self) -> bool:
+    def as_predicted(self) -> bool:
         """Whether describing function and stick-slip analysis together are right about friction."""
         slips = self.stick_slip is not None and self.stick_slip.stable
-        stable = slips or any(item.foreseen.stable for item in self.confirmations)
-        return all(item.confirmed for item in self.confirmations) and stable == self.by_friction
+        stable = slips or any(item.cycle.stable for item in self.confirmations)
+        return all(item.verdict == "confirmed" for item in self.confirmations) and stable == self.by_friction
 
 
 def limit_cycles(
@@ -96,7 +68,7 @@ def limit_cycles(
     step_rad: float,
     threshold_rad: float | None = None,
     stick_slip: StickSlipCycle | None = None,
-    foreseen: tuple[ForeseenCycle, ...] | None = None,
+    foreseen: tuple[Cycle, ...] | None = None,
 ) -> LimitCycles:
     """Foresee limit cycles, look for them in the simulator, and wait what steps end in.
 
@@ -108,7 +80,7 @@ def limit_cycles(
         Command that breaks away at once; a step of `BELOW` of it is waited for too.
     stick_slip : StickSlipCycle, optional
         A cycle foreseen by `analyses.friction_effects.stick_slip`; a step of its size is waited for too.
-    foreseen : tuple of ForeseenCycle, optional
+    foreseen : tuple of Cycle, optional
         By describing function, if known already.
     """
     design = replace(  # what noise or counts keep moving, friction does not
@@ -119,7 +91,7 @@ def limit_cycles(
     )
     if foreseen is None:
         foreseen = described_cycles(design, load_Nm)
-    checked = tuple(_confirm(design, load_Nm, cycle) for cycle in foreseen)
+    checked = tuple(confirm(design, cycle) for cycle in foreseen)
     sizes = [step_rad, 0.1 * step_rad] + ([BELOW * threshold_rad] if threshold_rad else [])
     sizes += [stick_slip.output_amplitude_rad] if stick_slip is not None else []
     return LimitCycles(checked, stick_slip, tuple(settle(design, load_Nm, size) for size in sizes))
@@ -130,53 +102,9 @@ def dry_Nm(design: Design, load_Nm: float) -> float:
     return float(dry_torque(design, load_Nm, 1) + dry_torque(design, load_Nm, -1))
 
 
-def described_cycles(design: Design, load_Nm: float) -> tuple[ForeseenCycle, ...]:
+def described_cycles(design: Design, load_Nm: float) -> tuple[Cycle, ...]:
     """Limit cycles by describing function, up to the top speed of the drive."""
     if dry_Nm(design, load_Nm) <= 0.0:
         return ()
     top = drive_figures(design, load_Nm).output_rate_rad_s * design.total_ratio
-    return foreseen_cycles(design, load_Nm, top if 0.0 < top < math.inf else 1e3)
-
-
-def _confirm(design: Design, load_Nm: float, cycle: ForeseenCycle) -> Confirmation:
-    """Start in the shape of the cycle at many sizes; find where motion turns from dying out to growing."""
-    Ts = design.controller.period_s
-    window = round(3.0 / (cycle.frequency_hz * Ts))
-    rows = Rows.of(design, len(SCALES), limits_on=False)
-    rows["load"] = load_Nm
-    rows.step("command", 0.0)
-    for name, value in cycle.state.items():
-        if name in PLACES:
-            rows[PLACES[name]] = SCALES * cycle.speed_amplitude_rad_s * value.real
-    if "th" in cycle.state and design.controller.velocity is not None:
-        before = -design.controller.position_loop.gain * cycle.state["th"].real
-        rows["speed_command_start"] = SCALES * cycle.speed_amplitude_rad_s * before
-    rows.window(window, 3, 0)
-    rows["ticks"] = round(CYCLES_WATCHED / 3.0) * window
-    result = rows.run()
-    low, high = result.span("motor_speed_rad_s")
-    peak = np.maximum(-low, high)
-    grows = ~result.ok | (peak > SCALES * cycle.speed_amplitude_rad_s)
-    turns = np.flatnonzero(grows[1:] != grows[:-1])
-    if len(turns) != 1:
-        return Confirmation(cycle, None, None)
-    k = int(turns[0])
-    ratio = float(math.sqrt(SCALES[k] * SCALES[k + 1]))
-    run = simulate_row(rows.take(k if cycle.stable else k + 1), window)
-    return Confirmation(cycle, ratio, run)
-
-
-def simulate_row(row: Rows, ticks: int) -> float | None:
-    """Frequency of the motor speed over the first ticks of a row."""
-    row["ticks"] = ticks
-    run = row.trajectory()
-    return _frequency(run.time_s, run.motor_speed_rad_s)
-
-
-def _frequency(time_s: np.ndarray, values: np.ndarray) -> float | None:
-    """Frequency from the rising zero crossings; ``None`` with fewer than two of them."""
-    up = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
-    if len(up) < 2:
-        return None
-    exact = time_s[up] - values[up] * (time_s[up + 1] - time_s[up]) / (values[up + 1] - values[up])
-    return float((len(up) - 1) / (exact[-1] - exact[0]))
+    return cycles_of_friction(design, load_Nm, top if 0.0 < top < math.inf else 1e3)

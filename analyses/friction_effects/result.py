@@ -13,10 +13,11 @@ from actuator_lti.drive.operating import dry_torque
 from actuator_lti.loops import assemble_loops
 from analyses.friction_effects.breakaway import Threshold, threshold
 from analyses.friction_effects.cycles import LimitCycles, described_cycles, dry_Nm, limit_cycles
-from analyses.friction_effects.describing import ForeseenCycle, at_load
 from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
 from analyses.friction_effects.stick_slip import stick_slip_cycle
 from analyses.large_signal.steady_start import linear_steady_state
+from analyses.limit_cycles.friction import at_load
+from analyses.limit_cycles.result import Cycle
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
@@ -95,9 +96,7 @@ def friction_effects(
     most = max(loads, key=lambda load: dry_Nm(design, load))
     described = described_cycles(design, most)
     for load in loads:
-        scaled = tuple(
-            at_load(cycle, design, most, load) for cycle in described if dry_Nm(design, load) > 0.0
-        )
+        scaled = tuple(at_load(cycle, design, load) for cycle in described if dry_Nm(design, load) > 0.0)
         if design.friction.points and load != most:  # a map does not grow in proportion to the load
             scaled = described_cycles(design, load)
         points.append(_point(design, loops, load, settling, scaled))
@@ -115,7 +114,7 @@ def _integrator(design: Design) -> str:
 
 
 def _point(
-    design: Design, loops: Loops, load_Nm: float, settling_ticks: int, described: tuple[ForeseenCycle, ...]
+    design: Design, loops: Loops, load_Nm: float, settling_ticks: int, described: tuple[Cycle, ...]
 ) -> FrictionPoint:
     step = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
     result = threshold(design, load_Nm)

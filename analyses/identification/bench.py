@@ -10,12 +10,12 @@ from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.driving import command_of
-from analyses.identification.dynamic import FrictionForm, Recipe
-from analyses.identification.electrical import ElectricalFit, electrical_estimate, fit_electrical
+from analyses.estimation.parameters import parameter
+from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
 from analyses.identification.following_error import following_item
 from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
-from analyses.identification.joint_model import JointModel
+from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, Recipe
 from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.own_bias import without_bias
 from analyses.identification.refinement import refine_records
@@ -23,15 +23,14 @@ from analyses.identification.resimulation import Resimulated, resimulate
 from analyses.identification.rows import recipe_for
 from analyses.identification.to_design import (
     INERTIAS,
-    KEYS,
-    design_with_estimate,
-    joint_estimate,
-    refined_estimate,
+    design_with_fit,
+    joint_values,
     with_fixed,
     with_structure,
 )
 from analyses.identification.verdict import (
     RESIDUAL_LIMIT,
+    Identified,
     Item,
     held_out_item,
     inputs_item,
@@ -41,14 +40,10 @@ from analyses.identification.verdict import (
     simulated_item,
     size_item,
 )
-from analyses.identification.verdict import passed as all_passed
 from analyses.records.consistency import Finding, check_record
+from analyses.records.inputs import InputUse, account
 from analyses.records.prepare import prepared
 from analyses.records.record import Record
-
-NAMES_OF_KEYS = {
-    ("symmetric", key): name for name, key in KEYS.items() if not name.endswith(("_forward", "_reverse"))
-} | {("per-direction", key): name for name, key in KEYS.items() if name not in ("viscous", "dry", "offset")}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +67,7 @@ class BenchSettings:
 
 
 @dataclass(frozen=True, kw_only=True)
-class BenchResult:
+class BenchResult(Identified):
     """Everything that the records told: the fit, the design that would be written, and whether it may be."""
 
     records: tuple[Record, ...]
@@ -80,18 +75,16 @@ class BenchResult:
     findings: Mapping[str, tuple[Finding, ...]]
     model: JointModel
     refined: OutputErrorResult | None
-    design: Design
-    text: str
     resimulated: tuple[Resimulated, ...]
-    items: tuple[Item, ...]
     settings: BenchSettings
     laws: tuple[LawChoice, ...] = ()
     electrical: ElectricalFit | None = None
 
     @property
-    def passed(self) -> bool:
-        """Whether nothing failed."""
-        return all_passed(self.items)
+    def inputs(self) -> dict[str, tuple[InputUse, ...]]:
+        """The columns of each record, and what each was used for."""
+        pairs = zip(self.model.records, self.records, strict=True)
+        return {record.name: account(record, part.used) for part, record in pairs}
 
 
 def identify_bench(
@@ -117,7 +110,7 @@ def identify_bench(
     if settings.electrical:
         electrical = fit_electrical(start, used)
         told = f"voltage equation of {', '.join(record.name for record in records)}"
-        start = design_with_estimate(start, electrical_estimate(start, electrical, told))
+        start = design_with_fit(start, electrical_values(start, electrical), told)
     model, laws = _fitted(start, used, settings)
     source = f"identified from {', '.join(record.name for record in records)}"
     model, simulated = _unbiased(start, _with_commands(start, model, used), used, settings)
@@ -125,15 +118,15 @@ def identify_bench(
     lags = [following_item(start, *pair) for pair in zip(used, simulated, strict=bool(simulated))]
     items = (*_fit_items(design, findings, model, settings.residual_limit), *sampled, *filter(None, lags))
     try:
-        estimate = joint_estimate(start, model, source, inertia_to=settings.inertia_to)
-        made = design_with_estimate(with_structure(start, model), estimate)
+        values = joint_values(start, model, inertia_to=settings.inertia_to)
+        made = design_with_fit(with_structure(start, model), values, source)
     except InputError as error:
         reasons = "; ".join(item.reason for item in items if item.passed is False)
         raise InputError(f"{error.message} ({reasons})" if reasons else error.message, error.where) from None
     refined = None
     if settings.refine:
-        refined = refine_records(made, used, estimate.paths, progress=progress)
-        made = design_with_estimate(made, refined_estimate(refined, f"{source}, refined by simulation"))
+        refined = refine_records(made, used, values.names, progress=progress)
+        made = design_with_fit(made, refined, f"{source}, refined by simulation")
     text = write_design(made)
     again = resimulate(read_design_text(text), (*used, *unseen), model.form)
     return BenchResult(
@@ -180,8 +173,8 @@ def _unbiased(
 ) -> tuple[JointModel, tuple[Record, ...]]:
     """The model less its own bias, where a design can be made of it and simulated; the simulated records."""
     try:
-        estimate = joint_estimate(start, model, "", inertia_to=settings.inertia_to)
-        made = design_with_estimate(with_structure(start, model), estimate)
+        values = joint_values(start, model, inertia_to=settings.inertia_to)
+        made = design_with_fit(with_structure(start, model), values, "")
     except InputError:
         return model, ()  # said where the design is made
     return without_bias(start, made, model, used, _recipe(used[0], settings))
@@ -196,16 +189,16 @@ def _recipe(record: Record, settings: BenchSettings) -> Recipe | None:
 def _held(design: Design, settings: BenchSettings) -> dict[str, float]:
     """Fixed keys by the model's names; a fixed rotor or load inertia fixes the whole."""
     held = {}
-    form = "symmetric" if settings.form == "map" else settings.form
+    names = [*NAMES["per-direction" if settings.form == "per-direction" else "symmetric"], "load_coefficient"]
+    of_key = {parameter(name).key: name for name in names if parameter(name).key}
     for path, value in settings.fixed.items():
-        name = NAMES_OF_KEYS.get((form, path))
         if path in INERTIAS:
             held["inertia"] = design.inertia_kgm2
-        elif name is not None:
-            held[name] = value
+        elif path in of_key:
+            held[of_key[path]] = value
         else:
-            known = sorted({key for own, key in NAMES_OF_KEYS if own == form} | set(INERTIAS))
-            raise InputError(f"--fix {path}: can be fixed here: {', '.join(known)}")
+            known = ", ".join(sorted({*of_key, *INERTIAS}))
+            raise InputError(f"--fix {path}: can be fixed here: {known}")
     return held
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from actuator_lti.design.model import Design
@@ -16,6 +16,7 @@ from analyses.identification.surface_fit import NAMES, SurfaceFit
 from analyses.identification.verdict import Item, residual_item, simulated_item, sizes_item
 from analyses.records.campaign_import import ImportedCampaign, SetAside
 from analyses.records.consistency import Finding
+from analyses.records.inputs import InputUse
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +27,7 @@ class CampaignResult:
     the runs set aside whose record does not agree with what is said of it.
     """
 
-    imported: ImportedCampaign
+    imported: ImportedCampaign = field(repr=False)
     fit: SurfaceFit
     laws: RicherLaws | None
     set_aside: tuple[SetAside, ...]
@@ -40,6 +41,21 @@ class CampaignResult:
         """Runs in the campaign file."""
         return len(self.imported.campaign.runs)
 
+    @property
+    def rows_in(self) -> int:
+        """Data rows in the files of the runs that are used."""
+        return self.imported.rows_in
+
+    @property
+    def rows_out(self) -> int:
+        """Rows that were kept of them."""
+        return self.imported.rows_out
+
+    @property
+    def inputs(self) -> tuple[InputUse, ...]:
+        """The columns of the runs' files, and what each was used for."""
+        return self.imported.inputs
+
 
 def identify_campaign(
     imported: ImportedCampaign,
@@ -48,7 +64,6 @@ def identify_campaign(
     criterion: SteadyCriterion | None = None,
     richer: bool = True,
     fixed: Mapping[str, float] | None = None,
-    progress: Callable[[int, int], None] | None = None,
 ) -> CampaignResult:
     """Identify C0, Cv and CM (paper, section 3) from imported runs.
 
@@ -63,8 +78,6 @@ def identify_campaign(
         Whether to ask, by cross-validation, for a richer law.
     fixed : mapping, optional
         Coefficients (C0, Cv, CM) that are held at a value.
-    progress : callable, optional
-        Called with (steps done, steps in all).
 
     Raises
     ------
@@ -80,8 +93,6 @@ def identify_campaign(
     points, restless = steady_points(imported.runs, constant, criterion)
     checked = check_runs(design, imported.runs, points, imported.campaign.instruments)
     aside = (*imported.set_aside, *restless, *checked.contradicting)
-    if progress is not None:
-        progress(1, 3)
     try:
         fit = fit_surface(
             checked.points,
@@ -96,11 +107,7 @@ def identify_campaign(
         raise InputError(
             f"{error.message} ({told})" if told else error.message, imported.campaign.origin
         ) from None
-    if progress is not None:
-        progress(2, 3)
     laws = compare_laws(fit) if richer and not fixed and len(fit.points) >= 5 else None
-    if progress is not None:
-        progress(3, 3)
     return CampaignResult(
         imported=imported,
         fit=fit,

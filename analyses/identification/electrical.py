@@ -11,42 +11,26 @@ from scipy.signal import butter, filtfilt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.identification.differentiation import central_difference
-from analyses.identification.least_squares import solve, told_apart
+from analyses.estimation.fit import Fit, Fixed
+from analyses.estimation.least_squares import solve, told_apart
+from analyses.estimation.parameters import parameter
 from analyses.identification.rows import motion_of, recipe_for
-from analyses.identification.to_design import Estimate
+from analyses.records.differentiation import central_difference
 from analyses.records.prepare import period_of
 from analyses.records.record import Record
 
 FloatArray = NDArray[np.float64]
 
-NAMES = ("resistance", "back_emf", "inductance", "offset")
+NAMES = ("resistance", "back_emf", "inductance", "voltage_offset")
 SHOWN = 5.0
 """A value counts as shown where it exceeds its standard error so many times."""
-KEYS = {
-    "resistance": "motor.resistance",
-    "back_emf": "motor.back_emf_constant",
-    "inductance": "motor.inductance",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
-class ElectricalFit:
-    """``u = R i + kE w + L di/dt + offset`` (equation 1), and what the records do not show, and why."""
+class ElectricalFit(Fit):
+    """``u = R i + kE w + L di/dt + offset`` (equation 1); fixed is what the records do not show."""
 
-    names: tuple[str, ...]
-    values: FloatArray
-    covariance: FloatArray
-    not_shown: dict[str, str]
     relative_residual: float
-
-    def __getitem__(self, name: str) -> float:
-        return float(self.values[self.names.index(name)])
-
-    def std(self, name: str) -> float:
-        """Standard error, with the correlation of the residual in time."""
-        k = self.names.index(name)
-        return float(np.sqrt(self.covariance[k, k]))
 
 
 def fit_electrical(
@@ -78,34 +62,26 @@ def fit_electrical(
     rest = tuple(name for name in whole.names if name != "inductance")
     told = f"the records do not show it ({value:.2g} H with a standard error of {std:.2g} H)"
     again = fit_electrical(design, records, only=rest)
-    return replace(again, not_shown={**again.not_shown, "inductance": told})
+    kept = Fixed(value=design.motor.inductance_H or 0.0, reason=f"{told}: the design's value kept")
+    return replace(again, fixed={**again.fixed, "inductance": kept})
 
 
 def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...] = NAMES) -> ElectricalFit:
     """The fit of rows that are made already; ``only`` these parameters."""
     ends = np.cumsum([len(part) for part in tables]).tolist()
     table = np.concatenate(tables)
-    names = list(only)
-    not_shown: dict[str, str] = {}
-    while True:
-        columns = [NAMES.index(name) for name in names]
-        w, u = table[:, columns], table[:, -1]
-        kept, left = told_apart(w, names)
-        if left:
-            for one in left:
-                not_shown[one.name] = str(one)
-            names = [names[k] for k in kept]
-            continue
-        result = solve(w, u, ends)
-        break
-    for name in ("resistance", "back_emf"):
-        if name in not_shown:
-            raise InputError(f"{KEYS[name]}: {not_shown[name]}; vary speed and load, not together only")
+    w, u = table[:, [NAMES.index(name) for name in only]], table[:, -1]
+    kept, left = told_apart(w, only)
+    for one in left:
+        if one.name in ("resistance", "back_emf"):
+            told = f"{parameter(one.name).key}: {one}; vary speed and load, not together only"
+            raise InputError(told)
+    result = solve(w[:, list(kept)], u, ends)
     return ElectricalFit(
-        names=tuple(names),
+        names=tuple(only[k] for k in kept),
         values=result.values,
         covariance=result.correlated,
-        not_shown=not_shown,
+        fixed={one.name: Fixed(value=0.0, reason=str(one)) for one in left},
         relative_residual=float(np.linalg.norm(result.residual) / np.linalg.norm(u)),
     )
 
@@ -128,7 +104,7 @@ def _rows(design: Design, record: Record, late_s: float) -> FloatArray:
     return table[skip : len(table) - skip]
 
 
-def electrical_estimate(design: Design, fit: ElectricalFit, source: str) -> Estimate:
+def electrical_values(design: Design, fit: ElectricalFit) -> Fit:
     """R, kE, L where it is shown, and kM with kE: one constant of one motor, correlated at 1.
 
     Raises
@@ -140,11 +116,6 @@ def electrical_estimate(design: Design, fit: ElectricalFit, source: str) -> Esti
     if motor.constants != "dc" or motor.torque_constant_Nm_A is None:
         raise InputError('the voltage equation is identified for motors with "dc" constants', design.name)
     before = motor.back_emf_constant_Vs_rad or motor.torque_constant_Nm_A
-    names = [name for name in fit.names if name in KEYS]
-    rows = [fit.names.index(name) for name in names]
-    mix = np.eye(len(names))[[*range(len(names)), names.index("back_emf")]]
-    mix[-1] *= motor.torque_constant_Nm_A / before
-    values = mix @ fit.values[rows]
-    covariance = mix @ fit.covariance[np.ix_(rows, rows)] @ mix.T
-    paths = (*(KEYS[name] for name in names), "motor.torque_constant")
-    return Estimate(paths=paths, values=values, covariance=covariance, source=source)
+    slopes = {parameter(name).key: {name: 1.0} for name in fit.names if parameter(name).key}
+    slopes["motor.torque_constant"] = {"back_emf": motor.torque_constant_Nm_A / before}
+    return fit.mapped(slopes)

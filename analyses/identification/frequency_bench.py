@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Coupling, Design, LoadFriction
 from actuator_lti.errors import InputError, NumericalError
-from analyses.identification.differentiation import filtered_motion
+from analyses.estimation.fit import Fit, Fixed
+from analyses.estimation.parameters import parameter
 from analyses.identification.frequency import (
     Lines,
     excited_lines,
@@ -23,18 +24,20 @@ from analyses.identification.frequency import (
 from analyses.identification.play import Play, find_play
 from analyses.identification.rows import drive_of
 from analyses.identification.sampled_current import held_voltage
-from analyses.identification.to_design import Estimate, design_with_estimate
+from analyses.identification.to_design import design_with_fit
 from analyses.identification.two_mass import (
     FLOORS,
+    NAMES,
     TwoMass,
     angle_responses,
     fit_two_mass,
     other_starts,
     start_of,
 )
-from analyses.identification.verdict import RESIDUAL_LIMIT, Item, inputs_item, simulated_item
-from analyses.identification.verdict import passed as all_passed
+from analyses.identification.verdict import RESIDUAL_LIMIT, Identified, Item, inputs_item, simulated_item
 from analyses.records.consistency import Finding, check_record
+from analyses.records.differentiation import filtered_motion
+from analyses.records.inputs import InputUse, account
 from analyses.records.prepare import prepared
 from analyses.records.record import Record
 
@@ -45,36 +48,34 @@ MISFIT_DOUBTED = 1.5
 """Above this other starts are tried: a valley may be the wrong one."""
 GUARD = 1.5
 COMMANDS = ("reference", "speed_reference", "current_reference", "voltage_reference", "current")
-KEYS = {
-    "motor_inertia": "motor.rotor_inertia",
-    "load_inertia": "load.inertia",
-    "stiffness": "coupling.stiffness",
-    "damping": "coupling.damping",
-    "viscous": "friction.viscous",
-    "load_viscous": "load.friction.viscous",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrequencyResult:
+class FrequencyResult(Identified):
     """What a frequency response (and a record for the play) told of a two-mass drive."""
 
     record: Record
     play_record: Record | None
-    lines: Lines
+    lines: Lines = field(repr=False)
     period_s: float
     fit: TwoMass
     play: Play | None
-    design: Design
-    text: str
     used: Mapping[str, str]
     findings: Mapping[str, tuple[Finding, ...]]
-    items: tuple[Item, ...]
 
     @property
-    def passed(self) -> bool:
-        """Whether nothing failed."""
-        return all_passed(self.items)
+    def found(self) -> Fit:
+        """Everything that was found: the parameters, both resonances, the play."""
+        fit, play = self.fit, self.play
+        found = fit.beside("antiresonance", *fit.antiresonance_rad_s).beside(
+            "resonance", *fit.resonance_rad_s
+        )
+        return found.beside("play", 2.0 * play.half_rad, 2.0 * play.half_std_rad) if play else found
+
+    @property
+    def inputs(self) -> tuple[InputUse, ...]:
+        """The record's columns, and what each was used for."""
+        return account(self.record, self.used)
 
 
 def identify_frequency(
@@ -226,7 +227,7 @@ def _held_at_zero(fit: TwoMass, below: Sequence[str]) -> TwoMass:
         names=tuple(fit.names[k] for k in rest),
         values=values,
         covariance=fit.covariance[np.ix_(rest, rest)],
-        fixed={**fit.fixed, **dict.fromkeys(below, 0.0)},
+        fixed={**fit.fixed, **dict.fromkeys(below, Fixed(value=0.0, reason="would come out negative"))},
     )
     more = [name for name in FLOORS if name in again.names and again[name] < 0.0]
     return _held_at_zero(again, more) if more else again
@@ -234,7 +235,7 @@ def _held_at_zero(fit: TwoMass, below: Sequence[str]) -> TwoMass:
 
 def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
     """Values of the design's keys by the names of the fit, at the motor and at the coupling."""
-    names = {key: name for name, key in KEYS.items()}
+    names = {parameter(name).key: name for name in NAMES}
     held = {}
     for path, value in fixed.items():
         if path not in names:
@@ -366,20 +367,11 @@ def _made(design: Design, fit: TwoMass, play: Play | None, record: str, behind: 
     own_load = base.load_side_inertia_kgm2 - base.load.inertia_kgm2 / behind**2
     shift = {"motor_inertia": -others, "load_inertia": -own_load}
     scale = {"load_inertia": behind**2}
-    names = [name for name in fit.names if fit[name] > 0.0]
-    rows = [fit.names.index(name) for name in names]
-    factors = np.array([scale.get(name, 1.0) for name in names])
-    values = np.array([(fit[name] + shift.get(name, 0.0)) for name in names]) * factors
-    covariance = fit.covariance[np.ix_(rows, rows)] * np.outer(factors, factors)
-    paths = [KEYS[name] for name in names]
-    if play is not None and play.told:
-        paths.append("coupling.play")
-        values = np.append(values, 2.0 * play.half_rad)
-        wide = np.zeros((len(values), len(values)))
-        wide[:-1, :-1] = covariance
-        wide[-1, -1] = 4.0 * play.half_std_rad**2
-        covariance = wide
-    estimate = Estimate(
-        paths=tuple(paths), values=values, covariance=covariance, source=f"frequency response of {record}"
+    names = {name: parameter(name).key for name in fit.names if fit[name] > 0.0}
+    made = fit.mapped(
+        {key: {name: scale.get(name, 1.0)} for name, key in names.items()},
+        {key: scale.get(name, 1.0) * (fit[name] + shift.get(name, 0.0)) for name, key in names.items()},
     )
-    return design_with_estimate(base, estimate)
+    if play is not None and play.told:
+        made = made.beside("coupling.play", 2.0 * play.half_rad, 2.0 * play.half_std_rad)
+    return design_with_fit(base, made, f"frequency response of {record}")

@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from actuator_lti.design.model import Design
-from analyses.identification.dynamic import Recipe
+from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
-from analyses.identification.joint_model import JointModel
-from analyses.identification.linear_basis import linear_basis
-from analyses.identification.means import correlation_time
+from analyses.identification.joint_model import JointModel, Recipe, linear_basis
 from analyses.identification.rows import Rows, record_rows
 from analyses.records.record import Record
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.identification.dynamic import FrictionForm, Recipe
-from analyses.identification.joint_model import KEYS, Fixed, JointModel, RecordFit, default_value
-from analyses.identification.least_squares import NotTold, Solution, by_record, solve, told_apart
+from analyses.estimation.fit import Fit, Fixed
+from analyses.estimation.least_squares import NotTold, Solution, by_record, solve, told_apart
+from analyses.estimation.parameters import parameter
+from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, RecordFit, default_value
 from analyses.identification.rows import Rows, record_rows
 from analyses.records.record import Record
 
@@ -133,12 +134,12 @@ def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed])
     """What the design's own tolerances of the values kept add to the covariance of those that were found."""
     added = np.zeros((len(free), len(free)))
     for name, one in fixed.items():
-        parameter = design.parameters.get(KEYS.get(name, ""))
-        if parameter is None or parameter.tolerance is None:
+        own = design.parameters.get(parameter(name).key)
+        if own is None or own.tolerance is None:
             continue
         moves = np.array([one.moves.get(other, 0.0) for other in free])
-        width = parameter.tolerance.half_width or 0.0
-        std = parameter.tolerance.std or width / np.sqrt(3.0)
+        width = own.tolerance.half_width or 0.0
+        std = own.tolerance.std or width / np.sqrt(3.0)
         added += std**2 * np.outer(moves, moves)
     return added
 
@@ -185,8 +186,8 @@ def _weights(blocks: Sequence[Rows], solution: Solution, weights: FloatArray) ->
 
 def _singles(
     blocks: Sequence[Rows], free: tuple[str, ...], fixed: Mapping[str, Fixed], values: FloatArray
-) -> list[dict[str, tuple[float, float]]]:
-    """Each record fitted alone: value and standard error of what it tells, the rest held at ``values``."""
+) -> list[Fit]:
+    """Each record fitted alone: what it tells, the rest held at ``values``."""
     out = []
     for block in blocks:
         columns = [block.names.index(name) for name in free]
@@ -198,8 +199,7 @@ def _singles(
             if name not in own
         }
         result = _joint([block], own, {**fixed, **rest}, np.ones(1))
-        std = np.sqrt(np.diag(result.correlated))
-        out.append({n: (float(v), float(s)) for n, v, s in zip(own, result.values, std, strict=True)})
+        out.append(Fit(names=own, values=result.values, covariance=result.correlated))
     return out
 
 
@@ -211,7 +211,8 @@ def _model(
     solution: Solution,
     weights: FloatArray,
 ) -> JointModel:
-    covariance, between, singles = solution.correlated, dict.fromkeys(free, 0.0), []
+    covariance, between = solution.correlated, dict.fromkeys(free, 0.0)
+    singles: list[Fit] = []
     if len(blocks) > 1:
         singles = _singles(blocks, free, fixed, solution.values)
         scatter = by_record(singles, free)
@@ -226,7 +227,7 @@ def _model(
         form=form,
         names=free,
         values=solution.values,
-        standard_errors=np.sqrt(np.diag(solution.white)),
+        white_errors=np.sqrt(np.diag(solution.white)),
         covariance=covariance,
         between=between,
         fixed=dict(fixed),
@@ -236,7 +237,7 @@ def _model(
         recipe=blocks[0].recipe,
         condition=solution.condition,
         weights=tuple(weights.tolist()),
-        singles={name: tuple(one[name][0] if name in one else np.nan for one in singles) for name in free},
+        singles={name: tuple(one.get(name, np.nan) for one in singles) for name in free},
     )
 
 
@@ -254,7 +255,7 @@ def _part(block: Rows, rest: FloatArray) -> RecordFit:
 
 def held_out_residual(design: Design, model: JointModel, record: Record) -> float:
     """Relative residual of a record that the model has not seen."""
-    gravity = "gravity_sin" in (*model.names, *model.fixed)
+    gravity = "gravity_sin" in model
     knots = model.knots_rad_s
     block = record_rows(design, record, model.form, None, gravity=gravity, knots_rad_s=knots)
     if gravity:

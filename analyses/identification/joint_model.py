@@ -1,41 +1,86 @@
-"""What an inverse dynamic model of records holds: values, errors, what was not fitted, each record's part."""
+"""The inverse dynamic model of records: its columns, its recipe, and what a fit of it holds.
+
+Source of the recipe and of the published figures: A. Janot, M. Gautier, M. Brunot, "Data Set and Reference
+Models of EMPS", Workshop on Nonlinear System Identification Benchmarks, 2019.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
-from analyses.identification.dynamic import FrictionForm, Recipe
+from actuator_lti.errors import InputError
+from analyses.estimation.fit import Fit
+from analyses.records.differentiation import Motion
 
 FloatArray = NDArray[np.float64]
+FrictionForm = Literal["symmetric", "per-direction"]
 
-KEYS = {
-    "viscous": "friction.viscous",
-    "dry": "friction.dry_torque",
-    "offset": "friction.offset_torque",
-    "viscous_forward": "friction.viscous",
-    "dry_forward": "friction.dry_torque",
-    "viscous_reverse": "friction.viscous_reverse",
-    "dry_reverse": "friction.dry_torque_reverse",
-    "load_coefficient": "friction.load_coefficient",
+NAMES: Mapping[FrictionForm, tuple[str, ...]] = {
+    "symmetric": ("inertia", "viscous", "dry", "offset"),
+    "per-direction": ("inertia", "viscous_forward", "dry_forward", "viscous_reverse", "dry_reverse"),
 }
-"""The design's key of each parameter of an inverse model; the inertia has a choice."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fixed:
-    """A parameter that was not fitted: its value (SI, at the motor) and why.
+class Recipe:
+    """The choices of the identification; the defaults are the published ones for EMPS.
 
-    ``moves``: by how much each fitted one is too large where the value is too small by one.
+    ``skip_end_samples`` are left out at the end of a record that ends in motion: there the filter, which has
+    no further samples, bends the position. The published recipe keeps them, and differentiates over three
+    ``points``.
     """
 
-    value: float
-    reason: str
-    moves: Mapping[str, float] = field(default_factory=dict)
+    cutoff_hz: float = 100.0
+    filter_order: int = 4
+    skip_samples: int = 49
+    decimation: int = 10
+    skip_end_samples: int = 0
+    points: int = 3
+
+    def __post_init__(self) -> None:
+        for name, low in (
+            ("filter_order", 1),
+            ("skip_samples", 0),
+            ("skip_end_samples", 0),
+            ("decimation", 1),
+        ):
+            if getattr(self, name) < low:
+                raise InputError(f"{name} = {getattr(self, name)}: must be {low} or more")
+
+
+def base_columns(motion: Motion, form: FrictionForm) -> FloatArray:
+    """Columns of inertia and friction for a motion, in the order of ``NAMES[form]``."""
+    velocity, direction = motion.velocity, np.sign(motion.velocity)
+    if form == "symmetric":
+        return np.column_stack([motion.acceleration, velocity, direction, np.ones_like(velocity)])
+    ahead, back = velocity > 0.0, velocity < 0.0
+    return np.column_stack(
+        [motion.acceleration, velocity * ahead, direction * ahead, velocity * back, direction * back]
+    )
+
+
+def linear_basis(speed: FloatArray, knots: Sequence[float]) -> FloatArray:
+    """Piecewise linear functions, one for each knot: 1 there and 0 at the others; the last slope continues.
+
+    Examples
+    --------
+    >>> linear_basis(np.array([0.0, 1.0, 4.0]), (0.0, 2.0, 3.0)).tolist()
+    [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, -1.0, 2.0]]
+    """
+    v = np.asarray(knots, dtype=float)
+    k = np.clip(np.searchsorted(v, speed, side="right") - 1, 0, len(v) - 2)
+    share = (speed - v[k]) / (v[k + 1] - v[k])
+    out = np.zeros((len(speed), len(v)))
+    rows = np.arange(len(speed))
+    out[rows, k] = 1.0 - share
+    out[rows, k + 1] = share
+    return out
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +97,7 @@ class RecordFit:
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointModel:
+class JointModel(Fit):
     """The inverse dynamic model of all records together.
 
     ``drive = inertia * acceleration + viscous * velocity + dry * sign(velocity) + offset``
@@ -61,9 +106,7 @@ class JointModel:
 
     Attributes
     ----------
-    names, values
-        What was fitted. ``fixed`` holds the rest with the reason.
-    standard_errors : array
+    white_errors : array
         As if the residual were white, as published for EMPS.
     covariance : array
         With the correlation of the residual in time, and with the scatter between records where there are
@@ -77,14 +120,10 @@ class JointModel:
     """
 
     form: FrictionForm
-    names: tuple[str, ...]
-    values: FloatArray
-    standard_errors: FloatArray
-    covariance: FloatArray
+    white_errors: FloatArray
     between: Mapping[str, float]
-    fixed: Mapping[str, Fixed]
     relative_residual: float
-    residual: FloatArray
+    residual: FloatArray = field(repr=False)
     records: tuple[RecordFit, ...]
     recipe: Recipe
     condition: float
@@ -93,11 +132,6 @@ class JointModel:
     weights: tuple[float, ...] = ()
     bias: Mapping[str, float] = field(default_factory=dict)
     bias_told: str = ""
-
-    def __getitem__(self, name: str) -> float:
-        if name in self.names:
-            return float(self.values[self.names.index(name)])
-        return self.fixed[name].value
 
     @property
     def rows_in(self) -> int:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.signal import lsim
 
 from actuator_lti.design.model import Design
-from analyses.identification.differentiation import Motion, filtered_motion
-from analyses.identification.dynamic import Recipe
+from analyses.identification.joint_model import Recipe
+from analyses.records.differentiation import Motion, filtered_motion
 from analyses.records.record import Record
 
 FloatArray = NDArray[np.float64]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,8 @@ from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.identification.least_squares import correlated_covariance
+from analyses.estimation.fit import Fit
+from analyses.estimation.least_squares import correlated_covariance
 
 FloatArray = NDArray[np.float64]
 
@@ -22,16 +23,13 @@ ITERATIONS = 12
 
 
 @dataclass(frozen=True, kw_only=True)
-class OutputErrorResult:
-    """Refined values by dotted key, their standard errors, and the relative error before and after.
+class OutputErrorResult(Fit):
+    """Refined values by dotted key, and the relative error before and after.
 
-    The errors are those of the drive signal: norm of the difference over norm of the measured. The standard
+    These errors are those of the drive signal: norm of the difference over norm of the measured. The standard
     errors respect the correlation in time of what is left.
     """
 
-    values: Mapping[str, float]
-    standard_errors: Mapping[str, float]
-    covariance: FloatArray
     error_before: float
     error_after: float
     iterations: int
@@ -85,12 +83,12 @@ def refine_by_output_error(
         return np.asarray(measured - output)
 
     p, rest, jac, iterations, first = _gauss_newton(residual, len(paths), paths, progress)
-    covariance = _covariance(jac, rest, ends) * np.outer(scale, scale)
+    covariance = correlated_covariance(jac, rest, ends) * np.outer(scale, scale)
     values = values_at(p)
     norm = float(np.linalg.norm(measured))
     return OutputErrorResult(
-        values=values,
-        standard_errors={k: float(v) for k, v in zip(paths, np.sqrt(np.diag(covariance)), strict=True)},
+        names=paths,
+        values=np.array(list(values.values())),
         covariance=covariance,
         error_before=float(np.linalg.norm(first)) / norm,
         error_after=float(np.linalg.norm(rest)) / norm,
@@ -136,11 +134,6 @@ def _halved_step(
             return p + change, tried, True
         change = 0.5 * change
     return p, rest, False
-
-
-def _covariance(jac: FloatArray, rest: FloatArray, ends: Sequence[int]) -> FloatArray:
-    """Of the residual as it is correlated in time; see `least_squares.solve`."""
-    return correlated_covariance(jac, rest, ends)
 
 
 def _scale(design: Design, path: str, start: float) -> float:

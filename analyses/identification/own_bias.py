@@ -12,9 +12,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import command_of
-from analyses.identification.dynamic import Recipe
 from analyses.identification.inverse import fit_records
-from analyses.identification.joint_model import JointModel, default_value
+from analyses.identification.joint_model import JointModel, Recipe, default_value
 from analyses.identification.rows import is_benchmark
 from analyses.records.record import Record
 
@@ -70,7 +69,7 @@ def _corrected(
             form=model.form,
             recipe=recipe,
             fixed={name: one.value for name, one in model.fixed.items()},
-            gravity="gravity_sin" in (*model.names, *model.fixed),
+            gravity="gravity_sin" in model,
             knots_rad_s=model.knots_rad_s,
             weights=model.weights,
         )
@@ -118,16 +117,8 @@ def _simulated(design: Design, record: Record) -> Record:
 
 def _sizes(model: JointModel) -> np.ndarray:
     """What a bias is held against: the value or, where it may be zero, that of its kind or its error."""
-    gravity = math.hypot(model["gravity_sin"], model["gravity_cos"]) if _gravity(model) else 0.0
-    dry = next((abs(model[n]) for n in ("dry", "dry_forward", "map_0") if _has(model, n)), 0.0)
+    gravity = math.hypot(model["gravity_sin"], model["gravity_cos"]) if "gravity_sin" in model else 0.0
+    dry = next((abs(model[n]) for n in ("dry", "dry_forward", "map_0") if n in model), 0.0)
     errors = np.sqrt(np.diag(model.covariance)) / LARGEST_BIAS
     like = [gravity if n.startswith("gravity") else dry if n == "offset" else 0.0 for n in model.names]
     return np.maximum(np.maximum(np.abs(model.values), like), errors)
-
-
-def _has(model: JointModel, name: str) -> bool:
-    return name in model.names or name in model.fixed
-
-
-def _gravity(model: JointModel) -> bool:
-    return _has(model, "gravity_sin") and _has(model, "gravity_cos")

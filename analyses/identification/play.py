@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 from actuator_lti.errors import InputError
-from analyses.identification.least_squares import solve, told_apart
+from analyses.estimation.least_squares import solve, told_apart
 
 FloatArray = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
-from analyses.identification.means import correlated_means
+from analyses.estimation.means import correlated_means
 from analyses.identification.steady import SteadyCriterion, SteadyWindow, find_steady_window
 from analyses.records.campaign_import import ImportedRun, SetAside
 

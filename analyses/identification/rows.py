@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.identification.differentiation import Motion, decimated, filtered_motion
-from analyses.identification.dynamic import NAMES, FrictionForm, Recipe, base_columns
-from analyses.identification.linear_basis import linear_basis
+from analyses.identification.joint_model import NAMES, FrictionForm, Recipe, base_columns, linear_basis
 from analyses.identification.load_side import TwoSides, two_sides
 from analyses.identification.sampled_current import mean_current
 from analyses.records.consistency import place_of
+from analyses.records.differentiation import Motion, decimated, filtered_motion
 from analyses.records.prepare import period_of, prepared
 from analyses.records.record import Record
 

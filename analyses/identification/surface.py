@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError, NumericalError
-from analyses.identification.least_squares import told_apart
+from analyses.estimation.fit import Fixed
+from analyses.estimation.least_squares import told_apart
 from analyses.identification.outliers import find_outliers
 from analyses.identification.points import SteadyPoint
 from analyses.identification.surface_fit import NAMES, Outlier, SurfaceFit
@@ -84,7 +84,7 @@ def _fitted(
     instruments: Instruments,
     torque_constant: float,
     named: tuple[Outlier, ...],
-    held: Mapping[str, Held],
+    held: Mapping[str, Fixed],
 ) -> SurfaceFit:
     x, y = _table(points)
     free, rest = _free(x, y, held)
@@ -110,6 +110,7 @@ def _fitted(
     draws = draw_errors(random_covariance, moved, freedom)
     return SurfaceFit(
         points=points,
+        names=NAMES,
         values=theta,
         covariance=random_covariance + moved.T @ moved / 3.0,
         random_covariance=random_covariance,
@@ -124,7 +125,7 @@ def _fitted(
         birge_ratio=birge,
         outliers=named,
         freedom=freedom,
-        held={name: one.reason for name, one in held.items()},
+        fixed=dict(held),
     )
 
 
@@ -133,19 +134,11 @@ def _table(points: tuple[SteadyPoint, ...]) -> tuple[FloatArray, FloatArray]:
     return x, np.array([p.torque_Nm for p in points])
 
 
-@dataclass(frozen=True)
-class Held:
-    """A coefficient that is not fitted: its value, and why."""
-
-    value: float
-    reason: str
-
-
 def _held(
     points: tuple[SteadyPoint, ...], fixed: Mapping[str, float], kept: Mapping[str, float] | None
-) -> dict[str, Held]:
+) -> dict[str, Fixed]:
     """What is not fitted: what was asked for, and what the runs do not tell apart."""
-    held = {name: Held(value, "fixed as asked") for name, value in fixed.items()}
+    held = {name: Fixed(value=value, reason="fixed as asked") for name, value in fixed.items()}
     names = [name for name in NAMES if name not in held]
     if not names:
         raise InputError("C0, Cv and CM are all fixed: nothing is left to identify")
@@ -159,7 +152,7 @@ def _held(
         )
     for one in left:
         why = "no run is loaded" if one.name == "CM" and not one.like else str(one)
-        held[one.name] = Held((kept or {})[one.name], f"{why}: the design's value kept")
+        held[one.name] = Fixed(value=(kept or {})[one.name], reason=f"{why}: the design's value kept")
     _check_count(points, len(NAMES) - len(held))
     return held
 
@@ -171,14 +164,14 @@ def _check_count(points: tuple[SteadyPoint, ...], coefficients: int) -> None:
         raise InputError(f"{len(points)} usable runs: at least {coefficients + 2} are needed for {words}")
 
 
-def _free(x: FloatArray, y: FloatArray, held: Mapping[str, Held]) -> tuple[FloatArray, FloatArray]:
+def _free(x: FloatArray, y: FloatArray, held: Mapping[str, Fixed]) -> tuple[FloatArray, FloatArray]:
     """The columns that are fitted, and the torques less what is held."""
     told = [k for k, name in enumerate(NAMES) if name not in held]
     rest = y - sum((one.value * x[:, NAMES.index(name)] for name, one in held.items()), np.zeros(len(y)))
     return x[:, told], np.asarray(rest)
 
 
-def _ordinary(x: FloatArray, y: FloatArray, held: Mapping[str, Held]) -> FloatArray:
+def _ordinary(x: FloatArray, y: FloatArray, held: Mapping[str, Fixed]) -> FloatArray:
     free, rest = _free(x, y, held)
     theta = np.array([held[name].value if name in held else 0.0 for name in NAMES])
     theta[[k for k, name in enumerate(NAMES) if name not in held]] = np.linalg.lstsq(free, rest, rcond=None)[

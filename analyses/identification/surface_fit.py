@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analyses.estimation.fit import Fit
+from analyses.estimation.parameters import parameter
 from analyses.identification.points import SteadyPoint
 from analyses.identification.systematic import ErrorDraws
 
 FloatArray = NDArray[np.float64]
 
 NAMES = ("C0", "Cv", "CM")
-UNITS = ("N*m", "N*m*s/rad", "N*m/(N*m)")
-PATHS = ("friction.dry_torque", "friction.viscous", "friction.load_coefficient")
+PATHS = tuple(parameter(name).key for name in NAMES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,7 @@ class Outlier:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SurfaceFit:
+class SurfaceFit(Fit):
     """The coefficients C0 (N m), Cv (N m s/rad), CM, and how sure they are.
 
     ``covariance`` holds everything: ``random_covariance`` from the runs' scatter and the instruments' shared
@@ -38,17 +38,15 @@ class SurfaceFit:
     distributions. ``residuals_Nm`` (``own_residuals_Nm``: less the most likely shared errors) and
     ``residual_stds_Nm`` are those of the runs used, in the order of ``points``. ``run_scatter_Nm`` is the
     scatter between runs that their own noise does not explain, ``birge_ratio`` the ratio of the two (1:
-    explained). ``held`` names the coefficients that were not fitted, with the reason; their errors are zero.
+    explained). ``fixed`` holds the coefficients that were not fitted, with the reason; their errors are zero.
     """
 
     points: tuple[SteadyPoint, ...]
-    values: FloatArray
-    covariance: FloatArray
     random_covariance: FloatArray
     shared_shifts: dict[str, FloatArray]
     half_widths: FloatArray
-    draws: ErrorDraws
-    shared_effects: FloatArray
+    draws: ErrorDraws = field(repr=False)
+    shared_effects: FloatArray = field(repr=False)
     residuals_Nm: FloatArray
     own_residuals_Nm: FloatArray
     residual_stds_Nm: FloatArray
@@ -56,12 +54,11 @@ class SurfaceFit:
     birge_ratio: float
     outliers: tuple[Outlier, ...]
     freedom: int
-    held: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def told(self) -> tuple[int, ...]:
         """Positions of the coefficients that were fitted."""
-        return tuple(k for k, name in enumerate(NAMES) if name not in self.held)
+        return tuple(k for k, name in enumerate(NAMES) if name not in self.fixed)
 
     @property
     def relative_residual(self) -> float:
@@ -69,22 +66,15 @@ class SurfaceFit:
         torque = np.array([p.torque_Nm for p in self.points])
         return float(np.linalg.norm(self.residuals_Nm) / np.linalg.norm(torque))
 
-    @property
-    def standard_errors(self) -> FloatArray:
-        """Standard errors with the shared errors in them."""
-        return np.sqrt(np.diag(self.covariance))
+    def interval(self, name: str) -> tuple[float, float]:
+        """95 % interval of one coefficient."""
+        half = float(self.half_widths[NAMES.index(name)])
+        return self[name] - half, self[name] + half
 
-    @property
-    def intervals(self) -> FloatArray:
-        """95 % intervals, shape (3, 2)."""
-        return np.column_stack([self.values - self.half_widths, self.values + self.half_widths])
-
-    @property
-    def correlation(self) -> FloatArray:
-        """Correlation matrix of the coefficients."""
-        std = np.where(self.standard_errors > 0.0, self.standard_errors, 1.0)
-        return np.asarray(self.covariance / np.outer(std, std))
+    def by_key(self) -> Fit:
+        """Those of the coefficients that were fitted, by the keys of a design."""
+        return self.renamed({name: parameter(name).key for name in NAMES if name not in self.fixed})
 
     def predict_Nm(self, speed_rad_s: FloatArray, load_Nm: FloatArray) -> FloatArray:
         """Friction torque at speeds and loads."""
-        return np.asarray(self.values[0] + self.values[1] * speed_rad_s + self.values[2] * np.abs(load_Nm))
+        return np.asarray(self["C0"] + self["Cv"] * speed_rad_s + self["CM"] * np.abs(load_Nm))

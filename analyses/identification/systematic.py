@@ -43,7 +43,7 @@ def shared_errors(
     bound = instruments.torque_accuracy * instruments.torque_full_scale_Nm * load_coefficient
     candidates = (
         SharedError(name="current gain", effect=instruments.current_gain * torque),
-        SharedError(name="torque constant", effect=instruments.torque_constant_gain * torque),
+        SharedError(name="torque constant", effect=instruments.torque_constant * torque),
         SharedError(
             name="current offset", effect=instruments.current_offset_A * torque_constant_Nm_A * direction
         ),

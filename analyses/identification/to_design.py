@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,37 +13,15 @@ from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Correlation, Design, FrictionPoint, Gravity, Tolerance
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
-from analyses.identification.joint_model import KEYS, JointModel
-from analyses.identification.output_error import OutputErrorResult
-from analyses.identification.surface_fit import PATHS, SurfaceFit
+from analyses.estimation.fit import Fit
+from analyses.estimation.parameters import parameter
+from analyses.identification.joint_model import JointModel
 
 FloatArray = NDArray[np.float64]
 
 LEAST_CORRELATION = 0.005
 TRUNCATION_STD = 6.5
 """Standard deviations that a normal distribution is sampled to."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Estimate:
-    """Values for dotted keys of a design, with their covariance and where they came from."""
-
-    paths: tuple[str, ...]
-    values: FloatArray
-    covariance: FloatArray
-    source: str
-    grade: str = "D"
-
-
-def surface_estimate(fit: SurfaceFit, source: str) -> Estimate:
-    """Those of C0, Cv and CM that were fitted, for ``[friction]``."""
-    told = list(fit.told)
-    return Estimate(
-        paths=tuple(PATHS[k] for k in told),
-        values=fit.values[told],
-        covariance=fit.covariance[np.ix_(told, told)],
-        source=source,
-    )
 
 
 PLAIN_KEYS = (
@@ -55,9 +33,7 @@ PLAIN_KEYS = (
 INERTIAS = ("motor.rotor_inertia", "load.inertia")
 
 
-def joint_estimate(
-    design: Design, model: JointModel, source: str, *, inertia_to: str = "motor.rotor_inertia"
-) -> Estimate:
+def joint_values(design: Design, model: JointModel, *, inertia_to: str = INERTIAS[0]) -> Fit:
     """The values of an inverse model for the keys of a design.
 
     The model's inertia is all of it, at the motor. ``inertia_to`` gets what the design's other inertias
@@ -68,44 +44,28 @@ def joint_estimate(
     InputError
         If the design's other inertias alone exceed the identified one.
     """
-    result = dict(zip(model.names, model.values.tolist(), strict=True))
-    paths: list[str] = []
-    values: list[float] = []
-    slopes = np.zeros((0, len(model.names)))
-
-    def add(path: str, value: float, **slope: float) -> None:
-        nonlocal slopes
-        paths.append(path)
-        values.append(value)
-        row = [slope.get(name, 0.0) for name in model.names]
-        slopes = np.vstack([slopes, row])
-
-    for name, value in result.items():
+    slopes: dict[str, dict[str, float]] = {}
+    values: dict[str, float] = {}
+    for name in model.names:
         if name == "inertia":
-            given, scale = inertia_share(design, value, inertia_to)
-            add(inertia_to, given, inertia=scale)
-        elif name in KEYS:
-            add(KEYS[name], value, **{name: 1.0})
-        elif name.startswith("map_"):
-            add(f"friction.point.{int(name[4:]) + 1}.torque", value, **{name: 1.0})
-    if {"gravity_sin", "gravity_cos"} <= set(result):
-        _add_gravity(design, result["gravity_sin"], result["gravity_cos"], add)
-    covariance = slopes @ model.covariance @ slopes.T
-    return Estimate(paths=tuple(paths), values=np.array(values), covariance=covariance, source=source)
+            values[inertia_to], scale = inertia_share(design, model[name], inertia_to)
+            slopes[inertia_to] = {name: scale}
+        elif parameter(name).key:
+            slopes[parameter(name).key] = {name: 1.0}
+    if {"gravity_sin", "gravity_cos"} <= set(model.names):
+        a, b = model["gravity_sin"], model["gravity_cos"]
+        peak, per_mass = float(np.hypot(a, b)), _moment_per_mass(design)
+        size, turn = {"gravity_sin": a / peak, "gravity_cos": b / peak}, {"gravity_sin": -b, "gravity_cos": a}
+        slopes["load.gravity.mass"] = {name: slope / per_mass for name, slope in size.items()}
+        slopes["load.gravity.offset"] = {name: slope / peak**2 for name, slope in turn.items()}
+        values |= {"load.gravity.mass": peak / per_mass, "load.gravity.offset": float(np.arctan2(b, a))}
+    return model.mapped(slopes, values)
 
 
-def _add_gravity(design: Design, a: float, b: float, add: Callable[..., None]) -> None:
-    """Mass and offset of the pendulum of ``a sin(phi) + b cos(phi)``; the arm is the design's, or 1 m."""
-    peak = float(np.hypot(a, b))
+def _moment_per_mass(design: Design) -> float:
+    """Of the pendulum that ``a sin(phi) + b cos(phi)`` becomes; its arm is the design's, or 1 m."""
     arm = 1.0 if design.load.gravity is None else design.load.gravity.arm_m
-    per_mass = Gravity(mass_kg=1.0, arm_m=arm).peak_Nm
-    add(
-        "load.gravity.mass",
-        peak / per_mass,
-        gravity_sin=a / peak / per_mass,
-        gravity_cos=b / peak / per_mass,
-    )
-    add("load.gravity.offset", float(np.arctan2(b, a)), gravity_sin=-b / peak**2, gravity_cos=a / peak**2)
+    return float(Gravity(mass_kg=1.0, arm_m=arm).peak_Nm)
 
 
 def with_structure(design: Design, model: JointModel) -> Design:
@@ -149,19 +109,12 @@ def inertia_share(design: Design, total_kgm2: float, key: str) -> tuple[float, f
     return left, scale
 
 
-def refined_estimate(refined: OutputErrorResult, source: str) -> Estimate:
-    """The values of a refinement by simulation, with their covariance."""
-    paths = tuple(refined.values)
-    values = np.array([refined.values[path] for path in paths])
-    return Estimate(paths=paths, values=values, covariance=refined.covariance, source=source)
-
-
 def with_fixed(design: Design, asked: Mapping[str, float]) -> Design:
     """The design with the values that were asked to be held, by key."""
     return with_values(design, dict(asked)) if asked else design
 
 
-def design_with_estimate(design: Design, estimate: Estimate) -> Design:
+def design_with_fit(design: Design, fit: Fit, source: str, grade: str = "D") -> Design:
     """A design with identified values, normal tolerances of their standard errors, and correlations.
 
     Margins and Monte Carlo then inherit them. Correlations below 0.005 are left out; old ones between the
@@ -171,8 +124,10 @@ def design_with_estimate(design: Design, estimate: Estimate) -> Design:
     ----------
     design : Design
         Everything else comes from it.
-    estimate : Estimate
-        In SI, as `surface_estimate`, `joint_estimate` and `refined_estimate` give it.
+    fit : Fit
+        By keys of the design.
+    source, grade : str
+        Of these values.
 
     Returns
     -------
@@ -182,34 +137,30 @@ def design_with_estimate(design: Design, estimate: Estimate) -> Design:
     Raises
     ------
     InputError
-        For an estimate that no drive can have: the record does not tell that parameter.
+        For a value that no drive can have: the record does not tell that parameter.
     """
-    values = {p: _short(float(v)) for p, v in zip(estimate.paths, estimate.values, strict=True)}
-    if "friction.viscous_reverse" in estimate.paths and design.friction.offset_torque_Nm:
+    values = {p: _short(float(v)) for p, v in zip(fit.names, fit.values, strict=True)}
+    if "friction.viscous_reverse" in fit.names and design.friction.offset_torque_Nm:
         values["friction.offset_torque"] = 0.0
-    design = _one_law(design, estimate.paths)
+    design = _one_law(design, fit.names)
     try:
         changed = with_values(design, values)
     except InputError as error:
-        if not error.message.startswith(estimate.paths):
+        if not error.message.startswith(fit.names):
             raise
         raise InputError(
             f"identified {error.message}; the record does not tell it: it takes a longer motion,"
             " at several speeds in both directions"
         ) from error
     parameters = dict(changed.parameters)
-    for path, std in zip(estimate.paths, np.sqrt(np.diag(estimate.covariance)), strict=True):
-        parameters[path] = replace(
-            parameters[path],
-            source=estimate.source,
-            grade=estimate.grade,
-            tolerance=_tolerance(path, parameters[path].value, _short(float(std))),
-        )
-    kept = [c for c in design.correlations if not {c.first, c.second} <= set(estimate.paths)]
+    for path, std in zip(fit.names, fit.standard_errors, strict=True):
+        tolerance = _tolerance(path, parameters[path].value, _short(float(std)))
+        parameters[path] = replace(parameters[path], source=source, grade=grade, tolerance=tolerance)
+    kept = [c for c in design.correlations if not {c.first, c.second} <= set(fit.names)]
     return replace(
         changed,
         parameters=FrozenMap(parameters),
-        correlations=(*kept, *_correlations(estimate.paths, estimate.covariance)),
+        correlations=(*kept, *_correlations(fit.names, fit.covariance)),
     )
 
 

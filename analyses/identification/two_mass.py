@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.fit import Fit, Fixed
 from analyses.identification.frequency import ComplexArray, Lines
 
 FloatArray = NDArray[np.float64]
@@ -17,11 +18,10 @@ NAMES = ("motor_inertia", "load_inertia", "stiffness", "damping", "viscous", "lo
 """J_m at the motor, J_l at its own shaft, k and c at the coupling, Cv at the motor, Cv_l behind."""
 FLOORS = ("damping", "viscous", "load_viscous")
 """What no drive has negative, but an estimate of it by its error may be."""
-COVERAGE = 1.959963984540054
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoMass:
+class TwoMass(Fit):
     """The two-mass drive that fits the lines best, with 95 % intervals.
 
     ``misfit`` is the root of the mean squared residual over its noise: near 1 the model explains the lines.
@@ -29,29 +29,10 @@ class TwoMass:
     without damping.
     """
 
-    names: tuple[str, ...]
-    values: FloatArray
-    covariance: FloatArray
-    fixed: Mapping[str, float]
     reduction: float
     misfit: float
     lines: int
     reaction: float = 0.0
-
-    def __getitem__(self, name: str) -> float:
-        return float(self.values[self.names.index(name)]) if name in self.names else self.fixed[name]
-
-    def std(self, name: str) -> float:
-        """Standard error of a parameter; 0 where it was held."""
-        if name not in self.names:
-            return 0.0
-        k = self.names.index(name)
-        return float(np.sqrt(self.covariance[k, k]))
-
-    def interval(self, name: str) -> tuple[float, float]:
-        """95 % interval of a parameter."""
-        half = COVERAGE * self.std(name)
-        return self[name] - half, self[name] + half
 
     @property
     def antiresonance_rad_s(self) -> tuple[float, float]:
@@ -164,7 +145,7 @@ def fit_two_mass(
         names=names,
         values=np.array([own[name] for name in names]),
         covariance=np.asarray(covariance),
-        fixed=held,
+        fixed={name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()},
         reduction=reduction,
         reaction=1.0 / reduction if reaction is None else reaction,
         misfit=misfit,

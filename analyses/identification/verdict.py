@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from analyses.records.record import Record
 RESIDUAL_LIMIT = 0.20
 """Largest relative residual that is taken without being told to."""
 LARGEST_FACTOR = 3.0
+LARGEST_OF_ANY = 10.0
 LARGEST_LINE_ERROR = 0.5
 ROWS_EACH = 10
 HELD_OUT_FACTOR = 1.5
@@ -32,6 +33,21 @@ class Item:
     value: float | None = None
     limit: float | None = None
     reason: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identified:
+    """The design that an identification comes to, its file, and whether it may be written."""
+
+    design: Design
+    text: str = field(repr=False)
+    items: tuple[Item, ...]
+    accepted: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """Whether nothing failed."""
+        return all(item.passed is not False for item in self.items)
 
 
 def inputs_item(record: str, findings: Sequence[Finding]) -> Item:
@@ -111,13 +127,21 @@ def simulated_item(record: str, error: float, limit: float, how: str) -> Item:
 
 def size_item(design: Design, model: JointModel) -> Item:
     """Identified values against those that the design had: a common factor is no drive's doing."""
-    ratios, behind = {}, _behind(design)
+    ratios, behind, far = {}, _behind(design), ""
     for name in model.names:
         kind = name.partition("_")[0]
         before = default_value(design, name)
-        if kind in ("inertia", "viscous", "dry") and before > 0.0:
+        if kind in behind and before > 0.0:
             ratios[name] = (model[name] + behind[kind]) / (before + behind[kind])
-    return sizes_item(ratios, {design.total_ratio: f"the reduction {design.total_ratio:g}"}, "inertia")
+        elif name == "load_coefficient" and before > 0.0:
+            ratio, sure = model[name] / before, abs(model[name] - before) > 3.0 * model.std(name)
+            if sure and not 1.0 / LARGEST_OF_ANY <= ratio <= LARGEST_OF_ANY:
+                factor = named_factor(ratio) if ratio else None
+                far = f"load friction is {ratio:.3g} times the design's" + (
+                    f": factor {factor}" if factor else ""
+                )
+    made = sizes_item(ratios, {design.total_ratio: f"the reduction {design.total_ratio:g}"}, "inertia")
+    return replace(made, passed=False, reason=made.reason or far) if far else made
 
 
 def _behind(design: Design) -> dict[str, float]:
@@ -166,8 +190,3 @@ def _common(ratios: Mapping[str, float], more: Mapping[float, str]) -> tuple[flo
             product *= ratio
         return product ** (1.0 / len(ratios)), names.pop()
     return None
-
-
-def passed(items: Sequence[Item]) -> bool:
-    """Whether nothing failed."""
-    return all(item.passed is not False for item in items)

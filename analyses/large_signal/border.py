@@ -7,15 +7,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Command, Design
 from actuator_lti.drive import signals
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.limiters import onset
 from actuator_lti.loops import Loops, assemble_loops
+from actuator_lti.loops.assemble import loops_at
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.grid import frequency_range_hz, tone
+from analyses.large_signal.nonlinear_parts import nonlinear_parts
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
-from analyses.validation.from_rest import nonlinear_parts
+from analyses.responses import response_at
 from nonlinear import LIMITERS
 from nonlinear.on_the_bench import on_the_bench
 
@@ -46,6 +49,8 @@ class BorderCheck:
         What the drive was judged without, as it has no single slope; in the loops and in the simulation.
     each_rad : mapping of str to ndarray, shape (f,)
         A_k(w) of every limiter.
+    command_gain : ndarray, shape (f,), or float
+        Of mean and filter of the command, which the amplitudes are behind.
     """
 
     friction_on: bool
@@ -58,6 +63,7 @@ class BorderCheck:
     reason: str = ""
     left_out: str = ""
     each_rad: Mapping[str, np.ndarray] = field(default_factory=dict)
+    command_gain: np.ndarray | float = 1.0
 
     @property
     def ratio(self) -> np.ndarray:
@@ -101,6 +107,8 @@ def check_border(
     lacks, the states of filters, may reach the limit, and a drive that is limited may stay so. ``None`` where
     the loop is unstable: it has no border.
 
+    The command is taken as it comes behind its profile and filter: what these do is no property of the loops.
+
     Parameters
     ----------
     friction_on : bool
@@ -109,7 +117,9 @@ def check_border(
         lowers the voltage limit by what the drive draws: neither is a part of the linear loop. So is an
         overload protection (I2t) that is slow against the tones (`slow_protection`).
     """
-    left_out = ""
+    left_out, given, design = "", loops, replace(design, command=Command())
+    if friction_on and loops.design.command != design.command:
+        loops = loops_at(replace(loops.design, command=design.command), loops.operating)
     if not friction_on:
         design = replace(on_the_bench(design), supply=None)
         slow = [signals.LIMITERS[name].words for name in slow_protection(design, loops)]
@@ -118,7 +128,7 @@ def check_border(
             design = _straight(design)
         if left_out or loops.design.command != design.command:
             model = on_the_bench(loops.design)  # need not be the drive that is simulated
-            loops = assemble_loops(_straight(model) if left_out else model)
+            loops = assemble_loops(_straight(model)) if left_out else loops_at(model, loops.operating)
     low, high = frequency_range_hz(design, loops)
     chosen = tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
     omega = np.array([t.omega_rad_s for t in chosen])
@@ -162,7 +172,18 @@ def check_border(
         _not_linear(design, friction_on),
         left_out,
         border.each_rad,
+        _command_gain(given, loops, omega),
     )
+
+
+def _command_gain(given: Loops, behind: Loops, omega_rad_s: np.ndarray) -> np.ndarray | float:
+    """What mean and filter of the command make of a sine, from how far in front of each a limit lies."""
+    if given.design.command == behind.design.command:
+        return 1.0
+    mean = command_mean(given.design)
+    gain = 1.0 if mean is None else np.abs(mean.response(omega_rad_s))
+    whole, rest = (np.abs(response_at(one.plain_response, omega_rad_s)) for one in (given, behind))
+    return np.asarray(gain * whole / rest)
 
 
 def _not_linear(design: Design, friction_on: bool) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.faces import draw
 from actuator_lti.limiters import onset
 from actuator_lti.loops import Loops
 from analyses.large_signal.border import slow_protection
@@ -89,10 +90,7 @@ class AmplitudeMap:
 
     def plot_map(self, axes: Any = None, *, linear_axis: bool = False) -> Axes:
         """Draw what acts at each point, and the linear onset lines; gives matplotlib's axes."""
-        from actuator_lti.plotting import plot_map
-
-        return plot_map(
-            self.frequency_hz, self.amplitude_rad, self.cause, CAUSES,
+        return draw("plot_map", self.frequency_hz, self.amplitude_rad, self.cause, CAUSES,
             onset_rad=self.onset_rad, linear_axis=linear_axis, axes=axes,
         )  # fmt: skip
 

@@ -8,7 +8,7 @@ from typing import Literal
 from actuator_lti.design.model import Design
 from analyses.settling import Settling, largest_swing
 
-Cause = Literal["play", "quantisation", "motor-quantisation"]
+Cause = Literal["play", "quantisation", "motor-quantisation", "friction"]
 Verdict = Literal["confirmed", "refuted"]
 
 
@@ -18,19 +18,22 @@ class Cycle:
 
     Attributes
     ----------
-    cause : {"play", "quantisation", "motor-quantisation"}
+    cause : {"play", "quantisation", "motor-quantisation", "friction"}
         Quantisation: of the output's sensor, or of the motor's.
     with_friction : bool
         Whether the drive's dry friction, by its own describing function, is in it.
     output_rad : float
         Amplitude of the output, peak.
     inner_rad : float
-        Amplitude of what the nonlinearity sees: the twist at the coupling, or the sensor's angle.
+        Amplitude of what the nonlinearity sees: the twist at the coupling, the sensor's angle, or the
+        motor's speed (rad/s).
     frequency_hz : float
     stable : bool
         Whether motion near it comes nearer; ``False``: the border between dying out and growing.
     state : dict of str to complex
         Its shape by state of the loop, at this amplitude.
+    load_Nm : float
+        Load torque that it is at.
     """
 
     cause: Cause
@@ -40,17 +43,18 @@ class Cycle:
     frequency_hz: float
     stable: bool
     state: dict[str, complex]
+    load_Nm: float = 0.0
 
 
 @dataclass(frozen=True)
 class Confirmation:
-    """A foreseen cycle against the simulator, started in its shape at several sizes.
+    """A predicted cycle against the simulator, started in its shape at several sizes.
 
     Attributes
     ----------
     ratio : float or None
-        Amplitude of the output over the foreseen one: of a stable cycle where the motion ends, of an unstable
-        one the size from which it grows; ``None``: refuted.
+        Amplitude of the output over the predicted one: of a stable cycle where the motion ends, of an
+        unstable one the size from which it grows; ``None``: refuted.
     frequency_hz : float or None
         Where the motion ends, of a stable one.
     """
@@ -72,7 +76,7 @@ class LimitCycles:
     Attributes
     ----------
     confirmations : tuple of Confirmation
-        Every foreseen cycle.
+        Every predicted cycle.
     rests : tuple of Settling
         Steps of two sizes at every load of the design, waited for.
     looked_for : tuple of str

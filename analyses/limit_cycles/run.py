@@ -1,4 +1,4 @@
-"""Foresee limit cycles, start the simulator in their shape, and wait what the drive as it is ends in."""
+"""Predict limit cycles, start the simulator in their shape, and wait what the drive as it is ends in."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.friction_effects.cycles import simulate_row
 from analyses.large_signal.steady_start import PLACES
-from analyses.limit_cycles.foreseen import (
+from analyses.limit_cycles.describing import (
     counts_matter,
     cycles_of_play,
     cycles_of_quantisation,
@@ -28,7 +27,7 @@ _STARTS = {**PLACES, "W": "load_speed_start", "twist": "twist_start"}
 def limit_cycles(design: Design) -> LimitCycles:
     """Limit cycles of play and of quantisation, and what steps of the drive as it is end in.
 
-    Cycles of play are foreseen without dry friction and with it; those of dry friction alone are
+    Cycles of play are predicted without dry friction and with it; those of dry friction alone are
     `analyses.friction_effects`.
 
     Raises
@@ -45,8 +44,8 @@ def limit_cycles(design: Design) -> LimitCycles:
     if design.controller.position is None:
         raise InputError("limit cycles: needs a drive with a position loop")
     has_play = design.coupling is not None and design.coupling.play_rad > 0.0
-    foreseen = [*cycles_of_play(design, friction=False), *cycles_of_play(design, friction=True)]
-    foreseen += cycles_of_quantisation(design)
+    predicted = [*cycles_of_play(design, friction=False), *cycles_of_play(design, friction=True)]
+    predicted += cycles_of_quantisation(design)
     full = design.validation.full_deflection_rad
     rests = tuple(
         settle(design, load, share * full)
@@ -56,17 +55,18 @@ def limit_cycles(design: Design) -> LimitCycles:
     names: tuple[Cause, ...] = ("play", "quantisation", "motor-quantisation")
     there = (has_play, *(counts_matter(design, name) for name in names[1:]))
     looked_for = tuple(name for name, yes in zip(names, there, strict=True) if yes)
-    return LimitCycles(design, tuple(confirm(design, cycle) for cycle in foreseen), rests, looked_for)
+    return LimitCycles(design, tuple(confirm(design, cycle) for cycle in predicted), rests, looked_for)
 
 
 def confirm(design: Design, cycle: Cycle) -> Confirmation:
     """Start in the cycle's shape at many sizes; find where motion turns from growing to dying out, or back.
 
-    Of several such sizes the one nearest to the foreseen counts.
+    Of several such sizes the one nearest to the predicted counts.
     """
     tried = _tried(design, cycle)
     window = round(3.0 / (cycle.frequency_hz * design.controller.period_s))
     rows = Rows.of(tried, len(SCALES), friction_on=cycle.with_friction, limits_on=False)
+    rows["load"] = cycle.load_Nm
     rows.step("command", _centre(design, cycle))
     for name, value in cycle.state.items():
         if name in _STARTS and (tried.coupling is not None or name not in ("W", "twist")):
@@ -83,8 +83,19 @@ def confirm(design: Design, cycle: Cycle) -> Confirmation:
         return Confirmation(cycle, None, None)
     ratios = np.sqrt(SCALES[turns] * SCALES[turns + 1])
     nearest = int(np.argmin(np.abs(np.log(ratios))))
-    frequency = simulate_row(rows.take(int(turns[nearest])), window)
-    return Confirmation(cycle, float(ratios[nearest]), frequency)
+    row = rows.take(int(turns[nearest]))
+    row["ticks"] = window
+    run = row.trajectory()
+    return Confirmation(cycle, float(ratios[nearest]), _frequency(run.time_s, run.motor_speed_rad_s))
+
+
+def _frequency(time_s: np.ndarray, values: np.ndarray) -> float | None:
+    """Frequency from the rising zero crossings; ``None`` with fewer than two of them."""
+    up = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
+    if len(up) < 2:
+        return None
+    exact = time_s[up] - values[up] * (time_s[up + 1] - time_s[up]) / (values[up + 1] - values[up])
+    return float((len(up) - 1) / (exact[-1] - exact[0]))
 
 
 def _centre(design: Design, cycle: Cycle) -> float:
@@ -103,7 +114,10 @@ def _tried(design: Design, cycle: Cycle) -> Design:
         return without_nonlinearities(motor)
     if cycle.cause == "motor-quantisation":
         return without_nonlinearities(output)
-    return replace(output, friction=replace(design.friction, load_coefficient=0.0), encoder=motor.encoder)
+    ideal = replace(output, encoder=motor.encoder)
+    if cycle.cause == "friction":
+        return ideal
+    return replace(ideal, friction=replace(design.friction, load_coefficient=0.0))
 
 
 def _speed_command(design: Design, cycle: Cycle) -> float:

@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from actuator_lti.verdict import Tally, Verdict
 from analyses.monte_carlo.statistics import ColumnStatistics
+from analyses.verdicts import RequirementVerdict, tally
 
 __all__ = ["ColumnStatistics", "MonteCarloResult", "Odds", "WorstCase"]
 
@@ -98,9 +100,14 @@ class MonteCarloResult:
         One a requirement, in the order of the design file; then all together (id ``"all"``).
     worst : tuple of WorstCase
     folder : Path
-        Every sample, as Parquet.
+        Every sample as Parquet, up to `KEPT`; the worst designs.
     nominal : mapping of str to float
         The figures of the nominal design, by column.
+    left_out : tuple of RequirementVerdict
+        Requirements that are not judged, not proven, as each takes a computation of one design.
+    at_least : float or None
+        Probability of meeting a requirement, with 95 % confidence, that is enough; without it every sample
+        and the worst case have to.
     notes : tuple of str
     """
 
@@ -114,12 +121,30 @@ class MonteCarloResult:
     worst: tuple[WorstCase, ...]
     folder: Path
     nominal: Mapping[str, float]
+    left_out: tuple[RequirementVerdict, ...] = ()
+    at_least: float | None = None
     notes: tuple[str, ...] = ()
 
     @property
-    def met(self) -> bool:
-        """Whether every sample met every requirement, and every worst case does."""
-        return all(o.passed == o.count for o in self.odds) and all(w.passed for w in self.worst)
+    def tally(self) -> Tally:
+        """The requirements counted."""
+        return Tally.of(self.judged(odds) for odds in self.odds if odds.id != "all") + tally(self.left_out)
+
+    @property
+    def verdict(self) -> Verdict:
+        """That of all requirements."""
+        return self.tally.verdict
+
+    def case(self, odds: Odds) -> WorstCase | None:
+        """The worst case of a requirement, where one was sought."""
+        return next((case for case in self.worst if case.requirement == odds.id), None)
+
+    def judged(self, odds: Odds) -> Verdict:
+        """Whether a requirement is met: in every sample and the worst case, or as often as is enough."""
+        if self.at_least is not None:
+            return Verdict.of(odds.low >= self.at_least)
+        case = self.case(odds)
+        return Verdict.of(odds.passed == odds.count and (case is None or case.passed))
 
     def __str__(self) -> str:
         lines = [f"{self.design_name}: {self.samples} samples, seed {self.seed}"]

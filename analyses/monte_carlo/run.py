@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,21 +19,27 @@ from actuator_lti.design import with_values, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.extras import need
 from actuator_lti.quantities import QUANTITIES
-from analyses.engine import Engine
+from actuator_lti.verdict import Verdict
+from analyses.engine import Chunk, Engine
 from analyses.monte_carlo.judging import in_populations, judge, label, source_columns
+from analyses.monte_carlo.reduction import BLOCK, Reducing, Reduction, Tally, judged, reduced, unpacked
 from analyses.monte_carlo.result import MonteCarloResult, Odds, WorstCase
+from analyses.monte_carlo.sketch import MOST
 from analyses.monte_carlo.statistics import clopper_pearson, column_statistics
 from analyses.monte_carlo.stepping import StepCheck
 from analyses.monte_carlo.store import CHUNK, Store
 from analyses.monte_carlo.task import SampleTask
 from analyses.monte_carlo.worst import worst_case
 from analyses.sampling import Table, sampler_of
+from analyses.verdicts import RequirementVerdict
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
 
 Progress = Callable[[int, int], None]
-_WORST_KEPT = 8
+KEPT = 1_000_000  # samples that are kept as Parquet, about 200 MB
+PARTS = 1024  # of a study whose samples are not kept: what a part comes to is a few MB
+NOTED_S = 30.0
 
 
 @dataclass(frozen=True)
@@ -96,8 +103,10 @@ def monte_carlo(
 ) -> MonteCarloResult:
     """Sample the tolerances of a design and judge its requirements.
 
-    Every sample goes to ``folder`` as Parquet; a study begun there before (same design, seed, settings and
-    code) goes on, with more samples if asked for. The numbers do not depend on engine, workers or chunks.
+    Up to `KEPT` samples, every one goes to ``folder`` as Parquet. Of more, only what they come to leaves the
+    place where they are computed: memory, disk and traffic do not grow with their number. A study begun in
+    the folder before (same design, seed, settings and code) goes on, with more samples if asked for, where
+    they are kept. The numbers do not depend on engine, workers or chunks.
 
     Parameters
     ----------
@@ -120,27 +129,21 @@ def monte_carlo(
     task = _task(design, settings)
     sampler = task.sampler
     store = Store.open(Path(folder), task.identity(), settings.chunk)
-    (engine or Engine()).run(task, store.missing(settings.samples), store.write, progress)
-
-    def blocks() -> Iterator[Mapping[str, np.ndarray]]:
-        return store.blocks(settings.samples)
-
-    tallies = [_Tally(r) for r in design.requirements if in_populations(r, design)]
-    together = 0
-    for block in blocks():
-        passed = np.ones(len(block["sample"]), dtype=bool)
-        for tally in tallies:
-            passed &= tally.add(design, block)
-        together += int(passed.sum())
+    whole = (_kept if settings.samples <= KEPT else _reduced)(
+        task, store, settings.samples, engine or Engine(), progress
+    )
     nominal = task.figures(sampler.nominal[None, :])
-    odds = [tally.odds(design, nominal) for tally in tallies]
+    tallies = list(zip(judged(design), whole.tallies, strict=True))
+    odds = [_tallied(design, requirement, tally, whole.count, nominal) for requirement, tally in tallies]
     if tallies:
-        odds.append(_odds("all", "all requirements together", "", together, settings.samples))
+        odds.append(_odds("all", "all requirements together", "", whole.together, whole.count))
     worst = _worst_cases(task, tallies, Path(folder)) if settings.worst_cases else ()
     return MonteCarloResult(
         design.name, task.identity()["design"], settings.samples, settings.seed, sampler.paths,
-        column_statistics(blocks, task.units), tuple(odds), worst, Path(folder),
-        {name: float(values[0]) for name, values in nominal.items()}, _notes(task),
+        {name: column_statistics(name, unit, whole.columns[name]) for name, unit in task.units.items()},
+        tuple(odds), worst, Path(folder),
+        {name: float(values[0]) for name, values in nominal.items()}, _left_out(design),
+        notes=_notes(task, settings.samples),
     )  # fmt: skip
 
 
@@ -149,49 +152,75 @@ def _odds(id: str, words: str, unit: str, passed: int, count: int) -> Odds:
     return Odds(id, words, unit, passed, count, passed / count, low, high)
 
 
-@dataclass
-class _Tally:
-    """Passes and the worst samples of one requirement, block by block."""
-
-    requirement: Requirement
-    passed: int = 0
-    count: int = 0
-    worst: list[tuple[float, int, float]] = field(default_factory=list)  # distance, sample, value
-
-    def add(self, design: Design, block: Mapping[str, np.ndarray]) -> np.ndarray:
-        judged = judge(self.requirement, design, block)
-        self.passed += int(judged.passed.sum())
-        self.count += len(judged.passed)
-        order = np.argsort(judged.distance, kind="stable")[:_WORST_KEPT]
-        result = [(float(judged.distance[k]), int(block["sample"][k]), float(judged.value[k])) for k in order]
-        self.worst = sorted(self.worst + result)[:_WORST_KEPT]
-        return judged.passed
-
-    def odds(self, design: Design, nominal: Mapping[str, np.ndarray]) -> Odds:
-        r = self.requirement
-        made = _odds(r.id, label(r), r.unit, self.passed, self.count)
-        _, sample, value = self.worst[0]
-        here = float(judge(r, design, nominal).value[0])
-        return replace(
-            made, minimum=r.minimum, maximum=r.maximum, nominal=here, worst=value, worst_sample=sample,
-            columns=source_columns(r, design),
-        )  # fmt: skip
+def _tallied(
+    design: Design, r: Requirement, tally: Tally, count: int, nominal: Mapping[str, np.ndarray]
+) -> Odds:
+    made = _odds(r.id, label(r), r.unit, tally.passed, count)
+    _, sample, value = tally.worst[0]
+    here = float(judge(r, design, nominal).value[0])
+    return replace(
+        made, minimum=r.minimum, maximum=r.maximum, nominal=here, worst=value, worst_sample=sample,
+        columns=source_columns(r, design),
+    )  # fmt: skip
 
 
-def _worst_cases(task: SampleTask, tallies: list[_Tally], folder: Path) -> tuple[WorstCase, ...]:
+def _kept(
+    task: SampleTask, store: Store, samples: int, engine: Engine, progress: Progress | None
+) -> Reduction:
+    """Keep every sample, then reduce them."""
+    engine.run(task, store.missing(samples), store.write, progress)
+    whole = Reduction()
+    for block in store.blocks(samples):
+        whole = whole.merged(reduced(task, block))
+    return whole
+
+
+def _reduced(
+    task: SampleTask, store: Store, samples: int, engine: Engine, progress: Progress | None
+) -> Reduction:
+    """Reduce the samples where they are computed; what is done is noted every `NOTED_S` and at the end."""
+    path = store.folder / f"reduced-{samples}.npz"
+    whole, done = unpacked(path.read_bytes()) if path.is_file() else (Reduction(), [])
+    noted = time.monotonic()
+
+    def note() -> None:
+        store.put(path, whole.packed(done))
+
+    def take(chunk: Chunk, part: Reduction) -> None:
+        nonlocal whole, noted
+        whole = whole.merged(part)
+        done.append(chunk)
+        if time.monotonic() - noted > NOTED_S:
+            note()
+            noted = time.monotonic()
+
+    part = max(BLOCK, BLOCK * -(-samples // (PARTS * BLOCK)))
+    parts = [(first, min(part, samples - first)) for first in range(0, samples, part)]
+    known = set(done)
+    try:
+        engine.run(Reducing(task), [one for one in parts if one not in known], take, progress)
+    finally:
+        if done:
+            note()
+    return whole
+
+
+def _worst_cases(
+    task: SampleTask, tallies: Sequence[tuple[Requirement, Tally]], folder: Path
+) -> tuple[WorstCase, ...]:
     from analyses.slugs import slug
 
     result = []
-    for place, tally in enumerate(tallies):
-        timed = QUANTITIES[tally.requirement.quantity].timed
+    for place, (requirement, tally) in enumerate(tallies):
+        timed = QUANTITIES[requirement.quantity].timed
         quick = replace(task, step=None, time_figures=timed)
-        case = worst_case(quick, tally.requirement, np.array([sample for _, sample, _ in tally.worst]))
-        name = f"worst-{place + 1:02d}-{slug(tally.requirement.id)}"
+        case = worst_case(quick, requirement, np.array([sample for _, sample, _ in tally.worst]))
+        name = f"worst-{place + 1:02d}-{slug(requirement.id)}"
         changed = with_values(task.design, case.parameters, check=False)
         titled = replace(
             changed,
             name=f"{slug(task.design.name)}-{name}",
-            title=f"{task.design.title or task.design.name}: worst case for {tally.requirement.id}",
+            title=f"{task.design.title or task.design.name}: worst case for {requirement.id}",
         )
         path = folder / f"{name}.toml"
         write_bytes(path, write_design(titled).encode())
@@ -199,7 +228,7 @@ def _worst_cases(task: SampleTask, tallies: list[_Tally], folder: Path) -> tuple
     return tuple(result)
 
 
-def _notes(task: SampleTask) -> tuple[str, ...]:
+def _notes(task: SampleTask, samples: int) -> tuple[str, ...]:
     notes = [
         "Scrambled Sobol points: intervals are those of independent samples (Clopper and Pearson, 95 %), "
         "which is on the safe side.",
@@ -214,7 +243,21 @@ def _notes(task: SampleTask) -> tuple[str, ...]:
         notes.append(
             "Worst cases of correlated parameters are sought in their ellipsoid, tied ones together."
         )
-    left_out = [r.id for r in task.design.requirements if not in_populations(r, task.design)]
-    if left_out:
-        notes.append(f"Not sampled, as each takes a computation of one design: {', '.join(left_out)}.")
+    if samples > KEPT:
+        notes.append(
+            f"More than {KEPT} samples: they are not kept. Quantiles are to one of up to {MOST} bins; any"
+            " sample is made again by its number."
+        )
     return tuple(notes)
+
+
+def _left_out(design: Design) -> tuple[RequirementVerdict, ...]:
+    """The requirements that figures of many designs do not tell: not proven."""
+    return tuple(
+        RequirementVerdict(
+            id=r.id, requirement=r, loop=None, value=None, distance=None, verdict=Verdict.NOT_PROVEN,
+            reason="not sampled, it takes a computation of one design", waiver=design.waiver_of(r.id),
+        )
+        for r in design.requirements
+        if not in_populations(r, design)
+    )  # fmt: skip

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError
 from actuator_lti.tree import Tree
@@ -33,10 +31,13 @@ class Store:
     folder : Path
     chunk : int
         Numbers a file.
+    manifest : bytes
+        Says of what study the folder is; written before the first chunk.
     """
 
     folder: Path
     chunk: int
+    manifest: bytes
 
     @classmethod
     def open(cls, folder: Path, identity: Mapping[str, Any], chunk: int = CHUNK) -> Store:
@@ -52,7 +53,6 @@ class Store:
         InputError
             If the folder holds another study.
         """
-        folder.mkdir(parents=True, exist_ok=True)
         path = folder / "manifest.json"
         wanted = {"schema": SCHEMA, "version": VERSION, "identity": dict(identity)}
         if path.exists():
@@ -60,10 +60,16 @@ class Store:
             if {key: result.get(key) for key in wanted} != wanted:
                 raise InputError("holds another study (design, seed, settings or code); take another folder",
                                  where=str(folder))  # fmt: skip
-            return cls(folder, int(result["chunk"]))
+            chunk = int(result["chunk"])
         text = json.dumps({**wanted, "chunk": chunk}, indent=1, sort_keys=True)
-        write_bytes(path, text.encode())
-        return cls(folder, chunk)
+        return cls(folder, chunk, text.encode())
+
+    def put(self, path: Path, data: bytes) -> None:
+        """Put a file of the study on disk, in a folder that says of what it is."""
+        manifest = self.folder / "manifest.json"
+        if not manifest.exists():
+            write_bytes(manifest, self.manifest)
+        write_bytes(path, data)
 
     def path(self, chunk: Chunk) -> Path:
         """File of a chunk."""
@@ -84,25 +90,15 @@ class Store:
 
         sink = pa.BufferOutputStream()
         pq.write_table(pa.table(dict(arrays)), sink, compression="zstd")
-        write_bytes(self.path(chunk), sink.getvalue().to_pybytes())
+        self.put(self.path(chunk), sink.getvalue().to_pybytes())
 
-    def blocks(self, total: int, columns: list[str] | None = None, size: int = 4096) -> Iterator[Arrays]:
-        """Columns in blocks of a fixed size in order of number, however the chunks were cut."""
+    def blocks(self, total: int) -> Iterator[Arrays]:
+        """The columns of one chunk after the other."""
         import pyarrow.parquet as pq
 
-        held: Arrays = {}
-        filled = 0
         for chunk in self.chunks(total):
-            part = pq.read_table(self.path(chunk), columns=columns, partitioning=None)
-            arrays = {name: part.column(name).to_numpy() for name in part.column_names}
-            held = {k: np.concatenate([held[k], v]) for k, v in arrays.items()} if filled else arrays
-            filled += chunk[1]
-            while filled >= size:
-                yield {name: values[:size] for name, values in held.items()}
-                held = {name: values[size:] for name, values in held.items()}
-                filled -= size
-        if filled:
-            yield held
+            part = pq.read_table(self.path(chunk), partitioning=None)
+            yield {name: part.column(name).to_numpy() for name in part.column_names}
 
 
 def _read_manifest(path: Path) -> Tree:

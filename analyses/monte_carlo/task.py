@@ -20,9 +20,10 @@ from actuator_lti.design import design_hash, with_values
 from actuator_lti.errors import InputError
 from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.tree import Tree
-from analyses.engine import Arrays, code_version
+from analyses.engine import Arrays
 from analyses.monte_carlo.judging import drive_column, loops_of
 from analyses.monte_carlo.stepping import StepCheck, step_columns, step_units
+from analyses.proof import code_version
 from analyses.sampling import Sampler, as_values
 
 if TYPE_CHECKING:
@@ -61,10 +62,17 @@ class SampleTask:
 
     def evaluate(self, first: int, count: int) -> Arrays:
         """All columns of samples first to first + count - 1."""
-        draws = self.sampler.draw(first, count)
-        columns: Arrays = {"sample": np.arange(first, first + count, dtype=np.int64)}
+        return self.columns(first, self.sampler.draw(first, count))
+
+    def columns(self, first: int, draws: np.ndarray) -> Arrays:
+        """All columns of samples from the first on, for their parameter values."""
+        columns: Arrays = {"sample": np.arange(first, first + len(draws), dtype=np.int64)}
         columns |= {f"parameter.{p}": draws[:, k] for k, p in enumerate(self.sampler.paths)}
         return columns | self.figures(draws)
+
+    def sample(self) -> bytes:
+        """The first sample, to be computed alike wherever the study is (`analyses.proof`)."""
+        return b"".join(values.tobytes() for values in self.evaluate(0, 1).values())
 
     def figures(self, draws: np.ndarray) -> Arrays:
         """Columns of figures for rows of parameter values (SI, in the order of ``sampler.paths``)."""

@@ -22,8 +22,9 @@ class Asked:
     amplitude: Annotated[
         float,
         Option(
-            words="Peak, for the outermost loop: deg at the output (mm on a linear axis), deg/s (mm/s) of a "
-            "speed drive, A, V; a ramp: per second; 1."
+            words='Peak for the outermost loop, such as "5 deg" or 5: deg at the output (mm on a linear '
+            "axis), deg/s (mm/s) of a speed drive, A, V; a ramp: per second; 1.",
+            kind="command",
         ),
     ] = 1.0
     frequency: Annotated[

@@ -38,16 +38,18 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
+from typing import Annotated, Literal
 
 from actuator_lti.bounds import CAMPAIGN_RUNS
 from actuator_lti.errors import InputError
 from actuator_lti.reading import shown_path
-from actuator_lti.tree import Tree
 from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
-from analyses.records.toml_tables import Table, read_toml
+from analyses.records.toml_tables import Table, key_of, read_toml
+
+Method = Literal["correlation", "event", "given"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,15 +57,20 @@ class Instruments:
     """Bounds of the systematic errors, constant over a campaign, uniform within.
 
     ``torque_accuracy`` is a share of ``torque_full_scale_Nm`` and bounds the error at zero and at full scale,
-    each on its own, with a straight line between. ``torque_constant_gain`` bounds the relative error of kM
+    each on its own, with a straight line between. ``torque_constant`` bounds the relative error of kM
     (0: taken as known).
     """
 
-    torque_full_scale_Nm: float = 10.0
-    torque_accuracy: float = 0.0
-    current_gain: float = 0.0
-    current_offset_A: float = 0.0
-    torque_constant_gain: float = 0.0
+    torque_full_scale_Nm: Annotated[float, "N*m"] = 10.0
+    torque_accuracy: Annotated[float, ""] = 0.0
+    current_gain: Annotated[float, ""] = 0.0
+    current_offset_A: Annotated[float, "A"] = 0.0
+    torque_constant: Annotated[float, ""] = 0.0
+
+    def __post_init__(self) -> None:
+        for name, value in asdict(self).items():
+            if value < 0.0:
+                raise InputError(f"instruments.{key_of(name)} = {value}: must be 0 or more")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,10 +79,10 @@ class RunEntry:
 
     id: str
     drive: Path
-    sensor: Path | None
-    speed_rad_s: float | None
-    load_Nm: float | None
-    offset_s: float | None
+    sensor: Path | None = None
+    speed_rad_s: Annotated[float | None, "rad/s"] = None
+    load_Nm: Annotated[float | None, "N*m"] = None
+    offset_s: Annotated[float | None, "s"] = None
     note: str = ""
 
 
@@ -83,18 +90,25 @@ class RunEntry:
 class Campaign:
     """A campaign file, read and checked; no record has been opened yet."""
 
-    name: str
-    design: str
+    name: str = ""
+    design: str = "ilr33-amber"
+    outliers: Literal["keep", "set-aside"] = "keep"
     drive: RecordSpec
     sensor: RecordSpec | None
-    join_method: str
-    join_drive_signal: str
-    join_sensor_signal: str
+    join: Join
     instruments: Instruments
     runs: tuple[RunEntry, ...]
     origin: str
-    outliers: str = "keep"
     notes: tuple[str, ...] = field(default=())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Join:
+    """How the two recorders are put on one clock, and the signals that show the shared happening."""
+
+    method: Method = "correlation"
+    drive_signal: str = "speed"
+    sensor_signal: str = "torque"
 
 
 def load_campaign(path: str | Path) -> Campaign:
@@ -107,24 +121,19 @@ def load_campaign(path: str | Path) -> Campaign:
     """
     path = Path(path)
     root = Table(read_toml(path), "", str(path))
+    root.only(("campaign", "drive", "sensor", "join", "instruments", "run"))
     head = root.table("campaign")
-    runs = tuple(_run(table, path.parent) for table in root.tables("run"))
-    join = root.table("join")
-    campaign = Campaign(
-        name=head.text("name", shown_path(path.stem)),
-        design=head.text("design", "ilr33-amber"),
-        outliers=head.text("outliers", "keep", ("keep", "set-aside")),
+    campaign = head.read(
+        Campaign,
         drive=_spec(root.table("drive")),
         sensor=_spec(root.table("sensor")) if "sensor" in root else None,
-        join_method=join.text("method", "correlation", ("correlation", "event", "given")),
-        join_drive_signal=join.text("drive_signal", "speed"),
-        join_sensor_signal=join.text("sensor_signal", "torque"),
+        join=root.table("join").read(Join),
         instruments=_instruments(root.table("instruments")),
-        runs=runs,
+        runs=tuple(_run(table, path.parent) for table in root.tables("run")),
         origin=str(path),
+        notes=(),
     )
-    for table in (head, join, root):
-        table.done()
+    campaign = campaign if "name" in head else replace(campaign, name=shown_path(path.stem))
     _check(campaign)
     return campaign
 
@@ -142,51 +151,29 @@ def _check(campaign: Campaign) -> None:
 
 
 def _run(table: Table, folder: Path) -> RunEntry:
-    sensor = table.text("sensor", "")
-    entry = RunEntry(
-        id=table.text("id"),
-        drive=folder / table.text("drive"),
-        sensor=folder / sensor if sensor else None,
-        speed_rad_s=table.quantity("speed", "rad/s"),
-        load_Nm=table.quantity("load", "N*m"),
-        offset_s=table.quantity("offset", "s"),
-        note=table.text("note", ""),
-    )
-    table.done()
-    return entry
+    entry = table.read(RunEntry)
+    sensor = folder / entry.sensor if entry.sensor and table.data["sensor"] else None
+    return replace(entry, drive=folder / entry.drive, sensor=sensor)
 
 
 def _instruments(table: Table) -> Instruments:
-    result = {
-        "torque_full_scale_Nm": table.quantity("torque_full_scale", "N*m", 10.0),
-        "torque_accuracy": table.quantity("torque_accuracy", "", 0.0),
-        "current_gain": table.quantity("current_gain", "", 0.0),
-        "current_offset_A": table.quantity("current_offset", "A", 0.0),
-        "torque_constant_gain": table.quantity("torque_constant", "", 0.0),
-    }
-    table.done()
-    for name, value in result.items():
-        if value is None or value < 0.0:
-            raise InputError(f"instruments: {name} = {value}: must be 0 or more", where=table.origin)
-    return Instruments(**{name: float(value or 0.0) for name, value in result.items()})
+    try:
+        return table.read(Instruments)
+    except InputError as error:
+        raise InputError(error.message, where=table.origin) from None
 
 
 def _spec(table: Table) -> RecordSpec:
     """A recorder's description, ``[drive]`` or ``[sensor]``."""
+    layout, parts = ({key_of(one.name) for one in fields(kind)} for kind in (CsvFormat, RecordSpec))
     try:
-        parts: Tree = {
-            "format": _format(table),
-            "time": _time(table.table("time")),
-            "signals": _signals(table.table("signals")),
-        }
-        for name, default in (("bad_rows", "error"), ("missing", "drop"), ("disorder", "error")):
-            more = ("interpolate",) if name == "missing" else ()
-            parts[name] = table.text(name, default, ("error", "drop", *more))
-        tolerance = table.quantity("resample_tolerance", "")
-        if tolerance is not None:
-            parts["resample_tolerance"] = tolerance
-        table.done()
-        return RecordSpec(**parts)
+        return table.read(
+            RecordSpec,
+            beside={*layout, "time", "signals"},
+            format=table.read(CsvFormat, beside=parts - {"format"}),
+            time=_time(table.table("time")),
+            signals=tuple(_signal(table.table("signals"), name) for name in table.table("signals")),
+        )
     except InputError as error:
         if error.where is not None:
             raise
@@ -195,54 +182,15 @@ def _spec(table: Table) -> RecordSpec:
 
 def record_spec(data: object, origin: str, path: str = "record") -> RecordSpec:
     """A recorder's description from a table of a TOML file."""
-    return _spec(Table(data, path, origin))
-
-
-def _format(table: Table) -> CsvFormat:
-    names = table.texts("names")
-    return CsvFormat(
-        separator=table.text("separator", ","),
-        decimal=table.text("decimal", "."),
-        comment=table.text("comment", "#"),
-        row_end=table.text("row_end", ""),
-        header=table.flag("header", None),
-        names=names,
-        skip_lines=table.integer("skip_lines", 0),
-        encoding=table.text("encoding", "utf-8"),
-        matrix=table.text("matrix", ""),
-    )
+    return _spec(Table(data, path, origin))  # type: ignore[arg-type]
 
 
 def _time(table: Table) -> TimeColumn:
-    period = table.quantity("period", "s")
-    column = None if period is not None and "column" not in table else table.column("column", "time")
-    time = TimeColumn(
-        column=column,
-        unit=table.text("unit", "s"),
-        tick_s=table.quantity("tick", "s"),
-        wrap=table.number("wrap"),
-        minimum=table.number("minimum"),
-        period_s=period,
-    )
-    table.done()
-    return time
+    usual = {} if {"period", "column"} & set(table) else {"column": "time"}
+    return Table({**usual, **table.data}, table.path, table.origin).read(TimeColumn)
 
 
-def _signals(table: Table) -> tuple[SignalColumn, ...]:
-    signals = []
-    for name in table:
-        one = table.table(name)
-        unit = one.text("unit", "1")
-        signals.append(
-            SignalColumn(
-                name=canonical(name, unit),
-                column=one.column("column", name),
-                unit=unit,
-                scale=one.number("scale", 1.0) or 0.0,
-                offset=one.number("offset", 0.0) or 0.0,
-                value=one.text("value", "dc", ("dc", "rms", "peak")),
-                between=one.text("between", "line-line", ("line-line", "phase")),
-            )
-        )
-        one.done()
-    return tuple(signals)
+def _signal(signals: Table, name: str) -> SignalColumn:
+    one = signals.table(name)
+    made = Table({"column": name, **one.data}, one.path, one.origin).read(SignalColumn, name=name)
+    return replace(made, name=canonical(name, made.unit))

@@ -10,12 +10,16 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from analyses.records.campaign_file import Campaign, RunEntry
-from analyses.records.clocks import ClockJoin, Method, join_records
+from analyses.records.clocks import ClockJoin, join_records
 from analyses.records.csv_stream import MAX_ROWS, read_csv_record
+from analyses.records.inputs import InputUse, account
 from analyses.records.mat_reader import read_mat_record
 from analyses.records.parquet_reader import read_parquet_record
 from analyses.records.record import InputColumn, Record, RowCounts
 from analyses.records.spec import RecordSpec
+
+USED = {"current": "torque kM i", "speed": "steady speed", "torque": "load", "angle": "check of the speed"}
+"""What a campaign uses its signals for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,9 +67,31 @@ class ImportedCampaign:
         """Rows that were kept of them."""
         return sum(c.rows_out for c in self._counts())
 
+    @property
+    def inputs(self) -> tuple[InputUse, ...]:
+        """The columns of the runs' files, their ranges over all runs."""
+        whole: dict[tuple[str, str], InputUse] = {}
+        for run in self.runs:
+            for file, inputs in (("drive", run.record.inputs), ("sensor", run.sensor_inputs)):
+                for one in account(replace(run.record, inputs=inputs), USED):
+                    if file == "sensor" and one.use == "time":
+                        one = InputUse(column=one.column, meaning="time, on a clock of its own", use="time")
+                    key = (file, one.column)
+                    whole[key] = _over(replace(one, file=file), whole.get(key))
+        return tuple(whole.values())
+
     def _counts(self) -> list[RowCounts]:
         drive = [run.record.counts for run in self.runs]
         return drive + [run.sensor_counts for run in self.runs if run.sensor_counts is not None]
+
+
+def _over(one: InputUse, known: InputUse | None) -> InputUse:
+    """A column of one run and of those before it; a run without load does not use the sensor."""
+    if known is None or known.low is None or known.high is None:
+        return one
+    if one.low is None or one.high is None:
+        return known
+    return replace(known, low=min(known.low, one.low), high=max(known.high, one.high))
 
 
 def import_campaign(
@@ -132,9 +158,9 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
         record, join = join_records(
             drive,
             sensor,
-            first_signal=campaign.join_drive_signal,
-            second_signal=campaign.join_sensor_signal,
-            method=_method(campaign.join_method),
+            first_signal=campaign.join.drive_signal,
+            second_signal=campaign.join.sensor_signal,
+            method=campaign.join.method,
             offset_s=entry.offset_s,
         )
     if not np.any(record["speed"]):
@@ -150,7 +176,3 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
         sensor_inputs=() if sensor is None else sensor.inputs,
         sensor_sha256="" if sensor is None else sensor.sha256,
     )
-
-
-def _method(name: str) -> Method:
-    return "event" if name == "event" else "given" if name == "given" else "correlation"

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal
 
 import numpy as np
 
 from actuator_lti.errors import InputError
+from analyses.records.campaign_file import Method
 from analyses.records.correlate_clocks import Fit, fit_by_correlation
 from analyses.records.events import motion_events
 from analyses.records.factors import named_factor
 from analyses.records.record import FloatArray, Record
-
-Method = Literal["event", "correlation", "given"]
 
 RATE_SPREAD = 0.01
 """Two clocks are taken to differ by less than 1 % in rate; anything else is no clock error."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 
 from actuator_lti.errors import InputError
-from analyses.identification.means import correlation_time
+from analyses.estimation.means import best_lag, correlation_time
 from analyses.records.record import FloatArray
 
 GRID = 4000
@@ -37,7 +36,7 @@ def fit_by_correlation(t_a: FloatArray, a: FloatArray, t_b: FloatArray, b: Float
     gb, vb = _grid(t_b, b, step)
     if np.std(va) <= 1e-12 * np.max(np.abs(va)) or np.std(vb) <= 1e-12 * np.max(np.abs(vb)):
         raise InputError("a flat signal cannot be aligned by correlation", where=where)
-    start = ga[0] - gb[0] + step * _best_lag(va - va.mean(), vb - vb.mean())
+    start = ga[0] - gb[0] + step * best_lag(va - va.mean(), vb - vb.mean())
     fit = _refined(ga, va, gb, vb, start, step)
     if not fit.quality >= MIN_QUALITY:
         raise InputError(
@@ -55,14 +54,6 @@ def _grid(time: FloatArray, values: FloatArray, step: float) -> tuple[FloatArray
     means = np.bincount(place, values)[filled] / counts[filled]
     times = np.bincount(place, time)[filled] / counts[filled]
     return centres, np.interp(centres, times, means)
-
-
-def _best_lag(a: FloatArray, b: FloatArray) -> int:
-    """Steps by which b is to be moved later to fit a, by the normalised cross-correlation."""
-    size = next_fast_len(len(a) + len(b) - 1, real=True)
-    cross = irfft(rfft(a, size) * np.conj(rfft(b, size)), size)
-    lag = int(np.argmax(cross))
-    return lag if lag < len(a) else lag - size
 
 
 class _Pair:

@@ -5,23 +5,17 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from pathlib import Path
-from types import MappingProxyType
 from typing import BinaryIO
-
-import numpy as np
 
 from actuator_lti.bounds import CSV_LINE_BYTES, CSV_ROWS
 from actuator_lti.errors import InputError
-from actuator_lti.reading import open_regular, shown_path
+from actuator_lti.reading import open_regular
 from analyses.records.bounded import BoundedRows
 from analyses.records.columns import find_columns, read_header
 from analyses.records.csv_rows import Account, Block, Columns, careful_rows, clean, fast_rows
-from analyses.records.gaps import filled, several_rates
-from analyses.records.inputs import inputs_of
 from analyses.records.record import FloatArray, Record
 from analyses.records.spec import RecordSpec
-from analyses.records.time_axis import TimeAxis
-from analyses.records.units import converter
+from analyses.records.table_record import in_si, record_of_rows
 
 BLOCK_BYTES = 1 << 22
 MAX_LINE_BYTES = CSV_LINE_BYTES.most
@@ -61,25 +55,7 @@ def read_csv_record(
     rows = BoundedRows(columns=1 + len(spec.signals), limit=max_rows)
     for chunk in stream_csv(path, spec, account=account, digest=digest):
         rows.add(chunk)
-    table = rows.array()
-    counts = account.frozen()
-    if len(table) < 2:
-        raise InputError(f"fewer than two usable rows ({counts})", where=str(path))
-    notes = (f"averaged over {rows.factor} rows to bound memory",) if rows.factor > 1 else ()
-    signals = {signal.name: np.ascontiguousarray(table[:, k]) for k, signal in enumerate(spec.signals, 1)}
-    signals, made = filled(table[:, 0], signals, spec.resample_tolerance, str(path))
-    return Record(
-        name=shown_path(path.name),
-        time_s=np.ascontiguousarray(table[:, 0]),
-        signals=MappingProxyType(signals),
-        units=MappingProxyType({s.name: converter(s).si_unit for s in spec.signals}),
-        counts=counts,
-        averaged=rows.factor,
-        sha256=digest.hexdigest(),
-        notes=(*notes, *made, *several_rates(counts)),
-        inputs=inputs_of(spec, account.columns),
-        resample_tolerance=spec.resample_tolerance,
-    )
+    return record_of_rows(rows.array(), spec, path, account, digest.hexdigest(), rows.factor)
 
 
 def stream_csv(
@@ -95,15 +71,11 @@ def stream_csv(
     """
     path = Path(path)
     account = Account() if account is None else account
-    converters = [converter(signal) for signal in spec.signals]
-    axis = TimeAxis(spec, account, str(path))
+    convert = in_si(spec, account, str(path))
     for block in _blocks(path, spec, account, digest):
-        time, values = axis.apply(block)
-        for k, convert in enumerate(converters):
-            values[:, k] = convert(values[:, k])
-        account.rows_out += len(time)
-        if len(time):
-            yield np.column_stack([time, values])
+        rows = convert(block)
+        if len(rows):
+            yield rows
 
 
 def _blocks(path: Path, spec: RecordSpec, account: Account, digest: hashlib._Hash | None) -> Iterator[Block]:

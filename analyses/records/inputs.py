@@ -3,12 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
 
 from analyses.records.naming import MEANINGS, NOT_NEEDED, is_time, signal_of, taken_apart
-from analyses.records.record import InputColumn
+from analyses.records.record import InputColumn, Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 
+NOT_USED = "not needed for this"
 NO_SIGNAL = "not named as a signal"
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputUse:
+    """One column of a file in an analysis: meaning, range in SI, what it was used for or why not."""
+
+    column: str
+    meaning: str = "–"
+    unit: str = "–"
+    low: float | None = None
+    high: float | None = None
+    si: str = ""
+    use: str = ""
+    file: str = ""
+
+    @property
+    def is_used(self) -> bool:
+        """Whether the analysis read it."""
+        return not self.use.startswith("no: ")
+
+
+def account(record: Record, used: Mapping[str, str]) -> tuple[InputUse, ...]:
+    """Every column of a record's file; ``used`` tells for each signal what it was used for."""
+    return tuple(_use(record, one, used) for one in record.inputs)
+
+
+def _use(record: Record, one: InputColumn, used: Mapping[str, str]) -> InputUse:
+    unit, note = one.unit or "–", f" ({one.note})" if one.note else ""
+    if one.signal == "time":
+        every, si = f"time, every {1e3 * record.period_s:.6g} ms", "s"
+        values, use = record.time_s, "time"
+    elif one.signal in record.signals:
+        every, si = MEANINGS.get(one.signal, one.signal), record.units.get(one.signal, "")
+        values, use = record[one.signal], used.get(one.signal, f"no: {NOT_USED}")
+    else:
+        return InputUse(
+            column=one.column, unit=unit, use=f"no: {one.note or NOT_USED}" + note * bool(one.signal)
+        )
+    return InputUse(
+        column=one.column,
+        meaning=every,
+        unit=unit,
+        low=float(np.min(values)),
+        high=float(np.max(values)),
+        si=si,
+        use=use + note,
+    )
 
 
 def inputs_of(spec: RecordSpec, columns: Sequence[str]) -> tuple[InputColumn, ...]:

@@ -16,6 +16,8 @@ from analyses.records.csv_stream import MAX_ROWS
 from analyses.records.inputs import spec_of_names
 from analyses.records.mat5 import MatContent
 from analyses.records.mat_reader import columns_of, load_mat, names_in
+from analyses.records.parquet_reader import load_parquet
+from analyses.records.published import EMPS_SPEC, ODRIVE_SPEC
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec
 from analyses.records.toml_tables import Table, read_toml
@@ -69,7 +71,6 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
 
 def _described(path: Path, max_rows: int) -> Record:
     data = read_toml(path)
-    table = Table(data, "", str(path))
     if "file" not in data:
         kind = "a design" if {"motor", "design"} & set(data) else "a TOML file"
         raise InputError(
@@ -77,7 +78,9 @@ def _described(path: Path, max_rows: int) -> Record:
             " (a design goes behind --design)",
             where=str(path),
         )
-    file = path.parent / table.text("file")
+    if not isinstance(data["file"], str):
+        raise Table(data, "", str(path)).fail("file", "a text is wanted")
+    file = path.parent / data["file"]
     spec = record_spec({k: v for k, v in data.items() if k != "file"}, str(path), "")
     return replace(read_record(file, spec, max_rows), name=shown_path(file.name))
 
@@ -87,14 +90,10 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
     if suffix == ".mat":
         return _spec_of_mat(path)
     if suffix in (".parquet", ".pq"):
-        from analyses.records.parquet_reader import parquet_columns
-
-        spec, why = spec_of_names(tuple(parquet_columns(path)))
+        spec, why = spec_of_names(tuple(load_parquet(path)[0]))
     else:
         head = _head(path)
         if head.startswith("%Motor characterization data"):
-            from analyses.correlation.voltage_motor import ODRIVE_SPEC
-
             return ODRIVE_SPEC, {}
         columns, layout = _columns_of_csv(head)
         spec, why = spec_of_names(columns, layout)
@@ -112,8 +111,6 @@ def _told(message: str, why: Mapping[str, str]) -> str:
 def _spec_of_mat(path: Path) -> tuple[RecordSpec, Mapping[str, str]]:
     content, _ = load_mat(path)
     if set(content.arrays) >= EMPS_COLUMNS:
-        from analyses.identification.emps import EMPS_SPEC
-
         return EMPS_SPEC, {}
     why: Mapping[str, str] = {}
     for layout in _layouts(content):

@@ -27,11 +27,12 @@ def read_parquet_record(path: str | Path, spec: RecordSpec) -> Record:
         Names the file, the column and the reason.
     """
     path = Path(path)
-    return record_of_columns(parquet_columns(path), spec, path, _digest(path))
+    vectors, digest = load_parquet(path)
+    return record_of_columns(vectors, spec, path, digest)
 
 
-def parquet_columns(path: Path) -> Mapping[str, FloatArray]:
-    """The columns of numbers by name; a value that is missing is NaN."""
+def load_parquet(path: Path) -> tuple[Mapping[str, FloatArray], str]:
+    """The columns of numbers by name, NaN where a value is missing, and the file's SHA-256."""
     need("pyarrow", "tables", "a Parquet file")
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -50,8 +51,4 @@ def parquet_columns(path: Path) -> Mapping[str, FloatArray]:
         if pa.types.is_integer(field.type) or pa.types.is_floating(field.type):
             column = table.column(field.name).cast(pa.float64(), safe=False)
             result[field.name] = np.asarray(column.to_numpy(), dtype=np.float64)
-    return result
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(read_bytes(path, "Parquet file", TABLE_BYTES)).hexdigest()
+    return result, hashlib.sha256(data).hexdigest()

@@ -68,8 +68,8 @@ class Record:
     """
 
     name: str
-    time_s: FloatArray
-    signals: Mapping[str, FloatArray]
+    time_s: FloatArray = field(repr=False)
+    signals: Mapping[str, FloatArray] = field(repr=False)
     units: Mapping[str, str]
     counts: RowCounts
     averaged: int = 1

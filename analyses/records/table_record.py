@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -38,28 +39,54 @@ def record_of_columns(
     columns += [signal.column for signal in spec.signals]
     names = [_name(column, tuple(vectors), path) for column in columns]
     table = _table([_vector(vectors, column, path) for column in names], names, path)
-    account = Account(rows_in=len(table))
-    axis = TimeAxis(spec, account, f"{path}, row")
-    time, values = axis.apply(Block(values=table, lines=np.arange(1, len(table) + 1)))
-    account.rows_out = len(time)
-    if len(time) < 2:
-        raise InputError(f"fewer than two usable rows ({account.frozen()})", where=str(path))
+    account = Account(rows_in=len(table), columns=tuple(vectors))
+    block = Block(values=table, lines=np.arange(1, len(table) + 1))
+    rows = in_si(spec, account, f"{path}, row")(block)
+    return replace(
+        record_of_rows(rows, spec, path, account, digest), constants=MappingProxyType(dict(constants or {}))
+    )
+
+
+def in_si(spec: RecordSpec, account: Account, origin: str) -> Callable[[Block], FloatArray]:
+    """What makes of one block after the other rows of time (s) and signals in SI, shape (n, 1 + signals)."""
     converters = [converter(signal) for signal in spec.signals]
-    signals = {
-        c.name: convert(values[:, k])
-        for k, (c, convert) in enumerate(zip(spec.signals, converters, strict=True))
-    }
-    signals, notes = filled(time, signals, spec.resample_tolerance, str(path))
+    axis = TimeAxis(spec, account, origin)
+
+    def convert(block: Block) -> FloatArray:
+        time, values = axis.apply(block)
+        account.rows_out += len(time)
+        return np.column_stack([time, *(own(values[:, k]) for k, own in enumerate(converters))])
+
+    return convert
+
+
+def record_of_rows(
+    rows: FloatArray, spec: RecordSpec, path: Path, account: Account, digest: str, averaged: int = 1
+) -> Record:
+    """A record of rows of time and signals in SI, its holes filled.
+
+    Raises
+    ------
+    InputError
+        For fewer than two rows, or holes too large to fill.
+    """
+    counts = account.frozen()
+    if len(rows) < 2:
+        raise InputError(f"fewer than two usable rows ({counts})", where=str(path))
+    time = np.ascontiguousarray(rows[:, 0])
+    signals = {signal.name: np.ascontiguousarray(rows[:, k]) for k, signal in enumerate(spec.signals, 1)}
+    signals, made = filled(time, signals, spec.resample_tolerance, str(path))
+    notes = (f"averaged over {averaged} rows to bound memory",) if averaged > 1 else ()
     return Record(
         name=shown_path(path.name),
         time_s=time,
         signals=MappingProxyType(signals),
-        units=MappingProxyType({s.name: c.si_unit for s, c in zip(spec.signals, converters, strict=True)}),
-        counts=account.frozen(),
+        units=MappingProxyType({signal.name: converter(signal).si_unit for signal in spec.signals}),
+        counts=counts,
+        averaged=averaged,
         sha256=digest,
-        constants=MappingProxyType(dict(constants or {})),
-        notes=(*notes, *several_rates(account.frozen())),
-        inputs=inputs_of(spec, tuple(vectors)),
+        notes=(*notes, *made, *several_rates(counts)),
+        inputs=inputs_of(spec, account.columns),
         resample_tolerance=spec.resample_tolerance,
     )
 

@@ -1,16 +1,35 @@
-"""Reading TOML strictly: unknown keys refused, every fault with key, value and what is allowed."""
+"""Tables of TOML as dataclasses: a key is a field by its name without the unit, and no other key is taken.
+
+The type of a field says what is read: a text, one of some (``Literal``), a file, a flag, a whole number, a
+number, a list of texts, a column (name or number) or, ``Annotated`` with its unit, a quantity. A field that
+has no default has to be given. Every fault is told with key, value and what is allowed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import MISSING, dataclass, fields
 from difflib import get_close_matches
+from functools import cache
 from pathlib import Path
-from typing import Any
+from types import NoneType
+from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
 from actuator_lti.reading import read_campaign_toml
 from actuator_lti.tree import Tree
+from analyses.request import UNITS
+
+T = TypeVar("T")
+WANTED: Mapping[frozenset[type], str] = {
+    frozenset({str}): "a text is wanted",
+    frozenset({Path}): "a text is wanted",
+    frozenset({bool}): "true or false",
+    frozenset({int}): "a whole number is wanted",
+    frozenset({float}): "a number is wanted",
+    frozenset({str, int}): "a column name, or a number from 1",
+}
 
 
 def read_toml(path: Path) -> Tree:
@@ -18,15 +37,30 @@ def read_toml(path: Path) -> Tree:
     return read_campaign_toml(path, "campaign or record file")
 
 
-class Table:
-    """One table of a file, read key by key; ``done`` refuses what was not asked for."""
+def key_of(name: str) -> str:
+    """The key of a field: its name without the unit."""
+    return name.removesuffix(next((unit for unit in UNITS if name.endswith(unit)), ""))
 
-    def __init__(self, data: object, path: str, origin: str) -> None:
-        self.path, self.origin = path, origin
-        if not isinstance(data, Mapping):
-            raise InputError(f"{path}: must be a table", where=origin)
-        self._data: Mapping[str, Any] = data
-        self._asked: set[str] = set()
+
+@cache
+def _hints(kind: type) -> dict[str, Any]:
+    return get_type_hints(kind, include_extras=True)
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table of a file, by its dotted path."""
+
+    data: Mapping[str, Any]
+    path: str
+    origin: str
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.data, Mapping):
+            raise InputError(f"{self.path}: must be a table", where=self.origin)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.data)
 
     def key(self, name: str) -> str:
         """The dotted path of a key."""
@@ -34,102 +68,65 @@ class Table:
 
     def fail(self, name: str, allowed: str) -> InputError:
         """The refusal of one key."""
-        shown = repr(self._data.get(name))[:60] if name in self._data else "is missing"
-        joint = " = " if name in self._data else " "
-        return InputError(f"{self.key(name)}{joint}{shown}: {allowed}", where=self.origin)
+        shown = f" = {self.data[name]!r:.60}" if name in self.data else " is missing"
+        return InputError(f"{self.key(name)}{shown}: {allowed}", where=self.origin)
 
-    def __contains__(self, name: str) -> bool:
-        return name in self._data
+    def table(self, name: str) -> Table:
+        """A table below this one; empty where it is not given."""
+        return Table(self.data.get(name, {}), self.key(name), self.origin)
 
-    def __iter__(self) -> Any:
-        self._asked.update(self._data)
-        return iter(self._data)
+    def tables(self, name: str) -> list[Table]:
+        """An array of tables."""
+        value = self.data.get(name, [])
+        if not isinstance(value, list):
+            raise self.fail(name, f"an array of tables, [[{name}]]")
+        return [Table(item, f"{self.key(name)}[{k}]", self.origin) for k, item in enumerate(value, 1)]
 
-    def text(self, name: str, default: str | None = None, allowed: Sequence[str] = ()) -> str:
-        """A text; missing without a default is refused."""
-        value = self._get(name, default)
-        if not isinstance(value, str) or (allowed and value not in allowed):
-            raise self.fail(name, "one of " + ", ".join(allowed) if allowed else "a text is wanted")
-        return value
+    def only(self, known: Collection[str]) -> None:
+        """Refuse keys that are not known."""
+        for name in self.data:
+            if name not in known:
+                near = get_close_matches(name, known, 1)
+                hint = f'; did you mean "{near[0]}"?' if near else ""
+                raise InputError(f"{self.key(name)}: unknown key{hint}", where=self.origin)
 
-    def column(self, name: str, default: str) -> str | int:
-        """A column: its name, or its number from 1."""
-        value = self._get(name, default)
-        if isinstance(value, bool) or not isinstance(value, str | int):
-            raise self.fail(name, "a column name, or a number from 1")
-        return value
+    def read(self, kind: type[T], *, beside: Collection[str] = (), **given: Any) -> T:
+        """A dataclass; ``beside``: keys for others to read, ``given``: fields that are no keys."""
+        hints = _hints(kind)  # type: ignore[arg-type]
+        own = [field for field in fields(kind) if field.name not in given]  # type: ignore[arg-type]
+        self.only({*map(key_of, (field.name for field in own)), *beside})
+        for field in own:
+            if key_of(field.name) in self.data:
+                given[field.name] = self._value(key_of(field.name), hints[field.name])
+            elif field.default is MISSING and field.default_factory is MISSING:
+                raise self.fail(key_of(field.name), "it is needed")
+        return kind(**given)
 
-    def texts(self, name: str) -> tuple[str, ...]:
-        """A list of texts; empty where it is not given."""
-        self._asked.add(name)
-        value = self._data.get(name, [])
-        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-            raise self.fail(name, "a list of texts is wanted")
-        return tuple(value)
+    def _value(self, name: str, kind: Any) -> Any:
+        """The value of a key, as the type of its field wants it."""
+        value = self.data[name]
+        if get_origin(kind) is Annotated:
+            return self._quantity(name, value, get_args(kind)[1])
+        if get_origin(kind) is Literal:
+            if value not in get_args(kind):
+                raise self.fail(name, "one of " + ", ".join(get_args(kind)))
+            return value
+        if get_origin(kind) is tuple:
+            if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
+                raise self.fail(name, "a list of texts is wanted")
+            return tuple(value)
+        kinds = frozenset(one for one in get_args(kind) or (kind,) if one is not NoneType)
+        number = kinds == {float}
+        taken = {int, float} if number else {str if one is Path else one for one in kinds}
+        if type(value) not in taken or (number and not abs(value) < 1e300):
+            raise self.fail(name, WANTED[kinds])
+        return float(value) if number else Path(value) if kinds == {Path} else value
 
-    def integer(self, name: str, default: int) -> int:
-        """A whole number."""
-        value = self._get(name, default)
-        if isinstance(value, bool) or not isinstance(value, int):
-            raise self.fail(name, "a whole number is wanted")
-        return value
-
-    def flag(self, name: str, default: bool | None) -> bool | None:
-        """True or false."""
-        value = self._data.get(name, default)
-        self._asked.add(name)
-        if value is not None and not isinstance(value, bool):
-            raise self.fail(name, "true or false")
-        return value
-
-    def number(self, name: str, default: float | None = None) -> float | None:
-        """A bare number, or None where it is not given."""
-        value = self._data.get(name, default)
-        self._asked.add(name)
-        if value is None:
-            return None
-        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e300:
-            raise self.fail(name, "a number is wanted")
-        return float(value)
-
-    def quantity(self, name: str, unit: str, default: float | None = None) -> float | None:
-        """A number with a unit, in SI; None or the default where it is not given."""
-        self._asked.add(name)
-        if name not in self._data:
-            return default
-        value = self._data[name]
+    def _quantity(self, name: str, value: object, unit: str) -> float:
+        """A number with a unit, in SI."""
         if isinstance(value, bool) or not isinstance(value, str | int | float):
             raise self.fail(name, f"a quantity in {unit or 'no unit'}")
         try:
             return parse_quantity(value, unit)
         except InputError as error:
             raise self.fail(name, error.message) from None
-
-    def table(self, name: str) -> Table:
-        """A table below this one; empty where it is not given."""
-        self._asked.add(name)
-        return Table(self._data.get(name, {}), self.key(name), self.origin)
-
-    def tables(self, name: str) -> list[Table]:
-        """An array of tables."""
-        self._asked.add(name)
-        value = self._data.get(name, [])
-        if not isinstance(value, list):
-            raise self.fail(name, f"an array of tables, [[{name}]]")
-        return [Table(item, f"{self.key(name)}[{k}]", self.origin) for k, item in enumerate(value, 1)]
-
-    def done(self) -> None:
-        """Refuse keys that nothing asked for."""
-        for name in self._data:
-            if name not in self._asked:
-                near = get_close_matches(name, self._asked, 1)
-                hint = f'; did you mean "{near[0]}"?' if near else ""
-                raise InputError(f"{self.key(name)}: unknown key{hint}", where=self.origin)
-
-    def _get(self, name: str, default: Any) -> Any:
-        self._asked.add(name)
-        if name in self._data:
-            return self._data[name]
-        if default is None:
-            raise self.fail(name, "it is needed")
-        return default

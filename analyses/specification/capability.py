@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Command, Design
 from analyses.drive_figures import DriveFigures, drive_figures
 from analyses.specification.manoeuvres import thermal_duty
 from nonlinear import commands, simulate
@@ -46,7 +46,11 @@ class Capability:
 
 
 def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
-    """Run the command away from the output, and read what the drive makes of it."""
+    """Run the command away from the output and read what the drive makes of it.
+
+    Behind the profile of the command, and without what depends on the angle: at one load, as the figures are.
+    """
+    design = replace(design, command=Command(), load=design.load.level(), motor=design.motor.level())
     figures = drive_figures(design, load_Nm)
     rate, push = figures.output_rate_rad_s, figures.acceleration_rad_s2
     current = figures.motor_current_A

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil, log
 from typing import Any
 
@@ -21,9 +22,9 @@ from actuator_lti.plain_system import PlainSystem
 from actuator_lti.resolvent import balanced
 from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
-from analyses.validation.small_signal import RESOLVED, SURE, WITHIN
-from nonlinear import Tangent, tangent
-from nonlinear.derivative import RETURNED
+from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, pole_near
+from nonlinear import tangent
+from nonlinear.differences import RETURNED
 from nonlinear.loop_setup import LoopSetup
 from nonlinear.stepper import Stepper
 
@@ -36,7 +37,6 @@ BESIDE = 0.01  # of a margin
 CHANGE = 3.0  # times which a run beside a margin grows or shrinks
 LONGEST, SHORTEST = 5000, 50  # periods of such a run
 SIZES = 10.0 ** -np.arange(0.0, 13.0)  # of a large signal
-LOST = 100.0  # times the best agreement
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,8 @@ def step_shown(bench: Bench, name: str) -> StepShown | None:
     setup, closed = bench.setup(name), figures.loop.plain_closed
     samples = int(min(max(SETTLINGS * figures.step.settling_time_s / closed.dt, 20.0), MOST_SAMPLES))
     linear = _linear_step(closed, samples)
-    simulated, own = _agreed(lambda size: _run_step(setup, size, samples))
     largest = float(np.max(np.abs(linear)))
+    simulated, own = _agreed(partial(_step, setup, samples), setup, WITHIN / SURE * largest)
     off = np.abs(simulated - linear) / largest
     k = int(np.argmax(off))
     allowed = max(WITHIN, SURE * own / largest)
@@ -109,42 +109,46 @@ def _linear_step(closed: PlainSystem, samples: int) -> Floats:
     return out
 
 
-def _agreed(run: Callable[[float], Numbers | None]) -> tuple[Numbers, float]:
-    """The run by the size where two successive ones agree best, and what they differ in, largest size first.
+def _agreed(run: Callable[[float], Numbers | None], setup: LoopSetup, enough: float) -> tuple[Numbers, float]:
+    """What a run by its size comes to, over that of none, and what two successive sizes differ in.
 
-    Once rounding has taken a hundred times that, sizes are too small to be felt.
+    The largest size of which two agree well enough, else where they agree best; a size that ends in an event
+    is none.
     """
+    calm, large = run(0.0), setup.range if np.isfinite(setup.range) else 1.0
     last: Numbers | None = None
     best: tuple[Numbers, float] | None = None
-    for size in SIZES:
-        now = run(float(size))
+    for size in large * SIZES:
+        course = run(size)
+        now = None
+        if course is not None and calm is not None and (course != calm).any():  # else lost in rounding
+            now = (course - calm) / size
         if now is not None and last is not None:
             off = float(np.max(np.abs(now - last)))
             if best is None or off < best[1]:
                 best = (last, off)
-            elif off > LOST * best[1]:
+            if off <= enough:
                 break
         last = now
     if best is None:
-        raise NumericalError("every step ends in an event: no operating motion without one")
+        raise NumericalError("every run ends in an event: no operating motion without one")
     return best
 
 
-def _run_step(setup: LoopSetup, part: float, samples: int) -> Floats | None:
-    """What comes back from a step of a part of a large signal, over its size; None after an event."""
-    size = part * (setup.range if np.isfinite(setup.range) else 1.0)
-    runs, flags = [], []
-    for height in (size, 0.0):
-        rows = setup.row()
-        rows.step(setup.point, height, -1.0)
-        drive = Stepper(rows)
-        back = np.empty(samples)
-        for k in range(samples):
-            drive.run(setup.hold_ticks)
-            back[k] = drive.s[RETURNED[setup.point]]
-        runs.append(back)
-        flags.append(drive.happened)
-    return None if flags != [(0.0, 0.0)] * 2 else np.asarray((runs[1] - runs[0]) / size, float)
+def _step(setup: LoopSetup, samples: int, size: float) -> Floats | None:
+    """What comes back, negated, from a step at the place; None after an event."""
+    rows = setup.row()
+    rows.step(setup.point, size, -1.0)
+    return _followed(Stepper(rows), samples, setup.hold_ticks, lambda s: -s[RETURNED[setup.point]])
+
+
+def _followed(drive: Stepper, count: int, ticks: int, read: Callable[[Floats], Numbers]) -> Numbers | None:
+    """What is read of the state after each so many ticks; None after an event."""
+    seen = []
+    for _ in range(count):
+        drive.run(ticks)
+        seen.append(read(drive.s))
+    return np.array(seen) if drive.happened == (0.0, 0.0) else None
 
 
 def margin_shown(bench: Bench, name: str) -> MarginShown | None:
@@ -172,38 +176,36 @@ def margin_shown(bench: Bench, name: str) -> MarginShown | None:
 def _beside(
     bench: Bench, name: str, gain: float, w: float
 ) -> tuple[float, float, float, float, Floats, Floats]:
-    """A run at a gain: gain, predicted factor a period, found over predicted, its own error, course."""
-    setup = replace(bench.setup(name), gain=gain)
+    """A run at a gain: gain, predicted factor a period, found over predicted, its own error, course.
+
+    The signal at the place begins with a part of what would be a large one.
+    """
+    setup, plain = replace(bench.setup(name), gain=gain), bench.loop(name).plain_open
     found = tangent(bench.drive, name, setup=setup)
-    predicted = _closed_pole(bench.loop(name).plain_open, gain, np.exp(1j * w * found.hold_s))
-    left, right, _ = _mode(found.A, predicted)
-    rate = abs(predicted)
+    predicted = pole_near(lambda z: 1.0 + gain * complex(plain(z)), np.exp(1j * w * found.hold_s))
+    left, right = _mode(found.A, predicted)
+    rate = float(abs(predicted))
     periods = int(np.clip(ceil(log(CHANGE) / max(abs(log(rate)), 1e-9)), SHORTEST, LONGEST))
-    wanted = predicted ** np.arange(periods + 1)
+    shown = float(np.max(np.abs(found.C @ right)))
+    if shown == 0.0:
+        raise NumericalError("the critical mode does not show at the place")
+    begins = complex(left @ right.real) / shown
+    rows = setup.row()
 
     def course(size: float) -> Complexes | None:
-        return _course(setup, found, left, right, size, periods)
+        drive = Stepper(rows)
+        drive.s[found.places] += size / shown * right.real
+        return _followed(drive, periods, setup.base_ticks, lambda s: left @ s[found.places])
 
-    seen, own = _agreed(course)
-    course_off = float(np.abs(seen[-1]) / np.abs(wanted[-1]))
+    last = rate**periods
+    seen, own = _agreed(course, setup, WITHIN / SURE**2 * abs(begins) * last)
+    seen = np.concatenate([[1.0], seen / begins])
+    blur = SURE * (own / abs(begins) / last + found.stated_error)
     time_s: Floats = found.period_s * np.arange(periods + 1.0)
-    blur = SURE * (own / float(np.abs(wanted[-1])) + found.stated_error)
-    return gain, rate, course_off, blur, time_s, seen.real
+    return gain, rate, float(np.abs(seen[-1])) / last, blur, time_s, seen.real
 
 
-def _closed_pole(system: PlainSystem, gain: float, z: complex) -> complex:
-    """The closed-loop pole of a linear loop at a gain, nearest to z, by Newton's method."""
-    for _ in range(50):
-        step = 1e-7 * abs(z)
-        value, beside = (1.0 + gain * complex(system(each)) for each in (z, z + step))
-        move = value * step / (beside - value)
-        z -= move
-        if abs(move) < 1e-15 * abs(z):
-            break
-    return complex(z)
-
-
-def _mode(A: Floats, pole: complex) -> tuple[Complexes, Complexes, complex]:
+def _mode(A: Floats, pole: complex) -> tuple[Complexes, Complexes]:
     """Left and right eigenvector of the eigenvalue nearest to a pole, their product 1."""
     from scipy.linalg import eig
 
@@ -211,27 +213,4 @@ def _mode(A: Floats, pole: complex) -> tuple[Complexes, Complexes, complex]:
     values, left, right = eig(even, left=True)
     k = int(np.argmin(np.abs(values - pole)))
     w, v = left[:, k].conj() / scale, right[:, k] * scale
-    return w / (w @ v), v, complex(values[k])
-
-
-def _course(
-    setup: LoopSetup, found: Tangent, left: Complexes, right: Complexes, part: float, periods: int
-) -> Complexes | None:
-    """Amplitude of a mode over a run that starts on it, over the first; None after an event.
-
-    The signal at the place begins with a part of what would be a large one.
-    """
-    rows = setup.row()
-    drive, calm = Stepper(rows), Stepper(rows)
-    shown = float(np.max(np.abs(found.C @ right)))
-    if shown == 0.0:
-        raise NumericalError("the critical mode does not show at the place")
-    size = part * (setup.range if np.isfinite(setup.range) else 1.0) / shown
-    drive.s[found.places] += size * right.real
-    seen = np.empty(periods + 1, complex)
-    for k in range(periods + 1):
-        seen[k] = left @ (drive.s[found.places] - calm.s[found.places])
-        drive.run(setup.base_ticks)
-        calm.run(setup.base_ticks)
-    calm_still = drive.happened == calm.happened == (0.0, 0.0)
-    return np.asarray(seen / seen[0], complex) if calm_still and seen[0] != 0.0 else None
+    return w / (w @ v), v

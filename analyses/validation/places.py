@@ -22,7 +22,7 @@ from analyses.validation.small_signal import Place
 from nonlinear import tangent
 from nonlinear.loop_setup import PATHS, LoopSetup, loop_setup, points_of, stages_of
 from nonlinear.on_the_bench import on_the_bench
-from nonlinear.operating_motion import on_its_stand
+from nonlinear.operating_motion import may_stand, on_its_stand, standing
 
 if TYPE_CHECKING:
     from actuator_lti.drive.operating import Operating
@@ -46,30 +46,55 @@ class Bench:
 
     design: Design
     model: Design
-    _assembled: dict[Operating, Loops] = field(default_factory=dict, init=False, repr=False)
+    _assembled: dict[tuple[Operating, bool], Loops] = field(default_factory=dict, init=False, repr=False)
+    _setups: dict[str, LoopSetup] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def drive(self) -> Design:
-        """The simulated drive as its loops are tested; a faint command does not reach the profile."""
-        return _faint(on_its_stand(on_the_bench(self.design)), self.design)
+        """The simulated drive as its loops are tested."""
+        return on_its_stand(on_the_bench(self.design))
 
     @cached_property
     def linear(self) -> Design:
         """The drive that is predicted, tested alike."""
-        return _faint(on_its_stand(on_the_bench(self.model), self.design), self.model)
+        return on_its_stand(on_the_bench(self.model), self.design)
 
     def setup(self, name: str) -> LoopSetup:
-        """How a place is tested; without limits."""
-        return loop_setup(self.drive, name, limits_on=False, held=name == "current")
+        """How a place is tested; without limits, and without the filter of the command but at the command.
+
+        A filter lags behind a ramp: the drive stands then; where it has no slope about rest it is left out.
+        """
+        if name not in self._setups:
+            setup = loop_setup(self.drive, name, limits_on=False, held=name == "current")
+            if name == "command" and self._filtered:
+                drive = _faint(self.drive, self.design)
+                if may_stand(drive):
+                    setup = LoopSetup(drive, name, standing(drive), limits_on=False)
+            self._setups[name] = setup
+        return self._setups[name]
+
+    @property
+    def _filtered(self) -> bool:
+        return max(self.design.command.filter_time_s, self.model.command.filter_time_s) > 0.0
 
     def loops(self, name: str) -> Loops:
         """The linear loops on the motion of a place."""
+        setup = self.setup(name)
+        return self._loops_at(setup.bias.operating(setup.design), filtered=setup.design is not self.drive)
+
+    @cached_property
+    def commanded(self) -> Loops:
+        """The linear loops with the filter of the command; a faint one does not reach the profile."""
+        setup = self.setup("command")
+        return self._loops_at(setup.bias.operating(setup.design), filtered=self._filtered)
+
+    def _loops_at(self, at: Operating, *, filtered: bool) -> Loops:
         from actuator_lti.loops.assemble import loops_at
 
-        at = self.setup(name).bias.operating(self.drive)
-        if at not in self._assembled:
-            self._assembled[at] = loops_at(self.linear, at)
-        return self._assembled[at]
+        if (at, filtered) not in self._assembled:
+            linear = _faint(self.linear, self.model) if filtered else self.linear
+            self._assembled[at, filtered] = loops_at(linear, at)
+        return self._assembled[at, filtered]
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -139,12 +164,13 @@ class Bench:
 
     def _delayed(self, more_s: float) -> tuple[Tangent, Complexes]:
         """Tangent at the voltage, and predicted poles over a base period, under a longer computing delay."""
-        from actuator_lti.loops import periodic_loop
+        from actuator_lti.drive.wiring import wire
+        from actuator_lti.loops import periodic_loop_of
 
         longer = Bench(_later(self.design, more_s), _later(self.model, more_s))
-        return tangent(longer.drive, "u", setup=longer.setup("u")), periodic_loop(
-            longer.loops("u"), "u"
-        ).modes()
+        setup = longer.setup("u")
+        predicted = periodic_loop_of(wire(longer.linear, setup.bias.operating(longer.drive)), "u")
+        return tangent(longer.drive, "u", setup=setup), predicted.modes()
 
 
 def _later(design: Design, more_s: float) -> Design:
@@ -153,7 +179,7 @@ def _later(design: Design, more_s: float) -> Design:
 
 
 def _faint(bench: Design, design: Design) -> Design:
-    """With the filter of the command, whose rates a faint command does not reach."""
+    """With the filter of the command; a faint one does not reach its rates."""
     return replace(
         bench, command=replace(design.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
     )

@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 from math import degrees
 from typing import TYPE_CHECKING
 
+from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design
 from actuator_lti.verdict import Tally, Verdict
+from analyses.large_signal.at_rest import RestSweep
+from analyses.large_signal.by_amplitude import AmplitudeMargin
+from analyses.large_signal.conditional import Conditional
+from analyses.limit_cycles.counts import Counts
 from analyses.loop_figures import LoopFigures
 from analyses.settling import Settling, largest_swing, words
-from analyses.validation.at_rest import RestSweep
 from analyses.validation.bench_sweep import BenchSweep
-from analyses.validation.by_amplitude import AmplitudeMargin
-from analyses.validation.conditional import Conditional
-from analyses.validation.counts import Counts
-from analyses.validation.from_rest import RestSteps
 from analyses.validation.in_time import MarginShown, StepShown
 from analyses.validation.row import Row
 
@@ -42,7 +42,7 @@ class Validation:
     margins : mapping of str to MarginShown
         Runs on either side of the quoted gain margin of each loop.
     sweeps : mapping of str to BenchSweep
-    amplitude_margins, conditional, rest_sweep, rest_steps, counts, large_signals, friction, specification :
+    amplitude_margins, conditional, rest_sweep, counts, large_signals, friction, specification :
         Findings: what large signals, friction and counts do.
     settlings : tuple of Settling
         What steps of the drive as it is end in.
@@ -61,7 +61,6 @@ class Validation:
     amplitude_margins: tuple[AmplitudeMargin, ...] = ()
     conditional: Conditional | None = None
     rest_sweep: RestSweep | None = None
-    rest_steps: RestSteps | None = None
     counts: tuple[Counts, ...] = ()
     settlings: tuple[Settling, ...] = ()
     large_signals: LargeSignals | None = None
@@ -73,7 +72,12 @@ class Validation:
     @property
     def tally(self) -> Tally:
         """The rows counted."""
-        return Tally.of(row.verdict for row in self.rows)
+        waived = [self.waived(f"{row.loop}/{row.name}") for row in self.rows]
+        return Tally.of((row.verdict for row in self.rows), waived)
+
+    def waived(self, what: str) -> bool:
+        """Whether the design waives a check not proven: of a loop, or one row of it (``loop/name``)."""
+        return self.design.waiver_of(f"{CHECKS}-{what}") is not None
 
     @property
     def not_met(self) -> tuple[Row, ...]:
@@ -101,10 +105,8 @@ class Validation:
         By its one judge (`analyses.settling`), whatever keeps it going: counts, play, friction, load. A swing
         of less than `NOTICED` of full deflection is listed, it fails nothing.
         """
-        points = () if self.friction is None else self.friction.points
-        swings = [*self.settlings, *(one for point in points for one in point.cycles.settlings)]
         least = NOTICED * self.design.validation.full_deflection_rad
-        return largest_swing(one for one in swings if one.swing_rad >= least)
+        return largest_swing(one for one in self.settlings if one.swing_rad >= least)
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -123,9 +125,6 @@ class Validation:
             does = ending.get(self.conditional.ending, "diverge")
             by = f" ({self.conditional.limiter} limit)" if self.conditional.limiter else ""
             found.append(f"a command within full deflection makes the drive {does}{by}")
-        border = None if self.large_signals is None else self.large_signals.border
-        if border is not None and border.passed is False:
-            found.append("a limit first acts at another amplitude, or is another one, than predicted")
         return tuple(found)
 
     @property
@@ -133,7 +132,8 @@ class Validation:
         """``not met`` where a row is, or the drive fails by itself; then ``not proven``; else ``met``."""
         if self.not_met or self.failures:
             return Verdict.NOT_MET
-        if self.undecided or self.hunting or not self.rows:
+        doubts = {**{f"stable-{name}": True for name in self.undecided}, "rest": self.hunting is not None}
+        if not self.rows or any(there and not self.waived(what) for what, there in doubts.items()):
             return Verdict.NOT_PROVEN
         return self.tally.verdict
 
@@ -142,9 +142,14 @@ class Validation:
         """Whether every prediction was judged and met, and the drive comes to rest where it is sent."""
         return self.verdict is Verdict.MET
 
-    def __str__(self) -> str:
+    @property
+    def words(self) -> str:
+        """The verdict in words: rows counted, and what the drive does that it must not."""
         said = [self.tally.words("predictions"), *self.failures]
         said += [f"stability of the {name} loop not known" for name in self.undecided]
         if self.hunting is not None and self.hunting.rest.verdict == "still moving":
             said.append(f"a step was still moving after {self.hunting.rest.after_s:.3g} s")
-        return f"{self.design.name}: {'; '.join(said)}"
+        return "; ".join(said)
+
+    def __str__(self) -> str:
+        return f"{self.design.name}: {self.words}"

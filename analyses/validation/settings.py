@@ -7,27 +7,33 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Which findings a validation looks for; the defaults are those of the report.
+    """What a validation looks at beside its checks; the defaults are those of the report.
 
     Attributes
     ----------
+    own : bool
+        What the drive itself does: whether it comes to rest, and what large commands make of it.  The verdict
+        is that of the checks and of these.
     sweep : bool
         The injected sweep of every loop, as an analyser on the bench would see it.
     amplitude_margins : bool
         Margins from small, medium and large deviations.
+    from_rest : bool
+        Sines from rest, and what counts do.
     rest_frequencies : int
         Of the sweep from rest.
     map_counts : tuple of int
         Amplitudes and frequencies of the large-signal map.
-    from_rest, large_signals, friction_effects, specification : bool
-        Whether these parts are computed; ``from_rest`` are steps, sweep, counts and large commands.
+    large_signals, friction_effects, specification : bool
+        Whether these parts are computed.
     """
 
+    own: bool = True
     sweep: bool = True
     amplitude_margins: bool = True
+    from_rest: bool = True
     rest_frequencies: int = 16
     map_counts: tuple[int, int] = (25, 40)
-    from_rest: bool = True
     large_signals: bool = True
     friction_effects: bool = True
     specification: bool = True
@@ -36,12 +42,14 @@ class Settings:
 QUICK = Settings(
     sweep=False,
     amplitude_margins=False,
-    rest_frequencies=10,
-    map_counts=(10, 16),
+    from_rest=False,
+    large_signals=False,
     friction_effects=False,
     specification=False,
 )
+"""All that the verdict is made of, without findings."""
 CHECKS = Settings(
+    own=False,
     sweep=False,
     amplitude_margins=False,
     from_rest=False,

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from math import degrees, pi
 from typing import TYPE_CHECKING
 
@@ -28,11 +29,12 @@ from actuator_lti.verdict import Verdict
 from analyses.loop_figures import LoopFigures
 from analyses.validation.row import Row, judged
 from nonlinear import Tangent
-from nonlinear.derivative import GRID, relative
+from nonlinear.lifted import GRID, relative
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins
 
+Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
 WITHIN = 1e-6  # of a response, of a margin
 SURE = 10.0  # times the stated error
@@ -40,6 +42,7 @@ RESOLVED = 1e-4  # of a response: a tangent that is worse proves nothing
 BESIDE = 1e-6  # of a margin: where the pole has to lie on either side of the circle
 ROUNDING = 1e-12  # of the norm of A, that an eigenvalue is computed with
 NEWTON_STEPS = 25
+MOST_LOG = 70.0  # of a gain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,45 +169,53 @@ def _pole_equation(t: Tangent, gain: complex, point: complex) -> complex:
 
 
 def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | None:
-    """Gain and angle of the closed-loop pole on the circle nearest to those given, by Newton's method."""
-    log_gain, step = float(np.log(gain)), 1e-6
-    turn = 0.0 if angle == 0.0 or abs(angle - pi) < 1e-12 else 1.0
-    for _ in range(NEWTON_STEPS):
-        value, by_gain, by_angle = (
-            _pole_equation(t, np.exp(log_gain + a), np.exp(1j * (angle + b)))
-            for a, b in ((0.0, 0.0), (step, 0.0), (0.0, step))
-        )
-        gains, angles = (by_gain - value) / step, (by_angle - value) / step
-        if turn:
-            slope = np.array([[gains.real, angles.real], [gains.imag, angles.imag]])
-            try:
-                move = np.linalg.solve(slope, [-value.real, -value.imag])
-            except np.linalg.LinAlgError:
-                return None
-        else:
-            move = np.array([-value.real / gains.real, 0.0]) if gains.real else np.array([np.nan, 0.0])
-        if not np.isfinite(move).all() or abs(log_gain + move[0]) > 50.0:
-            return None
-        move[1] = np.clip(move[1], -0.1, 0.1)
-        log_gain, angle = log_gain + float(move[0]), angle + float(move[1])
-        if abs(move[0]) < 1e-14 and abs(move[1]) < 1e-13:
+    """Gain and angle of the closed-loop pole on the circle nearest to those given: its size by secants."""
+    if min(angle, abs(angle - pi)) < 1e-12:
+        return _real_crossing(t, gain, 1.0 if angle < 1.0 else -1.0), angle
+    point = complex(np.exp(1j * angle))
+    before = log_gain = float(np.log(gain))
+    last = 0.0
+    for k in range(NEWTON_STEPS):
+        point = _nearest(t.at_gain(float(np.exp(log_gain))), point)
+        size = float(np.log(np.abs(point)))
+        if k and size == last:
             break
-    return float(np.exp(log_gain)), angle
+        move = BESIDE if k == 0 else -size * (log_gain - before) / (size - last)
+        before, last, log_gain = log_gain, size, log_gain + move
+        if not np.isfinite(log_gain) or abs(log_gain) > MOST_LOG:
+            return None
+        if abs(move) < 1e-14:
+            break
+    return float(np.exp(log_gain)), abs(float(np.angle(point)))
 
 
-def _followed(t: Tangent, gain: float, point: complex) -> complex:
-    """The closed-loop pole at a gain nearest to a point, by Newton's method."""
+def _real_crossing(t: Tangent, gain: float, end: float) -> float:
+    """The gain at which a pole crosses at z = 1 or -1, from beside it: there a mode at rest may stand.
+
+    What is real is even in the angle: from a tenth of a radian by tens, where two successive agree best.
+    """
+    found = []
+    for decade in range(1, 13):
+        values = np.linalg.eigvals(t.lifted(end * np.exp(1j * 10.0**-decade)))
+        values = values[values != 0.0]
+        nearest = values[int(np.argmin(np.abs(1.0 - 1.0 / values - gain)))]
+        found.append(1.0 - 1.0 / float(nearest.real))
+    return found[int(np.argmin(np.abs(np.diff(found)))) + 1]
+
+
+def pole_near(equation: Callable[[complex], complex], point: complex) -> complex:
+    """The zero of an equation of poles nearest to a point, by Newton's method."""
     for _ in range(NEWTON_STEPS):
         step = 1e-7 * abs(point)
-        value = _pole_equation(t, gain, point)
-        slope = (_pole_equation(t, gain, point + step) - value) / step
+        value = equation(point)
+        slope = (equation(point + step) - value) / step
         if slope == 0.0 or not np.isfinite(slope):
             break
         move = value / slope
         point -= move
         if abs(move) < 1e-15 * abs(point):
             break
-    return point
+    return complex(point)
 
 
 def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int | None) -> Row:
@@ -218,7 +229,11 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
     if found is None:
         return place.judged(name, ratio, None, allowed * ratio, "1", "no closed-loop pole crosses there")
     gain, turned = found
-    sides = [abs(_followed(t, ratio * x, np.exp(1j * turned))) - 1.0 for x in (1.0 - BESIDE, 1.0 + BESIDE)]
+    start = np.exp(1j * turned) * (1.0 - ROUNDING)  # not on a mode at rest
+    sides = [
+        abs(pole_near(partial(_pole_equation, t, ratio * x), start)) - 1.0
+        for x in (1.0 - BESIDE, 1.0 + BESIDE)
+    ]
     hertz = turned / (2.0 * pi * t.period_s)
     words = f"{hertz:.6g} Hz; pole beside the circle by {sides[0]:+.1e}, {sides[1]:+.1e}"
     row = place.judged(name, ratio, gain, allowed * ratio, "1", words)
@@ -258,19 +273,20 @@ def _angle_on_circle(poles: Complexes) -> float:
 def _delay_row(place: Place, delay_s: float) -> Row:
     """The computing delay lengthened to either side of its margin: the critical pole lies inside, outside."""
     assert place.delayed is not None
-    sizes = []
-    for side in (1.0 - BESIDE, 1.0 + BESIDE):
-        longer, poles = place.delayed(delay_s * side)
-        critical = poles[int(np.argmin(np.abs(np.abs(poles) - 1.0)))]
-        sizes.append(abs(_nearest(longer, critical)))
+    outside, poles = place.delayed(delay_s * (1.0 + BESIDE))
+    critical = poles[int(np.argmax(np.abs(poles)))]
+    inside, poles = place.delayed(delay_s * (1.0 - BESIDE))
+    before = poles[int(np.argmin(np.abs(poles - critical)))]
+    sizes = [abs(_nearest(inside.A, before)), abs(_nearest(outside.A, critical))]
     rates = np.log(sizes)
     found = delay_s * (1.0 - BESIDE + 2.0 * BESIDE * float(-rates[0] / (rates[1] - rates[0])))
     words = f"spectral radius beside it {sizes[0] - 1.0:+.1e}, {sizes[1] - 1.0:+.1e}"
     return place.judged("delay_margin", delay_s, found, place.allowed * delay_s, "s", words)
 
 
-def _nearest(t: Tangent, pole: complex) -> complex:
-    poles = np.linalg.eigvals(t.A)
+def _nearest(A: Floats, pole: complex) -> complex:
+    """The eigenvalue nearest to a pole."""
+    poles = np.linalg.eigvals(balanced(A)[0])
     return complex(poles[int(np.argmin(np.abs(poles - pole)))])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, TypeVar
 
@@ -11,24 +11,25 @@ import numpy as np
 
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
+from actuator_lti.loops.assemble import loops_at
 from actuator_lti.verdict import Verdict
 from analyses.isolation import attempt
+from analyses.large_signal.at_rest import RestSweep, free_amplitude, sweep_from_rest
+from analyses.large_signal.by_amplitude import margins_by_amplitude
+from analyses.large_signal.conditional import Conditional, conditional_stability
+from analyses.large_signal.settling_ticks import settling_ticks_of
+from analyses.limit_cycles.counts import Counts, counts_of
 from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.settling import Settling, settle
-from analyses.validation.at_rest import RestSweep, free_amplitude, sweep_from_rest
 from analyses.validation.bench_sweep import bench_sweep
-from analyses.validation.by_amplitude import margins_by_amplitude
-from analyses.validation.conditional import Conditional, conditional_stability
-from analyses.validation.counts import Counts, counts_of
 from analyses.validation.design_values import design_value_rows
-from analyses.validation.from_rest import RestSteps, steps_from_rest
 from analyses.validation.in_time import margin_shown, step_shown
 from analyses.validation.places import Bench
 from analyses.validation.result import Validation
 from analyses.validation.row import Row
 from analyses.validation.settings import Settings
-from analyses.validation.settling import EVER_TICKS, TIME_CONSTANTS, settling_ticks_of
 from analyses.validation.small_signal import Place, small_signal
 from nonlinear.on_the_bench import on_the_bench
 
@@ -109,8 +110,6 @@ class _Work:
         rows += self._part("numbers of the design", self._values, [])
         self._step()
         asked = self.settings
-        large = asked.from_rest and whole
-        rest_sweep, rest_steps = self._asked(large, "motion from rest", self._rest, (None, None))
         return Validation(
             design=self.design,
             rows=tuple(rows),
@@ -127,13 +126,10 @@ class _Work:
                 asked.amplitude_margins and bool(stable), "margins by amplitude",
                 lambda: tuple(margins_by_amplitude(self.bench)), (),
             ),
-            conditional=self._asked(large, "conditional stability", self._conditional, None),
-            rest_sweep=rest_sweep,
-            rest_steps=rest_steps,
-            settlings=self._asked(
-                large and not asked.friction_effects, "rest after a step", self._settlings, ()
-            ),
-            counts=self._asked(large, "counts of the encoders", self._counts, ()),
+            conditional=self._asked(asked.own and whole, "conditional stability", self._conditional, None),
+            settlings=self._asked(asked.own and whole, "rest after a step", self._settlings, ()),
+            rest_sweep=self._asked(asked.from_rest and whole, "motion from rest", self._rest, None),
+            counts=self._asked(asked.from_rest and whole, "counts of the encoders", self._counts, ()),
             large_signals=self._asked(asked.large_signals and whole, "large signals", self._large, None),
             friction=self._asked(asked.friction_effects and whole, "friction effects", self._friction, None),
             specification=self._asked(
@@ -203,56 +199,59 @@ class _Work:
 
     @cached_property
     def _loops(self) -> Any:
-        return self.bench.loops("command")
+        return self.bench.commanded
 
-    def _settle(self, longest: int) -> int:
+    @cached_property
+    def _whole(self) -> Any:
+        """The same with the profile and the filter of the command in front."""
+        if self.bench.model.command == self._loops.design.command:
+            return self._loops
+        at = self.bench.setup("command").bias.operating(self.bench.drive)
+        return loops_at(replace(self.bench.linear, command=self.bench.model.command), at)
+
+    def _settle(self) -> int:
         """Ticks in which the position loop settles."""
         closed = self._loops.present["position"].plain_closed
-        hold = self.bench.setup("position").hold_ticks
-        return settling_ticks_of(closed, hold, self.design.name, longest)
+        return settling_ticks_of(closed, self.bench.setup("position").hold_ticks, self.design.name)
 
     @cached_property
     def _commanded(self) -> LoopFigures:
         """Figures of the response to the command, with feed-forward and filters."""
-        return loop_figures(self._loops.present["position"], self._loops.plain_response)
+        mean = command_mean(self.bench.model)
+        return loop_figures(self._whole.present["position"], self._whole.plain_response, mean=mean)
 
-    def _rest(self) -> tuple[RestSweep | None, RestSteps]:
-        """Sines and steps from rest."""
+    def _rest(self) -> RestSweep | None:
+        """Sines from rest."""
         design, band = self.design, self._commanded.bandwidth
-        sweep = None
-        if band is not None and self._loops.limiters:
-            marks = [x for x in (band.minus3db_hz, band.minus90deg_hz) if x]
-            top = HIGHEST / (self._loops.present["position"].period_s or 1.0)
-            high = min(2.0 * max(marks, default=top), top)
-            asked = np.geomspace(min(marks, default=high) / BELOW, high, self.settings.rest_frequencies)
-            near = np.outer(marks, NEAR).ravel()
-            asked = np.sort(np.concatenate([asked, near[near < top]]))
-            part = min(design.validation.amplitude_fractions)
-            amplitude = free_amplitude(design, self._loops, asked, part)
-            dry = design.friction.dry_Nm(0.0) > 0.0
-            settle = self._settle(400_000)
-            sweep = sweep_from_rest(design, asked, amplitude, settle, described=dry)
-        return sweep, steps_from_rest(
-            design, self._settle(400_000), self._settle(EVER_TICKS) / TIME_CONSTANTS
-        )
+        if band is None or not self._loops.limiters:
+            return None
+        marks = [x for x in (band.minus3db_hz, band.minus90deg_hz) if x]
+        top = HIGHEST / (self._loops.present["position"].period_s or 1.0)
+        high = min(2.0 * max(marks, default=top), top)
+        asked = np.geomspace(min(marks, default=high) / BELOW, high, self.settings.rest_frequencies)
+        near = np.outer(marks, NEAR).ravel()
+        asked = np.sort(np.concatenate([asked, near[near < top]]))
+        amplitude = free_amplitude(design, self._whole, asked, min(design.validation.amplitude_fractions))
+        dry = design.friction.dry_Nm(0.0) > 0.0
+        return sweep_from_rest(design, asked, amplitude, self._settle(), described=dry)
 
     def _settlings(self) -> tuple[Settling, ...]:
-        """What steps of the drive as it is end in; else the friction effects ask it, at every named load."""
+        """What steps of the drive as it is end in, without load and at every named one."""
         asked, full = self.design.validation, self.design.validation.full_deflection_rad
-        loads = dict.fromkeys((0.0, max(asked.loads_Nm, key=abs, default=0.0)))
+        loads = dict.fromkeys((0.0, *asked.loads_Nm))
         sizes = [part * full for part in asked.amplitude_fractions]
         return tuple(settle(self.design, load, size) for load in loads for size in sizes)
 
     def _conditional(self) -> Conditional:
-        return conditional_stability(self.design, self._loops, self._settle(400_000))
+        return conditional_stability(self.design, self._loops, self._settle())
 
     def _counts(self) -> tuple[Counts, ...]:
-        return counts_of(self.design, self._loops, self._settle(400_000))
+        return counts_of(self.design, self._loops, self._settle())
 
     def _large(self) -> Any:
         from analyses.large_signal import large_signals
 
-        return large_signals(self.design, self._loops, counts=self.settings.map_counts)
+        return large_signals(self.design, self._whole, counts=self.settings.map_counts)
 
     def _friction(self) -> Any:
         from analyses.friction_effects import friction_effects

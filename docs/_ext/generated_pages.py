@@ -1,4 +1,4 @@
-"""Pages made from the sources at each build: keys of a design file, commands, requirement quantities."""
+"""Pages made from the sources at each build: keys of a design file, commands, quantities, terms."""
 
 from __future__ import annotations
 
@@ -130,7 +130,21 @@ def _options(command: Any) -> list[str]:
     return table(["option", "meaning"], rows) if rows else []
 
 
-PAGES = {"keys": keys_page, "commands": commands_page, "quantities": quantities_page}
+def glossary_page() -> str:
+    """Every term of reports with its line."""
+    from reports.glossary import glossary
+
+    rows = [[cell(term), cell(line)] for term, line in glossary().items()]
+    intro = "The words of reports and of this documentation; a heading of a report's table says its own line."
+    return "\n".join(["# Glossary", "", intro, "", *table(["term", "meaning"], rows)])
+
+
+PAGES = {
+    "keys": keys_page,
+    "commands": commands_page,
+    "quantities": quantities_page,
+    "glossary": glossary_page,
+}
 
 
 def write_pages(app: Any) -> None:

@@ -1,7 +1,7 @@
 """Code of a page that is run while the page is built; a failure ends the build.
 
-``python-run`` runs lines of Python, ``shell-run`` one command `actuator-lti`; code and what it printed
-stand on the page. The code of one page shares its names and one folder, which is gone afterwards.
+``python-run`` runs lines of Python, ``shell-run`` one command `actuator-lti`, or an example; code and what it
+printed stand on the page. The code of one page shares its names and one folder, which is gone afterwards.
 """
 
 from __future__ import annotations
@@ -88,17 +88,19 @@ class PythonRun(RunDirective):
 
 
 class ShellRun(RunDirective):
-    """One command `actuator-lti`, with the exit status that the page says (0 where it says nothing)."""
+    """One command `actuator-lti`, or an example, with the exit status that the page says (0 where none)."""
 
     language = "sh"
 
     def result(self, text: str, room: Room) -> str:
         program, *arguments = shlex.split(text, comments=True)
-        if program != "actuator-lti":
-            raise ValueError(f"{program}: only actuator-lti is run")
+        if program == "actuator-lti":
+            arguments = ["-m", "reports.cli", *arguments]
+        elif program != "python" or arguments[:1] != ["-m"] or not arguments[1].startswith("examples."):
+            raise ValueError(f"{program}: only actuator-lti and python -m examples.NAME are run")
         surroundings = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "80", "NO_COLOR": "1"}
         ended = subprocess.run(
-            [sys.executable, "-m", "reports.cli", *arguments],
+            [sys.executable, *arguments],
             cwd=room.folder, env=surroundings, capture_output=True, text=True, timeout=LONGEST_S, check=False,
         )  # fmt: skip
         wanted = self.options.get("status", 0)

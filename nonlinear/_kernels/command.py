@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 from nonlinear._kernels.filters import chain
 from nonlinear._kernels.regulator import clamp
 
 
-@scalar
+@kernel
 def closing_speed(distance, a, T):  # type: ignore[no-untyped-def]
     """Speed at which a distance is covered in whole samples T while the speed falls by a T in each."""
     d = abs(distance)
@@ -21,7 +21,7 @@ def closing_speed(distance, a, T):  # type: ignore[no-untyped-def]
     return speed if distance > 0.0 else -speed
 
 
-@scalar
+@kernel
 def profile(p, s, wanted):  # type: ignore[no-untyped-def]
     """Follow the command with limited first and second derivative; exact where it keeps both limits itself.
 
@@ -41,7 +41,7 @@ def profile(p, s, wanted):  # type: ignore[no-untyped-def]
     return x
 
 
-@scalar
+@kernel
 def average(p, s, x):  # type: ignore[no-untyped-def]
     """Mean of the last n values: what an acceleration limit a becomes has a jerk of at most 2 a/(n T)."""
     n, at = int(p[layout.PROFILE_SAMPLES]), int(p[layout.AT_AVERAGE])
@@ -59,7 +59,7 @@ def average(p, s, x):  # type: ignore[no-untyped-def]
     return s[layout.S_AVERAGE_SUM] / n
 
 
-@scalar
+@kernel
 def shape(p, s, wanted):  # type: ignore[no-untyped-def]
     """The command behind profile and filter, at the outermost stage's period; notes the profile's flag."""
     r = wanted

@@ -5,8 +5,8 @@ It is a function of its own: with measurements written into ``io`` it runs witho
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import entry, inlined, scalar, woven
 from nonlinear._kernels.estimate import measured_speed
 from nonlinear._kernels.filters import chain
 from nonlinear._kernels.position import (
@@ -22,7 +22,7 @@ from nonlinear._kernels.probes import PROBE_Y
 from nonlinear._kernels.regulator import clamp, pi, regulator, velocity_regulator
 
 
-@scalar
+@kernel
 def overload(p, s, i):  # type: ignore[no-untyped-def]
     """The overload (I2t) state, and the current limit of this tick."""
     x, share = s[layout.S_OVERLOAD], i / p[layout.CONTINUOUS_CURRENT]
@@ -36,7 +36,7 @@ def overload(p, s, i):  # type: ignore[no-untyped-def]
     s[layout.S_CURRENT_LIMIT] = lower if s[layout.S_OVERLOADED] > 0.0 else p[layout.CURRENT_LIMIT]
 
 
-@inlined
+@kernel
 def outer(p, s, io, th):  # type: ignore[no-untyped-def]
     """Update the outermost stage."""
     if p[layout.RARE_COMMAND] > 0.0:
@@ -49,7 +49,7 @@ def outer(p, s, io, th):  # type: ignore[no-untyped-def]
     put_outer(p, s, io, out, flags)
 
 
-@scalar
+@kernel
 def torque_path(p, s, e, limit):  # type: ignore[no-untyped-def]
     """Velocity controller with feed-forward: clamp with the anti-windup, filters, clamp again."""
     out, integral, hit = velocity_regulator(p, s, e, limit)
@@ -67,7 +67,7 @@ def torque_path(p, s, e, limit):  # type: ignore[no-untyped-def]
     return out
 
 
-@inlined
+@kernel
 def velocity(p, s, io, w, th):  # type: ignore[no-untyped-def]
     """Update the velocity stage."""
     measured = measured_speed(p, s, io, w, th) if p[layout.RARE_SPEED] > 0.0 else w
@@ -91,7 +91,7 @@ def velocity(p, s, io, w, th):  # type: ignore[no-untyped-def]
         put_voltage(p, s, io, out)
 
 
-@scalar
+@kernel
 def current_rare(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     """Current controller with feed-forward, another anti-windup or an overload limit; its output."""
     wanted = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
@@ -110,7 +110,7 @@ def current_rare(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     return out
 
 
-@inlined
+@kernel
 def current(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     """Update the current stage: every tick."""
     if p[layout.RARE_CURRENT] > 0.0:
@@ -124,7 +124,7 @@ def current(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     put_voltage(p, s, io, out)
 
 
-@woven
+@kernel
 def control(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     """One tick of the controller; leaves the voltage in the state."""
     if p[layout.OVERLOAD] > 0.0:
@@ -142,7 +142,7 @@ def control(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
         current(p, s, io, i, w, th)
 
 
-@entry
+@kernel
 def control_tick(p, s, io):  # type: ignore[no-untyped-def]
     """The controller alone, on what ``io[IN_CURRENT]`` and the next four inputs hold; returns the voltage."""
     if p[layout.SUPPLY] > 0.0:

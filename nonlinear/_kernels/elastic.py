@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 from nonlinear._kernels.elastic_energy import add_energies
 from nonlinear._kernels.elastic_modes import (
     change_mode,
@@ -33,7 +33,7 @@ FINITE = 1e15
 LARGEST = 1e300
 
 
-@scalar
+@kernel
 def elastic_motion(p, s, part, held, M, extra):  # type: ignore[no-untyped-def]
     """Advance the plant by one held segment; returns a status of ``layout``.
 
@@ -52,7 +52,7 @@ def elastic_motion(p, s, part, held, M, extra):  # type: ignore[no-untyped-def]
     return walk(p, s, whole)
 
 
-@scalar
+@kernel
 def put_torques(p, s):  # type: ignore[no-untyped-def]
     """Held torques on both sides in the present mode."""
     x = at.ES_INPUT
@@ -62,7 +62,7 @@ def put_torques(p, s):  # type: ignore[no-untyped-def]
     s[x + at.IN_LOAD] = s[x + at.IN_M] / p[at.EL_RATIO_BEHIND] + s[at.ES_LOAD_TORQUE]
 
 
-@scalar
+@kernel
 def speed_of_change(p, s):  # type: ignore[no-untyped-def]
     """Norm of x' in the units of energy; it bounds every derivative of a guard."""
     di, dw, dW, dd = elastic_slopes(p, s)
@@ -71,7 +71,7 @@ def speed_of_change(p, s):  # type: ignore[no-untyped-def]
     return math.sqrt(di * di + dw * dw + dW * dW + dd * dd)
 
 
-@scalar
+@kernel
 def stride(p, s, number):  # type: ignore[no-untyped-def]
     """Take one precomputed step if no guard can cross in it: 0, 1 the segments, 2 + j the step Ts/2^j."""
     m = int(s[at.ES_MODE])
@@ -105,7 +105,7 @@ def stride(p, s, number):  # type: ignore[no-untyped-def]
     return True
 
 
-@scalar
+@kernel
 def put_state(p, s, i, w, W, d, turned):  # type: ignore[no-untyped-def]
     """Write the state; the load's angle is what the motor's angle and the twist leave, or stays at rest."""
     s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST] = i, w, W, d
@@ -115,7 +115,7 @@ def put_state(p, s, i, w, W, d, turned):  # type: ignore[no-untyped-def]
     put_output(p, s)
 
 
-@scalar
+@kernel
 def walk(p, s, whole):  # type: ignore[no-untyped-def]
     """Advance with every event located."""
     levels, energy = int(p[at.EL_LEVELS]), p[layout.WITH_ENERGY] > 0.0
@@ -155,13 +155,13 @@ def walk(p, s, whole):  # type: ignore[no-untyped-def]
     return layout.OK
 
 
-@scalar
+@kernel
 def ends_rest(event):  # type: ignore[no-untyped-def]
     """Whether an event is a breakaway of either side."""
     return event == at.MOTOR_UP or event == at.MOTOR_DOWN or event == at.LOAD_UP or event == at.LOAD_DOWN
 
 
-@scalar
+@kernel
 def first_event(p, s, h):  # type: ignore[no-untyped-def]
     """Time and number of the first event of the interval whose series is filled; h and 0 if none."""
     best, event = h, at.NO_EVENT

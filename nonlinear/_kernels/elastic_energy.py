@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 from nonlinear._kernels.elastic_modes import contact_side, map_place
 from nonlinear._kernels.elastic_series import series_state
 
@@ -19,7 +19,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 NODES, WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
 
-@scalar
+@kernel
 def add_energies(p, s, h):  # type: ignore[no-untyped-def]
     """Add the energies over the first h of the interval whose series is filled."""
     for j in range(NODES.shape[0]):
@@ -27,7 +27,7 @@ def add_energies(p, s, h):  # type: ignore[no-untyped-def]
         add_powers(p, s, h * WEIGHTS[j], i, w, W, d)
 
 
-@scalar
+@kernel
 def add_powers(p, s, weight, i, w, W, d):  # type: ignore[no-untyped-def]
     """Add weight times the power of every line in one state."""
     e = layout.S_ENERGY
@@ -58,7 +58,7 @@ def add_powers(p, s, weight, i, w, W, d):  # type: ignore[no-untyped-def]
     s[e + layout.ENERGY_LOAD] -= weight * (outside * w + outside_load * W)
 
 
-@scalar
+@kernel
 def add_motor_friction(p, s, weight, w, torque):  # type: ignore[no-untyped-def]
     """Motor friction; a self-locking stage keeps what it does not hand on to the coupling."""
     e, direction, place = layout.S_ENERGY, s[layout.S_DIRECTION], map_place(p, s)

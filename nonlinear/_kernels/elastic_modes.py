@@ -8,20 +8,20 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 from nonlinear._kernels.elastic_series import rounding_of
 
 
-@scalar
+@kernel
 def contact_side(s):  # type: ignore[no-untyped-def]
     """1 or -1 while the coupling transmits torque on that side, else 0."""
     code = s[at.ES_CONTACT]
     return code if abs(code) == 1.0 else 0.0
 
 
-@scalar
+@kernel
 def spring_expression(p, s, side):  # type: ignore[no-untyped-def]
     """side T_s as if in contact: k (side delta - b) + side c delta'."""
     rate = s[layout.S_SPEED] / p[layout.RATIO_TO_COUPLING] - s[at.ES_LOAD_SPEED]
@@ -29,21 +29,21 @@ def spring_expression(p, s, side):  # type: ignore[no-untyped-def]
     return p[layout.STIFFNESS] * stretch + side * p[layout.COUPLING_DAMPING] * rate
 
 
-@scalar
+@kernel
 def coupling_torque(p, s):  # type: ignore[no-untyped-def]
     """T_s in this state, at the coupling's shaft."""
     side = contact_side(s)
     return side * spring_expression(p, s, side)
 
 
-@scalar
+@kernel
 def map_place(p, s):  # type: ignore[no-untyped-def]
     """Place of the segment of the friction map that holds."""
     side = 0 if s[layout.S_DIRECTION] >= 0.0 else at.MAP_SIDE
     return at.EL_MAP + side + int(s[at.ES_SEGMENT]) * at.MAP_SEGMENT
 
 
-@scalar
+@kernel
 def mode_number(p, s):  # type: ignore[no-untyped-def]
     """Number of the mode in the block of parameters."""
     motor = 0
@@ -57,7 +57,7 @@ def mode_number(p, s):  # type: ignore[no-untyped-def]
     return 6 * motor + 2 * contact + load
 
 
-@scalar
+@kernel
 def enter_mode(p, s):  # type: ignore[no-untyped-def]
     """Write what follows from the discrete state: place of the mode, constant torques, guards."""
     mode = at.EL_MODES + mode_number(p, s) * int(p[at.EL_MODE_SIZE])
@@ -80,7 +80,7 @@ def enter_mode(p, s):  # type: ignore[no-untyped-def]
         put_curvature(p, s, mode, at.ES_GUARD + j * at.GUARD_SIZE)
 
 
-@scalar
+@kernel
 def new_guard(s, event):  # type: ignore[no-untyped-def]
     """Append an empty guard; returns its place."""
     count = int(s[at.ES_GUARDS])
@@ -92,14 +92,14 @@ def new_guard(s, event):  # type: ignore[no-untyped-def]
     return g
 
 
-@scalar
+@kernel
 def twist_guard(p, s, sign, side, event):  # type: ignore[no-untyped-def]
     """sign (side delta - b) > 0."""
     g = new_guard(s, event)
     s[g + at.G_D], s[g + at.G_ONE] = sign * side, -sign * p[layout.HALF_PLAY]
 
 
-@scalar
+@kernel
 def spring_guard(p, s, sign, side, event):  # type: ignore[no-untyped-def]
     """sign (k (side delta - b) + side c delta') > 0."""
     g = new_guard(s, event)
@@ -108,7 +108,7 @@ def spring_guard(p, s, sign, side, event):  # type: ignore[no-untyped-def]
     s[g + at.G_D], s[g + at.G_ONE] = sign * side * k, -sign * k * p[layout.HALF_PLAY]
 
 
-@scalar
+@kernel
 def contact_guards(p, s):  # type: ignore[no-untyped-def]
     """Guards of contact, of the gap, and of the time between parting and the gap."""
     code = s[at.ES_CONTACT]
@@ -127,7 +127,7 @@ def contact_guards(p, s):  # type: ignore[no-untyped-def]
         spring_guard(p, s, 1.0, code, at.PART)
 
 
-@scalar
+@kernel
 def motor_guards(p, s):  # type: ignore[no-untyped-def]
     """Slip: the speed stays on its segment.  Rest: the drive torque stays within the breakaway level."""
     direction = s[layout.S_DIRECTION]
@@ -144,7 +144,7 @@ def motor_guards(p, s):  # type: ignore[no-untyped-def]
         s[g + at.G_W], s[g + at.G_ONE] = -direction, p[place + at.MAP_SEGMENT + at.MAP_SPEED]
 
 
-@scalar
+@kernel
 def motor_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
     """ratio (T0 + CM' |T_s|) - sign (kM i - offset - T_s/N_c + ...) > 0, with w = 0 in T_s."""
     g = new_guard(s, event)
@@ -165,7 +165,7 @@ def motor_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
     s[g + at.G_EXTRA] = -sign
 
 
-@scalar
+@kernel
 def load_guards(p, s):  # type: ignore[no-untyped-def]
     """Slip: W keeps its sign.  Rest: |T_s + M_ext/N_r - offset_l| within its breakaway level."""
     direction = s[at.ES_LOAD]
@@ -177,7 +177,7 @@ def load_guards(p, s):  # type: ignore[no-untyped-def]
     load_rest_guard(p, s, -1.0, at.LOAD_DOWN)
 
 
-@scalar
+@kernel
 def load_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
     """ratio_l C0_l - sign (T_s + M_ext/N_r - offset_l) > 0, with W = 0 in T_s."""
     g = new_guard(s, event)
@@ -189,7 +189,7 @@ def load_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
     s[g + at.G_M] = -sign / p[at.EL_RATIO_BEHIND]
 
 
-@scalar
+@kernel
 def put_curvature(p, s, mode, g):  # type: ignore[no-untyped-def]
     """Bound of |g''| over the norm of x': the norm of G A dual to that of the energy."""
     gi, gw, gv, gd = s[g + at.G_I], s[g + at.G_W], s[g + at.G_V], s[g + at.G_D]
@@ -208,7 +208,7 @@ def put_curvature(p, s, mode, g):  # type: ignore[no-untyped-def]
     s[g + at.G_CURVE] = math.sqrt(total)
 
 
-@scalar
+@kernel
 def guard_offset(s, g):  # type: ignore[no-untyped-def]
     """The part of a guard that does not depend on the state."""
     value = s[g + at.G_ONE]
@@ -218,14 +218,14 @@ def guard_offset(s, g):  # type: ignore[no-untyped-def]
     return value + s[g + at.G_EXTRA] * s[at.ES_INPUT + at.IN_EXTRA]
 
 
-@scalar
+@kernel
 def guard_state(s, g):  # type: ignore[no-untyped-def]
     """The part of a guard that is linear in (i, w, W, delta)."""
     value = s[g + at.G_I] * s[layout.S_CURRENT] + s[g + at.G_W] * s[layout.S_SPEED]
     return value + (s[g + at.G_V] * s[at.ES_LOAD_SPEED] + s[g + at.G_D] * s[at.ES_TWIST])
 
 
-@scalar
+@kernel
 def fails(p, s, event):  # type: ignore[no-untyped-def]
     """Whether the guard of an event is broken by more than the rounding of a short interval."""
     h = math.ldexp(p[layout.PERIOD], -int(p[at.EL_LEVELS]))
@@ -237,7 +237,7 @@ def fails(p, s, event):  # type: ignore[no-untyped-def]
     return False
 
 
-@scalar
+@kernel
 def elastic_slopes(p, s):  # type: ignore[no-untyped-def]
     """(i', w', W', delta') in the present mode under the inputs that were held last."""
     m = int(s[at.ES_MODE])
@@ -250,7 +250,7 @@ def elastic_slopes(p, s):  # type: ignore[no-untyped-def]
     return di, dw, dW, p[m + at.A_DW] * w + p[m + at.A_DV] * W
 
 
-@scalar
+@kernel
 def start_segment(p, s, direction):  # type: ignore[no-untyped-def]
     """The motor slips in a direction at its present speed: find the segment of its map."""
     s[layout.S_DIRECTION], s[at.ES_SEGMENT] = direction, 0.0
@@ -261,7 +261,7 @@ def start_segment(p, s, direction):  # type: ignore[no-untyped-def]
             s[at.ES_SEGMENT] = float(j)
 
 
-@scalar
+@kernel
 def elastic_start(p, s):  # type: ignore[no-untyped-def]
     """Set load side, twist and discrete state at t_0; the motor's own state stands in ``s``."""
     s[at.ES_TWIST], s[at.ES_LOAD_SPEED] = p[layout.TWIST_START], p[layout.LOAD_SPEED_START]
@@ -270,7 +270,7 @@ def elastic_start(p, s):  # type: ignore[no-untyped-def]
     find_mode(p, s)
 
 
-@scalar
+@kernel
 def find_mode(p, s):  # type: ignore[no-untyped-def]
     """The discrete state that belongs to speeds and twist: at t_0, and after a change of parameters."""
     w, W = s[layout.S_SPEED], s[at.ES_LOAD_SPEED]
@@ -281,7 +281,7 @@ def find_mode(p, s):  # type: ignore[no-untyped-def]
     enter_mode(p, s)
 
 
-@scalar
+@kernel
 def start_contact(p, s):  # type: ignore[no-untyped-def]
     """Contact as the state says."""
     s[at.ES_CONTACT] = at.GAP
@@ -294,7 +294,7 @@ def start_contact(p, s):  # type: ignore[no-untyped-def]
         s[at.ES_CONTACT] = -1.0 if spring_expression(p, s, -1.0) > 0.0 else -2.0
 
 
-@scalar
+@kernel
 def put_output(p, s):  # type: ignore[no-untyped-def]
     """Angle and speed of the output shaft; of a rigid drive, those of the motor."""
     if p[layout.RIGID] > 0.0:
@@ -305,7 +305,7 @@ def put_output(p, s):  # type: ignore[no-untyped-def]
     s[layout.S_OUTPUT_SPEED] = s[at.ES_LOAD_SPEED] / p[at.EL_RATIO_BEHIND]
 
 
-@scalar
+@kernel
 def change_contact(p, s, event):  # type: ignore[no-untyped-def]
     """The coupling meets, parts, or its torque changes sign."""
     code = s[at.ES_CONTACT]
@@ -323,7 +323,7 @@ def change_contact(p, s, event):  # type: ignore[no-untyped-def]
         s[at.ES_CONTACT] = 2.0 * side if waits else side
 
 
-@scalar
+@kernel
 def land_motor(p, s):  # type: ignore[no-untyped-def]
     """The motor's speed has come to zero: rest if the drive torque is within its level, else reversal."""
     direction = s[layout.S_DIRECTION]
@@ -333,7 +333,7 @@ def land_motor(p, s):  # type: ignore[no-untyped-def]
         s[layout.S_DIRECTION] = -direction
 
 
-@scalar
+@kernel
 def land_load(p, s):  # type: ignore[no-untyped-def]
     """The load's speed has come to zero: the same with its own level."""
     direction = s[at.ES_LOAD]
@@ -343,7 +343,7 @@ def land_load(p, s):  # type: ignore[no-untyped-def]
         s[at.ES_LOAD] = -direction
 
 
-@scalar
+@kernel
 def change_mode(p, s, event):  # type: ignore[no-untyped-def]
     """What an event does to the discrete state; only the speed that stops is set, to exactly 0."""
     if event <= at.INSIDE:

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import entry, scalar
 from nonlinear._kernels.elastic_steps import (
     double_step,
     growth_of,
@@ -27,7 +27,7 @@ SIDES = (0.0, 1.0, -1.0)  # gap, contact on either side
 LARGEST_POWER = 700.0  # of e in double precision
 
 
-@entry
+@kernel
 def prepare_elastic_sizes(p):  # type: ignore[no-untyped-def]
     """Shares of torque, friction segments, how often the period is halved, and the length of the row.
 
@@ -48,7 +48,7 @@ def prepare_elastic_sizes(p):  # type: ignore[no-untyped-def]
     p[layout.PARAMETER_SIZE] = float(at.EL_MODES + modes * size)
 
 
-@entry
+@kernel
 def prepare_elastic(p, s):  # type: ignore[no-untyped-def]
     """Fill the modes, after `prepare_elastic_sizes` and `prepare`; ``s`` lends its work space."""
     for number in range(mode_count(p)):
@@ -58,7 +58,7 @@ def prepare_elastic(p, s):  # type: ignore[no-untyped-def]
         put_steps(p, m, s, int(p[layout.AT_WORK]))
 
 
-@scalar
+@kernel
 def put_shares(p):  # type: ignore[no-untyped-def]
     """How torques pass the gears, and whether anything happens at zero speed of either side."""
     behind = p[layout.RATIO] / p[layout.RATIO_TO_COUPLING]
@@ -77,7 +77,7 @@ def put_shares(p):  # type: ignore[no-untyped-def]
     p[at.EL_LOAD_SMOOTH] = 1.0 if p[layout.LOAD_DRY] == 0.0 else 0.0
 
 
-@scalar
+@kernel
 def put_segments(p, side):  # type: ignore[no-untyped-def]
     """The motor's friction for w > 0 (side 0) or w < 0 as lines T = level + slope |w|: begins, level, slope.
 
@@ -98,13 +98,13 @@ def put_segments(p, side):  # type: ignore[no-untyped-def]
         place += at.MAP_SEGMENT
 
 
-@scalar
+@kernel
 def mode_count(p):  # type: ignore[no-untyped-def]
     """Number of modes: motor at rest or on a segment of either side, three contacts, load at rest or not."""
     return 6 * (1 + int(p[at.EL_SEGMENTS]) + int(p[at.EL_SEGMENTS_REVERSE]))
 
 
-@scalar
+@kernel
 def motor_of(p, motor):  # type: ignore[no-untyped-def]
     """Direction of the motor (0 at rest) and slope of its friction, by number: rest, forward, reverse."""
     forward = int(p[at.EL_SEGMENTS])
@@ -115,7 +115,7 @@ def motor_of(p, motor):  # type: ignore[no-untyped-def]
     return -1.0, p[at.EL_MAP + at.MAP_SIDE + (motor - 1 - forward) * at.MAP_SEGMENT + at.MAP_SLOPE]
 
 
-@scalar
+@kernel
 def put_mode(p, number, m):  # type: ignore[no-untyped-def]
     """Coefficients and weights of a mode at ``p[m]``, numbered as in `elastic_modes.mode_number`."""
     for j in range(at.MODE_CHORD):
@@ -136,7 +136,7 @@ def put_mode(p, number, m):  # type: ignore[no-untyped-def]
     put_weights(p, m)
 
 
-@scalar
+@kernel
 def put_electrical(p, m, direction):  # type: ignore[no-untyped-def]
     """The current of a motor that has one."""
     if p[layout.SOURCE] > 0.0:
@@ -148,7 +148,7 @@ def put_electrical(p, m, direction):  # type: ignore[no-untyped-def]
         p[m + at.A_WI] = p[layout.TORQUE_CONSTANT] / p[layout.MOTOR_INERTIA]
 
 
-@scalar
+@kernel
 def put_motor(p, m, slope, share, k, c):  # type: ignore[no-untyped-def]
     """The slipping motor under its friction and the coupling."""
     J = p[layout.MOTOR_INERTIA]
@@ -157,7 +157,7 @@ def put_motor(p, m, slope, share, k, c):  # type: ignore[no-untyped-def]
     p[m + at.A_WD] = -share * k / J
 
 
-@scalar
+@kernel
 def put_load_side(p, m, motor_slips, load_slips, share, k, c):  # type: ignore[no-untyped-def]
     """Twist and load speed."""
     N_c, J = p[layout.RATIO_TO_COUPLING], p[layout.LOAD_INERTIA]
@@ -171,7 +171,7 @@ def put_load_side(p, m, motor_slips, load_slips, share, k, c):  # type: ignore[n
         p[m + at.A_WV], p[m + at.A_VW] = share * c / p[layout.MOTOR_INERTIA], c / (N_c * J)
 
 
-@scalar
+@kernel
 def put_weights(p, m):  # type: ignore[no-untyped-def]
     """Square roots of L, J_m, J_l, k: in these units a passive plant does not grow.
 
@@ -185,7 +185,7 @@ def put_weights(p, m):  # type: ignore[no-untyped-def]
     p[weight + 3] = 0.0 if free else math.sqrt(p[layout.STIFFNESS])
 
 
-@scalar
+@kernel
 def terms_of(product):  # type: ignore[no-untyped-def]
     """Terms of the Taylor series over an interval on which the norm of A h is ``product``."""
     terms, rest = 1, product
@@ -195,7 +195,7 @@ def terms_of(product):  # type: ignore[no-untyped-def]
     return max(terms, 4)
 
 
-@scalar
+@kernel
 def put_bounds(p, m, growth):  # type: ignore[no-untyped-def]
     """Growth of the energy's norm over the shortest interval, and the chord bounds h^2/8 exp(growth h)."""
     levels = int(p[at.EL_LEVELS])
@@ -206,7 +206,7 @@ def put_bounds(p, m, growth):  # type: ignore[no-untyped-def]
         p[m + at.MODE_CHORD + j] = h * h / 8.0 * math.exp(min(growth * h, LARGEST_POWER))
 
 
-@scalar
+@kernel
 def put_steps(p, m, s, work):  # type: ignore[no-untyped-def]
     """Transitions over both held segments, and over Ts/2^j from the shortest up."""
     levels = int(p[at.EL_LEVELS])

@@ -7,16 +7,16 @@ two crossings that cancel cannot be missed.
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 
 NEVER = -1.0  # no fall
 AT_ONCE = -2.0  # the guard does not hold at the start, nor does it become positive
 ROUNDING = 2e-15
 
 
-@scalar
+@kernel
 def fill_series(p, s):  # type: ignore[no-untyped-def]
     """Taylor coefficients of (i, w, W, delta) from the present state under the held inputs."""
     m = int(s[at.ES_MODE])
@@ -43,7 +43,7 @@ def fill_series(p, s):  # type: ignore[no-untyped-def]
     s[x], s[x + 1], s[x + 2], s[x + 3] = i, w, W, d
 
 
-@scalar
+@kernel
 def series_state(p, s, t):  # type: ignore[no-untyped-def]
     """(i, w, W, delta) at t, and the angle that the motor has turned."""
     n = int(p[at.EL_TERMS])
@@ -60,7 +60,7 @@ def series_state(p, s, t):  # type: ignore[no-untyped-def]
     return i, w, W, d, turned * t
 
 
-@scalar
+@kernel
 def fill_polynomial(p, s, g, offset, h):  # type: ignore[no-untyped-def]
     """Coefficients of a guard over [0, h]; returns the rounding that its value may carry there."""
     for k in range(int(p[at.EL_TERMS]) + 1):
@@ -71,7 +71,7 @@ def fill_polynomial(p, s, g, offset, h):  # type: ignore[no-untyped-def]
     return rounding_of(p, s, g, offset, h)
 
 
-@scalar
+@kernel
 def rounding_of(p, s, g, offset, h):  # type: ignore[no-untyped-def]
     """Rounding of a guard over [0, h]: of its terms, and of the terms of its first derivative."""
     m, x = int(s[at.ES_MODE]), at.ES_INPUT
@@ -92,7 +92,7 @@ def rounding_of(p, s, g, offset, h):  # type: ignore[no-untyped-def]
     return ROUNDING * (now + h * (gi * di + gw * dw + gv * dW + gd * dd))
 
 
-@scalar
+@kernel
 def value_at(s, n, t):  # type: ignore[no-untyped-def]
     """The guard's polynomial of degree n."""
     value = s[at.ES_POLYNOMIAL + n]
@@ -101,7 +101,7 @@ def value_at(s, n, t):  # type: ignore[no-untyped-def]
     return value
 
 
-@scalar
+@kernel
 def slope_at(s, n, t):  # type: ignore[no-untyped-def]
     """Its derivative."""
     value = n * s[at.ES_POLYNOMIAL + n]
@@ -110,7 +110,7 @@ def slope_at(s, n, t):  # type: ignore[no-untyped-def]
     return value
 
 
-@scalar
+@kernel
 def curvature_bound(s, n, h):  # type: ignore[no-untyped-def]
     """Bound of the second derivative over [0, h]."""
     total = 0.0
@@ -120,7 +120,7 @@ def curvature_bound(s, n, h):  # type: ignore[no-untyped-def]
     return total
 
 
-@scalar
+@kernel
 def shift(s, n, x):  # type: ignore[no-untyped-def]
     """Move the origin of the polynomial to x."""
     for i in range(n):
@@ -129,7 +129,7 @@ def shift(s, n, x):  # type: ignore[no-untyped-def]
             s[k] += x * s[k + 1]
 
 
-@scalar
+@kernel
 def first_fall(s, n, h, tolerance):  # type: ignore[no-untyped-def]
     """First time in [0, h] at which the polynomial comes down to zero; it is used up.
 
@@ -161,7 +161,7 @@ def first_fall(s, n, h, tolerance):  # type: ignore[no-untyped-def]
     return NEVER
 
 
-@scalar
+@kernel
 def refine_fall(s, n, end):  # type: ignore[no-untyped-def]
     """Root in [0, end], where the polynomial falls through zero once: Newton inside bisection."""
     low, high = 0.0, end

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
-from nonlinear._kernels.compiled import scalar
 
 TERMS = 20  # of the Taylor series at norm 1/2: 0.5**20/20! = 4e-25
 SWEEPS = 12  # of Jacobi's method; it converges quadratically, in five or six
@@ -24,7 +24,7 @@ ROWS = (0, 0, 1, 1, 1, 1, 2, 2, 2, 3, 3)
 COLUMNS = (0, 1, 0, 1, 2, 3, 1, 2, 3, 1, 2)
 
 
-@scalar
+@kernel
 def put_first_order(p, m, h, s, a):  # type: ignore[no-untyped-def]
     """h times the matrix of the mode at ``m``, written at ``s[a]``."""
     for j in range(at.STEP_SIZE):
@@ -37,7 +37,7 @@ def put_first_order(p, m, h, s, a):  # type: ignore[no-untyped-def]
     s[a + 4 * at.STEP_COLUMNS + 1] = h
 
 
-@scalar
+@kernel
 def multiply(s, a, b, out):  # type: ignore[no-untyped-def]
     """The five rows at ``a`` times the four rows of the states at ``b``, without the inputs of ``a``."""
     for r in range(5):
@@ -48,7 +48,7 @@ def multiply(s, a, b, out):  # type: ignore[no-untyped-def]
             s[out + r * at.STEP_COLUMNS + c] = total
 
 
-@scalar
+@kernel
 def put_short_step(p, m, h, s, d):  # type: ignore[no-untyped-def]
     """D over an h that is short against the mode, by its Taylor series; three places behind are used."""
     term, first, product = d + at.STEP_SIZE, d + 2 * at.STEP_SIZE, d + 3 * at.STEP_SIZE
@@ -63,7 +63,7 @@ def put_short_step(p, m, h, s, d):  # type: ignore[no-untyped-def]
             s[d + j] += s[term + j]
 
 
-@scalar
+@kernel
 def double_step(s, d):  # type: ignore[no-untyped-def]
     """D over twice the time."""
     product = d + 3 * at.STEP_SIZE
@@ -72,7 +72,7 @@ def double_step(s, d):  # type: ignore[no-untyped-def]
         s[d + j] = 2.0 * s[d + j] + s[product + j]
 
 
-@scalar
+@kernel
 def keep_step(p, o, s, d):  # type: ignore[no-untyped-def]
     """Write the transition I + D at ``p[o]``."""
     for j in range(at.STEP_SIZE):
@@ -81,14 +81,14 @@ def keep_step(p, o, s, d):  # type: ignore[no-untyped-def]
         p[o + r * (at.STEP_COLUMNS + 1)] += 1.0
 
 
-@scalar
+@kernel
 def scaled_coefficient(p, m, j):  # type: ignore[no-untyped-def]
     """Coefficient ``j`` of the matrix in the units of the energy; 0 where one side weighs nothing."""
     weight = p[m + at.MODE_WEIGHT + COLUMNS[j]]
     return p[m + at.MODE_WEIGHT + ROWS[j]] * p[m + j] / weight if weight > 0.0 else 0.0
 
 
-@scalar
+@kernel
 def norm_of(p, m):  # type: ignore[no-untyped-def]
     """Frobenius norm of the mode's matrix in the units of the energy."""
     total = 0.0
@@ -98,7 +98,7 @@ def norm_of(p, m):  # type: ignore[no-untyped-def]
     return math.sqrt(total)
 
 
-@scalar
+@kernel
 def growth_of(p, m, s, a):  # type: ignore[no-untyped-def]
     """Logarithmic norm of the mode: the largest eigenvalue of the symmetric part, 0 where negative."""
     for j in range(16):
@@ -122,7 +122,7 @@ def growth_of(p, m, s, a):  # type: ignore[no-untyped-def]
     return largest
 
 
-@scalar
+@kernel
 def rotate(s, a, r, c):  # type: ignore[no-untyped-def]
     """One rotation of Jacobi's method: makes the elements (r, c) and (c, r) of the matrix at ``a`` zero."""
     beside = s[a + 4 * r + c]

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import entry, scalar
 from nonlinear._kernels.modal import slip_at
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
@@ -19,7 +19,7 @@ NODES, WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 LEDGER = layout.S_ENERGY
 
 
-@scalar
+@kernel
 def pieces_of(p, at, t):  # type: ignore[no-untyped-def]
     """Into how many pieces a time is cut so that each is short against every eigenvalue."""
     coupling = math.sqrt(abs(p[at + layout.M12] * p[at + layout.M21]))
@@ -27,7 +27,7 @@ def pieces_of(p, at, t):  # type: ignore[no-untyped-def]
     return int(min(1.0 + rate * t, 1e4))
 
 
-@scalar
+@kernel
 def add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww):  # type: ignore[no-untyped-def]
     """Add to the ledger what the integrals of i, i^2, i w and w^2 over a slip of ``angle`` mean."""
     Cv = p[layout.VISCOUS_REVERSE] if reverse > 0 else p[layout.VISCOUS]
@@ -43,7 +43,7 @@ def add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww):  # 
     s[LEDGER + layout.ENERGY_LOAD] -= (Tb + p[layout.OFFSET]) * angle
 
 
-@scalar
+@kernel
 def energy_slip(p, s, at, reverse, t, i, w, u, T, Tb):  # type: ignore[no-untyped-def]
     """Add the energies of slipping for t from (i, w)."""
     pieces = pieces_of(p, at, t)
@@ -63,7 +63,7 @@ def energy_slip(p, s, at, reverse, t, i, w, u, T, Tb):  # type: ignore[no-untype
     add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
 
 
-@entry
+@kernel
 def prepare_forms(p, s):  # type: ignore[no-untyped-def]
     """Write the integrals over each whole segment as forms of (i, w, u, T), by the same quadrature."""
     for which in range(4):
@@ -80,7 +80,7 @@ def prepare_forms(p, s):  # type: ignore[no-untyped-def]
                 add_node(p, s, at, side, (piece + NODES[j]) * h, h * WEIGHTS[j], form)
 
 
-@scalar
+@kernel
 def add_node(p, s, at, side, t, weight, form):  # type: ignore[no-untyped-def]
     """Add one node of the quadrature to the forms: responses of i and w at t to each of (i, w, u, T)."""
     work = int(p[layout.AT_WORK]) + layout.WORK_MORE
@@ -104,7 +104,7 @@ def add_node(p, s, at, side, t, weight, form):  # type: ignore[no-untyped-def]
             place += 1
 
 
-@scalar
+@kernel
 def quadratic(p, at, a, b, c, d):  # type: ignore[no-untyped-def]
     """A quadratic form of four numbers from its ten coefficients."""
     return (
@@ -115,7 +115,7 @@ def quadratic(p, at, a, b, c, d):  # type: ignore[no-untyped-def]
     )
 
 
-@scalar
+@kernel
 def energy_whole(p, s, which, i, w, u, T, Tb):  # type: ignore[no-untyped-def]
     """Add the energies of slipping over a whole segment; ``which`` is 2 for the reverse direction + part."""
     form, at = layout.FORMS + which * layout.FORM, layout.SLIP + which * layout.TRANSITION
@@ -127,7 +127,7 @@ def energy_whole(p, s, which, i, w, u, T, Tb):  # type: ignore[no-untyped-def]
     add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
 
 
-@scalar
+@kernel
 def energy_stick(p, s, t, i, u):  # type: ignore[no-untyped-def]
     """Add the energies of a locked rotor over t: i = i1 + (i0 - i1) exp(-R t/L)."""
     if p[layout.SOURCE] > 0.0 or t <= 0.0:

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
 from nonlinear._kernels.filters import chain
 
 IDEAL, DIFFERENCE, TRACKING = range(3)
 
 
-@inlined
+@kernel
 def counted(value, scale):  # type: ignore[no-untyped-def]
     """Angle as counted: the count below (floor), or the angle itself without an encoder grid."""
     return float(math.floor(value * scale)) / scale if scale > 0.0 else value
 
 
-@scalar
+@kernel
 def difference(p, s, angle):  # type: ignore[no-untyped-def]
     """Difference over the last m samples; the angles lie in the state, oldest first."""
     m, at = int(p[layout.DIFFERENCE_SAMPLES]), int(p[layout.AT_ANGLES])
@@ -28,7 +28,7 @@ def difference(p, s, angle):  # type: ignore[no-untyped-def]
     return speed
 
 
-@scalar
+@kernel
 def tracking(p, s, angle):  # type: ignore[no-untyped-def]
     """Tracking loop: p = th^ + T w^, r = th - p, th^ = p + 2 w0 T r, w^ += w0^2 T r."""
     speed = s[layout.S_TRACKED_SPEED]
@@ -40,7 +40,7 @@ def tracking(p, s, angle):  # type: ignore[no-untyped-def]
     return speed
 
 
-@scalar
+@kernel
 def measured_speed(p, s, io, w, th):  # type: ignore[no-untyped-def]
     """Speed by the encoder's method, then its first-order filter, then the speed filters."""
     x, angle, source = w, th, int(p[layout.SPEED_SOURCE])

@@ -5,14 +5,14 @@ Matrices lie in a row of work space from a place ``at`` on, row by row: four of 
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 
 MATRIX = 49
 TERMS = 19  # Taylor terms at norm 1/2: 0.5**19/19! = 1.6e-23
 
 
-@scalar
+@kernel
 def matmul(work, a, b, out, n):  # type: ignore[no-untyped-def]
     """Product of the n by n matrices at ``a`` and ``b``, written at ``out``."""
     for r in range(n):
@@ -23,7 +23,7 @@ def matmul(work, a, b, out, n):  # type: ignore[no-untyped-def]
             work[out + r * n + c] = total
 
 
-@scalar
+@kernel
 def halvings_of(work, at, n):  # type: ignore[no-untyped-def]
     """How often a matrix is halved until its norm is at most 1/2."""
     norm = 0.0
@@ -39,7 +39,7 @@ def halvings_of(work, at, n):  # type: ignore[no-untyped-def]
     return halvings, scale
 
 
-@scalar
+@kernel
 def exponential(work, at, n):  # type: ignore[no-untyped-def]
     """exp of the n by n matrix at ``at``, which is scaled, at ``at + MATRIX``: Taylor series and squaring."""
     result, term, product = at + MATRIX, at + 2 * MATRIX, at + 3 * MATRIX
@@ -63,7 +63,7 @@ def exponential(work, at, n):  # type: ignore[no-untyped-def]
             work[result + m] = work[product + m]
 
 
-@scalar
+@kernel
 def plant(p, reverse, dt, work, at, n):  # type: ignore[no-untyped-def]
     """Write dt times the slipping plant at ``at``, n by n: states (i, w, th, u, T, ...), inputs held."""
     for j in range(n * n):
@@ -83,7 +83,7 @@ def plant(p, reverse, dt, work, at, n):  # type: ignore[no-untyped-def]
     work[at + 2 * n + 1] = dt
 
 
-@scalar
+@kernel
 def transition(p, reverse, dt, work, at, out):  # type: ignore[no-untyped-def]
     """Write the twelve coefficients of the slipping plant over dt at ``p[out]``."""
     plant(p, reverse, dt, work, at, layout.SLIP_ORDER)

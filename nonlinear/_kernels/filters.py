@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 
 
-@scalar
+@kernel
 def chain(p, at, count, s, to, x):  # type: ignore[no-untyped-def]
     """Pass x through ``count`` sections (direct form II transposed).
 
@@ -21,7 +21,7 @@ def chain(p, at, count, s, to, x):  # type: ignore[no-untyped-def]
     return x
 
 
-@scalar
+@kernel
 def settle(p, at, count, s, to, x):  # type: ignore[no-untyped-def]
     """Set the states of a chain to those of a constant input x; returns its output."""
     for n in range(count):

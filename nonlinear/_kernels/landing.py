@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 from nonlinear._kernels.modal import COMPLEX, derivative, first_extremum, slip_at
 
 NONE_IN_SEGMENT = -1.0
@@ -13,7 +13,7 @@ NEVER_LEFT = -2.0
 ITERATIONS = 200
 
 
-@scalar
+@kernel
 def first_landing(p, s, at, reverse, d, i, w, th, u, T, dt):  # type: ignore[no-untyped-def]
     """First time in (0, dt] at which s w falls to zero.
 
@@ -37,7 +37,7 @@ def first_landing(p, s, at, reverse, d, i, w, th, u, T, dt):  # type: ignore[no-
         end = min(first_extremum(p, at, i, w, u, T, begin + gap), dt)
 
 
-@scalar
+@kernel
 def refine(p, s, at, reverse, d, i, w, th, u, T, begin, end):  # type: ignore[no-untyped-def]
     """Root of w in a bracket where s w falls through zero once: Newton inside bisection."""
     low, high = begin, end

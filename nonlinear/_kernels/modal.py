@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 from nonlinear._kernels.expm import MATRIX, exponential, plant
 
 REAL, COMPLEX, SINGLE = range(3)
 NEARLY_DOUBLE = 1e-3  # |s/m| below which the eigenvalues count as nearly double
 
 
-@scalar
+@kernel
 def describe(p, reverse, at):  # type: ignore[no-untyped-def]
     """Write kind, mean and half difference of the eigenvalues and A at ``p[at]``."""
     J, L = p[layout.INERTIA], p[layout.INDUCTANCE]
@@ -37,7 +37,7 @@ def describe(p, reverse, at):  # type: ignore[no-untyped-def]
     p[at + layout.M21], p[at + layout.M22] = a21, a22
 
 
-@scalar
+@kernel
 def phi12(x):  # type: ignore[no-untyped-def]
     """(exp(x) - 1)/x and (exp(x) - 1 - x)/x^2."""
     if abs(x) < 0.5:
@@ -50,7 +50,7 @@ def phi12(x):  # type: ignore[no-untyped-def]
     return first, (first - 1.0) / x
 
 
-@scalar
+@kernel
 def phi12_complex(x, y):  # type: ignore[no-untyped-def]
     """The same for z = x + j y; returns the two real and imaginary parts."""
     size = x * x + y * y
@@ -70,7 +70,7 @@ def phi12_complex(x, y):  # type: ignore[no-untyped-def]
     return first_re, first_im, (re * x + im * y) / size, (im * x - re * y) / size
 
 
-@scalar
+@kernel
 def integrals(kind, m, s, t):  # type: ignore[no-untyped-def]
     """a(t), b(t) and their integrals (real distinct or complex eigenvalues m +- s, m +- j s)."""
     if kind == REAL:
@@ -82,7 +82,7 @@ def integrals(kind, m, s, t):  # type: ignore[no-untyped-def]
     return t * er, t * ei / s, t * t * fr, t * t * fi / s
 
 
-@scalar
+@kernel
 def slip_close(p, s, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
     """The same for nearly double eigenvalues."""
     at = int(p[layout.AT_WORK])
@@ -96,7 +96,7 @@ def slip_close(p, s, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def
     )
 
 
-@scalar
+@kernel
 def slip_at(p, s, at, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
     """State (i, w, th) after slipping for t under held u and torque T (dry friction included in T)."""
     kind = int(p[at + layout.KIND])
@@ -115,7 +115,7 @@ def slip_at(p, s, at, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-de
     return i + a * di + b * qi, w + a * dw + b * qw, th + w * t + a2 * dw + b2 * qw
 
 
-@scalar
+@kernel
 def derivative(p, at, i, w, u, T):  # type: ignore[no-untyped-def]
     """(i', w') while slipping."""
     if int(p[at + layout.KIND]) == SINGLE:
@@ -125,7 +125,7 @@ def derivative(p, at, i, w, u, T):  # type: ignore[no-untyped-def]
     return di, dw
 
 
-@scalar
+@kernel
 def first_extremum(p, at, i, w, u, T, after):  # type: ignore[no-untyped-def]
     """First time later than ``after`` at which w' = 0; inf if there is none."""
     kind = int(p[at + layout.KIND])

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel, seldom
 from nonlinear._kernels import elastic_layout, layout
-from nonlinear._kernels.compiled import inlined, scalar, woven
 from nonlinear._kernels.elastic import elastic_motion
 from nonlinear._kernels.energy import energy_stick, energy_whole
 from nonlinear._kernels.segment import segment, slip_step
@@ -15,13 +15,13 @@ from nonlinear._kernels.smooth import tanh_segment
 FINITE = 1e15
 
 
-@inlined
+@kernel
 def wave_angle(p, at, angle):  # type: ignore[no-untyped-def]
     """Order times angle plus phase, of the wave whose order and phase stand at ``p[at]``."""
     return p[at] * angle + p[at + 1]
 
 
-@scalar
+@kernel
 def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
     """M_ext of this tick: constant, series, slope, damping, and what bends with the angle."""
     y = output_angle(p, s)
@@ -37,7 +37,7 @@ def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
     return M
 
 
-@scalar
+@kernel
 def shaft_torque(p, s, io):  # type: ignore[no-untyped-def]
     """Extra torque at the motor shaft: from outside, and the motor's own over its angle."""
     th, T = s[layout.S_ANGLE], io[layout.IN_TORQUE]
@@ -49,7 +49,7 @@ def shaft_torque(p, s, io):  # type: ignore[no-untyped-def]
     return T
 
 
-@scalar
+@kernel
 def put_load(p, s, moment, torque):  # type: ignore[no-untyped-def]
     """Note dry friction and torque at the motor under a hinge moment and an extra torque."""
     dry = p[layout.LOAD_COEFFICIENT] * abs(moment)
@@ -58,7 +58,7 @@ def put_load(p, s, moment, torque):  # type: ignore[no-untyped-def]
     s[layout.S_TORQUE] = p[layout.BACK_DRIVABLE] / p[layout.RATIO] * moment - p[layout.OFFSET] + torque
 
 
-@inlined
+@kernel
 def quick_slip(p, s, part, u, d):  # type: ignore[no-untyped-def]
     """Slip over a segment by its precomputed transition; 0 where the speed might cross zero within."""
     i, w = s[layout.S_CURRENT], s[layout.S_SPEED]
@@ -79,7 +79,7 @@ def quick_slip(p, s, part, u, d):  # type: ignore[no-untyped-def]
     return 1
 
 
-@inlined
+@kernel
 def quick_stick(p, s, part, u):  # type: ignore[no-untyped-def]
     """Rest over a whole segment; 0 where the rotor might break away within."""
     i, Tb = s[layout.S_CURRENT], s[layout.S_TORQUE]
@@ -96,7 +96,7 @@ def quick_stick(p, s, part, u):  # type: ignore[no-untyped-def]
     return 0
 
 
-@inlined
+@kernel
 def quick(p, s, part, u):  # type: ignore[no-untyped-def]
     """The short way over a segment in which nothing happens; 0 where it has to be looked at."""
     if p[layout.LOOK] > 0.0:
@@ -107,22 +107,21 @@ def quick(p, s, part, u):  # type: ignore[no-untyped-def]
     return quick_stick(p, s, part, u)
 
 
-@scalar
-def closely(p, s, part, u, events, rare):  # type: ignore[no-untyped-def]
-    """One segment by the general way; the number of events in this tick so far, -1 where there are too many.
-
-    With ``None`` for ``rare``, what a rigid drive with dry friction does not need is not even compiled.
-    """
-    if rare is not None and p[layout.ELASTIC_DRIVE] > 0.0:
+@seldom
+@kernel
+def closely(p, s, part, u, events):  # type: ignore[no-untyped-def]
+    """One segment by the general way; the events of this tick so far, -1 where there are too many."""
+    if p[layout.ELASTIC_DRIVE] > 0.0:
         status = elastic_motion(p, s, part, u, s[layout.S_LOAD], s[layout.S_EXTRA])
         return events + s[elastic_layout.ES_HAPPENED] if status == layout.OK else -1.0
-    if rare is not None and p[layout.LAW] > 0.0:
+    if p[layout.LAW] > 0.0:
         tanh_segment(p, s, part, u)
         return events
     return segment(p, s, part, u, events)
 
 
-@scalar
+@seldom
+@kernel
 def count_events(s, events):  # type: ignore[no-untyped-def]
     """Add the events of a tick; -1 marks a failed one."""
     if events < 0.0:
@@ -132,7 +131,7 @@ def count_events(s, events):  # type: ignore[no-untyped-def]
     s[layout.S_MAX_EVENTS] = max(s[layout.S_MAX_EVENTS], events)
 
 
-@woven
+@kernel
 def hold(p, s, io):  # type: ignore[no-untyped-def]
     """What acts on the plant over the tick that begins: the delay line and the load."""
     # the delay line holds u_k and the q + 1 before it, oldest first
@@ -145,14 +144,14 @@ def hold(p, s, io):  # type: ignore[no-untyped-def]
         put_load(p, s, io[layout.IO_MOMENT], shaft_torque(p, s, io))
 
 
-@woven
-def motion(p, s, io, rare):  # type: ignore[no-untyped-def]
+@kernel
+def motion(p, s, io):  # type: ignore[no-untyped-def]
     """Advance the plant by one tick."""
     hold(p, s, io)
     events = 0.0
     for part in range(0 if p[layout.SPLIT] > 0.0 else 1, 2):
         if events >= 0.0 and quick(p, s, part, s[layout.S_QUEUE + part]) == 0:
-            events = closely(p, s, part, s[layout.S_QUEUE + part], events, rare)
+            events = closely(p, s, part, s[layout.S_QUEUE + part], events)
     s[layout.S_HELD] = s[layout.S_QUEUE + 1]
     if events != 0.0:
         count_events(s, events)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.command import shape
-from nonlinear._kernels.compiled import inlined, scalar
 from nonlinear._kernels.estimate import counted
 from nonlinear._kernels.probes import PROBE_I, PROBE_U, PROBE_W, PROBE_Y, probe
 from nonlinear._kernels.regulator import clamp
@@ -13,7 +13,7 @@ CURRENT_RATE, FLAG_CURRENT_RATE = layout.LIMIT["current-rate"], float(layout.FLA
 STANDING = 1e-13  # change of the reference, relative, below which it stands still but for rounding
 
 
-@inlined
+@kernel
 def sloped(p, s, v, T):  # type: ignore[no-untyped-def]
     """What the slope limit leaves of a current command that is updated every T, and its flag."""
     change = v - s[layout.S_CURRENT_BEFORE]
@@ -23,7 +23,7 @@ def sloped(p, s, v, T):  # type: ignore[no-untyped-def]
     return s[layout.S_CURRENT_BEFORE] + allowed, FLAG_CURRENT_RATE
 
 
-@inlined
+@kernel
 def limited(p, s, v):  # type: ignore[no-untyped-def]
     """What the limits of the next stage leave of v, and their flags; nothing is stored."""
     if p[layout.HAS_VELOCITY] > 0.0:
@@ -42,7 +42,7 @@ def limited(p, s, v):  # type: ignore[no-untyped-def]
     return out, 0.0 if out == v else float(layout.FLAG_VOLTAGE)
 
 
-@inlined
+@kernel
 def put_voltage(p, s, io, v):  # type: ignore[no-untyped-def]
     """Make v the voltage of this tick, through its probe."""
     s[layout.S_VOLTAGE_BEFORE] = s[layout.S_VOLTAGE] = v
@@ -51,7 +51,7 @@ def put_voltage(p, s, io, v):  # type: ignore[no-untyped-def]
         s[layout.S_VOLTAGE] = clamp(after, s[layout.S_VOLTAGE_LIMIT])
 
 
-@inlined
+@kernel
 def put_current(p, s, io, v):  # type: ignore[no-untyped-def]
     """Make v the current command, through its probe."""
     s[layout.S_CURRENT_BEFORE] = s[layout.S_CURRENT_REFERENCE] = v
@@ -60,7 +60,7 @@ def put_current(p, s, io, v):  # type: ignore[no-untyped-def]
         s[layout.S_CURRENT_REFERENCE] = clamp(after, s[layout.S_CURRENT_LIMIT])
 
 
-@inlined
+@kernel
 def put_outer(p, s, io, out, flags):  # type: ignore[no-untyped-def]
     """Hand the outermost stage's output to the stage that it drives."""
     s[layout.S_FLAGS_OUTER] = flags
@@ -75,7 +75,7 @@ def put_outer(p, s, io, out, flags):  # type: ignore[no-untyped-def]
         put_voltage(p, s, io, out)
 
 
-@scalar
+@kernel
 def probed_output(p, s, io, y):  # type: ignore[no-untyped-def]
     """The output angle behind its probe."""
     s[layout.S_OUTPUT_BEFORE] = y
@@ -83,7 +83,7 @@ def probed_output(p, s, io, y):  # type: ignore[no-untyped-def]
     return s[layout.S_OUTPUT_AFTER]
 
 
-@scalar
+@kernel
 def position_feedback(p, s, io, th):  # type: ignore[no-untyped-def]
     """The angle that the position loop sees, as an angle of the motor."""
     N = p[layout.RATIO]
@@ -94,7 +94,7 @@ def position_feedback(p, s, io, th):  # type: ignore[no-untyped-def]
     return N * probed_output(p, s, io, angle / N) if p[PROBE_Y] > 0.0 else angle
 
 
-@scalar
+@kernel
 def feedforward(p, s, reference):  # type: ignore[no-untyped-def]
     """Note the reference (motor side); returns k_ff dr/dt and renews the torque feed-forward."""
     last, before = s[layout.S_REFERENCE], s[layout.S_REFERENCE_BEFORE]
@@ -110,7 +110,7 @@ def feedforward(p, s, reference):  # type: ignore[no-untyped-def]
     return p[layout.FEEDFORWARD] * change / p[layout.POSITION_PERIOD]
 
 
-@scalar
+@kernel
 def position_law(p, s, io, reference, th):  # type: ignore[no-untyped-def]
     """P, PI or PID of position with feed-forward; returns the output behind the limits, and flags."""
     e = reference - position_feedback(p, s, io, th)
@@ -132,7 +132,7 @@ def position_law(p, s, io, reference, th):  # type: ignore[no-untyped-def]
     return kept, flags
 
 
-@scalar
+@kernel
 def outer_rare(p, s, io, th):  # type: ignore[no-untyped-def]
     """Update the outermost stage, whichever it is."""
     r = shape(p, s, io[layout.IN_COMMAND])

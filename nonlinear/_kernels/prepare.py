@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import entry, scalar
 from nonlinear._kernels.expm import transition
 from nonlinear._kernels.modal import COMPLEX, describe
 
 
-@entry
+@kernel
 def prepare_run_sizes(p):  # type: ignore[no-untyped-def]
     """Places of the parts of the state whose lengths differ from drive to drive, and both rows' lengths.
 
@@ -37,7 +37,7 @@ def prepare_run_sizes(p):  # type: ignore[no-untyped-def]
     p[layout.STATE_SIZE] = p[layout.AT_WORK] + layout.WORK_SIZE
 
 
-@scalar
+@kernel
 def prepare_periods(p):  # type: ignore[no-untyped-def]
     """Who is outermost, how often it is updated, and what that means for limits and rates."""
     every = 1.0
@@ -51,7 +51,7 @@ def prepare_periods(p):  # type: ignore[no-untyped-def]
     p[layout.SPEED_STEP] = p[layout.ACCELERATION_LIMIT] * p[layout.POSITION_PERIOD]
 
 
-@scalar
+@kernel
 def any_of(p, first, behind):  # type: ignore[no-untyped-def]
     """1 where one of the numbers from ``first`` up to ``behind`` is not zero."""
     found = 0.0
@@ -61,7 +61,7 @@ def any_of(p, first, behind):  # type: ignore[no-untyped-def]
     return found
 
 
-@scalar
+@kernel
 def prepare_gates(p):  # type: ignore[no-untyped-def]
     """One number a stage that says whether it needs more than its short form."""
     more = max(any_of(p, layout.OUTPUT_SENSOR, layout.PROFILED), p[layout.PROFILED])
@@ -85,7 +85,7 @@ def prepare_gates(p):  # type: ignore[no-untyped-def]
     p[layout.RARE_LOAD] = any_of(p, layout.LOAD_SLOPE, layout.SUPPLY_TABLE)
 
 
-@scalar
+@kernel
 def prepare_plant(p, work):  # type: ignore[no-untyped-def]
     """Transitions over both segments and both directions, eigenvalues, decay of a locked current."""
     Ts, f = p[layout.PERIOD], p[layout.DELAY_FRACTION]
@@ -111,7 +111,7 @@ def prepare_plant(p, work):  # type: ignore[no-untyped-def]
     p[layout.LOOK] = max(ringing, max(p[layout.LAW], p[layout.ELASTIC_DRIVE]))
 
 
-@entry
+@kernel
 def prepare(p, s):  # type: ignore[no-untyped-def]
     """Fill the derived part of ``p`` (after `prepare_run_sizes`); ``s`` lends its work space.
 

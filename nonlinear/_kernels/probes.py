@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 
 PROBE_U = layout.PROBES + layout.POINT_VOLTAGE * layout.PROBE_SIZE
 PROBE_I = layout.PROBES + layout.POINT_CURRENT * layout.PROBE_SIZE
@@ -11,7 +11,7 @@ PROBE_W = layout.PROBES + layout.POINT_SPEED * layout.PROBE_SIZE
 PROBE_Y = layout.PROBES + layout.POINT_OUTPUT * layout.PROBE_SIZE
 
 
-@scalar
+@kernel
 def probe(p, s, io, point, value):  # type: ignore[no-untyped-def]
     """Signal after the probe at ``point``: gain times the delayed value plus the injected signal.
 
@@ -36,7 +36,7 @@ def probe(p, s, io, point, value):  # type: ignore[no-untyped-def]
     return p[at + layout.PROBE_GAIN] * passed + io[layout.IN_PROBE + point]
 
 
-@scalar
+@kernel
 def fill_ring(p, s, point, value):  # type: ignore[no-untyped-def]
     """Take every past value at a point as ``value``."""
     size = int(p[layout.PROBE_RING])

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 
 M_1, A_1 = 2147483563.0, 40014.0
 M_2, A_2 = 2147483399.0, 40692.0
@@ -17,7 +17,7 @@ TURN = 2.0 * math.pi
 WARM_UP = 16
 
 
-@scalar
+@kernel
 def rest(x, m):  # type: ignore[no-untyped-def]
     """Remainder of two whole numbers held in floats, x >= 0, below 2^53."""
     r = x - math.floor(x / m) * m
@@ -26,7 +26,7 @@ def rest(x, m):  # type: ignore[no-untyped-def]
     return r - m if r >= m else r
 
 
-@scalar
+@kernel
 def uniform(s, at):  # type: ignore[no-untyped-def]
     """Next number of the stream at ``s[at]``, above 0 and below 1."""
     s[at] = rest(A_1 * s[at], M_1)
@@ -37,7 +37,7 @@ def uniform(s, at):  # type: ignore[no-untyped-def]
     return z / M_1
 
 
-@scalar
+@kernel
 def normal(s, stream):  # type: ignore[no-untyped-def]
     """Next number of a stream with mean 0 and standard deviation 1 (Box and Muller)."""
     at = layout.S_NOISE + 2 * stream
@@ -45,7 +45,7 @@ def normal(s, stream):  # type: ignore[no-untyped-def]
     return radius * math.cos(TURN * uniform(s, at))
 
 
-@scalar
+@kernel
 def seed_streams(s, seed):  # type: ignore[no-untyped-def]
     """Start every stream; another seed starts all of them elsewhere."""
     for stream in range(4):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
 
 
-@inlined
+@kernel
 def record(p, io, history, rows, flag_history, row):  # type: ignore[no-untyped-def]
     """Write the columns that every run has, and those of active probes."""
     history[row] = io[layout.IO_REFERENCE]
@@ -22,7 +22,7 @@ def record(p, io, history, rows, flag_history, row):  # type: ignore[no-untyped-
         record_more(p, io, history, rows, row)
 
 
-@scalar
+@kernel
 def record_more(p, io, history, rows, row):  # type: ignore[no-untyped-def]
     """Write both sides of each active probe, by point, then an elastic drive's load side, then the load."""
     col = layout.HISTORY_PROBES

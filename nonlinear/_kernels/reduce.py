@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
+from actuator_lti.compiled.kernel import kernel, seldom
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import scalar
 
 LIMITER_BITS = np.array(layout.LIMITER_BITS)
 
 
-@scalar
+@kernel
 def clear(p, out):  # type: ignore[no-untyped-def]
     """Reset a row of results for a run."""
     for j in range(layout.OUT_SIZE):
@@ -32,7 +32,7 @@ def clear(p, out):  # type: ignore[no-untyped-def]
         out[layout.OUT_PHASOR + 2], out[layout.OUT_PHASOR + 3] = math.cos(turn), math.sin(turn)
 
 
-@scalar
+@kernel
 def extremes(io, count, out):  # type: ignore[no-untyped-def]
     """Update minimum and maximum of each signal."""
     for j in range(count):
@@ -41,7 +41,7 @@ def extremes(io, count, out):  # type: ignore[no-untyped-def]
         out[at + 1] = max(out[at + 1], io[layout.IO_REFERENCE + j])
 
 
-@scalar
+@kernel
 def window(io, count, which, harmonics, c, s, out):  # type: ignore[no-untyped-def]
     """Add one tick to a window; (c, s) is the unit phasor of the fundamental."""
     for j in range(count):
@@ -58,7 +58,7 @@ def window(io, count, which, harmonics, c, s, out):  # type: ignore[no-untyped-d
             re, im = re * c - im * s, re * s + im * c
 
 
-@scalar
+@kernel
 def step_figures(y, y_last, k, band, out):  # type: ignore[no-untyped-def]
     """Update rise, peak and settling of a response normalised to its target; times in ticks."""
     at = layout.OUT_STEP
@@ -74,7 +74,8 @@ def step_figures(y, y_last, k, band, out):  # type: ignore[no-untyped-def]
     out[at + layout.STEP_LAST] = y
 
 
-@scalar
+@seldom
+@kernel
 def note_limits(p, flags, first, until, out):  # type: ignore[no-untyped-def]
     """Count the ticks from ``first`` to ``until`` (exclusive), in which the same limiters acted."""
     ticks = until - first
@@ -91,7 +92,7 @@ def note_limits(p, flags, first, until, out):  # type: ignore[no-untyped-def]
         out[layout.OUT_WINDOW_STICK] += window
 
 
-@scalar
+@kernel
 def windows(p, io, k, count, out):  # type: ignore[no-untyped-def]
     """Add tick k to the last window or the one before it."""
     length = int(p[layout.WINDOW])
@@ -106,7 +107,7 @@ def windows(p, io, k, count, out):  # type: ignore[no-untyped-def]
     out[at], out[at + 1] = c * out[at + 2] - s * out[at + 3], c * out[at + 3] + s * out[at + 2]
 
 
-@scalar
+@kernel
 def reduce(p, io, k, out):  # type: ignore[no-untyped-def]
     """Add tick k to whatever is kept of the run."""
     if p[layout.STEP_TARGET] != 0.0:

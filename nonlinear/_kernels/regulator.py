@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
 
 CONDITIONAL, CLAMPED, BACK_CALCULATION = range(3)
 
 
-@inlined
+@kernel
 def clamp(value, limit):  # type: ignore[no-untyped-def]
     """Value held within +-limit."""
     return min(max(value, -limit), limit)
 
 
-@inlined
+@kernel
 def pi(e, integral, gain, step, limit):  # type: ignore[no-untyped-def]
     """PI with conditional integration: output, new integral, and 1 where the limit acts.
 
@@ -31,7 +31,7 @@ def pi(e, integral, gain, step, limit):  # type: ignore[no-untyped-def]
     return clamp(gain * e + integral, limit), integral, 1.0
 
 
-@scalar
+@kernel
 def regulator(e, integral, gain, step, extra, limit, law, tracking):  # type: ignore[no-untyped-def]
     """PI with a feed-forward ``extra`` and any anti-windup law; the same three numbers as `pi`.
 
@@ -59,7 +59,7 @@ def regulator(e, integral, gain, step, extra, limit, law, tracking):  # type: ig
     return clamp(gain * e + integral + extra, limit), integral, 1.0
 
 
-@scalar
+@kernel
 def velocity_regulator(p, s, e, limit):  # type: ignore[no-untyped-def]
     """The velocity controller's own law on its error."""
     return regulator(

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
-from nonlinear._kernels.compiled import entry, scalar, woven
 from nonlinear._kernels.record import record
 from nonlinear._kernels.reduce import clear, note_limits, reduce
 from nonlinear._kernels.signals import feed, fill_block
 from nonlinear._kernels.tick import step
 
 
-@woven
-def run_block(p, s, io, block, first, count, history, flag_history, out, rare):  # type: ignore[no-untyped-def]
+@kernel
+def run_block(p, s, io, block, first, count, history, flag_history, out):  # type: ignore[no-untyped-def]
     """Run ``count`` ticks from tick ``first`` on; returns the tick behind the last one done."""
     every, rows = int(p[layout.RECORD_EVERY]), flag_history.shape[0]
     row = int((first + every - 1) / every)
@@ -26,7 +26,7 @@ def run_block(p, s, io, block, first, count, history, flag_history, out, rare): 
             feed(block, k - first, io)
         if supplied:
             io[layout.IN_BUS] = block[layout.BLOCK_SUPPLY + k - first]
-        step(p, s, io, rare)
+        step(p, s, io)
         if io[layout.IO_FLAGS] != flags:
             note_limits(p, flags, since, k, out)
             flags, since = io[layout.IO_FLAGS], k
@@ -43,7 +43,7 @@ def run_block(p, s, io, block, first, count, history, flag_history, out, rare): 
     return k
 
 
-@scalar
+@kernel
 def finish(p, s, k, out):  # type: ignore[no-untyped-def]
     """Write the final state and the counts into the results."""
     out[layout.OUT_TICKS] = k
@@ -62,13 +62,13 @@ def finish(p, s, k, out):  # type: ignore[no-untyped-def]
         out[layout.OUT_ENERGY + j] = s[layout.S_ENERGY + j]
 
 
-@entry
-def run(p, s, io, block, tables, history, flag_history, out, shared, rare):  # type: ignore[no-untyped-def]
+@kernel
+def run(p, s, io, block, tables, history, flag_history, out, shared):  # type: ignore[no-untyped-def]
     """Run the drive described by ``p`` from the state ``s``; returns a status number of ``layout``.
 
     ``history`` is flat, columns one after the other, or empty; ``flag_history`` one number a row; ``out`` a
     row of results; ``shared[0]`` is set to the ticks done from time to time, a non-zero ``shared[1]`` stops
-    the run.  ``rare``: see `closely`.
+    the run.
     """
     clear(p, out)
     ticks, k = int(p[layout.TICKS]), int(s[layout.S_TICK])
@@ -78,7 +78,7 @@ def run(p, s, io, block, tables, history, flag_history, out, shared, rare):  # t
     while k < ticks and s[layout.S_STATUS] == 0.0:
         count = min(layout.BLOCK, ticks - k)
         fill_block(p, tables, k, count, stride, block)
-        k = run_block(p, s, io, block, k, count, history, flag_history, out, rare)
+        k = run_block(p, s, io, block, k, count, history, flag_history, out)
         shared[0] = k
         if shared[1] != 0.0 and s[layout.S_STATUS] == 0.0:
             s[layout.S_STATUS] = float(layout.CANCELLED)

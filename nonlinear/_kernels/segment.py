@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
 from nonlinear._kernels.energy import energy_slip, energy_stick, energy_whole
 from nonlinear._kernels.landing import NEVER_LEFT, NONE_IN_SEGMENT, first_landing
 from nonlinear._kernels.modal import slip_at
 
 
-@inlined
+@kernel
 def slip_step(p, o, i, w, th, u, T):  # type: ignore[no-untyped-def]
     """One precomputed transition."""
     return (
@@ -21,7 +21,7 @@ def slip_step(p, o, i, w, th, u, T):  # type: ignore[no-untyped-def]
     )
 
 
-@scalar
+@kernel
 def breakaway_time(p, i, level, u, Tb, dt):  # type: ignore[no-untyped-def]
     """Time at which the drive torque of the locked rotor reaches ``level``; also the current then."""
     R, L = p[layout.RESISTANCE], p[layout.INDUCTANCE]
@@ -32,7 +32,7 @@ def breakaway_time(p, i, level, u, Tb, dt):  # type: ignore[no-untyped-def]
     return min(t, dt), i_level
 
 
-@scalar
+@kernel
 def stick(p, i, u, Tb, Tp, Tm, dt, decay):  # type: ignore[no-untyped-def]
     """Locked rotor: time spent, current after it, direction of the breakaway (0: none).
 
@@ -58,7 +58,7 @@ def stick(p, i, u, Tb, Tp, Tm, dt, decay):  # type: ignore[no-untyped-def]
     return dt, i_end, 0.0
 
 
-@scalar
+@kernel
 def direction_at_rest(p, i, u, Tb, Tp, Tm, d):  # type: ignore[no-untyped-def]
     """What follows a landing of motion d: 0 rest while |drive| <= Tc breakaway, -d motion the other way."""
     drive = p[layout.TORQUE_CONSTANT] * i + p[layout.SOURCE_GAIN] * u + Tb
@@ -67,7 +67,7 @@ def direction_at_rest(p, i, u, Tb, Tp, Tm, d):  # type: ignore[no-untyped-def]
     return 0.0
 
 
-@scalar
+@kernel
 def slip_part(p, s, part, left, u, Tb, Tc, i, w, th, d):  # type: ignore[no-untyped-def]
     """Slip in direction d until it lands or the segment ends: time spent, (i, w, th), and how it ended.
 
@@ -93,7 +93,7 @@ def slip_part(p, s, part, left, u, Tb, Tc, i, w, th, d):  # type: ignore[no-unty
     return span, i, w, th, min(t, 0.0)
 
 
-@scalar
+@kernel
 def segment(p, s, part, u, events):  # type: ignore[no-untyped-def]
     """Advance current, speed, angle and direction of the state row over one segment with all its events.
 

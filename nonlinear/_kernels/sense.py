@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import inlined, scalar
 from nonlinear._kernels.elastic_modes import elastic_slopes
 from nonlinear._kernels.modal import derivative
 from nonlinear._kernels.random import normal
@@ -13,13 +13,13 @@ from nonlinear._kernels.regulator import clamp
 from nonlinear._kernels.smooth import tanh_torque
 
 
-@scalar
+@kernel
 def output_angle(p, s):  # type: ignore[no-untyped-def]
     """Angle of the output shaft."""
     return s[layout.S_OUTPUT] if p[layout.ELASTIC_DRIVE] > 0.0 else s[layout.S_ANGLE] / p[layout.RATIO]
 
 
-@scalar
+@kernel
 def slopes(p, s):  # type: ignore[no-untyped-def]
     """(i', w') at the sampling instant under the voltage that acted last."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
@@ -36,7 +36,7 @@ def slopes(p, s):  # type: ignore[no-untyped-def]
     return derivative(p, layout.MODES + (layout.MODAL if d < 0.0 else 0), i, w, u, T)
 
 
-@scalar
+@kernel
 def supply(p, s):  # type: ignore[no-untyped-def]
     """Bus voltage of this tick from voltage and current of the motor (model.md section 6)."""
     U, Us, Rs = s[layout.S_VOLTAGE_LIMIT], p[layout.SUPPLY_VOLTAGE], p[layout.SUPPLY_RESISTANCE]
@@ -59,7 +59,7 @@ def supply(p, s):  # type: ignore[no-untyped-def]
     s[ledger + layout.ENERGY_CAPACITOR] += 0.5 * C * (after - U) * (after + U)
 
 
-@inlined
+@kernel
 def applied_voltage(p, s, io):  # type: ignore[no-untyped-def]
     """What acts on the motor: the controller's voltage, or its share of a bus voltage that varies."""
     u = s[layout.S_VOLTAGE]
@@ -68,7 +68,7 @@ def applied_voltage(p, s, io):  # type: ignore[no-untyped-def]
     return u
 
 
-@scalar
+@kernel
 def sense(p, s, io):  # type: ignore[no-untyped-def]
     """Write what the controller measures of current, speed and angles, and the bus voltage."""
     i, w, th, y = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE], output_angle(p, s)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import entry, inlined, scalar
 
 TWO_PI = 2.0 * math.pi
 NONE, STEP, RAMP, SINE = layout.NONE, layout.STEP, layout.RAMP, layout.SINE
 TRIANGLE, CHIRP, LOG_CHIRP = layout.TRIANGLE, layout.CHIRP, layout.LOG_CHIRP
 
 
-@scalar
+@kernel
 def triangle_wave(cycles):  # type: ignore[no-untyped-def]
     """Triangle of amplitude 1 in phase with sin(2 pi cycles)."""
     x = cycles + 0.25
@@ -20,7 +20,7 @@ def triangle_wave(cycles):  # type: ignore[no-untyped-def]
     return 4.0 * x - 1.0 if x < 0.5 else 3.0 - 4.0 * x
 
 
-@scalar
+@kernel
 def chirp_cycles(kind, f0, f1, span, s):  # type: ignore[no-untyped-def]
     """Cycles since the start of a linear or logarithmic chirp from f0 to f1 over ``span`` seconds."""
     x = min(s, span)
@@ -32,7 +32,7 @@ def chirp_cycles(kind, f0, f1, span, s):  # type: ignore[no-untyped-def]
     return cycles + f1 * max(s - span, 0.0)
 
 
-@inlined
+@kernel
 def signal(row, at, tables, k, period):  # type: ignore[no-untyped-def]
     """Value at tick k of the signal whose eight numbers begin at ``row[at]``.
 
@@ -60,7 +60,7 @@ def signal(row, at, tables, k, period):  # type: ignore[no-untyped-def]
     return amplitude * math.sin(TWO_PI * chirp_cycles(kind, row[at + 3], row[at + 4], row[at + 5], s))
 
 
-@entry
+@kernel
 def fill(row, at, tables, first, count, stride, period, out, to):  # type: ignore[no-untyped-def]
     """Sample a signal at ticks first, first + stride, ... of ``count``, into ``out[to]`` and behind."""
     times = int((count + stride - 1) / stride)
@@ -74,14 +74,14 @@ def fill(row, at, tables, first, count, stride, period, out, to):  # type: ignor
         out[to + n * stride] = signal(row, at, tables, first + n * stride, period)
 
 
-@scalar
+@kernel
 def add_table(tables, start, length, first, count, out, to):  # type: ignore[no-untyped-def]
     """Write a table of one value a tick, its last value held, into ``out[to]`` and behind."""
     for n in range(count):
         out[to + n] = tables[start + min(first + n, length - 1)]
 
 
-@scalar
+@kernel
 def fill_block(p, tables, first, count, stride, block):  # type: ignore[no-untyped-def]
     """Work out all inputs of ``count`` ticks from tick ``first`` on; commands only every ``stride`` ticks."""
     period = p[layout.PERIOD]
@@ -106,7 +106,7 @@ def fill_block(p, tables, first, count, stride, block):  # type: ignore[no-untyp
         add_table(tables, int(p[layout.SUPPLY_TABLE]), length, first, count, block, layout.BLOCK_SUPPLY)
 
 
-@scalar
+@kernel
 def feed(block, j, io):  # type: ignore[no-untyped-def]
     """Hand the inputs beside the command of the j-th tick of a block to the drive."""
     io[layout.IN_LOAD], io[layout.IN_TORQUE] = block[layout.BLOCK_LOAD + j], block[layout.BLOCK_TORQUE + j]

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.compiled import entry, scalar
 from nonlinear._kernels.energy import NODES, WEIGHTS, add_slip, energy_whole, pieces_of
 from nonlinear._kernels.expm import MATRIX, exponential, plant, transition
 from nonlinear._kernels.segment import slip_step
@@ -30,7 +30,7 @@ WEIGHT_1, WEIGHT_2, WEIGHT_3 = STAGE + 3, STAGE + 6, STAGE + 9
 FORM_II, FORM_IW, FORM_WW, FORM_NW = 7, 35, 63, 91  # after the seven of i
 
 
-@scalar
+@kernel
 def phi_columns(p, t, h, work, at):  # type: ignore[no-untyped-def]
     """exp of the plant over t, at ``at + MATRIX``; a chain of integrators over h feeds the torque.
 
@@ -42,7 +42,7 @@ def phi_columns(p, t, h, work, at):  # type: ignore[no-untyped-def]
     exponential(work, at, layout.TANH_ORDER)
 
 
-@entry
+@kernel
 def prepare_tanh(p, s):  # type: ignore[no-untyped-def]
     """Fill the coefficients of every level for both segments."""
     for part in range(2):
@@ -56,7 +56,7 @@ def prepare_tanh(p, s):  # type: ignore[no-untyped-def]
             h *= 0.5
 
 
-@scalar
+@kernel
 def prepare_level(p, h, s, o):  # type: ignore[no-untyped-def]
     """Fill the coefficients of one step length at ``p[o]``."""
     at = int(p[layout.AT_WORK])
@@ -74,7 +74,7 @@ def prepare_level(p, h, s, o):  # type: ignore[no-untyped-def]
         p[o + WEIGHT_3 + r] = 4.0 * third - second
 
 
-@scalar
+@kernel
 def prepare_level_forms(p, h, s, form):  # type: ignore[no-untyped-def]
     """Write the integrals over one step as forms of (i, w, u, T, n0, nm, nc)."""
     for j in range(layout.TANH_FORM):
@@ -86,7 +86,7 @@ def prepare_level_forms(p, h, s, form):  # type: ignore[no-untyped-def]
             add_tanh_node(p, s, (piece + NODES[j]) * length, h, length * WEIGHTS[j], form)
 
 
-@scalar
+@kernel
 def add_tanh_node(p, s, t, h, weight, form):  # type: ignore[no-untyped-def]
     """Add one node of the quadrature to the forms of a step."""
     at = int(p[layout.AT_WORK])
@@ -121,7 +121,7 @@ def add_tanh_node(p, s, t, h, weight, form):  # type: ignore[no-untyped-def]
             place += 1
 
 
-@scalar
+@kernel
 def form_of_seven(p, at, a, b, c, d, e, f, g):  # type: ignore[no-untyped-def]
     """A quadratic form of seven numbers from its 28 coefficients."""
     return (
@@ -137,7 +137,7 @@ def form_of_seven(p, at, a, b, c, d, e, f, g):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@scalar
+@kernel
 def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):  # type: ignore[no-untyped-def]
     """Add the energies of one step under the friction torque (n0, nm, nc); ``angle`` is what it turned."""
     sum_i = p[form] * i + p[form + 1] * w + p[form + 2] * u + p[form + 3] * Tb
@@ -150,7 +150,7 @@ def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):  # type: ignore[no-
     s[layout.S_ENERGY + layout.ENERGY_DRY] -= sum_nw
 
 
-@scalar
+@kernel
 def tanh_torque(p, w, Tcp, Tcm):  # type: ignore[no-untyped-def]
     """Torque of the friction beyond the forward viscous slope, with its sign in the equation of motion."""
     x = w / p[layout.SMOOTHING]
@@ -159,7 +159,7 @@ def tanh_torque(p, w, Tcp, Tcm):  # type: ignore[no-untyped-def]
     return -Tcm * math.tanh(x) - (p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) * w
 
 
-@scalar
+@kernel
 def level_for(p, i, w, u, Tb, Tcp, Tcm, h):  # type: ignore[no-untyped-def]
     """Number of halvings of h that the tolerance asks for at this state."""
     if p[layout.TANH_LEVEL] >= 0.0:
@@ -182,7 +182,7 @@ def level_for(p, i, w, u, Tb, Tcp, Tcm, h):  # type: ignore[no-untyped-def]
     return level
 
 
-@scalar
+@kernel
 def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm):  # type: ignore[no-untyped-def]
     """One ETD4RK step: state after it, and the friction torque at its beginning, middle and end."""
     n0 = tanh_torque(p, w, Tcp, Tcm)
@@ -204,7 +204,7 @@ def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm):  # type: ignore[no-untyped-def]
     )
 
 
-@scalar
+@kernel
 def saturated(p, s, part, u):  # type: ignore[no-untyped-def]
     """Cross a whole segment in one exact step where tanh is 1 all the way; returns 1 where that was so."""
     i, w, far = s[layout.S_CURRENT], s[layout.S_SPEED], SATURATED * p[layout.SMOOTHING]
@@ -224,7 +224,7 @@ def saturated(p, s, part, u):  # type: ignore[no-untyped-def]
     return 1
 
 
-@scalar
+@kernel
 def tanh_segment(p, s, part, u):  # type: ignore[no-untyped-def]
     """Advance the state row over one segment under the smoothed law."""
     if saturated(p, s, part, u) > 0:

@@ -52,14 +52,20 @@ def places_of(p: npt.NDArray[np.float64], *kinds: str) -> npt.NDArray[np.intp]:
     return np.flatnonzero(np.isin(state_kinds(p), kinds))
 
 
-def names_of(places: npt.NDArray[np.intp]) -> tuple[str, ...]:
-    """Names of numbers of the state: the layout's, and how far behind it for one of a chain or line."""
-    named = {
+@cache
+def _named() -> dict[int, str]:
+    """Name of the number of the state by its place, as the layout has it."""
+    return {
         getattr(part, name): name[len(prefix) :].lower()
         for part, prefix in ((layout, "S_"), (elastic_layout, "ES_"))
         for name in get_type_hints(part)
         if name.startswith(prefix)
     }
+
+
+def names_of(places: npt.NDArray[np.intp]) -> tuple[str, ...]:
+    """Names of numbers of the state: the layout's, and how far behind it for one of a chain or line."""
+    named = _named()
     starts = np.array(sorted(named))
     begins = starts[np.searchsorted(starts, places, "right") - 1]
     return tuple(

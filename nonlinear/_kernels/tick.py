@@ -6,8 +6,8 @@ A state copied out and set again elsewhere goes on with the same bits.
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
-from nonlinear._kernels.compiled import entry, scalar, woven
 from nonlinear._kernels.control import control
 from nonlinear._kernels.elastic_modes import coupling_torque, elastic_start, find_mode
 from nonlinear._kernels.estimate import TRACKING, counted
@@ -19,7 +19,7 @@ from nonlinear._kernels.regulator import clamp
 from nonlinear._kernels.sense import applied_voltage, sense
 
 
-@scalar
+@kernel
 def init_controller(p, s):  # type: ignore[no-untyped-def]
     """Start values of the controller, all histories those of rest or of constant speed."""
     th = p[layout.ANGLE_START]
@@ -34,7 +34,7 @@ def init_controller(p, s):  # type: ignore[no-untyped-def]
     settle(p, chain, int(p[layout.TORQUE_FILTERS]), s, layout.S_TORQUE_CHAIN, p[layout.CURRENT_COMMAND_START])
 
 
-@scalar
+@kernel
 def init_estimate(p, s):  # type: ignore[no-untyped-def]
     """Start values of the speed measurement: those of constant speed."""
     w, th, T = p[layout.SPEED_START], p[layout.ANGLE_START], p[layout.VELOCITY_PERIOD]
@@ -49,7 +49,7 @@ def init_estimate(p, s):  # type: ignore[no-untyped-def]
     s[layout.S_MEASURED_SPEED] = w
 
 
-@scalar
+@kernel
 def init_command(p, s):  # type: ignore[no-untyped-def]
     """Start values of profile and command filter: those of the outermost stage."""
     r = p[layout.ANGLE_START] / p[layout.RATIO]
@@ -67,7 +67,7 @@ def init_command(p, s):  # type: ignore[no-untyped-def]
     settle(p, layout.COMMAND_CHAIN, int(p[layout.COMMAND_FILTERS]), s, layout.S_COMMAND_CHAIN, r)
 
 
-@scalar
+@kernel
 def init_lines(p, s):  # type: ignore[no-untyped-def]
     """Fill the delay line and the probes' rings."""
     u, y = p[layout.VOLTAGE_START], p[layout.ANGLE_START] / p[layout.RATIO]
@@ -80,7 +80,7 @@ def init_lines(p, s):  # type: ignore[no-untyped-def]
     s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = y
 
 
-@entry
+@kernel
 def init_run(p, s):  # type: ignore[no-untyped-def]
     """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
     for j in range(int(p[layout.STATE_SIZE])):
@@ -99,7 +99,7 @@ def init_run(p, s):  # type: ignore[no-untyped-def]
     seed_streams(s, p[layout.SEED])
 
 
-@entry
+@kernel
 def init_elastic(p, s):  # type: ignore[no-untyped-def]
     """What `init_run` leaves to do for an elastic drive train: load side, contact, the output's own angle."""
     elastic_start(p, s)
@@ -107,7 +107,7 @@ def init_elastic(p, s):  # type: ignore[no-untyped-def]
     s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = s[layout.S_OUTPUT]
 
 
-@entry
+@kernel
 def retune_rigid(p, s):  # type: ignore[no-untyped-def]
     """What parameters changed between two ticks mean for the state: torques, and whether the motor slips."""
     put_load(p, s, s[layout.S_LOAD], 0.0)
@@ -117,13 +117,13 @@ def retune_rigid(p, s):  # type: ignore[no-untyped-def]
         s[layout.S_DIRECTION] = 1.0
 
 
-@entry
+@kernel
 def retune_elastic(p, s):  # type: ignore[no-untyped-def]
     """The same for an elastic drive train: contact and the load's slip too."""
     find_mode(p, s)
 
 
-@woven
+@kernel
 def decide(p, s, io):  # type: ignore[no-untyped-def]
     """Sense and control at t_k, and note what there is to record."""
     i, w, th = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE]
@@ -145,7 +145,7 @@ def decide(p, s, io):  # type: ignore[no-untyped-def]
         note_more(p, s, io)
 
 
-@scalar
+@kernel
 def note_more(p, s, io):  # type: ignore[no-untyped-def]
     """Note both sides of each probe, the current command under overload, an elastic drive's load side."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
@@ -160,29 +160,29 @@ def note_more(p, s, io):  # type: ignore[no-untyped-def]
     io[at + 6], io[at + 7] = s[layout.S_OUTPUT_BEFORE], s[layout.S_OUTPUT_AFTER]
 
 
-@woven
-def step(p, s, io, rare):  # type: ignore[no-untyped-def]
-    """One tick: sense, control, move.  ``s[S_STATUS]`` says whether it went well; ``rare``: see `closely`."""
+@kernel
+def step(p, s, io):  # type: ignore[no-untyped-def]
+    """One tick: sense, control, move.  ``s[S_STATUS]`` says whether it went well."""
     decide(p, s, io)
-    motion(p, s, io, rare)
+    motion(p, s, io)
     s[layout.S_TICK] += 1.0
 
 
-@entry
+@kernel
 def tick(p, s, io):  # type: ignore[no-untyped-def]
     """`step` to be called from outside; returns the status."""
-    step(p, s, io, 1.0)
+    step(p, s, io)
     return int(s[layout.S_STATUS])
 
 
-@entry
+@kernel
 def get(p, s, to):  # type: ignore[no-untyped-def]
     """Copy the state out."""
     for j in range(int(p[layout.STATE_SIZE])):
         to[j] = s[j]
 
 
-@entry
+@kernel
 def set_state(p, s, source):  # type: ignore[no-untyped-def]
     """Copy a state in."""
     for j in range(int(p[layout.STATE_SIZE])):

@@ -1,7 +1,7 @@
 """The running drive outside of Python: C99, FMU and WebAssembly, all from the one emitted program.
 
-Nothing here computes: `nonlinear.emit` translates `nonlinear._kernels`, and the files of this folder put
-names, units, parameters and interfaces around it.
+Nothing here computes: `actuator_lti.compiled` translates `nonlinear._kernels`, and the files of this folder
+put names, units, parameters and interfaces around it.
 """
 
 from nonlinear.export.c_files import c_export

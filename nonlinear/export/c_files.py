@@ -8,13 +8,13 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.compiled.kinds import c_float
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
 from nonlinear.elastic import is_elastic
-from nonlinear.emit.kinds import c_float
 from nonlinear.export.program import c_text, header_text, single, source_hash, source_text, template
 from nonlinear.export.rows import place_words
 from nonlinear.native import parameters

@@ -10,10 +10,10 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
+from actuator_lti.compiled.compiler import compile_files
+from actuator_lti.compiled.kinds import c_float
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from nonlinear.emit.kinds import c_float
-from nonlinear.export.build import compile_files
 from nonlinear.export.c_files import c_export, exported, spare_parameters
 from nonlinear.export.model_description import MODEL, build_description, description
 from nonlinear.export.program import c_text, template

@@ -14,9 +14,10 @@ import math
 
 import numpy as np
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
+from nonlinear._kernels.start import derive, prepare_sizes
 from nonlinear._kernels.tick import tick
-from nonlinear.export.entries import derive, emitted, prepare_sizes
 from nonlinear.export.linear_row import at_rest, linear_row, set_off
 
 MOST = 48  # states of a loop
@@ -35,7 +36,7 @@ REMEMBERED = np.array([
 ])  # fmt: skip
 
 
-@emitted
+@kernel
 def without_outer(q, stage):
     """Take the stages outside of one away; its command is then that of the drive.
 
@@ -49,7 +50,7 @@ def without_outer(q, stage):
             q[layout.HAS_VELOCITY] = 0.0
 
 
-@emitted
+@kernel
 def cut_point(q, stage):
     """The probe that cuts the loop, or -1."""
     if stage == CURRENT and q[layout.HAS_VELOCITY] > 0.0:
@@ -63,13 +64,13 @@ def cut_point(q, stage):
     return layout.POINT_VOLTAGE if stage == AT_VOLTAGE else -1
 
 
-@emitted
+@kernel
 def feeds_speed(q):
     """Whether the measured speed is fed forward to the voltage."""
     return q[layout.HAS_CURRENT] > 0.0 and q[layout.BACK_EMF_FEEDFORWARD] != 0.0
 
 
-@emitted
+@kernel
 def interval(q, stage):
     """Ticks from one update of the signal at a cut to the next; 0 where the drive has no such loop."""
     outer = int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
@@ -91,7 +92,7 @@ def interval(q, stage):
     return outer if q[layout.HAS_VELOCITY] > 0.0 else slow
 
 
-@emitted
+@kernel
 def repeats(q, stage):
     """Ticks after which the loop repeats: more than `interval` where it is periodic."""
     every = interval(q, stage)
@@ -105,13 +106,13 @@ def repeats(q, stage):
     return max(slow, max(speed, every))
 
 
-@emitted
+@kernel
 def too_long(q):
     """Whether the delay line or the stored angles alone pass MOST, before anything is laid out for them."""
     return not (q[layout.DELAY_LINE] + q[layout.DIFFERENCE_SAMPLES] <= MOST)
 
 
-@emitted
+@kernel
 def listed(q, places):
     """Where the drive remembers something, angles first; how many there are, and how many are angles."""
     count = 2
@@ -144,7 +145,7 @@ def listed(q, places):
     return count, angles
 
 
-@emitted
+@kernel
 def seen_value(q, s, io, stage):
     """What a loop returns at the tick that has just been run."""
     if stage == CURRENT:
@@ -160,7 +161,7 @@ def seen_value(q, s, io, stage):
     return s[layout.S_CURRENT_BEFORE] if stage == AT_CURRENT else s[layout.S_VOLTAGE_BEFORE]
 
 
-@emitted
+@kernel
 def put_inputs(q, s, io, stage, size):
     """Write the inputs of a tick: nothing, or the unit at the place where the loop is cut."""
     for k in range(layout.IN_PROBE + 4):
@@ -182,7 +183,7 @@ def put_inputs(q, s, io, stage, size):
         io[layout.IN_PROBE + layout.POINT_VOLTAGE] = -size
 
 
-@emitted
+@kernel
 def one_column(q, s, io, stage, every, size, places, count, angles, column):
     """Run the drive as it stands over one period; writes the states after it, returns what the loop gave.
 
@@ -206,7 +207,7 @@ def one_column(q, s, io, stage, every, size, places, count, angles, column):
     return value
 
 
-@emitted
+@kernel
 def needed(n, a, b, c, keep):
     """Mark the states that the output sees and the input reaches; how many they are."""
     for i in range(n):
@@ -226,7 +227,7 @@ def needed(n, a, b, c, keep):
     return count
 
 
-@emitted
+@kernel
 def pruned(n, a, b, c, keep):
     """Leave out the other states, in place; the number that stays."""
     count = needed(n, a, b, c, keep)
@@ -245,7 +246,7 @@ def pruned(n, a, b, c, keep):
     return count
 
 
-@emitted
+@kernel
 def put_unit(q, s, places, j, angles):
     """Put the drive into the j-th unit state: the motor's angle takes the stored ones with it."""
     at_rest(q, s)
@@ -257,21 +258,21 @@ def put_unit(q, s, places, j, angles):
     set_off(q, s)
 
 
-@emitted
+@kernel
 def until_next(every, ticks):
     """Ticks until a stage runs next, so many ticks after it ran."""
     passed = ticks - every * int(ticks / every)
     return float(every - passed) if passed > 0 else 0.0
 
 
-@emitted
+@kernel
 def put_phase(q, s, ticks):
     """Let the slower stages be where they are so many ticks after they all ran."""
     s[layout.S_UNTIL_OUTER] = until_next(int(q[layout.OUTER_EVERY]), ticks)
     s[layout.S_UNTIL_VELOCITY] = until_next(int(q[layout.EVERY_VELOCITY]), ticks)
 
 
-@emitted
+@kernel
 def block(q, s, io, stage, first, every, places, n, angles, a, b, c, column):
     """A, b, c of the loop as run over the ``every`` ticks from tick ``first``; 0 where a tick failed."""
     for j in range(n + 1):
@@ -294,7 +295,7 @@ def block(q, s, io, stage, first, every, places, n, angles, a, b, c, column):
     return 1
 
 
-@emitted
+@kernel
 def prepared(q, s, stage):
     """Make ``q`` the row of the linear drive with its loop cut, and derive it; 0 where it is too long."""
     without_outer(q, stage)
@@ -309,13 +310,13 @@ def prepared(q, s, stage):
     return 1
 
 
-@emitted
+@kernel
 def runs_closed(stage):
     """Whether a loop is run closed, through the command of its own stage."""
     return stage == CURRENT or stage == VELOCITY
 
 
-@emitted
+@kernel
 def assembled(p, q, s, io, stage, a, b, c, places, column):
     """A, b, c of a loop of the drive with the parameters p; the number of states, or what stands in the way.
 
@@ -343,7 +344,7 @@ def assembled(p, q, s, io, stage, a, b, c, places, column):
     return pruned(n, a, b, c, column)
 
 
-@emitted
+@kernel
 def lead_of(p):
     """Feed-forward in front of a position loop as k_ff/(Kv T), NaN where it is more than that."""
     if p[layout.ELASTIC_DRIVE] > 0.0 and p[layout.RIGID] <= 0.0 and p[layout.OUTPUT_SENSOR] <= 0.0:

@@ -8,11 +8,11 @@ import math
 from actuator_lti.batch._eigen import eigenvalues
 from actuator_lti.batch._response import evaluate
 from actuator_lti.batch._run import one_loop
-from nonlinear.export.entries import emitted
+from actuator_lti.compiled.kernel import kernel
 from nonlinear.export.linear import LOST
 
 
-@emitted
+@kernel
 def poles_of(n, a, b, c, fed_back, poles, work, lent, lent_too, real, imaginary):
     """Poles of a loop, open and closed; 0 where they were not found."""
     for side in range(2):
@@ -29,7 +29,7 @@ def poles_of(n, a, b, c, fed_back, poles, work, lent, lent_too, real, imaginary)
     return 1
 
 
-@emitted
+@kernel
 def figures(
     n,
     a,
@@ -60,7 +60,7 @@ def figures(
     )
 
 
-@emitted
+@kernel
 def stepped(n, h, b, c, lead, count, y, state, after):
     """Step response of a closed loop at its samples; h is A - I. Lead NaN: of A, b, c as they are."""
     fed_back = 0.0 if math.isnan(lead) else 1.0
@@ -83,7 +83,7 @@ def stepped(n, h, b, c, lead, count, y, state, after):
         y[k] = total
 
 
-@emitted
+@kernel
 def responded(n, h, b, c, count, xs, rs, work, state, exchanged):
     """Response of a loop at angles per sample, as pairs."""
     for k in range(count):

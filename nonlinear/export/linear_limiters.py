@@ -10,10 +10,11 @@ from __future__ import annotations
 import math
 
 from actuator_lti.batch._complex import over
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.regulator import CLAMPED
+from nonlinear._kernels.start import derive, prepare_sizes
 from nonlinear._kernels.tick import tick
-from nonlinear.export.entries import derive, emitted, prepare_sizes
 from nonlinear.export.linear import (
     COMMAND,
     CURRENT,
@@ -37,7 +38,7 @@ SIGNALS = ("w_ref", "i_ref", "u")
 SHOWN, SEEN = 3, 5
 
 
-@emitted
+@kernel
 def noted_column(q, s, io, stage, every, size, places, count, angles, column, seen, j):
     """As `one_column`, with what stands in front of each limiter at every tick put down as column j."""
     put_inputs(q, s, io, stage, size)
@@ -63,7 +64,7 @@ def noted_column(q, s, io, stage, every, size, places, count, angles, column, se
     return 1
 
 
-@emitted
+@kernel
 def outer_stage(q):
     """The stage that takes the command."""
     if q[layout.HAS_POSITION] > 0.0:
@@ -71,7 +72,7 @@ def outer_stage(q):
     return VELOCITY if q[layout.HAS_VELOCITY] > 0.0 else CURRENT
 
 
-@emitted
+@kernel
 def outer_interval(q):
     """Ticks between two commands."""
     if q[layout.HAS_POSITION] > 0.0:
@@ -79,7 +80,7 @@ def outer_interval(q):
     return int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
 
 
-@emitted
+@kernel
 def limiters_assembled(p, q, s, io, a, b, places, column, seen):
     """A and b of the closed drive from its command, and rows of ``seen`` (tick, signal): states, then d.
 
@@ -124,7 +125,7 @@ def limiters_assembled(p, q, s, io, a, b, places, column, seen):
     return count
 
 
-@emitted
+@kernel
 def pivoted(n, k, work, state):
     """Bring the largest element of column k, from row k on, to row k."""
     best, largest = k, -1.0
@@ -144,7 +145,7 @@ def pivoted(n, k, work, state):
         state[2 * best + j] = kept
 
 
-@emitted
+@kernel
 def cleared(n, k, work, state):
     """Take row k out of the rows below it."""
     for i in range(k + 1, n):
@@ -161,7 +162,7 @@ def cleared(n, k, work, state):
         state[2 * i + 1] -= factor_r * here_i + factor_i * here_r
 
 
-@emitted
+@kernel
 def states_at(n, a, b, x, work, state):
     """(z I - A)^-1 b at an angle per interval, as pairs; A as it is, whose zeros keep the states apart."""
     sine = math.sin(0.5 * x)
@@ -187,7 +188,7 @@ def states_at(n, a, b, x, work, state):
         i -= 1
 
 
-@emitted
+@kernel
 def signal_interval(q, signal, every):
     """Ticks between two updates of a signal in front of a limiter."""
     if signal == VOLTAGE or signal == BESIDE_VOLTAGE:
@@ -197,7 +198,7 @@ def signal_interval(q, signal, every):
     return every
 
 
-@emitted
+@kernel
 def seen_at(n, seen, signal, k, state):
     """A signal in front of a limiter at tick k, as a pair."""
     at = (k * SEEN + signal) * (MOST + 1)
@@ -208,7 +209,7 @@ def seen_at(n, seen, signal, k, state):
     return real, imaginary
 
 
-@emitted
+@kernel
 def largest_change(n, seen, signal, every, step, x, state):
     """Largest change from one update to the next; the last one before the first is a turn older."""
     largest = 0.0
@@ -226,7 +227,7 @@ def largest_change(n, seen, signal, every, step, x, state):
     return largest
 
 
-@emitted
+@kernel
 def limiter_sizes(q, n, a, b, seen, every, count, xs, sizes, work, state):
     """Largest magnitude, over the ticks between two commands, of each signal in front of a limiter.
 

@@ -9,7 +9,7 @@ those of the true loop, so the verdict on stability is the truth.
 # mypy: disallow-untyped-defs=False
 from __future__ import annotations
 
-from nonlinear.export.entries import emitted
+from actuator_lti.compiled.kernel import kernel
 from nonlinear.export.linear import (
     LOST,
     MOST,
@@ -29,7 +29,7 @@ MOST_STATES = 160  # of all phases together
 BLOCK = MOST * (MOST + 2)  # numbers of one phase: A, b, c
 
 
-@emitted
+@kernel
 def phases_of(p, q, s, io, stage, blocks, places, column, a, b, c):
     """Closed A, b, c of each phase into ``blocks``; the states, or what stands in the way."""
     linear_row(p, q)
@@ -57,13 +57,13 @@ def phases_of(p, q, s, io, stage, blocks, places, column, a, b, c):
     return n
 
 
-@emitted
+@kernel
 def next_phase(m, count):
     """The phase after one."""
     return m + 1 if m + 1 < count else 0
 
 
-@emitted
+@kernel
 def spread(n, count, blocks, keep):
     """Mark, phase by phase, the states that the output sees and the input reaches."""
     total = n * count
@@ -95,7 +95,7 @@ def spread(n, count, blocks, keep):
     return kept
 
 
-@emitted
+@kernel
 def fundamental(n, count, kept, blocks, keep, a, b, c):
     """A, b, c of the fundamental's open loop from closed phases, over the states that are kept."""
     for k in range(kept * kept):
@@ -118,7 +118,7 @@ def fundamental(n, count, kept, blocks, keep, a, b, c):
             a[i * kept + j] += b[i] * c[j]
 
 
-@emitted
+@kernel
 def periodic_assembled(p, q, s, io, stage, blocks, places, column, keep, a, b, c):
     """A, b, c of the fundamental of a periodic loop; the number of states, or what stands in the way."""
     n = phases_of(p, q, s, io, stage, blocks, places, column, a, b, c)

@@ -20,14 +20,14 @@ from actuator_lti.batch._figures import (
     MODULUS,
     MODULUS_X,
 )
+from actuator_lti.compiled.kernel import kernel
 from actuator_lti.rest_mode import ROUNDED
-from nonlinear.export.entries import emitted
 from nonlinear.export.linear_limiters import states_at
 
 LEAST = np.array(rest_mode_rule.LEAST)
 
 
-@emitted
+@kernel
 def real_response(n, a, b, c, x, work, state):
     """L at an angle where it is real, 0 or pi; infinite or NaN where it has a pole there."""
     states_at(n, a, b, x, work, state)
@@ -37,13 +37,13 @@ def real_response(n, a, b, c, x, work, state):
     return total
 
 
-@emitted
+@kernel
 def entry(n, a, i, k, turned):
     """An element of A, or of its transpose."""
     return a[k * n + i] if turned > 0 else a[i * n + k]
 
 
-@emitted
+@kernel
 def row_size(n, a, c, i, j, turned, v):
     """Largest term of A v = v (row n: of c v = 0); with v_j = 0, before v is known, the largest factor."""
     size = 0.0
@@ -57,7 +57,7 @@ def row_size(n, a, c, i, j, turned, v):
     return size if size > 0.0 else 1.0
 
 
-@emitted
+@kernel
 def posed(n, a, c, j, turned, v, system):
     """Write A v = v, c v = 0 for v_j = 1: n + 1 scaled rows of n - 1 unknowns and the right side."""
     for i in range(n + 1):
@@ -68,7 +68,7 @@ def posed(n, a, c, j, turned, v, system):
             system[i * n + to] = (-value if k == j else value) / size
 
 
-@emitted
+@kernel
 def scaled_columns(n, system, sizes):
     """Scale the unknowns, so that the largest term of each is 1."""
     for k in range(n - 1):
@@ -82,7 +82,7 @@ def scaled_columns(n, system, sizes):
     return 1
 
 
-@emitted
+@kernel
 def eliminated(n, system):
     """Bring n + 1 rows of n - 1 unknowns to triangular form, rows exchanged; 0 where they are dependent."""
     for k in range(n - 1):
@@ -103,7 +103,7 @@ def eliminated(n, system):
     return 1
 
 
-@emitted
+@kernel
 def holds_at_rest(n, a, c, j, turned, v):
     """Whether A v = v and c v = 0 hold within the rounding of the entries, and v is more than v_j."""
     seen, terms, others = 0.0, 0.0, 0
@@ -121,7 +121,7 @@ def holds_at_rest(n, a, c, j, turned, v):
     return others if abs(seen) <= ROUNDED * terms else 0
 
 
-@emitted
+@kernel
 def solved_mode(n, a, c, j, turned, system, sizes, v):
     """Solve A v = v, c v = 0 for v_j = 1, each row over the size of its terms at the v given; 0 where not."""
     posed(n, a, c, j, turned, v, system)
@@ -144,7 +144,7 @@ def solved_mode(n, a, c, j, turned, system, sizes, v):
     return 1
 
 
-@emitted
+@kernel
 def rest_mode(n, a, c, j, turned, system, sizes, v):
     """Find v with v_j = 1, A v = v and c v = 0 within rounding; 0 where there is none."""
     for i in range(n):
@@ -167,7 +167,7 @@ def rest_mode(n, a, c, j, turned, system, sizes, v):
     return 0
 
 
-@emitted
+@kernel
 def entries_of(n, a, j, turned):
     """How many elements of a row of A, or of its transpose, are not zero."""
     count = 0
@@ -177,7 +177,7 @@ def entries_of(n, a, j, turned):
     return count
 
 
-@emitted
+@kernel
 def left_out(n, a, b, c, j, turned, v, a_less, b_less, c_less):
     """Copy the loop without the mode v at rest: state j stays as one that nothing moves."""
     for i in range(n):
@@ -189,7 +189,7 @@ def left_out(n, a, b, c, j, turned, v, a_less, b_less, c_less):
     b_less[j], c_less[j] = 0.0, 0.0
 
 
-@emitted
+@kernel
 def level_at_rest(n, a, b, c, work, state, sizes, v, a_less, b_less, c_less):
     """L(0), without a mode at rest that the loop does not show (`actuator_lti.rest_mode`)."""
     for turned in range(2):
@@ -204,7 +204,7 @@ def level_at_rest(n, a, b, c, work, state, sizes, v, a_less, b_less, c_less):
     return real_response(n, a, b, c, 0.0, work, state)
 
 
-@emitted
+@kernel
 def corrected_at_rest(n, a, b, c, row, work, state, sizes, v, a_less, b_less, c_less):
     """Correct the gain margin that ``row`` lists at zero frequency, and the distance |1 + L(0)|."""
     closed = row[DC_GAIN]
@@ -223,7 +223,7 @@ def corrected_at_rest(n, a, b, c, row, work, state, sizes, v, a_less, b_less, c_
         row[MODULUS], row[MODULUS_X] = distance, 0.0
 
 
-@emitted
+@kernel
 def crossover_missed(n, a, b, c, row, work, state):
     """Whether the number of gain crossovers does not fit the gain at both ends: one lies below the scan."""
     if not math.isfinite(row[DC_GAIN]):

@@ -11,9 +11,10 @@ import math
 
 import numpy as np
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.elastic_modes import enter_mode, put_output
-from nonlinear.export.entries import emitted, init
+from nonlinear._kernels.start import init
 
 CLEARED = np.array([
     layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.OFFSET, layout.LOAD,
@@ -36,7 +37,7 @@ UNLIMITED = np.array([
 ROUNDED = 1e-15  # as in the linear loops: what rounding leaves of a slope
 
 
-@emitted
+@kernel
 def map_slope(p):
     """Slope of the friction map's first piece for w > 0; the viscous friction without a map."""
     if p[layout.MAP_COUNT] <= 0.0:
@@ -47,7 +48,7 @@ def map_slope(p):
     return (p[at + 3] - p[at + 1]) / (p[at + 2] - p[at])
 
 
-@emitted
+@kernel
 def slope_at_zero(p, slope, waves, peak, order):
     """Slope of a torque over its angle at zero; what rounding leaves of it, as at a quarter turn, is none."""
     size = abs(slope)
@@ -58,7 +59,7 @@ def slope_at_zero(p, slope, waves, peak, order):
     return 0.0 if abs(slope) <= ROUNDED * size else slope
 
 
-@emitted
+@kernel
 def linear_row(p, q):
     """Copy the parameters of a run, without anything that is not linear; what bends becomes its slope."""
     for k in range(layout.SIZE):
@@ -77,7 +78,7 @@ def linear_row(p, q):
         q[layout.LOAD_COEFFICIENT] = 0.0
 
 
-@emitted
+@kernel
 def set_off(q, s):
     """Hold an elastic drive train in its linear mode, its angles those of motor and twist."""
     if q[layout.ELASTIC_DRIVE] <= 0.0:
@@ -91,7 +92,7 @@ def set_off(q, s):
     put_output(q, s)
 
 
-@emitted
+@kernel
 def at_rest(q, s):
     """Put the drive at its start, ready to be run as a linear map."""
     init(q, s)

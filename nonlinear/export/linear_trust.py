@@ -16,7 +16,7 @@ from actuator_lti.batch._figures import (
     RADIUS,
 )
 from actuator_lti.batch.withheld import AT_BORDER
-from nonlinear.export.entries import emitted
+from actuator_lti.compiled.kernel import kernel
 from nonlinear.export.linear_limiters import states_at
 
 GROWTH = 10.0  # of an open-loop pole in one sample: below it the entries stay small
@@ -25,7 +25,7 @@ BETWEEN = np.array([0.03, 0.3, 1.0, 2.5])
 EPS = 2.220446049250313e-16
 
 
-@emitted
+@kernel
 def told(n, a, b, c, x, work, state, lent, sizes):
     """How many of its own rounding errors L is at an angle, as `actuator_lti.margins.trust.told_from_zero`.
 
@@ -47,7 +47,7 @@ def told(n, a, b, c, x, work, state, lent, sizes):
     return math.hypot(real, imaginary) / (EPS * bound) if bound > 0.0 else math.inf
 
 
-@emitted
+@kernel
 def rounding_decides(n, a, b, c, poles, row, work, state, lent, sizes):
     """Whether rounding decides the figures in ``row`` of the loop a, b, c, as it was before `one_loop`."""
     if abs(row[RADIUS] - 1.0) < AT_BORDER:

@@ -12,9 +12,9 @@ from actuator_lti.drive.wiring import wire
 from actuator_lti.drive_figure import drive_figure
 from actuator_lti.limiters import limiter_places
 from nonlinear._kernels import layout as at
-from nonlinear.emit.kinds import c_float
 from nonlinear.export.linear_limiters import SIGNALS as SEEN
-from nonlinear.export.trace import Tape, Traced, used_statements
+from nonlinear.export.statement import Statement, used
+from nonlinear.export.trace import Tape, Traced, stored
 from nonlinear.parameters import design_row
 
 PLACES = {
@@ -59,25 +59,24 @@ def changes_figure(design: Design, path: str, name: str, load_Nm: float) -> bool
         return False
 
 
-def row_statements(design: Design, keys: Mapping[str, float]) -> list[str]:
-    """The statements from keys, ``k[0]``, ``k[1]``, ... in their order, to the row, in C."""
+def row_statements(design: Design, keys: Mapping[str, float]) -> tuple[Statement, ...]:
+    """The statements from keys, ``k[0]``, ``k[1]``, ... in their order, to the row."""
     tape, changed = _followed(design, keys)
     row = design_row(changed, kind=object)
-    stored = [f"p[{place}] = {item.name};" for place, item in enumerate(row) if isinstance(item, Traced)]
-    return list(used_statements([*tape.lines, *stored]))
+    return used([*tape.statements, *stored(row)])
 
 
 def figure_statements(
     design: Design, keys: Mapping[str, float], name: str, load_Nm: float
-) -> list[str] | None:
+) -> tuple[Statement, ...] | None:
     """The statements from keys to a figure of the whole drive, ``p[0]``; None where it cannot be followed."""
     tape, changed = _followed(design, keys)
     try:
         figure = drive_figure(changed, name, load_Nm)
     except TypeError:
         return None
-    stored = figure.name if isinstance(figure, Traced) else c_float(float(figure))
-    return list(used_statements([*tape.lines, f"p[0] = {stored};"]))
+    term = figure.name if isinstance(figure, Traced) else float(figure)
+    return used([*tape.statements, Statement("store", 0, "", (term,))])
 
 
 def _followed(design: Design, keys: Mapping[str, float]) -> tuple[Tape, Design]:

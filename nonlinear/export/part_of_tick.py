@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.motion import closely, count_events, hold, quick
+from nonlinear._kernels.start import derive
 from nonlinear._kernels.tick import decide
-from nonlinear.export.entries import derive, emitted
 
 
-@emitted
+@kernel
 def part_of_tick(p, q, s, io, tau):  # type: ignore[no-untyped-def]
     """Sense and control at t_k and move to t_k + tau, 0 < tau < Ts; returns a status.
 
@@ -25,6 +26,6 @@ def part_of_tick(p, q, s, io, tau):  # type: ignore[no-untyped-def]
             u = s[layout.S_QUEUE + part]
             s[layout.S_HELD] = u
             if quick(q, s, part, u) == 0:
-                events = closely(q, s, part, u, events, 1.0)
+                events = closely(q, s, part, u, events)
     count_events(s, events)
     return int(s[layout.S_STATUS])

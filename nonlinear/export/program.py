@@ -7,12 +7,12 @@ import re
 from functools import cache
 from importlib.resources import files
 
+from actuator_lti.compiled import Program, emit_c
+from actuator_lti.compiled.kinds import FUNCTIONS, Kind
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.control import control_tick
+from nonlinear._kernels.start import derive, init, prepare_sizes, retune
 from nonlinear._kernels.tick import get, set_state, tick
-from nonlinear.emit import Program, emit_c
-from nonlinear.emit.kinds import FUNCTIONS, Kind
-from nonlinear.export.entries import derive, init, prepare_sizes, retune
 from nonlinear.export.part_of_tick import part_of_tick
 from nonlinear.export.rows import names_of, parameter_names, words
 
@@ -27,12 +27,6 @@ ENTRIES: dict[object, tuple[Kind, ...]] = {
     retune: (_ROW, _ROW),
     get: (_ROW, _ROW, _ROW),
     set_state: (_ROW, _ROW, _ROW),
-}
-_MINMAX = {
-    "min": "static inline double drive_min(double a, double b) { return (b < a) ? b : a; }",
-    "max": "static inline double drive_max(double a, double b) { return (b > a) ? b : a; }",
-    "min_int": "static inline int drive_min_int(int a, int b) { return (b < a) ? b : a; }",
-    "max_int": "static inline int drive_max_int(int a, int b) { return (b > a) ? b : a; }",
 }
 STATUS = {
     "OK": "went well",
@@ -113,23 +107,17 @@ def _plain(text: str) -> str:
 def source_text() -> str:
     """``drive.c``: constants, helpers, types, functions."""
     emitted = program()
-    body = emitted.functions
     parts = [
         '#include "drive.h"\n\n#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n',
         emitted.constants_text(words()),
         "",
-        *helpers_of(body),
+        *emitted.helpers,
         "",
         emitted.types,
         "",
-        body,
+        emitted.functions,
     ]
     return template("drive_head.c") + "\n".join(parts)
-
-
-def helpers_of(body: str) -> list[str]:
-    """Minimum and maximum as Python has them, those that a program calls."""
-    return [text for name, text in _MINMAX.items() if f"drive_{name}(" in body]
 
 
 def source_hash() -> str:

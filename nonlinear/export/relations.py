@@ -12,12 +12,13 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from actuator_lti.design.access import stacked
-from actuator_lti.design.checks import RELATIONS
+from actuator_lti.design.checks import FIRST_RELATIONS, RELATIONS
+from actuator_lti.design.mistakes import refusal_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.parameters import FrozenMap
-from actuator_lti.errors import InputError
 from nonlinear.export.program import c_text
-from nonlinear.export.trace import Key, Tape, Traced, used_statements
+from nonlinear.export.statement import Statement, used
+from nonlinear.export.trace import Key, Tape, Traced
 
 MOST_TURNS = 2  # branches beside the design's own that are followed; beyond: another structure
 BEYOND = "these parameters ask for another structure: export the changed design again"
@@ -31,65 +32,68 @@ class _Way(Tape):
     told: Sequence[bool] = ()
     outcomes: list[bool] = field(default_factory=list)
 
-    def condition(self, text: str, outcome: bool) -> bool:
+    def condition(self, does: str, terms: tuple[Any, ...], outcome: bool) -> bool:
         """Note a comparison among the statements."""
         number = len(self.outcomes)
         self.outcomes.append(self.told[number] if number < len(self.told) else outcome)
-        self.lines.append(f"?{text}")
-        return self.outcomes[-1]
+        return super().condition(does, terms, self.outcomes[-1])
 
 
 def relation_functions(design: Design, keys: Sequence[Key]) -> list[list[str]]:
     """Statements of C functions of ``(k, why, size)``: 0 where keys contradict each other, and why."""
     bare = replace(design, parameters=FrozenMap({}))  # values are shown as they are then, not as written
-    ways = [_followed(bare, keys, check, (), 0) for check in RELATIONS]
-    return [list(used_statements(lines)) for lines in ways if _refuses(lines)]
+    ways = [_followed(bare, keys, check, (), 0) for check in (*FIRST_RELATIONS, *RELATIONS)]
+    return [_indented(used(way)) for way in ways if _refuses(way)]
 
 
 def _followed(
     design: Design, keys: Sequence[Key], check: Any, told: tuple[bool, ...], turns: int
-) -> list[str]:
-    """What a check does behind the outcomes that are told."""
+) -> list[Statement]:
+    """What a check does behind the outcomes that are told, up to what it refuses first."""
     way = _Way(loose=True, told=told)
     values = {key.path: Traced(way, f"k[{n}]", key.value) for n, key in enumerate(keys)}
-    end = ["return 1;"]
+    end = Statement("allowed")
     try:
-        check(stacked(design, values), "")
-    except InputError as refusal:
-        end = _refusal(refusal.message)
+        for refusal in check(stacked(design, values)):
+            end = _refusal(refusal_text(refusal))
+            break
     except ArithmeticError:  # a turn that no values take: those of the keys' ranges never come here
         end = _refusal(BEYOND)
-    lines: list[str] = []
-    number = 0
-    for line in way.lines:
-        if not line.startswith("?"):
-            lines += [line] if number >= len(told) else []
+    found: list[Statement] = []
+    number = 0  # of comparisons so far; what lies before those that are told is there already
+    for statement in way.statements:
+        if statement.kind != "condition":
+            found += [statement] if number >= len(told) else []
             continue
         if number >= len(told):
-            before, outcome = tuple(way.outcomes[:number]), way.outcomes[number]
-            beyond = turns > MOST_TURNS
+            turned = (*way.outcomes[:number], not way.outcomes[number])
             body = (
-                _refusal(BEYOND)
-                if beyond
-                else _followed(design, keys, check, (*before, not outcome), turns + 1)
+                [_refusal(BEYOND)]
+                if turns > MOST_TURNS
+                else _followed(design, keys, check, turned, turns + 1)
             )
             if _refuses(body):
-                sign = "!" if outcome else ""
-                lines += [f"if ({sign}({line[1:]})) {{", *(f"    {more}" for more in body), "}"]
+                found += [replace(statement, kind="branch"), *body, Statement("end")]
         number += 1
-    return lines + end
+    return [*found, end]
 
 
-def _refuses(lines: Sequence[str]) -> bool:
-    return any("return 0;" in line for line in lines)
+def _refuses(statements: Sequence[Statement]) -> bool:
+    return any(statement.kind == "refusal" for statement in statements)
 
 
-def _refusal(text: str) -> list[str]:
+def _refusal(text: str) -> Statement:
     """A message that shows the values of then."""
-    parts = _SHOWN.sub("\x01", text.replace("%", "%%")).split("\x01")
-    forms = [form for form, _ in _SHOWN.findall(text)]
-    named = "".join(
-        part + (f"%{form}" if form else "") for part, form in zip(parts, [*forms, ""], strict=True)
-    )
-    arguments = "".join(f", {name}" for _, name in _SHOWN.findall(text))
-    return [f"(void)snprintf(why, size, {c_text(named)}{arguments});", "return 0;"]
+    parts = _SHOWN.split(text.replace("%", "%%"))  # words, form, name, words, ...
+    words = "".join(part if n % 3 == 0 else f"%{part}" for n, part in enumerate(parts) if n % 3 < 2)
+    return Statement("refusal", does=c_text(words), terms=tuple(parts[2::3]))
+
+
+def _indented(statements: Sequence[Statement]) -> list[str]:
+    lines: list[str] = []
+    depth = 0
+    for statement in statements:
+        depth -= statement.kind == "end"
+        lines.append("    " * depth + statement.c)
+        depth += statement.kind == "branch"
+    return lines

@@ -1,6 +1,6 @@
 """How the row of a run follows from the keys of its design, found by running `design_row` on traced values.
 
-Arithmetic on a traced value is written down as C.  Where the program looks at one (a comparison, a floor),
+Arithmetic on a traced value is written down.  Where the program looks at one (a comparison, a floor),
 the outcome is written down as a condition: other values that meet all conditions give the same program.
 """
 
@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import operator
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,7 +18,7 @@ from actuator_lti.design.access import located, parameter_value, paths_of, stack
 from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout as at
-from nonlinear.emit.kinds import c_float as c_number
+from nonlinear.export.statement import Statement, Term, used
 from nonlinear.parameters import design_row
 
 
@@ -38,24 +37,23 @@ class Tape:
 
     interpreted: bool = False
     loose: bool = False
-    lines: list[str] = field(default_factory=list)
+    statements: list[Statement] = field(default_factory=list)
     count: int = 0
 
-    def value(self, text: str, number: float) -> Traced:
+    def value(self, does: str, terms: tuple[Any, ...], number: float) -> Traced:
         """A new intermediate value."""
         self.count += 1
-        name = f"v{self.count}"
-        self.lines.append(f"const double {name} = {text};")
-        return Traced(self, name, number)
+        self.statements.append(Statement("value", self.count, does, tuple(map(_term, terms))))
+        return Traced(self, f"v{self.count}", number)
 
-    def condition(self, text: str, outcome: bool) -> bool:
+    def condition(self, does: str, terms: tuple[Any, ...], outcome: bool) -> bool:
         """Note what was found of a value."""
-        self.lines.append(f"if ({'!' if outcome else ''}({text})) {{ return 0; }}")
+        self.statements.append(Statement("condition", int(outcome), does, tuple(map(_term, terms))))
         return outcome
 
 
-def _text(value: Any) -> str:
-    return value.name if isinstance(value, Traced) else c_number(float(value))
+def _term(value: Any) -> Term:
+    return value.name if isinstance(value, Traced) else float(value)
 
 
 def _number(value: Any) -> float:
@@ -66,10 +64,10 @@ def _binary(sign: str, function: Callable[[Any, Any], Any]) -> tuple[Any, Any]:
     def forward(self: Traced, other: Any) -> Traced:
         if isinstance(other, np.ndarray):
             return NotImplemented  # numpy goes over its elements
-        return self.tape.value(f"{self.name} {sign} {_text(other)}", function(self.number, _number(other)))
+        return self.tape.value(sign, (self, other), function(self.number, _number(other)))
 
     def backward(self: Traced, other: Any) -> Traced:
-        return self.tape.value(f"{_text(other)} {sign} {self.name}", function(_number(other), self.number))
+        return self.tape.value(sign, (other, self), function(_number(other), self.number))
 
     return forward, backward
 
@@ -80,27 +78,27 @@ def _compared(sign: str, function: Callable[[Any, Any], bool]) -> Any:
             return False
         if self.tape.loose and isinstance(other, float) and math.isinf(other):
             return function(self.number, other)
-        text, outcome = f"{self.name} {sign} {_text(other)}", function(self.number, _number(other))
         made = self.tape.value if self.tape.interpreted else self.tape.condition
-        return made(text, outcome)
+        return made(sign, (self, other), function(self.number, _number(other)))
 
     return compare
 
 
 def _function(name: str) -> Any:
     def function(self: Traced) -> Traced:
-        return self.tape.value(f"{name}({self.name})", getattr(math, name)(self.number))
+        return self.tape.value(name, (self,), getattr(math, name)(self.number))
 
     return function
 
 
 def _rounded(name: str) -> Any:
     def rounded(self: Traced) -> Any:
-        result = np.float64(getattr(math, name)(self.number))
+        result = float(getattr(math, name)(self.number))
+        made = self.tape.value(name, (self,), result)
         if self.tape.interpreted:
-            return self.tape.value(f"{name}({self.name})", float(result))
-        self.tape.condition(f"{name}({self.name}) == {c_number(float(result))}", True)
-        return result
+            return made
+        self.tape.condition("==", (made, result), True)
+        return np.float64(result)
 
     return rounded
 
@@ -127,47 +125,47 @@ class Traced:
     def __and__(self, other: Any) -> Any:
         """Both; of comparisons that are values."""
         both = bool(self.number) and bool(_number(other))
-        return self.tape.value(f"{self.name} && {_text(other)}", both)
+        return self.tape.value("&&", (self, other), both)
 
     def __or__(self, other: Any) -> Any:
         """One at least."""
         one = bool(self.number) or bool(_number(other))
-        return self.tape.value(f"{self.name} || {_text(other)}", one)
+        return self.tape.value("||", (self, other), one)
 
     __rand__, __ror__ = __and__, __or__
 
     def either(self, yes: Any, no: Any) -> Traced:
         """One value where this comparison holds, else the other."""
         number = _number(yes if self.number else no)
-        return self.tape.value(f"where({self.name}, {_text(yes)}, {_text(no)})", number)
+        return self.tape.value("where", (self, yes, no), number)
 
     def zero_below(self, least: Any) -> Traced:
         """The value, or 0 where its size is less."""
         if not self.tape.interpreted:
-            return self if abs(self) >= least else self.tape.value("0.0", 0.0)
+            return self if abs(self) >= least else self.tape.value("", (0.0,), 0.0)
         kept = self.number if abs(self.number) >= _number(least) else 0.0
-        return self.tape.value(f"zero_below({self.name}, {_text(least)})", kept)
+        return self.tape.value("zero_below", (self, least), kept)
 
     def __pow__(self, power: Any) -> Traced:
-        return self.tape.value(f"pow({self.name}, {_text(power)})", self.number ** _number(power))
+        return self.tape.value("pow", (self, power), self.number ** _number(power))
 
     def __mod__(self, other: Any) -> Traced:
         if not self.tape.loose:
             raise NotTraceable("a remainder")
-        return self.tape.value(f"fmod({self.name}, {_text(other)})", math.fmod(self.number, _number(other)))
+        return self.tape.value("fmod", (self, other), math.fmod(self.number, _number(other)))
 
     def __format__(self, form: str) -> str:
         """Stands in a message for the value that it will have."""
         return f"\x01{form or 'g'}\x02{self.name}\x03"
 
     def __neg__(self) -> Traced:
-        return self.tape.value(f"-{self.name}", -self.number)
+        return self.tape.value("-", (self,), -self.number)
 
     def __abs__(self) -> Traced:
-        return self.tape.value(f"fabs({self.name})", abs(self.number))
+        return self.tape.value("fabs", (self,), abs(self.number))
 
     def __bool__(self) -> bool:
-        return self.tape.condition(f"{self.name} != 0.0", self.number != 0.0)
+        return self.tape.condition("!=", (self, 0.0), self.number != 0.0)
 
     def __float__(self) -> float:
         if self.tape.loose:
@@ -241,24 +239,14 @@ def trace_keys(design: Design) -> KeyTrace:
     tape = Tape()
     values = {key.path: Traced(tape, f"k[{n}]", key.value) for n, key in enumerate(free)}
     row = design_row(stacked(design, values), kind=object)
-    lines = [*tape.lines]
-    lines += [f"p[{place}] = {item.name};" for place, item in enumerate(row) if isinstance(item, Traced)]
-    return KeyTrace(keys=tuple(free), constants=tuple(constants), lines=used_statements(lines))
+    lines = tuple(statement.c for statement in used([*tape.statements, *stored(row)]))
+    return KeyTrace(keys=tuple(free), constants=tuple(constants), lines=lines)
 
 
-def used_statements(lines: list[str]) -> tuple[str, ...]:
-    """Statements without the values that nothing asks for."""
-    kept: list[str] = []
-    wanted: set[str] = set()
-    for line in reversed(lines):
-        made = re.match(r"\s*const double (v\d+) = ", line)
-        if made and made[1] not in wanted:
-            continue
-        if made:  # of this name there may be another in another branch
-            wanted.remove(made[1])
-        wanted |= set(re.findall(r"\bv\d+\b", line[made.end() :] if made else line))
-        kept.append(line)
-    return tuple(reversed(kept))
+def stored(row: Any) -> list[Statement]:
+    """Statements that put what was followed into the places of a row."""
+    places = ((place, item) for place, item in enumerate(row) if isinstance(item, Traced))
+    return [Statement("store", place, "", (item.name,)) for place, item in places]
 
 
 def _reached(design: Design, path: str) -> set[int] | None:

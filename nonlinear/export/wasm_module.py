@@ -22,9 +22,10 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.batch import _figures, _quoted, _response, _run
+from actuator_lti.compiled import Program, emit_c
+from actuator_lti.compiled.compiler import compile_files
+from actuator_lti.compiled.kinds import Kind
 from actuator_lti.tree import Tree
-from nonlinear.emit import Program, emit_c
-from nonlinear.emit.kinds import Kind
 from nonlinear.export import (
     linear,
     linear_figures,
@@ -33,8 +34,7 @@ from nonlinear.export import (
     linear_rest,
     linear_trust,
 )
-from nonlinear.export.build import compile_files
-from nonlinear.export.program import ENTRIES, header_text, helpers_of, template
+from nonlinear.export.program import ENTRIES, header_text, template
 
 MOST_BYTES = 100_000
 _NAME, _RECORD = "drive.wasm", "drive.wasm.json"
@@ -89,7 +89,7 @@ def program() -> Program:
 
 def _linear_header() -> str:
     """Prototypes and lengths beyond those of ``drive.h``."""
-    known = {function.py_func.__name__ for function in _LINEAR}
+    known = {function.__name__ for function in _LINEAR}
     heads = [text for name, text in program().declarations.items() if name in known]
     return "\n".join([*(f"enum {{ {name} = {size} }};" for name, size in _SIZES.items()), *heads, ""])
 
@@ -98,9 +98,7 @@ def _source() -> str:
     """The program behind its prototypes."""
     emitted = program()
     head = '#include "drive.h"\n\n#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n'
-    return "\n".join(
-        [head, emitted.constants_text(), *helpers_of(emitted.functions), emitted.types, emitted.functions]
-    )
+    return "\n".join([head, emitted.constants_text(), *emitted.helpers, emitted.types, emitted.functions])
 
 
 def sources() -> dict[str, str]:

@@ -1,1 +1,1 @@
-"""Charts as data, and their SVG: drawn once here, kept live on the page by ``templates/live.js``."""
+"""Charts as data, and their SVG: drawn once here, kept live on the page by ``templates/page``."""

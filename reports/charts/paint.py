@@ -25,7 +25,6 @@ BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BROWN = SERIES = ("c1", "c2", "c3", "c4",
 INK, MUTED = "ink", "muted"
 # lengths of dash and gap; the first is a full line
 DASHES = ("", "9 4", "3 3", "10 4 2.5 4", "1.5 2.5", "14 5", "6 2.5")
-MARKERS = "osD^v+x"
 HATCHES = ("", "//", "--", "||", "\\\\", "+", "x")
 
 MARKER_PATHS = {

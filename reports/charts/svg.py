@@ -1,6 +1,6 @@
 """A chart as SVG: each column a picture on a page, all in one picture on paper.
 
-What stands here is all that ``templates/live.js`` needs to zoom, read out and redraw: every panel carries
+What stands here is all that ``templates/page`` needs to zoom, read out and redraw: every panel carries
 its axes (``data-x``, ``data-y``: kind, ends, pixels), every curve its key.
 """
 

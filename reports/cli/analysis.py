@@ -2,40 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from importlib import import_module
 from inspect import Parameter, Signature, cleandoc
 from pathlib import Path
+from textwrap import dedent
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from analyses.request import Option, flag, options
+from actuator_lti.verdict import Verdict
+from analyses.request import OnMachines, Option, flag, options
+from analyses.study_asked import study_with
 from reports.analyses import Analysis
-from reports.cli.drive import SetOption, load_drive, output_quantity
-from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, QuietOption, on_axis, read_load
+from reports.cli.drive import SetOption, load_drive, output_quantity, read_changes
+from reports.cli.options import (
+    DEFAULT_DESIGN,
+    DesignArgument,
+    JsonOption,
+    QuietOption,
+    command_quantity,
+    on_axis,
+    read_load,
+)
 from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
+    from analyses.study import Study
+    from reports.document_schema import Section
 
+DesignOption = Annotated[
+    str | None,
+    typer.Option(
+        "--design", metavar="DESIGN", help="Design by name or path (default: what the files name, or emps)."
+    ),
+]
 FolderOption = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", callback=folder_for_results, help="Write page and JSON there."),
+]
+
+StudyArgument = Annotated[
+    str | None, typer.Argument(metavar="STUDY", help="Study file (--example prints one), or a design.")
+]
+VariantOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help='A variant more: "gear.worm.ratio=50"; repeatable.'),
 ]
 
 
 def command(one: Analysis) -> Callable[..., None]:
     """The function that typer makes a command of."""
 
-    def run(
-        design: str, changes: list[str] | None, out: Path | None, as_json: bool, quiet: bool, **chosen: Any
-    ) -> None:
-        answer(one, load_drive(design, changes), chosen, out, as_json, quiet)
+    def run(design: str | None, changes: list[str] | None, **given: Any) -> None:
+        name = design or (usual(given) if usual else DEFAULT_DESIGN)
+        answer(one, _study(design, changes) if one.study else load_drive(name, changes), **given)
 
+    usual = getattr(one.request, "design_of", None)  # then the design is an option
     needed = any(option.argument for _, option in _options(one).values())  # then a design is, too
+    subject: tuple[Any, Any] = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
     parameters = [
-        _parameter("design", DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN),
-        _parameter("changes", SetOption, None),
+        _parameter("design", DesignOption, None)
+        if usual
+        else _parameter("design", *((StudyArgument, None) if one.study else subject)),
+        _parameter("changes", VariantOption if one.study else SetOption, None),
         *(
             _parameter(name, *_option(name, *each, getattr(one.request, name, None)))
             for name, each in _options(one).items()
@@ -43,6 +74,7 @@ def command(one: Analysis) -> Callable[..., None]:
         _parameter("out", FolderOption, Path(one.out) if one.out else None),
         _parameter("as_json", JsonOption, False),
         _parameter("quiet", QuietOption, False),
+        *([_parameter("example", _example(one), False)] if one.example else []),
     ]
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}
@@ -50,37 +82,99 @@ def command(one: Analysis) -> Callable[..., None]:
     return run
 
 
+def _example(one: Analysis) -> Any:
+    """An option that prints a file to start from: what stands in a module's docstring behind ``::``."""
+
+    def show(wanted: bool) -> None:
+        if wanted:
+            text = (import_module(one.example).__doc__ or "").split("::", 1)[1]
+            typer.echo(dedent(text).strip())
+            raise typer.Exit
+
+    words = "Print a file to start from, and stop."
+    return Annotated[bool, typer.Option("--example", is_eager=True, callback=show, help=words)]
+
+
 def answer(
-    one: Analysis, drive: Design, chosen: dict[str, Any], out: Path | None, as_json: bool, quiet: bool
+    one: Analysis,
+    subject: Design | Study | None,
+    *,
+    out: Path | None,
+    as_json: bool,
+    quiet: bool,
+    **chosen: Any,
 ) -> None:
     """Ask, then print the section or the result, and leave with the verdict."""
+    from actuator_lti.design import warnings_of
+    from analyses.isolation import isolated
+    from reports import document as doc
+    from reports.build import notices
     from reports.cli.errors import leave_with
-    from reports.cli.output import print_json, print_line
+    from reports.cli.output import print_json, print_line, print_note, print_warning
     from reports.cli.progress import progress
-    from reports.study_pages import study_document, write_pages
-    from reports.terminal import print_section
 
+    drive: Any = getattr(getattr(subject, "base", None), "design", subject)
     values = {name: _read(name, option, chosen[name], drive) for name, (_, option) in _options(one).items()}
-    with progress(f"{one.doing} {drive.name}", quiet=quiet) as doing:
-        more = {"progress": doing} if one.doing else {}
-        result = one.run(drive, *one.asked(drive, values), **more)
-    first, *others = parts = one.sections(result)
+    if one.written and (as_json or out is not None):
+        values[one.written] = True
+    asked = one.asked(subject, values)
+    for each in asked:
+        if isinstance(each, OnMachines) and each.engine.caution:
+            print_note(f"actuator-lti: {each.engine.caution}")
+    for warning in warnings_of(drive) if one.warns else ():
+        print_warning(f"{drive.name}: {warning}")
+    with progress(f"{one.doing} {getattr(subject, 'name', '')}", quiet=quiet) as doing, isolated() as missing:
+        more: dict[str, Any] = {"progress": doing} if one.doing else {}
+        more |= {"out": out} if one.keeps else {}
+        result = one.run(subject, *asked, **more)
+    if (text := one.text(result)) is not None:
+        print_line(text)
+        return
+    parts = [*notices(missing, one.name), *one.sections(result)]
+    doc.waived(parts, drive)
     passed = getattr(result, "verdict", getattr(result, "passed", None))
     files = one.write(result, out)
     if out is not None:
-        title = f"{drive.title or drive.name}: {first['title']}"
-        made = study_document(drive, parts, title=title, subtitle=first["result"], kind=one.name)
-        with progress("drawing figures", quiet=quiet) as drawing:
-            files += map(str, write_pages(made, out, one.stem or one.name, progress=drawing))
+        files += _pages(one, drive, parts, out, quiet)
     if as_json:
         print_json(one.data(result))
     else:
-        print_section(first, passed, name=drive.name)
-        for part in others:
-            print_section(part, None)
+        _print(one, drive.name, result, parts, passed)
         for path in files:
             print_line(f"wrote {path}")
     leave_with(passed in (None, True, "met"))
+
+
+def _study(path: str | None, changes: list[str] | None) -> Study | None:
+    return (
+        None if path is None else study_with(path, {words: read_changes([words]) for words in changes or ()})
+    )
+
+
+def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, quiet: bool) -> list[str]:
+    """Write page and JSON."""
+    from reports.cli.progress import progress
+    from reports.study_pages import study_document, write_pages
+
+    title = f"{drive.title or drive.name}: {parts[0]['title']}"
+    made = study_document(drive, parts, title=title, subtitle=parts[0]["result"], kind=one.name)
+    with progress("drawing figures", quiet=quiet) as drawing:
+        return [str(path) for path in write_pages(made, out, one.stem or one.name, progress=drawing)]
+
+
+def _print(
+    one: Analysis, name: str, result: Any, parts: Sequence[Section], passed: bool | Verdict | None
+) -> None:
+    """Print the sections, or in brief what they say."""
+    from reports.terminal import print_blocks, print_section, print_verdict
+
+    brief = one.brief(result)
+    if brief is not None:
+        print_verdict(passed or False, f"{name}: {brief.words}")
+        print_blocks(brief.blocks, brief.notes)
+        return
+    for k, part in enumerate(parts):
+        print_section(part, None if k else passed, name="" if k else name)
 
 
 def _options(one: Analysis) -> dict[str, tuple[Any, Option]]:
@@ -89,7 +183,7 @@ def _options(one: Analysis) -> dict[str, tuple[Any, Option]]:
 
 def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, Any]:
     """A field as an option of typer; what is not given is None, and the request knows what then."""
-    text = {"plain": kind, "output": str, "load": float}[option.kind]
+    text = {"plain": kind, "load": float}.get(option.kind, str)
     more: dict[str, Any] = {"parser": read_load} if option.kind == "load" else {}
     if option.argument:
         return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], Parameter.empty
@@ -101,6 +195,8 @@ def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, An
 
 def _read(name: str, option: Option, value: Any, drive: Design) -> Any:
     """The value of an option in SI, once the drive is known."""
+    if option.kind == "command":
+        return command_quantity(f"--{option.flag or flag(name)}", value, drive)
     if option.kind == "output":
         return output_quantity(f"--{option.flag or flag(name)}", value, drive)
     return on_axis(value, drive) if option.kind == "load" and value is not None else value

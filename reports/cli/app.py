@@ -20,11 +20,11 @@ def _declared(group: str) -> tuple[str, ...]:
 # In the order in which the help lists them, by the panel that they stand in.
 PANELS: dict[str, tuple[str, ...]] = {
     "Designs": ("designs", "init", "keys", "objects"),
-    "Linear loops": ("margins", *_declared("Linear loops"), "report", "pdf"),
-    "Nonlinear checks": (*_declared("Nonlinear checks"), "validate"),
-    "Bench records": ("identify", *_declared("Bench records")),
+    "Linear loops": (*_declared("Linear loops"), "report", "pdf"),
+    "Nonlinear checks": _declared("Nonlinear checks"),
+    "Bench records": _declared("Bench records"),
     "Out of Python": ("export",),
-    "Variants and history": ("compare", "montecarlo", *_declared("Variants and history"), "nightly"),
+    "Variants and history": (*_declared("Variants and history"), "nightly"),
 }
 
 

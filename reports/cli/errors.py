@@ -1,5 +1,7 @@
 """Exit statuses: 0 done, 1 a verdict fails, 2 bad input or usage, 3 no result, 130 interrupted.
 
+Mistakes of a design file are a line each.
+
 There is no result after a numerical failure, after the time limit, or where something happened that nobody
 foresaw. One line says which, and where the traceback lies; what a report lacks because of it stands in
 the report as well.
@@ -13,7 +15,7 @@ from collections.abc import Callable, Mapping
 
 import typer
 
-from actuator_lti.errors import InputError, NumericalError, OutOfTime, UnstableError
+from actuator_lti.errors import InputError, Mistakes, NumericalError, OutOfTime, UnstableError
 from reports.cli import time_limit
 from reports.cli.crash import write_crash_file
 
@@ -73,6 +75,8 @@ def _run(call: Callable[[], object], options: Callable[[], Mapping[str, str]]) -
         sys.stdout.flush()
     except UnstableError as error:
         return _say(str(error), VERDICT_FAILED)
+    except Mistakes as error:
+        return max(_say(str(one), BAD_INPUT) for one in error.mistakes)
     except InputError as error:
         return _say(_by_option(error, options), BAD_INPUT)
     except (NumericalError, OutOfTime) as error:

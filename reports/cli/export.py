@@ -47,8 +47,6 @@ def c(
     """Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README."""
     from actuator_lti.atomic import write_together
     from nonlinear.export import c_export
-    from reports.cli.errors import leave_with
-    from reports.cli.output import print_json, print_line
     from reports.export_check import check_text
 
     drive = load_drive(design, changes)
@@ -58,13 +56,8 @@ def c(
     result = _checked(drive) if check else None
     texts["README.md"] += "\n" + check_text(result, single_precision=single)
     write_together({out / name: text.encode() for name, text in texts.items()})
-    if as_json:
-        about = {"files": [str(out / name) for name in texts]}
-        print_json({"schema": "actuator-lti/export-c", "version": 1, **about, **_check_json(result)})
-    else:
-        print_line(f"{out}: {', '.join(texts)}")
-        _say(result)
-    leave_with(result is None or not result.failed)
+    about = {"files": [str(out / name) for name in texts]}
+    _answer("export-c", about, f"{out}: {', '.join(texts)}", result, as_json)
 
 
 def _checked(drive: Design) -> CodeCheck:
@@ -75,23 +68,19 @@ def _checked(drive: Design) -> CodeCheck:
         return check_code(drive)
 
 
-def _say(code_check: CodeCheck | None) -> None:
-    """Print what the check has found."""
-    from reports.cli.output import print_line
+def _answer(schema: str, about: Tree, words: str, result: CodeCheck | None, as_json: bool) -> None:
+    """Print what was written and what the check has found, and leave with its verdict."""
+    from reports.cli.errors import leave_with
+    from reports.cli.output import print_json, print_line
     from reports.export_check import summary
 
-    if code_check is not None:
-        print_line(summary(code_check))
-
-
-def _check_json(code_check: CodeCheck | None) -> Tree:
-    from reports.export_check import summary
-
-    return (
-        {}
-        if code_check is None
-        else {"check": {"passed": not code_check.failed, "result": summary(code_check)}}
-    )
+    if result is not None:
+        about = {**about, "check": {"passed": not result.failed, "result": summary(result)}}
+    if as_json:
+        print_json({"schema": f"actuator-lti/{schema}", "version": 1, **about})
+    else:
+        print_line("\n".join([words, *([summary(result)] if result else [])]))
+    leave_with(result is None or not result.failed)
 
 
 @app.command("fmu")
@@ -114,8 +103,6 @@ def fmu(
     """Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a parameter."""
     from actuator_lti.atomic import write_bytes
     from nonlinear.export import PLATFORMS, fmu_bytes, refuse_unknown
-    from reports.cli.errors import leave_with
-    from reports.cli.output import print_json, print_line
     from reports.export_documents import export_documents
     from reports.model_picture import model_png
     from reports.provenance import package_version
@@ -135,10 +122,6 @@ def fmu(
         tool=f"actuator-lti {package_version()}",
     )
     write_bytes(target, data)
-    if as_json:
-        about = {"file": str(target), "fmi": version, "platforms": platforms, "bytes": len(data)}
-        print_json({"schema": "actuator-lti/export-fmu", "version": 1, **about, **_check_json(result)})
-    else:
-        print_line(f"{target}: FMI {version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes")
-        _say(result)
-    leave_with(result is None or not result.failed)
+    about: Tree = {"file": str(target), "fmi": version, "platforms": platforms, "bytes": len(data)}
+    words = f"{target}: FMI {version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes"
+    _answer("export-fmu", about, words, result, as_json)

@@ -9,7 +9,7 @@ import typer
 
 from actuator_lti.bounds import JOB_MEMORY
 from actuator_lti.errors import InputError
-from reports.cli.options import JsonOption, QuietOption, SchedulerOption, TlsOption
+from reports.cli.options import JsonOption, QuietOption, SchedulerOption, TlsOption, engine_of
 
 if TYPE_CHECKING:
     from reports.nightly.view import Overview
@@ -88,7 +88,6 @@ def nightly(
 
     need("filelock", "nightly", "a nightly build")
     need("ruptures", "nightly", "a nightly build")
-    from analyses.engine import Engine
     from reports.cli.errors import leave_with
     from reports.cli.progress import progress
     from reports.nightly.memory import HistoryLost
@@ -105,7 +104,7 @@ def nightly(
         state=state,
         accept_lost_history=accept_lost_history,
         memory_limit_bytes=memory_limit * 1_000_000,
-        engine=None if scheduler is None else Engine(scheduler=scheduler, tls=tls),
+        engine=None if scheduler is None else engine_of(None, scheduler, tls),
     )
     try:
         if approving:

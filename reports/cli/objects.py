@@ -9,7 +9,7 @@ import typer
 
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
-from reports.cli.targets import refuse_existing
+from reports.cli.targets import write_new
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import ControllerObject
@@ -55,7 +55,6 @@ def export(
     """Write a design's settings as controller objects: TOML, or XML where FILE ends in .xdc or .xml."""
     from dataclasses import replace
 
-    from actuator_lti.atomic import write_text
     from actuator_lti.design.objects import calibration, export_objects
     from actuator_lti.design.settings_file import write_settings_toml
     from actuator_lti.design.settings_xml import settings_xml
@@ -71,9 +70,7 @@ def export(
         text, homeless = settings_xml(result.objects, into)
     else:
         text = write_settings_toml(result.objects)
-    if out is not None:
-        refuse_existing(out, force)
-        write_text(out, text)
+    write_new(out, text, force)
     notes = [*(f"rounded: {item}" for item in result.rounded), *result.notes]
     notes += [f"no place for it in {into}: {label}" for label in homeless]
     if as_json:
@@ -97,7 +94,6 @@ def import_settings(
     as_json: JsonOption = False,
 ) -> None:
     """Put controller settings into a design and write it as a design file."""
-    from actuator_lti.atomic import write_text
     from actuator_lti.design import load_design, write_design
     from actuator_lti.design.objects import calibration, import_objects
     from actuator_lti.design.settings_file import read_settings
@@ -107,9 +103,7 @@ def import_settings(
     factor = None if per is None else calibration(per)
     result = import_objects(read_settings(settings, factor), load_design(base), shown_path(settings))
     text = write_design(result.design)
-    if out is not None:
-        refuse_existing(out, force)
-        write_text(out, text)
+    write_new(out, text, force)
     if as_json:
         changed = {path: result.design.parameters[path].text for path in result.changed}
         print_json({"schema": "actuator-lti/objects-import", "version": 1, "changed": changed,

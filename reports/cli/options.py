@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +12,7 @@ from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
+    from analyses.engine import Engine
 
 DEFAULT_DESIGN = "ilr33-amber"
 DEFAULT_OUT = Path("out")
@@ -71,30 +73,36 @@ def read_load(text: str) -> float:
     raise typer.BadParameter(f'{reason}; allowed: a torque such as "4 N*m" (linear axis: a force, "40 N")')
 
 
-LoadOption = Annotated[
-    float,
-    typer.Option(
-        "--load",
-        metavar="LOAD",
-        parser=read_load,
-        help='Load torque at the output, such as "4 N*m" or 4 (N m; linear axis: N).',
-    ),
-]
-FormOption = Annotated[
-    str, typer.Option("--form", metavar="FORM", help="Linear form: sampled, continuous or ideal.")
-]
-OperatingPointOption = Annotated[
-    str,
-    typer.Option(
-        "--operating-point",
-        metavar="POINT",
-        help="Friction: sliding, rest or describing-function; behind a coupling also driving and driven (the "
-        "load's share of the friction) and gap (in the play).",
-    ),
-]
-WorkersOption = Annotated[
-    int | None, typer.Option("--workers", metavar="N", help="Processes of a local Dask cluster.")
-]
+def command_quantity(option: str, words: str | None, drive: Design) -> float | None:
+    """An amount of the outermost loop's command in its usual unit: a plain number, or one with its unit.
+
+    Raises
+    ------
+    InputError
+        For no number, or a unit of something else.
+    """
+    from actuator_lti.design.units import parse_quantity
+    from actuator_lti.errors import InputError
+    from nonlinear.trajectory import COMMAND_UNITS
+
+    if words is None:
+        return None
+    unit, per_SI = COMMAND_UNITS[drive.axis, drive.controller.outermost]
+    try:
+        value = float(words)
+    except ValueError:
+        pass
+    else:
+        if not isfinite(value):
+            raise InputError(f"{option} {words}: must be a finite number")
+        return value
+    try:
+        return parse_quantity(words, unit.replace("deg", "rad").replace("mm", "m")) * per_SI
+    except InputError as error:
+        reason = error.message.partition("; allowed")[0]
+        raise InputError(f'{option} {words!r}: {reason}; allowed: "5 {unit}", or 5 in {unit}') from None
+
+
 SchedulerOption = Annotated[
     str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that is running.")
 ]
@@ -103,3 +111,14 @@ TlsOption = Annotated[
     typer.Option("--tls", metavar="DIR", help="ca.pem, cert.pem and key.pem for a tls:// scheduler."),
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress on standard error.")]
+
+
+def engine_of(workers: int | None, scheduler: str | None, tls: Path | None) -> Engine:
+    """Where a study is computed; says what to know of the connection."""
+    from analyses.engine import Engine
+    from reports.cli.output import print_note
+
+    engine = Engine(workers, scheduler, tls=tls)
+    if engine.caution:
+        print_note(f"actuator-lti: {engine.caution}")
+    return engine

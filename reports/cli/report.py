@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -17,10 +17,6 @@ from reports.cli.options import (
     OutOption,
     QuietOption,
 )
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from reports.document_schema import Section
 
 IncludeOption = Annotated[
     list[Path] | None,
@@ -61,7 +57,7 @@ def report(
     failure cases, duty cycle, limit cycles and corners.
     """
     from actuator_lti.verdict import Verdict
-    from reports.build import design_report, further_sections, write_report
+    from reports.build import design_report, further_sections, validation_sections, write_report
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
     from reports.cli.progress import progress
@@ -75,7 +71,8 @@ def report(
     with progress(f"further sections of {drive.name}", quiet=quiet):
         added += further_sections(drive, wanted)
     if validation:
-        added = [*_validated(drive, quiet), *added]
+        with progress(f"validating {drive.name}", quiet=quiet) as validating:
+            added = [*validation_sections(drive, validating), *added]
     with progress(f"computing {drive.name}", quiet=quiet) as computing:
         made = design_report(drive, added, progress=computing)
     with progress("drawing figures", quiet=quiet) as drawing:
@@ -92,12 +89,3 @@ def report(
         print_verdict(Verdict(made["verdict"]["verdict"]), f"{drive.name}: {first}")
         print_line("\n".join([*more, *map(str, written)]))
     leave_with(passed)
-
-
-def _validated(drive: Design, quiet: bool) -> list[Section]:
-    """Put the linear predictions to the simulator, and give the sections about it."""
-    from reports.build import validation_sections
-    from reports.cli.progress import progress
-
-    with progress(f"validating {drive.name}", quiet=quiet) as validating:
-        return validation_sections(drive, validating)

@@ -22,6 +22,15 @@ def refuse_existing(path: Path, force: bool) -> None:
         raise InputError("exists already; allowed: another name, or --force", where=str(path))
 
 
+def write_new(path: Path | None, text: str, force: bool) -> None:
+    """Write a file that is not there yet, or with ``--force``; nothing without a path."""
+    from actuator_lti.atomic import write_text
+
+    if path is not None:
+        refuse_existing(path, force)
+        write_text(path, text)
+
+
 def folder_for_results(path: Path | None) -> Path | None:
     """Refuse a folder that cannot be written, before anything is computed; made only when it is needed.
 

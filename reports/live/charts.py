@@ -53,6 +53,7 @@ def _bode() -> Chart:
     top.y.limits(-60.0, 40.0)
     bottom.y.limits(-360.0, 0.0)
     top.rule_y(0.0, colour=style.INK)
+    bottom.rule_y(-180.0, colour=style.INK)
     return chart
 
 

@@ -8,13 +8,14 @@ of `actuator_lti.drive_figure`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from actuator_lti.design.access import located, parameter_value, paths_of
 from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design, Parameter, Tolerance
 from nonlinear.export.page import changes_figure, changes_row, figure_statements, row_statements
+from nonlinear.export.statement import Statement, Term
 from reports.live_schema import FixedKey, NamedKey, SliderKey
 
 Figure = tuple[str, float]  # of the whole drive: name, load in N m
@@ -36,8 +37,8 @@ class Followed:
     ----------
     free, fixed : list of dict
         As they stand in the page's data.
-    lines : list of str
-        Statements in the C of `nonlinear.export.trace`: ``k[n]`` is the n-th free key.
+    lines : list of list
+        Statements (`nonlinear.export.statement`) from the keys to the row: ``k[n]`` is the n-th free key.
     figures : dict
         Statements from the keys to each figure of the whole drive, by name and load; without those that
         cannot be followed.
@@ -45,8 +46,8 @@ class Followed:
 
     free: list[SliderKey]
     fixed: list[FixedKey]
-    lines: list[str]
-    figures: dict[Figure, list[str]]
+    lines: list[list[Term]]
+    figures: dict[Figure, list[list[Term]]]
 
 
 def followed(design: Design, figures: Iterable[Figure] = ()) -> Followed:
@@ -67,9 +68,13 @@ def followed(design: Design, figures: Iterable[Figure] = ()) -> Followed:
     return Followed(
         free=free,
         fixed=fixed,
-        lines=row_statements(design, values),
-        figures={each: lines for each, lines in made.items() if lines is not None},
+        lines=_data(row_statements(design, values)),
+        figures={each: _data(lines) for each, lines in made.items() if lines is not None},
     )
+
+
+def _data(statements: Sequence[Statement]) -> list[list[Term]]:
+    return [statement.data for statement in statements]
 
 
 def _reason(design: Design, path: str, figures: Iterable[Figure]) -> str:

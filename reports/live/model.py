@@ -153,7 +153,7 @@ def _figures(design: Design) -> list[Figure]:
     ]
 
 
-def _on_drive(design: Design, figures: Mapping[Figure, list[str]]) -> list[FollowedLimit]:
+def _on_drive(design: Design, figures: Mapping[Figure, list[list[str | float]]]) -> list[FollowedLimit]:
     """Give the requirements on the whole drive whose figures follow, each with its statements."""
     return [
         {**_limit(item), "load": item.load_Nm or 0.0, "lines": figures[item.quantity, item.load_Nm or 0.0]}
@@ -162,7 +162,9 @@ def _on_drive(design: Design, figures: Mapping[Figure, list[str]]) -> list[Follo
     ]
 
 
-def _apart(design: Design, figures: Mapping[Figure, list[str]], held: Collection[str]) -> list[NotFollowed]:
+def _apart(
+    design: Design, figures: Mapping[Figure, list[list[str | float]]], held: Collection[str]
+) -> list[NotFollowed]:
     """Give the requirements that do not follow, with what they limit."""
     stages = tuple(name for name in LOOPS if name in design.controller.stages)
     of_held: list[NotFollowed] = [

@@ -55,12 +55,8 @@ class Cache:
         """Where an entry lies."""
         return self.folder / key[:2] / f"{key}.entry"
 
-    def write(self, key: str, meta: Mapping[str, Any], files: Mapping[str, bytes]) -> None:
-        """Store a result (see `sealed`)."""
-        self._put(self.path(key), sealed(key, meta, files))
-
     def take(self, key: str, data: bytes) -> None:
-        """Store an entry that was made elsewhere.
+        """Store an entry that was made elsewhere (see `sealed`), whole or not at all.
 
         Raises
         ------
@@ -68,16 +64,12 @@ class Cache:
             Where it is not whole, or that of another key.
         """
         _opened(key, data)
-        self._put(self.path(key), data)
-
-    @staticmethod
-    def _put(path: Path, data: bytes) -> None:
-        """Put a file in place whole; what a power cut does to it the checksum finds."""
+        path = self.path(key)
         temporary = path.with_name(f".{path.name[:16]}.{os.getpid()}.part")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             temporary.write_bytes(data)
-            temporary.replace(path)
+            temporary.replace(path)  # what a power cut does to it the checksum finds
         except OSError as error:
             temporary.unlink(missing_ok=True)
             raise InputError(f"cannot write: {error.strerror or error}", where=str(path)) from error

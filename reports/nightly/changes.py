@@ -32,13 +32,6 @@ class Change:
         """How far it moved."""
         return None if self.before is None or self.after is None else self.after - self.before
 
-    @property
-    def size(self) -> float:
-        """How far it moved in tolerances; what appeared or vanished counts most."""
-        if self.delta is None:
-            return float("inf")
-        return abs(self.delta) / self.tolerance if self.tolerance else float("inf")
-
 
 @dataclass(frozen=True, kw_only=True)
 class Cause:
@@ -49,11 +42,6 @@ class Cause:
     libraries: tuple[tuple[str, str, str], ...] = ()
     commits: tuple[tuple[str, str], ...] = ()
     code: bool = False
-
-    @property
-    def known(self) -> bool:
-        """Whether anything differs at all."""
-        return bool(self.parameters or self.settings or self.libraries or self.commits or self.code)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,9 +68,9 @@ class Columns:
         self.absolute, self.relative = np.array(pairs).reshape(-1, 2).T
         self.better = np.array([figure.better for figure in figures])
         self.verdict = np.array([figure.kind == "verdict" for figure in figures], dtype=bool)
-        names = np.array([figure.name for figure in figures])
+        self.names = [figure.name for figure in figures]
         self.order = np.empty(len(figures), dtype=int)
-        self.order[np.argsort(names, kind="stable")] = np.arange(len(figures))
+        self.order[np.argsort(np.array(self.names), kind="stable")] = np.arange(len(figures))
 
     def compare(self, before: np.ndarray, after: np.ndarray) -> tuple[Change, ...]:
         """List every figure that moved beyond its tolerance, appeared or vanished; the worst first.

@@ -15,7 +15,7 @@ from reports.nightly.job import canonical
 from reports.nightly.text import one_line, sha256
 
 PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
-LIBRARIES = ("control", "numpy", "scipy", "numba", "matplotlib", "jinja2", "typst")
+LIBRARIES = ("control", "numpy", "scipy", "matplotlib", "jinja2", "typst")
 _SUFFIXES = (".py", ".toml", ".html", ".j2", ".css", ".js", ".typ", ".svg")
 _GIT_TIME_LIMIT_S = 10.0
 COMMITS = 8  # named at most between two nights

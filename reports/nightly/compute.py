@@ -91,7 +91,7 @@ def comparison_document(payload: Mapping[str, Any]) -> Document:
     from analyses.slugs import slug
     from analyses.study import Study, Variant
     from analyses.variants import compare
-    from reports.sections.compare import sections
+    from reports.sections.compare import section as sections
     from reports.study_pages import study_document
 
     designs = [

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypedDict
 
 import numpy as np
 from markupsafe import Markup
 
+from actuator_lti.tree import Tree
 from reports.nightly.charts import Chart, line_chart
-from reports.nightly.clock import to_seconds
 from reports.nightly.figures import Figure, Verdict, first_number
 from reports.nightly.history import History
 from reports.nightly.records import Result
+from reports.nightly.text import to_seconds
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.trend import LOOK_BACK, ChangePoint, change_points, flaps
 from reports.nightly.view import DesignView, Overview
@@ -21,22 +21,11 @@ from reports.nightly.view import DesignView, Overview
 MAX_CHARTS = 60
 
 
-class CourseChart(TypedDict):
-    """A figure over the nights: its drawing, and the nights in which its level changed."""
-
-    title: str
-    id: str
-    unit: str
-    svg: Markup
-    points: list[tuple[str, ChangePoint]]
-    flaps: bool
-
-
 @dataclass
 class Course:
     """Charts for the page, figures without a change, change points and number of moves by night."""
 
-    charts: list[CourseChart] = field(default_factory=list)
+    charts: list[Tree] = field(default_factory=list)
     steady: list[Figure] = field(default_factory=list)
     marks: dict[int, list[tuple[Figure, ChangePoint]]] = field(default_factory=dict)
     moved: dict[int, int] = field(default_factory=dict)
@@ -47,17 +36,15 @@ def course_of(night: Overview, design: DesignView, history: History, past: Seque
 
     Requirements are always charted; margins and other figures with a better side only where they moved.
     """
-    good = [r for r in past if r.snapshot is not None]
+    good = [r for r in past if r.home is not None]
     if not good:
         return Course()
-    current = history.figures(good[-1].snapshot)
-    chosen = [(number, current[f.name]) for number, f in history.figure_table().items() if f.name in current]
-    values = history.matrix(past, [number for number, _ in chosen])
+    figures = list(history.figures(good[-1]).values())
+    values = history.matrix(past, [figure.name for figure in figures])
     writer = _Writer(night, design, past)
-    writer.course.moved = _moved(past, values, [figure for _, figure in chosen], night.tolerances)
-    order = sorted(range(len(chosen)), key=lambda j: chosen[j][1].kind != "requirement")
-    for column in order:
-        figure = chosen[column][1]
+    writer.course.moved = _moved(past, values, figures, night.tolerances)
+    for column in sorted(range(len(figures)), key=lambda j: figures[j].kind != "requirement"):
+        figure = figures[column]
         if figure.kind in ("requirement", "check") or (figure.better and figure.kind == "figure"):
             writer.add(figure, values[:, column])
     return writer.course
@@ -91,7 +78,8 @@ class _Writer:
 
     def _chart(
         self, figure: Figure, values: np.ndarray, points: Sequence[ChangePoint], to_and_fro: bool
-    ) -> CourseChart:
+    ) -> Tree:
+        """A figure over the nights: its drawing, and the nights in which its level changed."""
         verdict = self.verdicts.get(figure.name)
         chart = Chart(
             title=verdict.label if verdict is not None else figure.name,
@@ -124,7 +112,7 @@ def _moved(
     past: Sequence[Result], values: np.ndarray, figures: Sequence[Figure], tolerances: Tolerances
 ) -> dict[int, int]:
     """How many figures moved beyond their tolerance in each night, against the last night with a result."""
-    rows = [i for i, r in enumerate(past) if r.snapshot is not None]
+    rows = [i for i, r in enumerate(past) if r.home is not None]
     if len(rows) < 2:
         return {}
     size = np.max(np.abs(np.nan_to_num(values)), axis=0)

@@ -33,7 +33,7 @@ class Job:
         Hash of the design's content.
     parameters : mapping
         Dotted key to text as written: what is shown when a figure has moved.
-    title, revision : str
+    revision : str
         Of the design.
     """
 
@@ -42,7 +42,6 @@ class Job:
     payload: Mapping[str, Any] = field(default_factory=dict)
     design_hash: str = ""
     parameters: Mapping[str, str] = field(default_factory=dict)
-    title: str = ""
     revision: str = ""
 
     def key(self, code: str) -> str:

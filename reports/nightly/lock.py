@@ -13,8 +13,7 @@ from filelock import FileLock, Timeout
 
 from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError
-from reports.nightly.clock import now
-from reports.nightly.text import one_line
+from reports.nightly.text import now, one_line
 
 
 @contextmanager

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from typing import TypedDict
-from xml.sax.saxutils import escape, quoteattr
+from dataclasses import asdict
+from xml.etree import ElementTree as Xml
 
 from actuator_lti.tree import Tree
 from reports.nightly.changes import Cause, Change, Comparison
-from reports.nightly.figures import Verdict
 from reports.nightly.text import markdown_cell, one_line
 from reports.nightly.view import DesignView, Overview
 from reports.numbers import significant
@@ -25,92 +24,12 @@ STATE_WORDS = {
     "regression": "regressed",
     "pass": "passing",
 }
+_OF_REQUIREMENT = ("id", "label", "value", "limit", "unit", "distance", "verdict", "waiver")
+_OF_CHANGE = ("figure", "unit", "before", "after", "tolerance", "worse", "flapping")
 SIGNS = {"broken": "⚠", "fail": "✗", "unproven": "?", "regression": "▼", "pass": "✓"}
 
 
-class RequirementJson(TypedDict):
-    """A requirement of a design, as `Verdict`."""
-
-    id: str
-    label: str
-    value: float | None
-    limit: str
-    unit: str
-    distance: float | None
-    verdict: str
-    waiver: str
-
-
-class ChangeJson(TypedDict):
-    """A figure that moved, as `Change`."""
-
-    figure: str
-    unit: str
-    before: float | None
-    after: float | None
-    tolerance: float
-    worse: bool | None
-    flapping: bool
-
-
-class ComparisonJson(TypedDict):
-    """A design against an earlier night."""
-
-    run: int | None
-    note: str
-    figures: list[ChangeJson]
-    behind_it: list[str]
-
-
-class DesignJson(TypedDict):
-    """What came of one design."""
-
-    name: str
-    kind: str
-    state: str
-    status: str
-    message: str
-    failed: int
-    total: int
-    worst_requirement: str | None
-    worst_relative_distance: float | None
-    flapping: bool
-    cached: bool
-    report: str | None
-    requirements: list[RequirementJson]
-    changes_since_last_night: ComparisonJson
-    changes_since_baseline: ComparisonJson
-    approved_by: str | None
-    approved_because: str | None
-
-
-class CodeJson(TypedDict):
-    """What computed the night."""
-
-    hash: str
-    commit: str
-    libraries: dict[str, str]
-
-
-class NightJson(TypedDict):
-    """``summary.json``."""
-
-    schema: str
-    version: int
-    study: str
-    run: int
-    started: str
-    finished: str | None
-    code: CodeJson
-    study_commit: str
-    history: Tree
-    exit_status: int
-    counts: dict[str, int]
-    gone: list[str]
-    designs: list[DesignJson]
-
-
-def summary(night: Overview) -> NightJson:
+def summary(night: Overview) -> Tree:
     """What came of a night, as plain JSON."""
     return {
         "schema": SCHEMA,
@@ -125,7 +44,7 @@ def summary(night: Overview) -> NightJson:
             "libraries": dict(night.run.libraries),
         },
         "study_commit": night.run.study_commit,
-        "history": night.memory.plain(),
+        "history": asdict(night.memory),
         "exit_status": night.exit_status,
         "counts": {state: night.count(state) for state in STATE_WORDS},
         "gone": list(night.gone),
@@ -138,60 +57,30 @@ def summary_text(night: Overview) -> str:
     return json.dumps(summary(night), ensure_ascii=True, allow_nan=False, indent=1) + "\n"
 
 
-def _design(design: DesignView) -> DesignJson:
-    result = design.result
+def _design(design: DesignView) -> Tree:
+    result, approval = design.result, design.approval
     return {
-        "name": design.name,
-        "kind": result.kind,
+        **{name: getattr(result, name) for name in ("name", "kind", "status", "failed", "total", "cached")},
         "state": design.state,
-        "status": result.status,
         "message": result.message.partition("\n")[0],
-        "failed": result.failed,
-        "total": result.total,
         "worst_requirement": result.worst_id or None,
         "worst_relative_distance": result.worst,
         "flapping": design.status_flaps,
-        "cached": result.cached,
         "report": None if design.broken else f"{design.report}/report.html",
-        "requirements": [_requirement(v) for v in design.verdicts],
+        "requirements": [{name: getattr(v, name) for name in _OF_REQUIREMENT} for v in design.verdicts],
         "changes_since_last_night": _comparison(design.last_night),
         "changes_since_baseline": _comparison(design.baseline),
-        "approved_by": design.approval.by if design.approval else None,
-        "approved_because": design.approval.reason if design.approval else None,
+        "approved_by": approval.by if approval else None,
+        "approved_because": approval.reason if approval else None,
     }
 
 
-def _requirement(verdict: Verdict) -> RequirementJson:
-    return {
-        "id": verdict.id,
-        "label": verdict.label,
-        "value": verdict.value,
-        "limit": verdict.limit,
-        "unit": verdict.unit,
-        "distance": verdict.distance,
-        "verdict": verdict.verdict,
-        "waiver": verdict.waiver,
-    }
-
-
-def _comparison(comparison: Comparison) -> ComparisonJson:
+def _comparison(comparison: Comparison) -> Tree:
     return {
         "run": comparison.run.id if comparison.run else None,
         "note": comparison.note,
-        "figures": [_change(c) for c in comparison.changes],
+        "figures": [{name: getattr(c, name) for name in _OF_CHANGE} for c in comparison.changes],
         "behind_it": cause_lines(comparison.cause),
-    }
-
-
-def _change(change: Change) -> ChangeJson:
-    return {
-        "figure": change.figure,
-        "unit": change.unit,
-        "before": change.before,
-        "after": change.after,
-        "tolerance": change.tolerance,
-        "worse": change.worse,
-        "flapping": change.flapping,
     }
 
 
@@ -208,84 +97,61 @@ def cause_lines(cause: Cause) -> list[str]:
 
 def junit(night: Overview) -> str:
     """JUnit XML: a suite a design, a case a requirement, one for its build and one for regressions."""
-    suites = [_suite(d, night) for d in night.designs]
-    totals = [sum(part[1][k] for part in suites) for k in range(4)]
-    head = (
-        f'<testsuites name={_attribute(night.study)} tests="{totals[0]}" failures="{totals[1]}"'
-        f' errors="{totals[2]}" skipped="{totals[3]}">'
-    )
-    body = "\n".join(part[0] for part in suites)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{head}\n{body}\n</testsuites>\n'
+    top = Xml.Element("testsuites", name=_line(night.study))
+    for design in night.designs:
+        suite = Xml.SubElement(
+            top, "testsuite", name=_line(design.name), time=f"{design.result.seconds:.3f}",
+            timestamp=night.run.started.rstrip("Z"),
+        )  # fmt: skip
+        _cases(suite, design)
+        _count(suite)
+    _count(top)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{Xml.tostring(top, encoding="unicode")}\n'
 
 
-def _suite(design: DesignView, night: Overview) -> tuple[str, tuple[int, int, int, int]]:
-    name = _attribute(design.name)
-    cases = [_build_case(design)]
-    if not design.broken:
-        cases.append(_regression_case(design))
-        cases += [_requirement_case(design, v) for v in design.verdicts]
-        cases += [_section_case(design, title) for title in design.failed_sections]
-    counts = [len(cases), *(sum(f"<{tag} " in c for c in cases) for tag in ("failure", "error", "skipped"))]
-    tests, failures, errors, skipped = counts
-    head = (
-        f'<testsuite name={name} tests="{tests}" failures="{failures}" errors="{errors}" skipped="{skipped}"'
-        f' time="{design.result.seconds:.3f}" timestamp="{night.run.started.rstrip("Z")}">'
-    )
-    return head + "\n" + "\n".join(cases) + "\n</testsuite>", (tests, failures, errors, skipped)
+def _count(element: Xml.Element) -> None:
+    tags = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
+    for name, tag in tags.items():
+        element.set(name, str(sum(1 for _ in element.iter(tag))))
 
 
-def _case(design: DesignView, name: str, inside: str = "") -> str:
-    head = f"<testcase classname={_attribute(design.name)} name={_attribute(name)}"
-    return f"{head}>{inside}</testcase>" if inside else f"{head}/>"
+def _cases(suite: Xml.Element, design: DesignView) -> None:
+    def case(name: str, tag: str = "", message: str = "", kind: str = "", text: str = "") -> None:
+        one = Xml.SubElement(suite, "testcase", classname=_line(design.name), name=_line(name))
+        if tag:
+            about = {"type": kind, "message": _line(message)} if kind else {"message": _line(message)}
+            Xml.SubElement(one, tag, about).text = visible(text)[:_MAX_TEXT]
 
-
-def _build_case(design: DesignView) -> str:
-    if not design.broken:
-        return _case(design, "is built")
-    first, _, rest = design.result.message.partition("\n")
-    inside = (
-        f"<error type={_attribute(design.result.status)} message={_attribute(first)}>{_text(rest)}</error>"
-    )
-    return _case(design, "is built", inside)
-
-
-def _regression_case(design: DesignView) -> str:
+    if design.broken:
+        first, _, rest = design.result.message.partition("\n")
+        case("is built", "error", first, design.result.status, rest)
+        return
+    case("is built")
     worse = design.regressions
-    if not worse:
-        return _case(design, "no unapproved regression")
-    lines = [f"{c.figure}: {_value(c.before)} -> {_value(c.after)} {c.unit}" for c in worse]
-    lines += cause_lines(design.baseline.cause)
-    message = _attribute(f"{len(worse)} figure(s) worse than the baseline")
-    inside = f'<failure type="regression" message={message}>{_text(chr(10).join(lines))}</failure>'
-    return _case(design, "no unapproved regression", inside)
+    if worse:
+        lines = [f"{c.figure}: {_value(c.before)} -> {_value(c.after)} {c.unit}" for c in worse]
+        text = "\n".join([*lines, *cause_lines(design.baseline.cause)])
+        message = f"{len(worse)} figure(s) worse than the baseline"
+        case("no unapproved regression", "failure", message, "regression", text)
+    else:
+        case("no unapproved regression")
+    for v in design.verdicts:
+        name = f"{v.id} {v.label}" if v.label != v.id else v.id
+        if v.verdict == "met":
+            case(name)
+        elif v.waiver:
+            case(name, "skipped", v.why)
+        elif v.verdict == "not met":
+            found = f"found {_value(v.value)}, limit {v.limit}, distance {_value(v.distance)} {v.unit}"
+            case(name, "failure", found, "requirement", v.reason)
+        else:
+            case(name, "failure", "not proven", "not proven", v.reason)
+    for title in design.meta.get("failed_sections", ()):
+        case(f"section {title}", "failure", "does not pass", "section")
 
 
-def _requirement_case(design: DesignView, verdict: Verdict) -> str:
-    name = f"{verdict.id} {verdict.label}" if verdict.label != verdict.id else verdict.id
-    result = (
-        f"found {_value(verdict.value)}, limit {verdict.limit}, "
-        f"distance {_value(verdict.distance)} {verdict.unit}"
-    )
-    if verdict.verdict == "met":
-        return _case(design, name)
-    if verdict.waiver:
-        return _case(design, name, f"<skipped message={_attribute(verdict.why)}/>")
-    message = result if verdict.verdict == "not met" else "not proven"
-    kind = "requirement" if verdict.verdict == "not met" else "not proven"
-    inside = f'<failure type="{kind}" message={_attribute(message)}>{_text(verdict.reason)}</failure>'
-    return _case(design, name, inside)
-
-
-def _section_case(design: DesignView, title: str) -> str:
-    return _case(design, f"section {title}", '<failure type="section" message="does not pass"></failure>')
-
-
-def _attribute(text: str) -> str:
-    return quoteattr(one_line(text, _MAX_TEXT))
-
-
-def _text(text: str) -> str:
-    return escape(visible(text)[:_MAX_TEXT])
+def _line(text: str) -> str:
+    return one_line(text, _MAX_TEXT)
 
 
 def _value(value: float | None) -> str:

@@ -7,12 +7,11 @@ not restored, a deleted file). A night is refused where the history knows less t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from actuator_lti.errors import InputError
 from actuator_lti.reading import read_json
-from actuator_lti.tree import Tree
 
 
 class HistoryLost(Exception):
@@ -33,10 +32,6 @@ class Memory:
     id: str
     nights: int
     approvals: int
-
-    def plain(self) -> Tree:
-        """As it stands in ``summary.json``."""
-        return asdict(self)
 
 
 def remembered(site: Path) -> Memory | None:
@@ -75,7 +70,7 @@ def check(site: Path, now: Memory, state: Path) -> None:
         return
     knows = _words(before.nights, before.approvals)
     raise HistoryLost(
-        f"{state / 'history.sqlite'}: {what}, but the site knows of {knows}: "
+        f"{state / 'history.json'}: {what}, but the site knows of {knows}: "
         "regressions cannot be told. Restore the state folder from a copy, or begin anew on purpose "
         "with --accept-lost-history"
     )

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import platform
 import socket
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,16 +19,16 @@ from reports.nightly import memory
 from reports.nightly import site as site_files
 from reports.nightly.apart import Done, Limits, Task, build_each
 from reports.nightly.cache import Cache, CorruptEntry
-from reports.nightly.clock import now
 from reports.nightly.code_version import CodeVersion, code_version, commit_of
 from reports.nightly.figures import Figure
-from reports.nightly.history import History, open_history
-from reports.nightly.job import Job, Outcome, check_jobs
+from reports.nightly.history import FILE, NIGHTS, History, Reported, open_history
+from reports.nightly.job import BROKEN, Job, Outcome, check_jobs
 from reports.nightly.lock import hold
-from reports.nightly.records import NewResult
-from reports.nightly.text import one_line
+from reports.nightly.records import Result
+from reports.nightly.text import now, one_line
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.view import Overview, overview
+from reports.visible import visible
 
 DESIGNS_A_LIMIT = 50  # of a comparison, within one time limit
 Progress = Callable[[int, int], None]
@@ -92,11 +93,11 @@ def state_of(site: Path, settings: Settings) -> Path:
         beside it.
     """
     state = _state_of(site, settings)
-    cache = state / "cache"
-    for folder in (state, cache):
+    folders = (state, state / "cache", state / NIGHTS)
+    for folder in folders:
         if os.path.lexists(folder) and not folder.is_dir():
             raise InputError("is no folder; allowed: a folder, or none yet", where=shown_path(folder))
-    inside = [path for folder in (state, cache) if folder.is_dir() for path in folder.iterdir()]
+    inside = [path for folder in folders if folder.is_dir() for path in folder.iterdir()]
     for path in (state, *inside):
         if path.is_symlink():
             raise InputError(
@@ -159,32 +160,42 @@ def run_night(
         Where the history knows less than the site.
     """
     use = settings or Settings()
-    tell = say or _silent
     jobs = check_jobs(study.jobs, study.name)
+    version = code or code_version()
+    with _held(study, site, use) as (history, cache):
+        site_files.remove_leftovers(site, history.state)
+        site_files.mark(site)
+        run = history.start_run(started=clock(), **_about(version, study))
+        outcomes = _outcomes(jobs, version, cache, use, progress, say or _silent)
+        history.finish_run(run, clock(), [(_result(run.id, o), _reported(o)) for o in outcomes])
+        return publish(study, site, history, cache, use, {o.key: o.meta for o in outcomes})
+
+
+@contextmanager
+def _held(study: Study, site: Path, use: Settings, *, begun: bool = False) -> Iterator[tuple[History, Cache]]:
+    """Hold history and cache of a site, both as they should be; ``begun``: only where there is a history."""
     state = state_of(site, use)
     site_files.check_place(site)
     _unless_lost(site, state, use)
-    version = code or code_version()
-    with hold(state, use.wait_s), open_history(state / "history.sqlite") as history:
-        if history.notice:
-            tell(history.notice)
-        site_files.remove_leftovers(site, state)
-        history.claim(study.name)
+    if begun and not (state / FILE).exists():
+        raise InputError("no night has been built here yet", where=str(site))
+    with hold(state, use.wait_s), open_history(state) as history:
         if not use.accept_lost_history:
             memory.check(site, history.memory(), state)
-        site_files.mark(site)
-        run = history.start_run(_run_row(version, study, clock()))
-        outcomes = _outcomes(jobs, version, Cache(state / "cache"), use, progress, tell)
-        known = history.known(o.key for o in outcomes)
-        history.finish_run(run, clock(), [_new_result(o, o.key in known) for o in outcomes])
-        metas = {o.key: o.meta for o in outcomes}
-        return publish(study, site, history, Cache(state / "cache"), use, metas)
+        history.claim(study.name)
+        yield history, Cache(state / "cache")
 
 
 def _unless_lost(site: Path, state: Path, use: Settings) -> None:
-    """Refuse a site whose history is not there, before one is begun."""
-    if not use.accept_lost_history and not (state / "history.sqlite").exists():
-        memory.check(site, memory.Memory("", 0, 0), state)
+    """Refuse a site whose history is not there, or of an earlier version, before one is begun."""
+    if use.accept_lost_history or (state / FILE).exists():
+        return
+    if (state / "history.sqlite").exists():
+        raise memory.HistoryLost(
+            f"{state / 'history.sqlite'}: is the history of an earlier version, which this one does not read:"
+            " go on with that version, or begin anew on purpose with --accept-lost-history"
+        )
+    memory.check(site, memory.Memory("", 0, 0), state)
 
 
 def publish(
@@ -224,19 +235,11 @@ def approve(
     use = settings or Settings()
     if not by.strip() or not reason.strip():
         raise InputError("--by and --reason: an approval needs a name and a reason", where="nightly approve")
-    state = state_of(site, use)
-    site_files.check_place(site)
-    if not (state / "history.sqlite").exists():
-        memory.check(site, memory.Memory("", 0, 0), state)
-        raise InputError("no night has been built here yet", where=str(site))
-    with hold(state, use.wait_s), open_history(state / "history.sqlite") as history:
-        history.claim(study.name)
-        if not use.accept_lost_history:
-            memory.check(site, history.memory(), state)
-        runs = history.runs()
-        if not runs:
+    with _held(study, site, use, begun=True) as (history, cache):
+        if not history.runs:
             raise InputError("no night has been finished here yet", where=str(site))
-        there = {r.name for r in history.results(run=runs[-1].id) if r.snapshot is not None}
+        last = history.runs[-1].id
+        there = {r.name for r in history.night(last).results if r.home is not None}
         for name in names:
             if name not in there:
                 raise InputError(
@@ -244,13 +247,13 @@ def approve(
                     where=study.name,
                 )
         limits = {"by": one_line(by, 200), "reason": one_line(reason, 2000)}
-        history.approve(runs[-1].id, list(names) or None, at=clock(), **limits)
-        return publish(study, site, history, Cache(state / "cache"), use)
+        history.approve(last, list(names) or None, at=clock(), **limits)
+        return publish(study, site, history, cache, use)
 
 
-def _run_row(version: CodeVersion, study: Study, started: str) -> Mapping[str, Any]:
+def _about(version: CodeVersion, study: Study) -> dict[str, Any]:
+    """What is known of a night as it begins."""
     return {
-        "started": started,
         "code": version.hash,
         "code_commit": version.commit,
         "study_commit": commit_of(study.origin) if study.origin is not None else "",
@@ -319,7 +322,7 @@ def _built(cache: Cache, job: Job, done: Done) -> Outcome:
                 job=job, key=done.key, status=_status(entry.meta), meta=entry.meta, seconds=done.seconds
             )
     status = done.status if done.status in ("error", "timeout", "crash") else "crash"
-    message = done.message + (f"\n{done.detail}" if done.detail else "")
+    message = visible(done.message + (f"\n{done.detail}" if done.detail else ""))
     return Outcome(job=job, key=done.key, status=status, seconds=done.seconds, message=message)  # type: ignore[arg-type]
 
 
@@ -334,23 +337,31 @@ def _message(outcome: Outcome) -> str:
     return outcome.message or (f"not passed: {', '.join(sections)}" if sections else "")
 
 
-def _new_result(outcome: Outcome, known: bool) -> NewResult:
-    """Make a row of the history; of a result that it knows the figures are not needed."""
+def _reported(outcome: Outcome) -> Reported | None:
+    """Figures of an outcome and what is behind them; None where there is no result."""
+    if outcome.status in BROKEN:
+        return None
+    job = outcome.job
+    inputs = {
+        "parameters": dict(job.parameters),
+        "settings": _flat_settings(job.payload),
+        "design_hash": job.design_hash,
+        "revision": job.revision,
+    }
+    return [Figure(**f) for f in outcome.meta.get("figures", ())], inputs
+
+
+def _result(run: int, outcome: Outcome) -> Result:
+    """What the history keeps of an outcome."""
     meta = outcome.meta
     ranked = [v for v in meta.get("verdicts", ()) if v["relative"] is not None]
     worst = min(ranked, key=lambda v: v["relative"], default=None)
-    return NewResult(
+    return Result(
+        run=run,
         name=outcome.job.name,
         kind=outcome.job.kind,
         status=outcome.status,
-        key=outcome.key,
-        figures=[] if known else [Figure(**f) for f in meta.get("figures", ())],
-        inputs={
-            "parameters": dict(outcome.job.parameters),
-            "settings": _flat_settings(outcome.job.payload),
-            "design_hash": outcome.job.design_hash,
-            "revision": outcome.job.revision,
-        },
+        key="" if outcome.status in BROKEN else outcome.key,
         seconds=outcome.seconds,
         cached=outcome.cached,
         failed=int(meta.get("failed", 0)),

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
-from typing import Any, TypedDict
+from typing import Any
 
 from markupsafe import Markup
 
-from reports.html import asset, environment, security_policy, show_signed
+from actuator_lti.tree import Tree
+from reports.html import environment, security_policy, show_signed
 from reports.nightly.course import Course, course_of
-from reports.nightly.figures import Figure
 from reports.nightly.headline import cause_words, change_words, headlines, main_changes
 from reports.nightly.history import History
 from reports.nightly.machines import SIGNS, STATE_WORDS, cause_lines
 from reports.nightly.records import Result, Run
 from reports.nightly.text import csv_text, one_line
-from reports.nightly.trend import ChangePoint
 from reports.nightly.view import SHOWN_CHANGES, DesignView, Overview, outcome, report_folder
 from reports.numbers import MISSING, significant
+from reports.scripts import asset, bundled
 from reports.visible import visible
 
 MAX_NIGHTS = 400
@@ -57,7 +57,7 @@ def of_night(night: Overview, history: History, available: set[str]) -> Iterator
 
 def design_page(night: Overview, design: DesignView, history: History, available: set[str]) -> str:
     """Make the page of one design."""
-    past = history.results(name=design.name)
+    past = history.results(design.name)
     course = course_of(night, design, history, past)
     return _render(
         "nightly/design.html",
@@ -74,13 +74,13 @@ def design_page(night: Overview, design: DesignView, history: History, available
 
 def figures_csv(design: DesignView, history: History) -> str:
     """Give every figure of tonight as a table for a spreadsheet."""
-    figures = history.figures(design.result.snapshot)
+    figures = history.figures(design.result)
     rows = ((f.name, f.value, f.unit, f.kind) for f in figures.values())
     return csv_text(("figure", "value", "unit", "kind"), rows)
 
 
 def _render(template: str, **context: Any) -> str:
-    script = asset("nightly/nightly.js") + asset("live.js")
+    script = asset("nightly/nightly.js") + bundled("figures")
     counter = itertools.count(1)
     return (
         environment()
@@ -105,33 +105,15 @@ def _render(template: str, **context: Any) -> str:
     )
 
 
-class GapRow(TypedDict):
-    """Nights that are missing, in the table of nights."""
-
-    gap: int
-
-
-class NightRow(GapRow):
-    """A design in one night."""
-
-    run: Run
-    result: Result | None
-    status: str
-    report: str
-    moved: int
-    marks: list[tuple[Figure, ChangePoint]]
-    approved: bool
-
-
 def _nights(
     night: Overview, design: DesignView, past: list[Result], course: Course, available: set[str]
-) -> list[NightRow | GapRow]:
+) -> list[Tree]:
     """Rows of the table of nights, the last first, with rows for nights that are missing."""
     known = {r.run: r for r in past}
     outcomes = {r.run: outcome(r, before) for r, before in zip(past, [None, *past], strict=False)}
     gaps = {night.runs[i].id: count for i, count in night.missing}
     first = past[0].run if past else 0
-    rows: list[NightRow | GapRow] = []
+    rows: list[Tree] = []
     for run in reversed(night.runs):
         if run.id < first or len(rows) >= MAX_NIGHTS:
             break
@@ -148,10 +130,10 @@ def _night(
     design: DesignView,
     course: Course,
     available: set[str],
-) -> NightRow:
+) -> Tree:
     folder = report_folder(design.name, result.key) if result is not None and result.key else ""
     return {
-        "gap": 0,
+        "gap": 0,  # of nights that are missing a row has nothing else
         "run": run,
         "result": result,
         "status": outcomes.get(run.id, "absent"),

@@ -1,53 +1,125 @@
-"""What the history holds: nights, results, approvals."""
+"""What the history holds: nights, what came of each design in them, approvals."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from base64 import b64decode, b64encode
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from reports.nightly.figures import Figure
+
+Named = tuple[str, str, int, str]  # of a figure: name, unit, which way is better, kind
+
+
+def packed(figures: Iterable[Figure]) -> str:
+    """Values of figures as text, no bit lost: base64 of float64, NaN where there is none.
+
+    Examples
+    --------
+    >>> unpacked(packed([Figure(name="x", value=0.1), Figure(name="y", value=None)]))
+    array([0.1, nan])
+    """
+    return b64encode(np.array([f.value for f in figures], dtype="<f8").tobytes()).decode()
+
+
+def unpacked(text: str) -> np.ndarray:
+    """The numbers of `packed`."""
+    return np.frombuffer(b64decode(text), dtype="<f8")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """One night: when, and with which code and study."""
+    """One night: when, with which code and study, and the checksum of its file."""
 
     id: int
     started: str
-    finished: str | None
-    state: str
     code: str
     code_commit: str
     study_commit: str
     libraries: Mapping[str, str]
     host: str
+    finished: str = ""
+    sha256: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Content:
+    """The figures of a result and what is behind them.
+
+    Attributes
+    ----------
+    layout : int
+        Which of the lists of figures of the night.
+    values : str
+        Their numbers, as `packed`.
+    inputs : dict
+        Parameters and settings.
+    """
+
+    layout: int
+    values: str
+    inputs: dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """What one design came to in one night; ``snapshot`` is ``None`` where there is no result."""
+    """What one design came to in one night.
+
+    Attributes
+    ----------
+    run : int
+        The night.
+    home : int or None
+        The night whose file holds the content: an earlier one where all is as it was then; None where there
+        is no result.
+    """
 
     run: int
     name: str
     kind: str
     status: str
-    snapshot: int | None
-    key: str
-    seconds: float
-    cached: bool
-    failed: int
-    total: int
-    worst: float | None
-    worst_id: str
-    message: str
+    key: str = ""
+    seconds: float = 0.0
+    cached: bool = False
+    failed: int = 0
+    total: int = 0
+    worst: float | None = None
+    worst_id: str = ""
+    message: str = ""
+    home: int | None = None
+    content: Content | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Night:
+    """The file of a night: its results, and the lists of figures that they share."""
+
+    id: int
+    layouts: list[list[Named]]
+    results: list[Result]
+
+    @cached_property
+    def by_name(self) -> dict[str, Result]:
+        """The results by their designs."""
+        return {result.name: result for result in self.results}
+
+    @cached_property
+    def figures(self) -> list[tuple[Figure, ...]]:
+        """The lists of figures, without values."""
+        return [
+            tuple(Figure(name=n, value=None, unit=u, better=b, kind=k) for n, u, b, k in one)
+            for one in self.layouts
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Baseline:
     """A night that somebody has approved, for one design or for all of them (``name`` is ``None``)."""
 
-    id: int
     run: int
     at: str
     by: str
@@ -56,19 +128,16 @@ class Baseline:
 
 
 @dataclass(frozen=True, kw_only=True)
-class NewResult:
-    """What a night adds for one design."""
+class Index:
+    """All nights: those that ended, when others began that did not, and what was approved.
 
-    name: str
-    kind: str
-    status: str
-    key: str = ""
-    figures: Sequence[Figure] = ()
-    inputs: Mapping[str, Any] | None = None
-    seconds: float = 0.0
-    cached: bool = False
-    failed: int = 0
-    total: int = 0
-    worst: float | None = None
-    worst_id: str = ""
-    message: str = ""
+    ``begun`` counts every night that ever began; ``running`` says when the one began that has not ended.
+    """
+
+    id: str
+    study: str = ""
+    begun: int = 0
+    running: str = ""
+    runs: list[Run] = field(default_factory=list)
+    interrupted: list[str] = field(default_factory=list)
+    baselines: list[Baseline] = field(default_factory=list)

@@ -153,7 +153,8 @@ def _reports_to_keep(history: History, night: Overview, nights: int) -> set[str]
     """Folders of the reports of the last nights and of the approved ones."""
     wanted = {run.id for run in night.runs[-max(1, nights) :]}
     wanted |= {d.approval.run for d in night.designs if d.approval is not None}
-    return {report_folder(name, key) for name, key in history.contents(wanted)}
+    kept = (result for run in wanted for result in history.night(run).results)
+    return {report_folder(result.name, result.key) for result in kept if result.key}
 
 
 def _collect_garbage(site: Path, current: str, kept: set[str]) -> None:

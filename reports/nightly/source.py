@@ -126,7 +126,7 @@ def comparison_job(study: StudyFile, jobs: Sequence[Job], settings: Mapping[str,
         "study": {"title": study.title or study.name, "designs": designs},
         "settings": {"pdf": settings["pdf"]},
     }
-    return Job(name=name, kind="compare", payload=payload, title=study.title or study.name)
+    return Job(name=name, kind="compare", payload=payload)
 
 
 def refused_job(variant: Variant) -> Job:
@@ -146,6 +146,5 @@ def design_job(design: Design, settings: Mapping[str, Any], name: str) -> Job:
         payload={"name": name, "design": write_design(design), "settings": dict(settings)},
         design_hash=design_hash(design),
         parameters={path: parameter.text for path, parameter in design.parameters.items()},
-        title=design.title,
         revision=design.revision,
     )

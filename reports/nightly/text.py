@@ -1,4 +1,4 @@
-"""Other people's names made safe: as file names, in XML, in CSV and in one line of text."""
+"""Times as texts; other people's names made safe: as file names, in XML, in CSV and in one line of text."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import hashlib
 import io
 import re
 from collections.abc import Iterable, Sequence
+from datetime import UTC, datetime
 
 from reports.visible import visible
 
@@ -87,3 +88,19 @@ def csv_text(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     writer.writerow([csv_cell(h) for h in header])
     writer.writerows([csv_cell(v) for v in row] for row in rows)
     return buffer.getvalue()
+
+
+def now() -> str:
+    """Time of the clock, as ``2026-01-31T23:59:59Z``."""
+    return datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def to_seconds(text: str) -> float:
+    """Seconds since 1970 of such a text.
+
+    Examples
+    --------
+    >>> to_seconds("1970-01-02T00:00:00Z")
+    86400.0
+    """
+    return datetime.fromisoformat(text.replace("Z", "+00:00")).timestamp()

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.nightly.clock import to_seconds
+from reports.nightly.text import to_seconds
 
 WINDOW = 14
 LOOK_BACK = 365  # nights in which changes of level are looked for: the search takes their square

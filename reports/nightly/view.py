@@ -64,26 +64,6 @@ class DesignView:
         title = str(self.meta.get("title", ""))
         return "" if title == self.name else title
 
-    @property
-    def revision(self) -> str:
-        """Revision of the design."""
-        return str(self.meta.get("revision", ""))
-
-    @property
-    def files(self) -> tuple[str, ...]:
-        """Files of its report."""
-        return tuple(self.meta.get("files", ()))
-
-    @property
-    def words(self) -> tuple[str, ...]:
-        """Verdict of its report, a line for each kind."""
-        return tuple(self.meta.get("words", ()))
-
-    @property
-    def failed_sections(self) -> tuple[str, ...]:
-        """Titles of the sections of its report that do not pass."""
-        return tuple(self.meta.get("failed_sections", ()))
-
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
         """Requirements of tonight's report."""
@@ -154,22 +134,21 @@ def overview(
     history: History, cache: Cache, study: Study, metas: Mapping[str, Mapping[str, Any]] | None = None
 ) -> Overview:
     """Put together what the site says about the last finished night."""
-    runs = history.runs()
+    runs = history.runs
     run = runs[-1]
-    reader = _Reader(history, cache, study, runs)
-    reader.metas = dict(metas or {})
-    tonight = history.results(run=run.id)
-    designs = sorted((reader.design(r) for r in tonight), key=lambda d: d.rank)
-    before = {r.name for r in history.results(run=runs[-2].id)} if len(runs) > 1 else set()
+    reader = _Reader(history, cache, study, metas or {})
+    tonight = history.night(run.id).by_name
+    designs = sorted((reader.design(r) for r in tonight.values()), key=lambda d: d.rank)
+    before = history.night(runs[-2].id).by_name if len(runs) > 1 else {}
     return Overview(
         study=study.name,
         title=study.title or study.name,
         run=run,
         designs=tuple(designs),
         runs=tuple(runs),
-        gone=tuple(sorted(before - {r.name for r in tonight})),
+        gone=tuple(sorted(before.keys() - tonight.keys())),
         missing=missing_nights([r.started for r in runs]),
-        interrupted=tuple(history.interrupted()),
+        interrupted=tuple(history.index.interrupted),
         tolerances=study.tolerances,
         memory=history.memory(),
     )
@@ -178,23 +157,19 @@ def overview(
 class _Reader:
     """Reads what belongs to each design, and what lies between two nights once."""
 
-    def __init__(self, history: History, cache: Cache, study: Study, runs: list[Run]) -> None:
+    def __init__(self, history: History, cache: Cache, study: Study, metas: Mapping[str, Any]) -> None:
         self.history = history
         self.cache = cache
         self.study = study
-        self.runs = {r.id: r for r in runs}
-        self.last = runs[-1]
-        self._nights = sorted(self.runs)
-        self.baselines = [b for b in history.baselines() if b.run in self.runs]
-        self.metas: dict[str, Mapping[str, Any]] = {}
+        self.metas = metas
+        self.runs = {r.id: r for r in history.runs}
+        self.last = history.runs[-1]
+        self._nights = list(self.runs)
         self._commits: dict[tuple[int, int], tuple[tuple[str, str], ...]] = {}
-        self._table = history.figure_table()
-        self._number = {f.name: i for i, f in self._table.items()}
-        self._numbers = list(self._table)
-        self._columns = Columns(list(self._table.values()), study.tolerances)
+        self._columns: dict[tuple[int, int], Columns] = {}
 
     def design(self, result: Result) -> DesignView:
-        past = self.history.results(name=result.name, last=2 * STRIP)
+        past = self.history.results(result.name, last=2 * STRIP)
         approval = self._approval(result.name)
         return DesignView(
             result=result,
@@ -209,8 +184,9 @@ class _Reader:
     def _meta(self, result: Result) -> Mapping[str, Any]:
         if not result.key:
             return {}
-        if self.metas.get(result.key):
-            return self.metas[result.key]
+        known: Mapping[str, Any] = self.metas.get(result.key, {})
+        if known:
+            return known
         try:
             entry = self.cache.read(result.key)
         except CorruptEntry:
@@ -223,13 +199,18 @@ class _Reader:
         return tuple((run, known.get(run.id, "absent")) for run in shown)
 
     def _approval(self, name: str) -> Baseline | None:
-        for baseline in reversed(self.baselines):
-            if baseline.name in (None, name) and self.history.results(run=baseline.run, name=name, good=True):
+        for baseline in reversed(self.history.index.baselines):
+            if baseline.name in (None, name) and baseline.run in self.runs and self._good(baseline.run, name):
                 return baseline
         return None
 
+    def _good(self, run: int, name: str) -> Result | None:
+        """The result of a design in a night, where it has one."""
+        result = self.history.night(run).by_name.get(name)
+        return result if result is not None and result.home is not None else None
+
     def _last_night(self, result: Result, past: list[Result]) -> Comparison:
-        good = [r for r in past if r.snapshot is not None and r.run < result.run]
+        good = [r for r in past if r.home is not None and r.run < result.run]
         if not any(r.run < result.run for r in past):
             return Comparison(note="first night of this design")
         if not good:
@@ -245,34 +226,45 @@ class _Reader:
 
     def _baseline(self, result: Result, approval: Baseline | None) -> Comparison:
         if approval is not None:
-            base = self.history.results(run=approval.run, name=result.name, good=True)[0]
+            base = self.history.night(approval.run).by_name[result.name]
             return self._compare(base, result, "")
-        first = self.history.results(name=result.name, good=True, last=-1)
-        if not first:
+        first = next(filter(None, (self._good(run, result.name) for run in self._nights)), None)
+        if first is None:
             return Comparison(note="no baseline: no night has a result")
-        if first[0].run == result.run:
+        if first.run == result.run:
             return Comparison(run=self.last, note="this is the first night: nothing to compare with")
         note = "nobody has approved a baseline yet: compared with the first night"
-        return self._compare(first[0], result, note)
+        return self._compare(first, result, note)
 
     def _compare(self, old: Result, new: Result, note: str) -> Comparison:
         run = self.runs[old.run]
-        if new.snapshot is None:
+        if new.home is None:
             return Comparison(run=run, note=note or "no result tonight")
-        if new.snapshot == old.snapshot:
+        if new.home == old.home:
             return Comparison(run=run, note=note)
-        before, after = self.history.matrix((old, new), self._numbers)
-        changes = self._columns.compare(before, after)
-        inputs = (self.history.inputs(old.snapshot or 0), self.history.inputs(new.snapshot))
+        columns = self._columns_of(old, new)
+        before, after = self.history.matrix((old, new), columns.names)
+        inputs = (self.history.inputs(old), self.history.inputs(new))
         cause = cause_of(run, self.runs[new.run], inputs, self._commits_between(run, self.runs[new.run]))
-        return Comparison(run=run, changes=changes, cause=cause, note=note)
+        return Comparison(run=run, changes=columns.compare(before, after), cause=cause, note=note)
+
+    def _columns_of(self, old: Result, new: Result) -> Columns:
+        """The figures of two results, each as the new one declares it where both have it."""
+        before, after = (self.history.numbers(result)[0] for result in (old, new))
+        key = (id(before), id(after))  # the history keeps them
+        if key not in self._columns:
+            known = {figure.name: figure for figure in (*after, *before)} | {
+                figure.name: figure for figure in after
+            }
+            self._columns[key] = Columns(list(known.values()), self.study.tolerances)
+        return self._columns[key]
 
     def _flapping(self, changes: tuple[Change, ...], past: list[Result]) -> tuple[Change, ...]:
         """Mark those of the changes that a page shows that go to and fro."""
-        shown = [c for c in changes[:SHOWN_CHANGES] if c.figure in self._number]
+        shown = changes[:SHOWN_CHANGES]
         if not shown or len(past) < 4:
             return changes
-        values = self.history.matrix(past[-WINDOW:], [self._number[c.figure] for c in shown])
+        values = self.history.matrix(past[-WINDOW:], [c.figure for c in shown])
         maybe = may_flap(values, np.array([c.tolerance for c in shown]))
         to_and_fro = {c.figure for j, c in enumerate(shown) if maybe[j] and flaps(values[:, j], c.tolerance)}
         return tuple(replace(c, flapping=True) if c.figure in to_and_fro else c for c in changes)

@@ -6,6 +6,7 @@ import importlib
 import os
 import pickle
 import signal
+import sys
 import traceback
 from collections.abc import Callable, Mapping
 from queue import SimpleQueue
@@ -14,7 +15,6 @@ from typing import Any, BinaryIO
 
 from actuator_lti.errors import InputError
 from reports.nightly.cache import sealed
-from reports.nightly.limits import die_with_parent, limit_memory
 from reports.nightly.text import one_line
 
 # A process that hangs in compiled code without its parent is ended by the system this long after its limit.
@@ -85,3 +85,26 @@ def _alarm(seconds: float) -> None:
     if hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_REAL, seconds)
+
+
+def limit_memory(limit_bytes: int) -> None:
+    """Bound what this process may allocate; beyond it Python raises MemoryError, others give up.
+
+    Counted is what can be written to (heap, stacks, private mappings), not files and code that are mapped.
+    Systems without such a limit take no notice.
+    """
+    try:
+        import resource
+    except ImportError:  # not on Windows
+        return
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    most = limit_bytes if hard == resource.RLIM_INFINITY else min(limit_bytes, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+
+
+def die_with_parent() -> None:
+    """Let the system end this process with its parent, also where a build never lets go (Linux)."""
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG

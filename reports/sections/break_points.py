@@ -11,7 +11,6 @@ from reports import document as doc
 from reports.document_schema import Row, Section
 from reports.sections.margins import (
     MARGIN_COLUMNS,
-    cells,
     evidence_notes,
     finite,
     margin_row,
@@ -85,7 +84,7 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
 def _row(name: str, others: str, figures: LoopFigures | None) -> Row:
     if figures is None:
         return {"point": POINTS.get(name, name), "others": others, "stable": "see below"}
-    return {"point": POINTS.get(name, name), "others": others, **cells(margin_row(figures))}
+    return {"point": POINTS.get(name, name), "others": others, **margin_row(figures)}
 
 
 def _exact_row(name: str, point: BreakPoint) -> Row:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from analyses.validation.by_amplitude import AmplitudeMargin
+from analyses.large_signal.by_amplitude import AmplitudeMargin
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actuator_lti.atomic import write_text
+from actuator_lti.tree import Tree
 from actuator_lti.verdict import Verdict
 from analyses.requirements import tally
 from reports import document as doc
+from reports.as_json import as_json
 from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
 from reports.numbers import significant
 from reports.sections import compare_best, compare_figures, compare_ledger, compare_many
 from reports.sections.compare_best import limit_words, number
 from reports.sections.names import LOOPS
 from reports.sections.requirements import item, label
+from reports.terminal import Brief
 
 if TYPE_CHECKING:
     from analyses.requirements import RequirementVerdict
@@ -24,23 +29,55 @@ if TYPE_CHECKING:
 GROUPS = {**LOOPS, "drive": "Drive", "large": "Large signals"}
 COLUMNS = 4  # variants beside the base in one table: what reads on one screen
 _MOST_MOVERS = 3
+_MOST_NAMES = 12
 _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 
 
-def sections(comparison: Comparison) -> list[Section]:
+def section(comparison: Comparison) -> list[Section]:
     """Make all sections of a comparison; of very many designs those at the ends are shown."""
     shown = compare_many.choice(comparison)
     best = compare_best.section(shown)
     best["intro"] = f"{best['intro']} {compare_many.shown_words(shown)}".strip()
-    made = [
-        best,
-        verdicts(shown),
-        figures(shown),
-        differences(shown),
-    ]
-    made += compare_ledger.sections(shown)
-    made += compare_figures.sections(shown)
-    return made
+    made = [best, verdicts(shown), figures(shown), differences(shown)]
+    return [*made, *compare_ledger.sections(shown), *compare_figures.sections(shown)]
+
+
+def text(comparison: Comparison | str) -> str | None:
+    """The example of a study file."""
+    return comparison if isinstance(comparison, str) else None
+
+
+def brief(comparison: Comparison) -> Brief:
+    """Which designs meet their requirements."""
+    counts = {one.variant.name: tally(one.verdicts) for one in comparison.all}
+    said = f"{comparison.tally.words('requirements')}, over {len(counts)} designs"
+    for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
+        names = [name for name, count in counts.items() if count.verdict == word]
+        said += f"; {word}: {_listed(names)}" if names else ""
+    refused = [variant.name for variant in comparison.refused]
+    said += f"; no design: {_listed(refused)}" if refused else ""
+    said += "; a prediction is not confirmed by the simulator" if comparison.unconfirmed else ""
+    return Brief(said, [overview(comparison)])
+
+
+def data(comparison: Comparison) -> Tree:
+    """The result by its names."""
+    kept = ("study", "names", "base", "variants", "sensitivities", "refused", "verdict")
+    return {name: as_json(getattr(comparison, name)) for name in kept}
+
+
+def write(comparison: Comparison, folder: Path | None) -> list[str]:
+    """Write every figure of every design as a table."""
+    if folder is None:
+        return []
+    write_text(folder / compare_many.TABLE, compare_many.table_text(comparison))
+    return [str(folder / compare_many.TABLE)]
+
+
+def _listed(names: list[str]) -> str:
+    """Names in one sentence, the first few of many."""
+    more = len(names) - _MOST_NAMES
+    return ", ".join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 def verdicts(comparison: Comparison) -> Section:
@@ -67,7 +104,7 @@ def verdicts(comparison: Comparison) -> Section:
         blocks.append(doc.text(f"{variant.name}: no design. {variant.error}"))
     if len(comparison.refused) > compare_many.MANY:
         blocks.append(doc.text(f"{len(comparison.refused) - compare_many.MANY} more have no design."))
-    count = tally(v for one in everything.all for v in one.verdicts)
+    count = comparison.tally
     result = f"{count.words('requirements')}, over {len(everything.all)} designs."
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
         of = [(one, v) for one in everything.all for v in one.verdicts if v.verdict == word and not v.waiver]

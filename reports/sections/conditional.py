@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from analyses.validation.conditional import Conditional, Prediction
+from analyses.large_signal.conditional import Conditional, Prediction
 from reports import document as doc
 from reports.document_schema import Block, Section, Status
 from reports.findings import Finding
@@ -33,22 +33,10 @@ def section(conditional: Conditional, axis: str = "rotary") -> Section:
 
 def findings_of(conditional: Conditional, axis: str = "rotary") -> list[Finding]:
     """What a reader must know of large commands."""
-    scale, unit = (1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")
     findings = []
     if conditional.diverges:
         findings.append(Finding(severity="fail", text=sentence(conditional, axis), where="conditional"))
-    if conditional.lasting_rad:
-        text = _lasting(conditional, scale, unit)
-        findings.append(Finding(severity="warn", text=text, where="conditional"))
     return findings
-
-
-def _lasting(conditional: Conditional, scale: float, unit: str) -> str:
-    """Say what goes on after a step without any limit."""
-    return (
-        f"After a step the output goes on moving by ±{conditional.lasting_rad * scale:.3g} {unit} although "
-        "no limit acts: dry friction under an integral, play or gravity keep it up."
-    )
 
 
 def sentence(conditional: Conditional, axis: str = "rotary") -> str:
@@ -60,10 +48,7 @@ def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
     """Say in some sentences what was found, the result first."""
     full = f"{conditional.full_deflection_rad * scale:.4g} {unit}"
     if not conditional.diverges:
-        if conditional.lasting_rad:
-            words = f"No step from rest up to full deflection ({full}) is made to oscillate by a limit."
-            return [words, _lasting(conditional, scale, unit)]
-        return [f"Every step from rest up to full deflection ({full}) settles."]
+        return [f"No step from rest up to full deflection ({full}) is made to oscillate by a limit."]
     threshold = conditional.threshold_rad or 0.0
     beyond = f"beyond {threshold * scale:.4g} {unit}" if threshold else "of any size"
     words = f"Steps {beyond} do not settle (full deflection {full})"

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
-from analyses.correlation.summary import agrees, summarise, worst_of
+from analyses.correlation.summary import agrees, moves_alike, summarise, worst_of
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Row, Section, Status
+from reports.document_schema import Block, Column, Section, Status
 from reports.numbers import show
-from reports.sections.identification_inputs import finding_table, result_input_table
+from reports.sections.record_tables import finding_table, input_table
 from reports.sections.thinning import kept_rows
 
 if TYPE_CHECKING:
@@ -31,9 +31,13 @@ NAMES = {
 }
 
 
+BESIDE = ("speed", "velocity", "current", "force")
+"""Signals that stand beside the motion in the first sentence."""
+
+
 def section(result: CorrelationResult, number: int = 1, *, error_limit: float | None = None) -> Section:
     """Make the section of one record; ``error_limit`` is the largest relative error allowed."""
-    figures = [signal_figure(signal) for signal in result.signals]
+    figures = [signal_figure(signal) for signal in result.signals.values()]
     active = {name: share for name, share in result.limits.items() if share > 0.0}
     limits = ", ".join(f"{name} {100.0 * share:.1f} % of the time" for name, share in active.items())
     told = limits or "none"
@@ -43,7 +47,7 @@ def section(result: CorrelationResult, number: int = 1, *, error_limit: float | 
     blocks = [
         comparison_table(result),
         *figures,
-        result_input_table(result),
+        input_table(f"Inputs: {result.record}", result.inputs),
         finding_table(result.record, result.findings),
         *[doc.remark(note) for note in result.notes],
     ]
@@ -64,16 +68,17 @@ def words(results: Sequence[CorrelationResult], error_limit: float | None = None
     parts = [f"{record}: {outcome.subject}: {outcome.text}." for record, outcome in wrong[:2]]
     result, motion = worst_of(results)
     where = f" ({result.record})" if len(results) > 1 else ""
+    beside = [result[name] for name in BESIDE if name in result.signals and name != motion.name]
     parts.append(
-        f"{NAMES.get(motion.name, motion.name)} of the model within "
-        f"{show(100.0 * motion.relative_error, 'sig:3')} % of the measured{where}, "
-        f"rms {show(motion.rms_error, 'sig:3')} {motion.unit}, "
-        f"largest {show(motion.max_error, 'sig:3')} {motion.unit}."
+        f"{NAMES.get(motion.name, motion.name)} of the model within {_share(motion)} of the measured motion "
+        f"about its mean{where}, rms {show(motion.rms_error, 'sig:3')} {motion.unit}, largest "
+        f"{show(motion.max_error, 'sig:3')} {motion.unit}"
+        + "".join(f"; {NAMES.get(one.name, one.name).lower()} within {_share(one)}" for one in beside)
+        + "."
     )
-    far = max((s for r in results for s in r.signals), key=lambda s: s.relative_error)
-    if far.name != motion.name:
-        share = show(100.0 * far.relative_error, "sig:3")
-        parts.append(f"Furthest off: {NAMES.get(far.name, far.name).lower()}, {share} %.")
+    apart = [one.record for one in results if not moves_alike(one)]
+    parts += [f"{record}: a fit below 0 %, the model moves otherwise." for record in apart]
+    far = max((s for r in results for s in r.signals.values()), key=lambda s: s.relative_error)
     if error_limit is None and not wrong:
         one = "The record contradicts" if len(results) == 1 else "The records contradict"
         parts.append(f"{one} neither {'itself' if len(results) == 1 else 'themselves'} nor the design.")
@@ -83,79 +88,62 @@ def words(results: Sequence[CorrelationResult], error_limit: float | None = None
     return " ".join(parts)
 
 
+def _share(signal: SignalComparison) -> str:
+    return f"{show(100.0 * signal.share_of_motion, 'sig:3')} %"
+
+
 def summary_section(results: Sequence[CorrelationResult], *, error_limit: float | None = None) -> Section:
     """Make the section of all records together: a table with a row for all, and the worst one's figure."""
-    columns = [
-        doc.column("name", "Signal"),
-        doc.column("record", "Record"),
-        doc.column("mean", "Mean |e|", format="sig:4"),
-        doc.column("rms", "rms", format="sig:4"),
-        doc.column("largest", "Largest", format="sig:4"),
-        doc.column("unit", "Unit"),
-        doc.column("relative", "Relative error", "%", format="sig:4"),
+    rows: list[tuple[str, SignalComparison | SignalSummary]] = []
+    for name, one in summarise(results).items():
+        rows += [(result.record, result[name]) for result in results if name in result.signals]
+        rows.append((f"all {one.records}; worst: {one.worst}", one))
+    columns: list[tuple[Column, Callable[[tuple[str, Any]], Any]]] = [
+        (doc.column("name", "Signal"), lambda row: NAMES.get(row[1].name, row[1].name)),
+        (doc.column("record", "Record"), lambda row: row[0]),
+        (doc.column("mean", "Mean |e|", format="sig:4"), lambda row: row[1].mean_error),
+        (doc.column("rms", "rms", format="sig:4"), lambda row: row[1].rms_error),
+        (doc.column("largest", "Largest", format="sig:4"), lambda row: row[1].max_error),
+        (doc.column("unit", "Unit"), lambda row: row[1].unit),
+        (
+            doc.column("relative", "Relative error", "%", format="sig:4"),
+            lambda row: 100.0 * row[1].relative_error,
+        ),
     ]
-    rows = []
-    for one in summarise(results):
-        label = NAMES.get(one.name, one.name)
-        for result in results:
-            rows += [_summary_row(label, result.record, s) for s in result.signals if s.name == one.name]
-        rows.append(_summary_row(label, f"all {one.records}; worst: {one.worst}", one) | {"_status": "info"})
+    table = doc.listing(
+        "All records", rows, columns, status=lambda row: "info" if row[0].startswith("all ") else None
+    )
     result, signal = worst_of(results)
     figure = signal_figure(signal, f"The worst record, {result.record}. ")
     intro = f"{len(results)} records against {result.design}; the motion of {result.record} is furthest off."
-    table = doc.table("All records", columns, rows)
-    judged = agrees(results, error_limit)
-    status: Status = "pass" if judged else "fail"
+    status: Status = "pass" if agrees(results, error_limit) else "fail"
     return doc.section(
         "correlation", "All records", [table, figure],
         result=words(results, error_limit), intro=intro, status=status,
     )  # fmt: skip
 
 
-def _summary_row(label: str, record: str, signal: SignalComparison | SignalSummary) -> Row:
-    return {
-        "name": label,
-        "record": record,
-        "mean": signal.mean_error,
-        "rms": signal.rms_error,
-        "largest": signal.max_error,
-        "unit": signal.unit,
-        "relative": 100.0 * signal.relative_error,
-    }
-
-
 def comparison_table(result: CorrelationResult) -> Block:
     """One row a signal."""
-    columns = [
-        doc.column("name", "Signal"),
-        doc.column("relative", "Relative error", "%", format="sig:4"),
-        doc.column("fit", "Fit", "%", format="fix:3"),
-        doc.column("mean", "Mean |e|", format="sig:3"),
-        doc.column("rms", "rms", format="sig:3"),
-        doc.column("largest", "Largest error", format="sig:3"),
-        doc.column("unit", "Unit"),
-        doc.column("at", "at", "s", format="fix:3"),
-        doc.column("delay", "Measured lags by", "ms", format="fix:3"),
-    ]
-    rows = [
-        {
-            "name": NAMES.get(s.name, s.name),
-            "relative": 100.0 * s.relative_error,
-            "fit": s.fit_percent,
-            "mean": s.mean_error,
-            "rms": s.rms_error,
-            "largest": s.max_error,
-            "unit": s.unit,
-            "at": s.max_error_time_s,
-            "delay": None if s.delay_s is None else 1e3 * s.delay_s,
-        }
-        for s in result.signals
+    columns: list[tuple[Column, Callable[[SignalComparison], Any]]] = [
+        (doc.column("name", "Signal"), lambda s: NAMES.get(s.name, s.name)),
+        (doc.column("relative", "Relative error", "%", format="sig:4"), lambda s: 100.0 * s.relative_error),
+        (doc.column("fit", "Fit", "%", format="fix:3"), lambda s: s.fit_percent),
+        (doc.column("mean", "Mean |e|", format="sig:3"), lambda s: s.mean_error),
+        (doc.column("rms", "rms", format="sig:3"), lambda s: s.rms_error),
+        (doc.column("largest", "Largest error", format="sig:3"), lambda s: s.max_error),
+        (doc.column("unit", "Unit"), lambda s: s.unit),
+        (doc.column("at", "at", "s", format="fix:3"), lambda s: s.max_error_time_s),
+        (
+            doc.column("delay", "Measured lags by", "ms", format="fix:3"),
+            lambda s: None if s.delay_s is None else 1e3 * s.delay_s,
+        ),
     ]
     note = (
         "Relative error: norm of the difference over the norm of the measured signal. Fit: 100 % minus the "
         "norm of the difference over that of the measured signal without its mean (normalised rms fit)."
     )
-    return doc.table(f"{result.design} against {result.record}", columns, rows, note)
+    return doc.listing(f"{result.design} against {result.record}", result.signals.values(), columns, note)
 
 
 def signal_figure(signal: SignalComparison, first: str = "") -> Block:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from analyses.limit_cycles import Confirmation
-from analyses.validation.counts import WITHIN, Counts
+from analyses.limit_cycles.counts import WITHIN, Counts
 from reports import document as doc
 from reports.document_schema import Block, FactItem, Section, Status
 from reports.findings import Finding
@@ -75,14 +75,14 @@ def _facts(one: Counts, axis: str) -> list[FactItem]:
 
 
 def _cycles(cycles: Sequence[tuple[Counts, Confirmation]], axis: str) -> Block:
-    """Foreseen limit cycles beside what the simulator says of them."""
+    """Predicted limit cycles beside what the simulator says of them."""
     scale, unit, _ = _units(axis)
     columns = [
         doc.column("sensor", "Sensor"),
         doc.column("amplitude", "Amplitude at the sensor", unit, format="sig:3"),
         doc.column("output", "At the output", unit, format="sig:3"),
         doc.column("hertz", "Frequency", "Hz", format="sig:3"),
-        doc.column("ratio", "Simulated over foreseen", format="sig:3"),
+        doc.column("ratio", "Simulated over predicted", format="sig:3"),
         doc.column("verdict", "Simulation"),
     ]
     rows = [

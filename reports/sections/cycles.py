@@ -1,4 +1,4 @@
-"""Limit cycles of play and quantisation: foreseen by describing function, then sought by simulation."""
+"""Limit cycles of play and quantisation: predicted by describing function, then sought by simulation."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ def section(result: LimitCycles) -> Section:
     fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
     intro = (
         "Play acts for a sinusoidal twist as a softer coupling, a sensor's count for a small swing about its "
-        "edge as a relay. A cycle is foreseen where the sampled loop with that gain keeps an oscillation's "
+        "edge as a relay. A cycle is predicted where the sampled loop with that gain keeps an oscillation's "
         "size, then the simulator is started in its shape at many sizes. Cycles of dry friction alone stand "
         "under Dry friction at small signals."
     )
     blocks: list[Block] = []
     if result.confirmations:
-        blocks.append(_foreseen(result, fine, small))
+        blocks.append(_predicted(result, fine, small))
     else:
         causes = (
             " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
         )
-        blocks.append(doc.text(f"No limit cycle of {causes} is foreseen."))
+        blocks.append(doc.text(f"No limit cycle of {causes} is predicted."))
     blocks.append(_rests(result, fine, small))
     text = summary(result)
     severity: Any = "info" if result.hunting is None else "warn"
@@ -54,19 +54,19 @@ def summary(result: LimitCycles) -> str:
     fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
     swing, count = result.hunting, len(result.confirmations)
     seen = sum(one.verdict == "confirmed" for one in result.confirmations)
-    tail = f"; {seen} of {count} foreseen cycles confirmed" if count else "; none is foreseen"
+    tail = f"; {seen} of {count} predicted cycles confirmed" if count else "; none is predicted"
     if swing is None:
         return f"The drive as it is comes to rest after every step{tail}."
     at = f"{swing.load_Nm:g} {load_unit(result.design)}"
     return f"The drive as it is does not come to rest: {words(swing.rest, fine, small)} under {at}{tail}."
 
 
-def _foreseen(result: LimitCycles, fine: float, small: str) -> Block:
+def _predicted(result: LimitCycles, fine: float, small: str) -> Block:
     columns = [
         doc.column("cause", "Cause"),
         doc.column("friction", "Dry friction"),
         doc.column("kind", "Kind"),
-        doc.column("size", "Foreseen, peak", small, format="sig:3", better=-1),
+        doc.column("size", "Predicted, peak", small, format="sig:3", better=-1),
         doc.column("hz", "at", "Hz", format="sig:3"),
         doc.column("seen", "Simulated", small, format="sig:3"),
         doc.column("seen_hz", "at", "Hz", format="sig:3"),
@@ -77,7 +77,7 @@ def _foreseen(result: LimitCycles, fine: float, small: str) -> Block:
         "out or by its own describing function, as the column says; no limit acts."
     )
     rows = [_row(one, fine) for one in result.confirmations]
-    return doc.table("Foreseen limit cycles, at the output", columns, rows, note)
+    return doc.table("Predicted limit cycles, at the output", columns, rows, note)
 
 
 def _row(one: Confirmation, fine: float) -> Row:

@@ -14,7 +14,7 @@ from reports.document_schema import Block, Row, Section
 from reports.numbers import to_minus
 from reports.sections.loop import nyquist_hz
 from reports.sections.loop_charts import both
-from reports.sections.margins import cells, evidence_notes, margin_row, response_row
+from reports.sections.margins import evidence_notes, margin_row, response_row
 from reports.sections.names import FORMS, figure_column, loop_words
 
 COLUMNS = [
@@ -74,7 +74,7 @@ def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) 
     reference = margin_row(ideal)["phase_margin_deg"] if ideal else None
     own = margins["phase_margin_deg"]
     cost = None if own is None or reference is None or form == "ideal" else own - reference
-    row = {**cells(margins, response), "loop": loop_words(name), "form": FORMS[form], "phase_cost_deg": cost}
+    row = {**margins, **response, "loop": loop_words(name), "form": FORMS[form], "phase_cost_deg": cost}
     return row | ({"_status": "fail"} if figures.sound is False else {})
 
 

@@ -6,14 +6,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.design.model import Command
 from analyses.settling import largest_swing
 from analyses.settling import words as end_words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Row, Section, VerdictItem
+from reports.document_schema import Block, Row, Section, Severity, Status, VerdictItem
 from reports.findings import Finding
 from reports.sections.large_signal import load_unit, output_unit
+from reports.verdict_summary import tally
 
 if TYPE_CHECKING:
     from analyses.friction_effects import FrictionEffects
@@ -40,24 +42,24 @@ def section(result: FrictionEffects) -> Section:
     intro = (
         "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion."
     )
-    failed = any(item["verdict"] == "not met" for item in items)
-    words, more = _summary(result, fine, small)
-    blocks += [doc.text(more)] if more else []
+    status: Status = tally(items).role
+    severity: Severity = "fail" if status == "fail" else "warn" if status == "warn" else "info"
+    words = _summary(result, fine, small)
     return doc.section(
-        "friction-effects", title, blocks, result=words, intro=intro, status="fail" if failed else "info",
-        findings=[Finding(severity="fail" if failed else "info", text=words, where="friction-effects")],
+        "friction-effects", title, blocks, result=words, intro=intro, status=status,
+        findings=[Finding(severity=severity, text=words, where="friction-effects")],
     )  # fmt: skip
 
 
 def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> VerdictItem:
-    """Say whether friction keeps the drive hunting, and whether that was foreseen."""
+    """Say whether friction keeps the drive hunting, and whether that was predicted."""
     cycles, swing = point.cycles, point.cycles.hunting
-    foreseen = _foreseen_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
+    predicted = _predicted_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
         result = f"at rest after steps of {len(cycles.settlings)} sizes"
     else:
         result = end_words(swing.rest, fine, small)
-    agree = "as predicted" if cycles.as_foreseen else "not as predicted"
+    agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
     return doc.verdict(
@@ -69,29 +71,27 @@ def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> 
         distance=None,
         passed=swing is None,
         comparison="<=",
-        reason=f"{foreseen}; simulated: {result}; {agree}",
+        reason=f"{predicted}; simulated: {result}; {agree}",
     )
 
 
-def _foreseen_words(cycles: LimitCycles, fine: float, small: str) -> str:
-    """Say what the describing function foresees and what the simulator makes of it."""
+def _predicted_words(cycles: LimitCycles, fine: float, small: str) -> str:
+    """Say what the describing function predicts and what the simulator makes of it."""
     if not cycles.confirmations:
         return "describing function of the whole loop: none"
     parts = []
     for item in cycles.confirmations:
-        one = item.foreseen
+        one = item.cycle
         kind = "stable" if one.stable else "unstable, the border of what friction damps"
-        seen = (
-            "refuted" if item.simulated_ratio is None else f"simulated at {item.simulated_ratio:.2f} of that"
-        )
-        hz = "" if item.simulated_hz is None else f", {item.simulated_hz:.4g} Hz"
-        size = fine * one.output_amplitude_rad
+        seen = "refuted" if item.ratio is None else f"simulated at {item.ratio:.2f} of that"
+        hz = "" if item.frequency_hz is None else f", {item.frequency_hz:.4g} Hz"
+        size = fine * one.output_rad
         parts.append(f"±{size:.3g} {small} at {one.frequency_hz:.4g} Hz ({kind}; {seen}{hz})")
     return "describing function of the whole loop: " + "; ".join(parts)
 
 
 def _slip_words(cycles: LimitCycles, fine: float, small: str) -> str:
-    """Say what the analysis of stick and slip foresees."""
+    """Say what the analysis of stick and slip predicts."""
     one = cycles.stick_slip
     if one is None:
         return "stick-slip analysis: none"
@@ -122,6 +122,8 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
         else "No controller integrates: a step below the threshold never moves the output. Each "
         "reversal loses 2 Tc over the stiffness."
     )
+    if result.design.command != Command():
+        note += " Steps as they come behind the profile and filter of the command."
     return doc.table("Threshold of motion and lost motion", columns, rows, note)
 
 
@@ -215,23 +217,23 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
     return doc.figure("hysteresis", chart, caption=caption, alt=caption)
 
 
-def _summary(result: FrictionEffects, fine: float, small: str) -> tuple[str, str]:
-    """Say what becomes of the steady-state error, and a remark."""
+def _summary(result: FrictionEffects, fine: float, small: str) -> str:
+    """Say what becomes of the steady-state error, as the steps show it."""
     settlings = [one for point in result.points for one in point.cycles.settlings]
     swing = largest_swing(settlings)
     if swing is not None:
-        return f"The drive does not come to rest after a step: {end_words(swing.rest, fine, small)}.", ""
-    if result.integrator:
-        left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
-        if left:
-            most = max(abs(one.rest.error) for one in left)
-            words = f"an error of up to {fine * most:.3g} {small} is left at rest"
-            return f"The {result.integrator} controller integrates; {words}.", ""
-        return (
-            f"Dry friction leaves no steady-state error and causes no hunting: the {result.integrator} "
-            "integrator removes the error.",
-            "With breakaway above sliding friction the drive may hunt. A describing function of dry friction "
-            "cannot "
-            "predict that, as a sinusoid spends no time at rest.",
-        )
-    return "No controller integrates: a steady-state error of up to the threshold remains.", ""
+        return f"The drive does not come to rest after a step: {end_words(swing.rest, fine, small)}."
+    left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
+    does = (
+        f"The {result.integrator} controller integrates" if result.integrator else "No controller integrates"
+    )
+    if left:
+        most = max(left, key=lambda one: abs(one.rest.error))
+        under = f", at a load of {most.load_Nm:g} {load_unit(result.design)}" if most.load_Nm else ""
+        return f"{does}; an error of up to {fine * abs(most.rest.error):.3g} {small} is left at rest{under}."
+    if not result.integrator:
+        return f"{does}; the steps leave no error at rest."
+    return (
+        f"Dry friction leaves no steady-state error and causes no hunting: the {result.integrator} "
+        "integrator removes the error."
+    )

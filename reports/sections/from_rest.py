@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analyses.validation.at_rest import RestSweep
+from analyses.large_signal.at_rest import RestSweep
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.design.model import Command
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -158,6 +159,8 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
         "Diamonds "
         "and triangles: where the simulation first reaches it."
     )
+    if result.design.command != Command():
+        caption += " Simulated behind the profile and filter of the command, drawn in front of them."
     shown = result.map
     if shown.coarser:
         points_shown = f"{shown.amplitude_rad.size} amplitudes by {shown.frequency_hz.size} frequencies"
@@ -203,6 +206,8 @@ def _border_table(result: LargeSignals, scale: float, unit: str) -> Block:
             row["shift"] = 100.0 * (shifted.ratio[k] - 1.0)
         rows.append(row)
     note = "The shift by friction is shown, not judged."
+    if result.design.command != Command():
+        note += " Amplitudes behind the profile and filter of the command."
     return doc.table("Amplitude at which a limit is first reached", columns, rows, note)
 
 

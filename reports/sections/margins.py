@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TypedDict, cast
+from typing import TYPE_CHECKING
 
 from actuator_lti.quantities import Quantity
+from actuator_lti.tree import Tree
 from actuator_lti.verdict import Verdict
 from analyses.held_loops import HELD, OPEN
 from analyses.loop_figures import LoopFigures
 from analyses.loop_survey import OperatingPointFigures
 from analyses.weakest import Spread, spread
 from reports import document as doc
-from reports.document_schema import Block, Mark, Row, Section, State, Status
+from reports.document_schema import Block, Row, Section, State, Status
 from reports.numbers import short, to_minus
-from reports.sections.names import LOOPS, figure_column, hertz, loop_words
+from reports.sections import requirements
+from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words
+from reports.terminal import Brief, side_by_side
+
+if TYPE_CHECKING:
+    from analyses.margins import Margins
 
 STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE_STATUS: dict[str, Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
@@ -65,14 +71,66 @@ CROSSING_COLUMNS = [
 ]
 
 
-def section(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> Section:
+def section(result: Margins) -> list[Section]:
+    """Make the sections from `analyses.margins.margins`: the loops as asked for, the requirements."""
+    asked, judged = result.asked, requirements.section(result.requirements, load_unit(result.design))
+    known = {**{LOOPS[name]: one for name, one in result.loops.items()}, **result.around}
+    made = _loops(known, result.operating_points, f"{FORMS[asked.form].capitalize()}; {_where(result)}. ")
+    made["blocks"] += [doc.text(note) for note in _notes(result, known)]
+    return [{**made, "result": f"{_stability(known)}. {judged['result']}"}, judged]
+
+
+def brief(result: Margins) -> Brief:
+    """The tables as one, a column a loop."""
+    first, judged = section(result)
+    known = {**{LOOPS[name]: one for name, one in result.loops.items()}, **result.around}
+    every, own = with_held(known), with_own_margins(with_held(known))
+    head = f"{result.design.name}: {result.asked.form}, {_where(result)}"
+    tables = [margin_table(own), spread_table(result.operating_points, known), response_table(every)]
+    counts = [len(one.margins.gain_margins) + len(one.margins.phase_margins) for one in known.values()]
+    crossings = [crossing_table(own)] if max(counts, default=0) > 2 else []
+    notes = [*by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
+    return Brief(first["result"], [side_by_side(head, tables), *crossings, *judged["blocks"]], notes)
+
+
+def _where(result: Margins) -> str:
+    return f"{result.asked.operating_point}, load {result.asked.load_Nm:g} {load_unit(result.design)}"
+
+
+def _notes(result: Margins, named: Mapping[str, LoopFigures]) -> list[str]:
+    own = [note for one in named.values() for note in (*one.margins.notes, *one.notes)]
+    return list(
+        dict.fromkeys([*own, *(f"{name}: broken at the command of the drive" for name in result.around)])
+    )
+
+
+def _stability(named: Mapping[str, LoopFigures]) -> str:
+    """Say which loops are not stable; or that all are, and which only with the rotor or load held."""
+    unstable = [name for name, one in named.items() if one.sound is False]
+    unknown = [name for name, one in named.items() if one.sound is None]
+    if unstable or unknown:
+        words = f"not stable: {', '.join(unstable)}" if unstable else ""
+        return words or f"stability not known: {', '.join(unknown)}"
+    held = [
+        f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, the load drives it away)"
+        for label, one in named.items()
+        if one.held is not None
+    ]
+    return f"the drive is stable, all loops closed; {', '.join(held)}" if held else "every loop is stable"
+
+
+def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> Section:
     """Make the section from the figures of the sampled, sliding loops, and those of the operating points."""
-    loops = named = {LOOPS[name]: loop_figures for name, loop_figures in figures.items()}
-    notes = by_itself_notes(named)
-    named = with_held(named)
+    how = "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
+    made = _loops({LOOPS[name]: one for name, one in figures.items()}, points, how)
+    return {**made, "result": result(figures)}
+
+
+def _loops(loops: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures], how: str) -> Section:
+    named = with_held(loops)
     own = with_own_margins(named)
     blocks = [
-        *(doc.text(note) for note in notes),
+        *(doc.text(note) for note in by_itself_notes(loops)),
         margin_table(own),
         *([spread_table(points, loops)] if points else ()),
         response_table(named),
@@ -81,11 +139,11 @@ def section(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointF
     ]
     intro = (
         "Each loop is cut at its own error, with the loops inside it closed and those outside it open. "
-        "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
-    ) + evidence_meaning(named)
-    status = worst_status([loop_figures.sound for loop_figures in figures.values()])
+        f"{how}{evidence_meaning(named)}"
+    )
+    status = worst_status([one.sound for one in loops.values()])
     return doc.section(
-        "margins", "Margins and bandwidths", blocks, result=result(figures), intro=intro, status=status,
+        "margins", "Margins and bandwidths", blocks, intro=intro, status=status,
         verdict=Verdict.NOT_PROVEN if status == "warn" else None,
     )  # fmt: skip
 
@@ -199,48 +257,16 @@ def crossing_table(named: Mapping[str, LoopFigures]) -> Block:
     return doc.table("Every gain and phase crossover", CROSSING_COLUMNS, rows)
 
 
-class MarginRow(TypedDict):
-    """The margins of one loop, by column."""
-
-    stable: State
-    evidence: Mark
-    gain_margin_db: float | None
-    gain_margin_hz: float | None
-    phase_margin_deg: float | None
-    crossover_hz: float | None
-    crossover_rad_s: float | None
-    delay_margin_ms: float | None
-    delay_margin_samples: float | None
-    modulus_margin: float | None
-    s_peak_db: float | None
-    disk_margin: float | None
-
-
-class ResponseRow(TypedDict):
-    """Bandwidth, resonance and step of one loop, by column."""
-
-    minus3db_hz: float | None
-    minus90deg_hz: float | None
-    resonance_db: float | None
-    resonance_hz: float | None
-    t_peak_db: float | None
-    rise_ms: float | None
-    overshoot_percent: float | None
-    settling_ms: float | None
-    dc: float | None
-
-
-def margin_row(figures: LoopFigures) -> MarginRow:
+def margin_row(figures: LoopFigures) -> Tree:
     """Give the margins of one loop by column; an unstable loop has none, only the crossings listed below."""
     m = figures.margins
     row = _stable_row(figures)
     if m.stable is not False:
         return row
-    blank = dict.fromkeys(MarginRow.__annotations__)
-    return cast(MarginRow, {**blank, "stable": row["stable"], "evidence": row["evidence"]})
+    return {key: row[key] if key in ("stable", "evidence") else None for key in row}
 
 
-def _stable_row(figures: LoopFigures) -> MarginRow:
+def _stable_row(figures: LoopFigures) -> Tree:
     """Give the figures of one loop by column, whatever they are margins of."""
     m = figures.margins
     gain, phase, delay, disk = m.gain_margin, m.phase_margin, m.delay_margin, m.disk_margin
@@ -302,7 +328,7 @@ def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
     ]
 
 
-def response_row(figures: LoopFigures) -> ResponseRow:
+def response_row(figures: LoopFigures) -> Tree:
     """Give bandwidth, resonance and step of one loop by column."""
     band, peaks, step = figures.bandwidth, figures.peaks, figures.step
     return {
@@ -322,11 +348,6 @@ def shown(quantity: Quantity, figures: LoopFigures) -> float | None:
     """Give a figure of the registry as reports write it: with its sign; an unstable loop has none."""
     value = None if figures.margins.stable is False else quantity.raw(figures)
     return times(value, quantity.shown[1])
-
-
-def cells(*rows: MarginRow | ResponseRow) -> Row:
-    """The same rows as cells of one table."""
-    return {key: cast(doc.Cell, value) for row in rows for key, value in row.items()}
 
 
 def _crossings(name: str, figures: LoopFigures) -> list[Row]:

@@ -6,14 +6,20 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.design import write_design
+from actuator_lti.design.model import Design
+from actuator_lti.verdict import Verdict
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
-from reports.document_schema import Block, Section, Status, VerdictItem
+from reports.document_schema import Block, Section, VerdictItem
 from reports.sections.margins import finite
+from reports.sections.requirements import label
+from reports.terminal import Brief
 
 if TYPE_CHECKING:
     from analyses.monte_carlo import ColumnStatistics, MonteCarloResult, Odds, WorstCase
+    from analyses.verdicts import RequirementVerdict
 
 ODDS_COLUMNS = [
     doc.column("label", "Requirement"),
@@ -44,16 +50,10 @@ FIGURE_COLUMNS = [
 _SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
 
 
-def section(result: MonteCarloResult, at_least: float | None = None) -> Section:
-    """Make the section.
-
-    Parameters
-    ----------
-    result : MonteCarloResult
-    at_least : float, optional
-        Probability to be met with 95 % confidence; without it every sample and the worst case must pass.
-    """
-    items = [_verdict(odds, _case(result, odds), at_least) for odds in result.odds if odds.id != "all"]
+def section(result: MonteCarloResult) -> Section:
+    """Make the section from `analyses.monte_carlo.monte_carlo`."""
+    items = [_verdict(result, odds) for odds in result.odds if odds.id != "all"]
+    items += [_not_sampled(one) for one in result.left_out]
     blocks: list[Block] = [doc.verdicts(items, what="odds")] if items else []
     if result.odds:
         blocks.append(_odds_table(result))
@@ -66,24 +66,36 @@ def section(result: MonteCarloResult, at_least: float | None = None) -> Section:
         doc.fact("Samples", result.samples), doc.fact("Seed", result.seed),
         doc.fact("Parameters that vary", ", ".join(result.paths)),
     ]))  # fmt: skip
-    failed = any(item["verdict"] == "not met" for item in items)
     intro = (
         f"{result.samples} designs drawn from the tolerances; sampled loops. An optimiser seeks the worst "
-        "case in "
-        "the whole tolerance box, as sampling alone does not find it."
+        "case in the whole tolerance box, as sampling alone does not find it."
     )
-    status: Status = "fail" if failed else "info"
     return doc.section(
-        "monte-carlo", "Tolerances", blocks, result=_result(result), intro=intro, status=status
+        "monte-carlo", "Tolerances", blocks, result=_result(result), intro=intro, status=result.tally.role
     )
+
+
+def brief(result: MonteCarloResult) -> Brief:
+    """The odds in few columns."""
+    kept = ("label", "probability", "low", "nominal", "worst", "unit")
+    tables = [doc.with_columns(_odds_table(result), kept)] if result.odds else []
+    return Brief(_result(result), tables, [*result.notes, f"samples and worst designs: {result.folder}"])
+
+
+def text(result: MonteCarloResult | Design) -> str | None:
+    """One sample as a design file."""
+    return write_design(result).rstrip("\n") if isinstance(result, Design) else None
 
 
 def _result(result: MonteCarloResult) -> str:
     """Say how many samples meet everything, and which requirement fails most often."""
+    words = f"{result.tally.words('requirements')} under tolerances"
     every = next((odds for odds in result.odds if odds.id == "all"), None)
     if every is None:
-        return f"The design states no requirement; {result.samples} samples were drawn."
-    words = f"{every.passed} of {every.count} samples meet every requirement"
+        said = words if result.left_out else "The design states no requirement"
+        return f"{said}; {result.samples} samples were drawn."
+    words += f"; {every.passed} of {every.count} samples meet every one"
+    words += " that is sampled" if result.left_out else ""
     weakest = min(
         (odds for odds in result.odds if odds.id != "all"), key=lambda odds: odds.probability, default=None
     )
@@ -95,18 +107,12 @@ def _result(result: MonteCarloResult) -> str:
     )
 
 
-def _case(result: MonteCarloResult, odds: Odds) -> WorstCase | None:
-    return next((case for case in result.worst if case.requirement == odds.id), None)
-
-
-def _verdict(odds: Odds, case: WorstCase | None, at_least: float | None) -> VerdictItem:
+def _verdict(result: MonteCarloResult, odds: Odds) -> VerdictItem:
     """Judge one requirement by its odds."""
-    wanted = 1.0 if at_least is None else at_least
-    if at_least is None:
-        passed = odds.passed == odds.count and (case is None or case.passed)
-        reason = "" if passed else _why(odds, case)
-    else:
-        passed = odds.low >= at_least
+    wanted = 1.0 if result.at_least is None else result.at_least
+    passed = result.judged(odds) is Verdict.MET
+    reason = "" if passed else _why(odds, result.case(odds))
+    if result.at_least is not None:
         reason = f"{100 * odds.low:.3f} % with 95 % confidence"
     return doc.verdict(
         f"tolerance/{odds.id}",
@@ -114,11 +120,18 @@ def _verdict(odds: Odds, case: WorstCase | None, at_least: float | None) -> Verd
         value=100.0 * odds.probability,
         limit=100.0 * wanted,
         unit="%",
-        distance=100.0 * ((odds.low if at_least is not None else odds.probability) - wanted),
+        distance=100.0 * ((odds.low if result.at_least is not None else odds.probability) - wanted),
         passed=passed,
         reason=reason,
         comparison=">=",
     )
+
+
+def _not_sampled(one: RequirementVerdict) -> VerdictItem:
+    return doc.verdict(
+        f"tolerance/{one.id}", f"{label(one)}: met within the tolerances", value=None, limit=None, unit="",
+        distance=None, passed=None, reason=one.reason, waiver=one.waiver.words if one.waiver else "",
+    )  # fmt: skip
 
 
 def _why(odds: Odds, case: WorstCase | None) -> str:
@@ -141,13 +154,13 @@ def _limit(odds: Odds) -> str:
 def _odds_table(result: MonteCarloResult) -> Block:
     rows = []
     for odds in result.odds:
-        case = _case(result, odds)
+        case = result.case(odds)
         rows.append({
             "label": odds.label, "limit": _limit(odds), "probability": 100 * odds.probability,
             "low": 100 * odds.low, "high": 100 * odds.high, "nominal": finite(odds.nominal),
             "sampled": finite(odds.worst), "number": odds.worst_sample,
             "worst": None if case is None else finite(case.value), "unit": odds.unit,
-            "_status": "pass" if odds.passed == odds.count and (case is None or case.passed) else "fail",
+            "_status": "info" if odds.id == "all" else result.judged(odds).role(),
         })  # fmt: skip
     note = "A dash in the worst case: not computed, or a loop is unstable there."
     return doc.table("Odds of meeting each requirement", ODDS_COLUMNS, rows, note)
@@ -217,7 +230,7 @@ def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: Colum
     panel.shape([([x[0], *x, x[-1]], [0.0, *y, 0.0])], colour=style.SKY, opacity=0.45)
     panel.curve(x, y, colour=style.BLUE, width=1.3, read=False)
     panel.y.limits(0.0, 1.35 * max(counts))
-    case, alone = _case(result, odds), len(odds.columns) == 1
+    case, alone = result.case(odds), len(odds.columns) == 1
     nominal = finite(result.nominal.get(column.name))
     worst = finite(case.value) if case is not None and alone else None
     for name, value, colour, dash in (("nominal", nominal, style.INK, 0), ("worst", worst, style.ORANGE, 1)):

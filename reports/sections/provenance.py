@@ -22,7 +22,6 @@ def section(
         {"what": "commit", "value": provenance["commit"] or "not built from a git tree"},
         {"what": "built", "value": provenance["time"]},
         {"what": "Python", "value": f"{provenance['python']}, {provenance['platform']}"},
-        {"what": "simulator", "value": provenance.get("kernel", "numba")},
         *({"what": name, "value": version} for name, version in provenance["libraries"].items()),
     ]
     columns = [doc.column("what", "What"), doc.column("value", "Value")]

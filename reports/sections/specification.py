@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.specification import Specification
 
-
+ALIKE = 0.05  # relative: closed form and simulation are not told apart in the headline
 BOUND_COLOURS = {
     "voltage limit": style.RED,
     "drive signal at its limit": style.RED,
@@ -33,7 +33,11 @@ BOUND_COLOURS = {
 def section(result: Specification) -> Section:
     """Make the section from `analyses.specification.specification`."""
     blocks = [_capability_table(result), *_planes(result), _manoeuvre_table(result), _step_table(result)]
-    intro = "Closed form and simulation side by side; output side unless a column says motor."
+    intro = (
+        "Closed form and simulation side by side, behind the profile of the command; manoeuvres and steps "
+        "with it. "
+        "Output side unless a column says motor."
+    )
     findings = _findings(result)
     return doc.section(
         "specification", "Actuator figures", blocks, result=_result(result), intro=intro, findings=findings
@@ -46,13 +50,34 @@ def _result(result: Specification) -> str:
     one = max(result.capabilities, key=lambda one: one.figures.load_Nm, default=None)
     if one is None:
         return ""
-    rate, push = one.figures.output_rate_rad_s, one.figures.acceleration_rad_s2
-    parts = [f"{significant(scale * rate)} {unit}/s"] if rate is not None and math.isfinite(rate) else []
-    parts += [f"{significant(scale * push)} {unit}/s²"] if push is not None and math.isfinite(push) else []
+    both = (
+        (one.figures.output_rate_rad_s, one.simulated_rate_rad_s, f"{unit}/s"),
+        (one.figures.acceleration_rad_s2, one.simulated_acceleration_rad_s2, f"{unit}/s²"),
+    )
+    parts = [
+        f"{significant(scale * value)} {per}{_unlike(value, found, scale)}"
+        for value, found, per in both
+        if value is not None and math.isfinite(value)
+    ]
     return (
         f"At {one.figures.load_Nm:g} {load_unit(result.design)} load the output reaches "
-        f"{' and '.join(parts)}."
+        f"{' and '.join(parts)}.{_commanded(result.design)}"
     )
+
+
+def _unlike(value: float, simulated: float | None, scale: float) -> str:
+    """What the simulation shows, where it is not the closed form."""
+    if simulated is None or abs(simulated - value) <= ALIKE * abs(value):
+        return ""
+    return f" (simulated {significant(scale * simulated)})"
+
+
+def _commanded(design: Design) -> str:
+    """What the profile of the command asks for at most."""
+    scale, unit = output_unit(design)
+    limits = ((design.command.rate_rad_s, f"{unit}/s"), (design.command.acceleration_rad_s2, f"{unit}/s²"))
+    parts = [f"{significant(scale * value)} {per}" for value, per in limits if math.isfinite(value)]
+    return f" The profile of its command asks for at most {' and '.join(parts)}." if parts else ""
 
 
 def _findings(result: Specification) -> list[Finding]:

@@ -117,7 +117,7 @@ def _lost_motion(result: Stiffness) -> Block:
     assert lost is not None
     columns = [
         doc.column("what", "What"),
-        doc.column("foreseen", "Foreseen", unit, format="sig:4"),
+        doc.column("foreseen", "Predicted", unit, format="sig:4"),
         doc.column("seen", "Simulated", unit, format="sig:4"),
     ]
     seen = None if lost.seen_rad is None else scale * lost.seen_rad
@@ -155,7 +155,7 @@ def _at_rest(result: Stiffness, unit: str) -> Block:
 def _checks(result: Stiffness, unit: str) -> Block:
     note = (
         "A small moment injected in the simulator, without play, quantisation, dry friction or friction by "
-        "load: foreseen here is the linear stiffness of that drive, without the friction by load "
+        "load: predicted here is the linear stiffness of that drive, without the friction by load "
         "that the curves have."
     )
     return doc.listing(
@@ -163,7 +163,7 @@ def _checks(result: Stiffness, unit: str) -> Block:
         result.checks,
         [
             (doc.column("frequency_hz", "Frequency", "Hz", format="sig:4"), lambda one: one.frequency_hz),
-            (doc.column("foreseen", "Foreseen", unit, format="sig:6"), lambda one: abs(one.foreseen_Nm_rad)),
+            (doc.column("foreseen", "Predicted", unit, format="sig:6"), lambda one: abs(one.foreseen_Nm_rad)),
             (doc.column("seen", "Simulated", unit, format="sig:6"), lambda one: abs(one.seen_Nm_rad)),
             (doc.column("difference", "Relative difference", format="sig:2"), lambda one: one.difference),
         ],

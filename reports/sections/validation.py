@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
-from actuator_lti.verdict import Tally, Verdict
+from actuator_lti.design.checks import CHECKS
+from actuator_lti.verdict import Verdict
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
-from reports.document_schema import Block, Row, Section, Status, VerdictItem
+from reports.document_schema import Block, Row, Section, Severity, Status, VerdictItem
 from reports.findings import Finding
 from reports.sections.conditional import findings_of
 from reports.sections.names import LOOPS, POINTS, QUANTITIES
+from reports.terminal import Brief
 
 MORE = {
     "response": "response of the closed loop",
@@ -19,7 +22,8 @@ MORE = {
     "gain_margin": "gain margin",
     "gain_margin_up": "gain margin, upwards",
     "gain_margin_down": "gain margin, downwards",
-    "bandwidth_90deg": "bandwidth at -90°",
+    "bandwidth": "bandwidth (−3 dB) of the feedback loop",
+    "bandwidth_90deg": "bandwidth at −90° of the feedback loop",
     "complementary_peak": "peak of T",
     "step": "small step in time, every sample",
     "inside_the_margin": "run just inside the gain margin",
@@ -55,6 +59,28 @@ def _others(validation: Validation) -> list[Section]:
     if validation.specification is not None:
         made.append(specification.section(validation.specification))
     return made
+
+
+def brief(validation: Validation) -> Brief:
+    """The verdict, why it is none where it is none, and every check by loop."""
+    made = section(validation)
+    shown = ("quantity", "predicted", "found", "unit", "error", "allowed", "verdict")
+    items = [
+        item
+        for part in made
+        for block in part["blocks"]
+        if block["kind"] == "verdicts"
+        for item in block["items"]
+    ]
+    said = [
+        f"{item['label']}: {item['verdict']}. {item['reason']}" for item in items if item["verdict"] != "met"
+    ]
+    large = [part["result"] for part in made if part["id"] == "conditional"]
+    tables = [
+        doc.with_columns(table(rows, loop_name(name)), shown)
+        for name, rows in by_loop(validation.rows).items()
+    ]
+    return Brief(validation.words, [*map(doc.text, said), *tables, *map(doc.text, large)], validation.notes)
 
 
 def summary(validation: Validation) -> Section:
@@ -96,7 +122,8 @@ def findings(validation: Validation) -> list[Finding]:
             grave = row.verdict is Verdict.NOT_MET
             says = "is contradicted by the simulation" if grave else f"is not proven: {row.because}"
             text = f"{loop_name(row.loop)}: {quantity_name(row)} {says}."
-            made.append(Finding(severity="fail" if grave else "warn", text=text, where="validation"))
+            open_one: Severity = "info" if validation.waived(f"{row.loop}/{row.name}") else "warn"
+            made.append(Finding(severity="fail" if grave else open_one, text=text, where="validation"))
     if validation.conditional is not None:
         made += findings_of(validation.conditional, validation.design.axis)
     if validation.design.coupling is None:
@@ -107,7 +134,7 @@ def findings(validation: Validation) -> list[Finding]:
 
 def verdict_items(validation: Validation) -> list[VerdictItem]:
     """One verdict a loop, break point or path, and one for each thing that the drive must not do."""
-    items = [_rows_item(name, rows) for name, rows in by_loop(validation.rows).items()]
+    items = [_rows_item(validation, name, rows) for name, rows in by_loop(validation.rows).items()]
     if not items:
         items.append(_item("judged", "Predictions", 0.0, None, None, "; ".join(validation.notes)))
     for k, failure in enumerate(validation.failures):
@@ -117,18 +144,24 @@ def verdict_items(validation: Validation) -> list[VerdictItem]:
         _item(f"stable-{name}", f"{loop_name(name)}: stable", None, None, None, "not known")
         for name in validation.undecided
     ]
+    swing = validation.hunting
+    if swing is not None and swing.rest.verdict == "still moving":
+        reason = f"still moving after {swing.rest.after_s:.3g} s"
+        items.append(_item("rest", "Comes to rest after a step", None, None, None, reason))
     return items
 
 
-def _rows_item(name: str, rows: Sequence[Check]) -> VerdictItem:
-    tally = Tally.of(row.verdict for row in rows)
+def _rows_item(validation: Validation, name: str, rows: Sequence[Check]) -> VerdictItem:
+    tally = replace(validation, rows=tuple(rows)).tally
     wrong = [row for row in rows if row.verdict is not Verdict.MET]
     words = [f"{quantity_name(row)}: {row.because or 'off'}" for row in wrong[:3]]
     share = max(row.error / (row.allowed or 1.0) for row in rows)
-    passed = None if tally.verdict is Verdict.NOT_PROVEN else tally.verdict is Verdict.MET
+    open_ones = tally.not_proven + tally.waived
+    passed = False if tally.not_met else None if open_ones else True
     label = f"{loop_name(name)}: predictions met by the simulator"
     reason = "; ".join(words) or f"largest error {share:.1g} of what is allowed"
-    return _item(f"predictions-{name}", label, float(tally.met), float(tally.total), passed, reason)
+    waiver = f"{tally.waived} of {open_ones} waived" if tally.waived and not tally.not_proven else ""
+    return {**_item(name, label, float(tally.met), float(tally.total), passed, reason), "waiver": waiver}
 
 
 def _item(
@@ -136,8 +169,8 @@ def _item(
 ) -> VerdictItem:
     distance = None if value is None or limit is None else value - limit
     return doc.verdict(
-        id, label, value=value, limit=limit, unit="", distance=distance, passed=passed, reason=reason,
-        comparison=">=",
+        f"{CHECKS}-{id}", label, value=value, limit=limit, unit="", distance=distance, passed=passed,
+        reason=reason, comparison=">=",
     )  # fmt: skip
 
 

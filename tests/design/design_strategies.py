@@ -126,7 +126,8 @@ def design_trees(draw: st.DrawFn) -> dict[str, Any]:
     }
     tracking = draw(st.sampled_from([{"speed": "ideal"}, {"speed": "tracking", "bandwidth": "10 Hz"}]))
     given = {
-        "load": {"moment_damping": f"1e-12 {torque}*s/{angle}", "gear_error": None}, "friction": {},
+        "load": {"moment_damping": f"1e-12 {torque}*s/{angle}", "gear_error": None,
+                 "locking_gear": None}, "friction": {},
         "encoder": {"bandwidth": None, **tracking}, "validation": {},
         "coupling": {"after": None}, "output_encoder": {}, "instruments": {"jitter": "20 us"},
     }  # fmt: skip

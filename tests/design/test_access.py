@@ -15,7 +15,6 @@ from actuator_lti.design import (
     warnings_of,
     with_overrides,
     with_values,
-    write_design,
 )
 from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
@@ -151,12 +150,6 @@ def test_every_value_has_a_pedigree_also_the_defaults() -> None:
     assert set(AMBER.parameters) < set(result)
     assert result["friction.breakaway_ratio"].source == "default"
     assert result["motor.resistance"].symbol == "R"
-
-
-def test_a_written_design_keeps_text_source_grade_and_tolerance() -> None:
-    again = read_design_text(write_design(AMBER), AMBER.origin)
-    assert again == AMBER
-    assert again.parameters["motor.inductance"].text == "6 uH"
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from actuator_lti.bounds import TEXT_CHARACTERS, TOML_BYTES
 from actuator_lti.design import design_tree, load_design, read_design_text, write_design
 from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
+from reports.cli.main import main
 
 AMBER = design_text("ilr33-amber")
 TOLERANCE = 'tolerance = "50 %"'
@@ -19,11 +20,9 @@ FACTS = "[[fact]]"
 def refused(text: str) -> str:
     with pytest.raises(InputError) as caught:
         read_design_text(text, "my.toml")
-    line = str(caught.value)
-    assert line.startswith("my.toml: ")
-    assert "\n" not in line
-    assert line.isprintable()
-    return line
+    lines = str(caught.value).split("\n")
+    assert all(line.startswith("my.toml: ") and line.isprintable() for line in lines)
+    return "\n".join(lines)
 
 
 def changed(*replacements: tuple[str, str]) -> str:
@@ -70,9 +69,9 @@ CASES = {
     "truth for a number": ([("value = 66", "value = true")], ["gear.planetary.ratio", "a number"]),
     "date for a text": ([('revision = "1"', "revision = 1979-05-27")], ["design.revision", "allowed: text"]),
     "no name": ([('name = "ilr33-amber"', 'name = " "')], ["design.name", "allowed: a text"]),
-    "name for paths": ([('name = "worm"', 'name = "../x"')], ["gear.name", "letters, digits"]),
-    "duplicate gear": ([('name = "worm"', 'name = "planetary"')], ["gear.name", "each name once"]),
-    "duplicate requirement": ([('id = "phase-margin"', 'id = "gain-margin"')], ["requirement.id", "each id once"]),
+    "name for paths": ([('name = "worm"', 'name = "../x"')], ["gear[2].name", "letters, digits"]),
+    "duplicate gear": ([('name = "worm"', 'name = "planetary"')], ["gear[2].name", "each name once"]),
+    "duplicate requirement": ([('id = "phase-margin"', 'id = "gain-margin"')], ["requirement.gain-margin.id", "each id once"]),
     "unknown quantity": ([('"gain_margin"', '"gain_margn"')], ["gain_margn", 'nearest known: "gain_margin"']),
     "loop that is not there": ([('loop = "position"', 'loop = "spin"')], ['.loop = "spin"', "velocity"]),
     "limit in a wrong unit": ([('"15 Hz"', '"15 dB"')], ["requirement.position-bandwidth.minimum", "Hz"]),
@@ -94,7 +93,7 @@ CASES = {
     ),
     "correlation above 1": (
         [(FACTS, '[[correlation]]\nfirst="load.inertia"\nsecond="gear.worm.input_inertia"\ncoefficient=1.5\n[[fact]]')],
-        ["coefficient = 1.5", "-1 to 1"],
+        ["coefficient = 1.5", "at least -1 and at most 1"],
     ),
     "terminal escape": ([('title = "ILR', 'title = "\\u001b[31mILR')], ["design.title", "U+001B"]),
     "key that runs backward": ([("[motor]", '[motor]\n"\\u202ex" = 1')], ["a key of motor", "U+202E"]),
@@ -113,8 +112,52 @@ CASES = {
 def test_a_bad_value_is_refused_in_one_line(case: str) -> None:
     replacements, says = CASES[case]
     line = refused(changed(*replacements))
+    assert "\n" not in line or case in ("one table for many", "correlation of a fixed value")
     for part in says:
         assert part in line
+
+
+MISTAKES = [
+    (
+        'resistance = { value = "55 mohm"',
+        'resistance = { value = "55 mH"',
+        "motor.resistance",
+        "wrong dimension",
+    ),
+    ("ratio = { value = 36", "ratio = { value = -36", "gear.worm.ratio", "above 0"),
+    ("[control.velocity]", "[control.velocity]\ngian = 3", "control.velocity.gian", 'nearest known: "gain"'),
+    ('minimum = "45 deg"', 'minimum = "45 V"', "requirement.phase-margin.minimum", "deg"),
+]
+
+
+def test_all_mistakes_are_told_at_once_each_with_its_line() -> None:
+    text = changed(*((old, new) for old, new, *_ in MISTAKES))
+    told = refused(text).split("\n")
+    assert len(told) == len(MISTAKES)
+    lines = text.splitlines()
+    for _, new, path, why in MISTAKES:
+        line = next(k for k, one in enumerate(lines, 1) if new.split("\n")[-1] in one)
+        assert any(one.startswith(f"my.toml: line {line}: {path} = ") and why in one for one in told)
+
+
+def test_mistakes_between_keys_are_told_at_once_too(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    text = changed(('"942.5 rad/s"', '"30000 rpm"'), ('"4 A", source', '"14 A", source'))
+    assert [one.split(" = ")[0] for one in refused(text).split("\n")] == [
+        f"my.toml: line {k}: limits.{key}"
+        for k, one in enumerate(text.splitlines(), 1)
+        for key, new in (("speed", '"30000 rpm"'), ("continuous_current", '"14 A"'))
+        if new in one
+    ]
+    path = tmp_path / "my.toml"
+    path.write_text(text, encoding="utf-8")
+    assert main(["margins", str(path)]) == 2
+    assert capsys.readouterr().err.count("\nactuator-lti: ") == 1
+
+
+def test_many_mistakes_are_cut_short() -> None:
+    assert refused(AMBER + "".join(f"[x{k}]\n" for k in range(100))).endswith("and 70 more mistakes")
 
 
 def test_correlations_that_contradict_each_other_are_refused() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins, sweep, write_design
+from actuator_lti.design import design_hash, parameter_value, read_design_text
 from nonlinear import commands, simulate
 
 DESIGN = load_design("ilr33-amber")
@@ -34,6 +35,32 @@ def test_anything_else_is_refused_in_one_line(given: object) -> None:
             call()
     with pytest.raises(InputError, match='nearest known: "ilr33-amber"'):
         assemble_loops("ilr33-ambre")
+
+
+BAD = {
+    "load": lambda: load_design(3),  # type: ignore[arg-type]
+    "text": lambda: read_design_text(b"x"),  # type: ignore[arg-type]
+    "write": lambda: write_design(3),  # type: ignore[arg-type]
+    "hash": lambda: design_hash(None),  # type: ignore[arg-type]
+    "lambda": lambda: DESIGN.with_values({"motor.resistance": lambda: 1.0}),
+    "complex": lambda: DESIGN.with_values({"motor.resistance": 1j}),
+    "pairs": lambda: DESIGN.with_values([("motor.resistance", 1.0)]),  # type: ignore[arg-type]
+    "number": lambda: DESIGN.with_values({3: 1.0}),  # type: ignore[dict-item]
+    "key": lambda: parameter_value(DESIGN, 3),  # type: ignore[arg-type]
+    "no design": lambda: parameter_value("ilr33-amber", "motor.resistance"),  # type: ignore[arg-type]
+    "sweep key": lambda: sweep("ilr33-amber", 3, [1.0]),  # type: ignore[arg-type]
+    "sweep": lambda: sweep("ilr33-amber", "limits.voltage", 5),  # type: ignore[arg-type]
+    "load torque": lambda: assemble_loops(DESIGN, load_Nm="4 N*m"),  # type: ignore[arg-type]
+    "form": lambda: assemble_loops(DESIGN, form=["sampled"]),  # type: ignore[arg-type]
+    "filter": lambda: DESIGN.add_filter("velocity", kind="lowpass", frequency=[1.0]),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_argument_is_an_input_error_that_says_what_is_allowed(name: str) -> None:
+    with pytest.raises(InputError, match=r"allowed: |must be a finite number|one of ") as caught:
+        BAD[name]()
+    assert "\n" not in str(caught.value)
 
 
 def test_a_sweep_changes_one_key_and_says_so() -> None:

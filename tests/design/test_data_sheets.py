@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from math import pi, sqrt
 
 import pytest
 
-from actuator_lti.design import read_design_text, warnings_of, with_overrides
+from actuator_lti.design import parameter_value, read_design_text, warnings_of, with_overrides
+from actuator_lti.design.explained import explained
 from actuator_lti.drive.facts import capability
 from actuator_lti.errors import InputError
 from analyses.loop_survey import survey_loops
+from reports.cli.main import main
 from reports.sections import forms
 
 FLAT = """
@@ -120,6 +123,82 @@ def test_an_undamped_spring_is_said_and_has_its_forms() -> None:
         one.startswith("coupling.damping")
         for one in warnings_of(with_overrides(design, {"coupling.damping": "5 N*m*s/rad"}))
     )
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "value"),
+    [
+        ("limits.peak_current", "12 A rms", 12 * sqrt(1.5)),
+        ("limits.peak_current", "12 Arms", 12 * sqrt(1.5)),
+        ("limits.peak_current", "12 A peak", 12 * sqrt(3) / 2),
+        ("limits.peak_current", "12 Apk", 12 * sqrt(3) / 2),
+        ("limits.peak_current", "12 A dc", 12.0),
+        ("control.velocity.gain", "0.04 A rms*s/rad", 0.04 * sqrt(1.5)),
+        ("control.current.gain", "25 V/Arms", 25 / sqrt(1.5)),
+        ("motor.torque_constant", "0.93 Nm/Arms", 0.93),
+        ("motor.back_emf_constant", "59.9 Vrms/1000rpm", 59.9 * 60 / (2000 * pi)),
+        ("control.period", "16 kHz", 62.5e-6),
+    ],
+)
+def test_amperes_rms_and_peak_are_those_of_the_model(path: str, text: str, value: float) -> None:
+    """i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak (model.md section 1); the motor as its sheet says."""
+    design = with_overrides(read_design_text(SERVO, "servo"), {path: text})
+    assert parameter_value(design, path) == pytest.approx(value, rel=1e-14)
+    assert not any(line.startswith(path) for line in warnings_of(design))
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "bad"),
+    [
+        (SERVO, "motor.torque_constant", "0.93 Nm/Apk"),
+        (SERVO, "limits.voltage", "230 Vrms"),
+        (FLAT, "limits.peak_current", "5 A rms"),
+    ],
+)
+def test_a_convention_that_the_motor_has_not_is_refused(text: str, path: str, bad: str) -> None:
+    with pytest.raises(InputError, match=f"{path} = .*allowed: "):
+        with_overrides(read_design_text(text, "servo"), {path: bad})
+
+
+def test_amperes_of_an_ac_motor_that_say_nothing_are_warned_of() -> None:
+    lines = warnings_of(read_design_text(SERVO, "servo"))
+    assert any(line.startswith("control.velocity.gain: 0.04 A*s/rad of the equivalent DC") for line in lines)
+    assert any("0.03266 A rms*s/rad" in line for line in lines)
+    assert any(line.startswith("control.current.gain") and "30.62 V/A rms" in line for line in lines)
+
+
+def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    items = {item.path: item for item in explained(read_design_text(SERVO, "servo"))}
+    assert items["motor.torque_constant"].written == "0.93 N*m/A"
+    assert items["motor.torque_constant"].model == f"kM = {0.93 / sqrt(1.5):.9g} N*m/A"
+    assert items["motor.rotor_inertia"].read == "5.9e-05 kg*m^2"
+    assert main(["keys", "torque_constant", "--explain", "ilr33-amber", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["keys"] == [
+        {"path": "motor.torque_constant", "written": "5.9 mN*m/A", "read": "0.0059 N*m/A",
+         "model": "kM = 0.0059 N*m/A"}
+    ]  # fmt: skip
+    assert main(["keys", "--explain", "ilr33-amber"]) == 0
+    assert "in the model as" in capsys.readouterr().out
+
+
+def test_a_filter_is_added_behind_those_that_there_are() -> None:
+    base = with_overrides(read_design_text(FLAT, "flat"), {})
+    one = base.add_filter("velocity", kind="notch", frequency="120 Hz", width="60 Hz", depth=0.1)
+    two = one.add_filter("velocity", kind="lowpass", frequency=500.0, on="speed")
+    assert two.controller.velocity is not None
+    assert [item.kind for item in two.controller.velocity.filters] == ["notch", "lowpass"]
+    assert two.controller.velocity.filters[0].width_rad_s == pytest.approx(120 * pi, rel=1e-15)
+    assert two.controller.velocity.filters[1].frequency_rad_s == 500.0
+    for bad, words in (
+        ({"stage": "current"}, 'stage = "current": has no filters; allowed: "velocity"'),
+        ({"stage": "velocity", "kind": "notch", "frequency": "1 V"}, "filter.1.frequency"),
+        ({"stage": "velocity", "kind": "comb"}, '"lowpass" or "notch"'),
+        ({"stage": "velocity", "kind": "lowpass", "corner": "1 Hz"}, "corner.*unknown key"),
+    ):
+        with pytest.raises(InputError, match=words):
+            base.add_filter(**bad)
 
 
 def test_gear_sheets_state_arc_minutes_and_torque_per_arc_minute() -> None:

@@ -39,9 +39,9 @@ def one_line(call: Any) -> None:
     try:
         call()
     except InputError as error:
-        line = str(error)
-        assert line.isprintable()
-        assert len(line) < 2000
+        for line in str(error).split("\n"):
+            assert line.isprintable()
+            assert len(line) < 2000
 
 
 @MANY

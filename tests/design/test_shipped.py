@@ -4,8 +4,7 @@ from math import pi, sqrt
 
 import pytest
 
-from actuator_lti.design import load_design, parameter_value, shipped_designs, warnings_of
-from actuator_lti.errors import InputError
+from actuator_lti.design import load_design, parameter_value, shipped_designs
 
 # Facts about the drive: value in SI, grade.
 AMBER = {
@@ -127,12 +126,9 @@ def test_emps_holds_the_published_figures() -> None:
     assert design.encoder.difference_samples == 2
 
 
-def test_every_shipped_design_is_named_like_its_file_and_the_baseline_comes_first() -> None:
+def test_the_shipped_designs_are_these_each_named_like_its_file() -> None:
     assert shipped_designs()[0] == "ilr33-amber"
     assert [load_design(name).name for name in shipped_designs()] == list(shipped_designs())
-
-
-def test_the_shipped_designs_are_these() -> None:
     assert set(shipped_designs()) == {
         "ilr33-amber", "ilr33-amber-compliant", "ilr33-amber-multirate", "ilr33-amber-tanh",
         "ballscrew", "ctms-motor-position", "emps", "fin", "joint",
@@ -184,12 +180,3 @@ def test_the_sources_of_the_real_drives_state_their_own_sums() -> None:
     # N m/A rms and V rms line-line of one motor differ by sqrt(3): one constant in the model
     same = screw.effective_motor
     assert same.torque_constant_Nm_A == pytest.approx(same.back_emf_constant_Vs_rad, rel=1e-3)
-
-
-def test_the_baseline_gives_no_cause_for_suspicion() -> None:
-    assert warnings_of(load_design("ilr33-amber")) == ()
-
-
-def test_an_unknown_name_is_answered_with_the_nearest() -> None:
-    with pytest.raises(InputError, match='nearest known: "ilr33-amber"'):
-        load_design("ilr33-ambre")

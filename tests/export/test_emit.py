@@ -3,22 +3,26 @@
 import ctypes
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from emit_samples import (
+    FIRST,
     everything,
     open_order,
     power,
     sliced,
+    through,
     truth,
     twice,
     two_types,
 )  # fmt: skip
 
-from nonlinear.emit import EmitError, emit_c
+from actuator_lti.compiled import EmitError, emit_c
+from actuator_lti.compiled.form import Form
 
 COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 STRICT = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
@@ -29,9 +33,9 @@ static inline int t_min_int(int a, int b) { return b < a ? b : a; }
 """
 
 
-def library(folder: Path, entries: dict[Any, list[str]]) -> ctypes.CDLL:
+def library(folder: Path, entries: dict[Any, list[str]], forms: Sequence[Form] = ()) -> ctypes.CDLL:
     """The entries compiled with every warning an error."""
-    program = emit_c(entries, prefix="t_")  # type: ignore[arg-type]
+    program = emit_c(entries, "t_", forms)  # type: ignore[arg-type]
     heads = "#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n"
     declared = "\n".join(program.declarations.values())
     text = "\n".join([heads, program.constants_text(), HELPERS, program.types, declared, program.functions])
@@ -55,6 +59,24 @@ def test_every_construct_gives_the_same_bits(tmp_path: Path) -> None:
         a, b = everything(p, ours, n), lib.t_everything(p, theirs, n)
         assert np.float64(a).tobytes() == np.float64(b).tobytes(), round_
         assert ours.tobytes() == theirs.tobytes()
+
+
+@pytest.mark.skipif(COMPILER is None, reason="no C compiler on this machine")
+def test_a_form_leaves_out_what_known_numbers_rule_out_and_gives_the_same_bits(tmp_path: Path) -> None:
+    form = Form("gated", "bare", "p", {FIRST: 0.0})
+    lib = library(tmp_path, {through: ["row", "float"]}, [form])
+    text = emit_c({through: ["row", "float"]}, "t_", [form]).functions
+    bare = text[text.index("t_bare_gated(const double *p, double x)\n{") :]
+    assert "sin(" not in bare
+    assert "t_dear(" in bare
+    assert "if (p[0] == 0.0)" in text
+    row = np.ctypeslib.ndpointer(np.float64)
+    lib.t_through.argtypes, lib.t_through.restype = [row, ctypes.c_double], ctypes.c_double
+    rng = np.random.default_rng(8)
+    for first in (0.0, -1.0, 0.5):
+        for x in rng.normal(size=50):
+            p = np.array([first, rng.normal(), 3.0])
+            assert lib.t_through(p, x) == through(p, x)
 
 
 @pytest.mark.parametrize(

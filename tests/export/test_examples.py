@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from actuator_lti import load_design
+from actuator_lti.compiled.compiler import system_compiler
 from nonlinear.export import fmu_bytes
-from nonlinear.export.build import system_compiler
 
 pytestmark = pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
 

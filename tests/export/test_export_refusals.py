@@ -9,11 +9,10 @@ from pathlib import Path
 
 import pytest
 
-import nonlinear.export.build as build
+import actuator_lti.compiled.compiler as build
 from actuator_lti import load_design
-from nonlinear import native
+from actuator_lti.compiled.compiler import system_compiler
 from nonlinear.export import c_export
-from nonlinear.export.build import system_compiler
 from reports.cli.main import main
 
 NOISY = '[instruments]\ncurrent_noise = "0.1 A"\n'
@@ -114,14 +113,6 @@ def test_unknown_versions_and_platforms(
     out = tmp_path / "drive.fmu"
     assert said in refused(["export", "fmu", "emps", "--out", str(out), *more], capsys)
     assert not out.exists()
-
-
-def test_the_library_without_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(build, "system_compiler", lambda: None)
-    monkeypatch.setattr(native, "_FOLDER", tmp_path)
-    with pytest.raises(Exception, match="no C compiler; allowed: gcc or clang, or leave it to numba"):
-        native.build()
-    assert not list(tmp_path.iterdir())
 
 
 def test_no_name_ends_a_comment_or_turns_the_code_round() -> None:

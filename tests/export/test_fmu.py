@@ -18,12 +18,12 @@ from random_drives import random_drive
 from typer.testing import CliRunner
 
 from actuator_lti import load_design
+from actuator_lti.compiled.compiler import compile_files, system_compiler, zig_command
 from actuator_lti.design.access import parameter_value, paths_of, with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear import commands, loads, simulate
 from nonlinear.export import fmu_bytes
-from nonlinear.export.build import compile_files, system_compiler, zig_command
 from nonlinear.export.trace import trace_keys
 from nonlinear.export.variables import structured
 from nonlinear.parameters import design_row
@@ -216,10 +216,9 @@ def test_tuning_between_steps_changes_what_follows(
 ) -> None:
     """Keys changed during the run: as if the simulator had been stopped and gone on with the other row."""
     from nonlinear._kernels import layout as at
-    from nonlinear._kernels.call import parameters
-    from nonlinear._kernels.tick import tick
+    from nonlinear._kernels.start import derive, prepare_sizes, retune
     from nonlinear.export.c_files import exported, spare_parameters
-    from nonlinear.export.entries import derive, prepare_sizes, retune
+    from nonlinear.native import parameters, tick
 
     design = load_design(name)
     values = {path: parameter_value(design, path) * factor for path, factor in change.items()}
@@ -309,7 +308,7 @@ def test_command_writes_the_report_and_the_licence_into_it(tmp_path: Path) -> No
 
 
 def test_no_compiler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    import nonlinear.export.build as ours
+    import actuator_lti.compiled.compiler as ours
 
     monkeypatch.setattr(ours, "system_compiler", lambda: None)
     monkeypatch.setattr(ours, "zig_command", lambda: None)

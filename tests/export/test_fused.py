@@ -9,10 +9,9 @@ import pytest
 from random_drives import random_drive
 
 from actuator_lti import load_design
+from actuator_lti.compiled.compiler import compile_files, system_compiler
 from actuator_lti.design.model import Design
-from nonlinear.export.build import compile_files, system_compiler
-from nonlinear.export.run_library import run_sources
-from nonlinear.native import borrowed
+from nonlinear.native import LIBRARY
 from nonlinear.rows import Rows
 
 SHIPPED = (
@@ -30,9 +29,10 @@ pytestmark = pytest.mark.skipif(
 def libraries(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """The simulator compiled plainly, and with products and sums in one rounding."""
     folder, command = tmp_path_factory.mktemp("fma"), [str(system_compiler())]
+    texts = {"run.c": LIBRARY.text()}
     for name, more in (("plain.so", ()), ("fused.so", ("-mfma", "-ffp-contract=fast"))):
         flags = ("-O3", "-shared", "-fPIC", *more)
-        (folder / name).write_bytes(compile_files(run_sources(), "run.so", "x", flags, command=command))
+        (folder / name).write_bytes(compile_files(texts, "run.so", "x", flags, command=command))
     return folder / "plain.so", folder / "fused.so"
 
 
@@ -44,7 +44,7 @@ def apart(design: Design, libraries: tuple[Path, Path], ticks: int = 3000) -> fl
         rows["ticks"], rows["load"] = ticks, 0.1
         turns = np.sin(2.0 * np.pi * 3.0 * np.arange(ticks) / ticks)
         rows.series("command", 0.3 * design.validation.full_deflection_rad * turns)
-        with borrowed(path):
+        with LIBRARY.borrowed(path):
             run = rows.trajectory()
         found.append(
             np.column_stack([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])

@@ -1,10 +1,9 @@
-"""The library built at installation gives numba's bits and has one switch."""
+"""The compiled kernels are the written ones, bit for bit; and which library is loaded, and when."""
 
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,51 +11,36 @@ import numpy as np
 import pytest
 from random_drives import random_drive, random_elastic_drive
 
-import nonlinear.native as native
+from actuator_lti import load_design
+from actuator_lti.batch import Population, linear_figures
+from actuator_lti.batch.library import LIBRARY as FIGURES
+from actuator_lti.compiled import compiler
+from actuator_lti.compiled.library import Library
 from actuator_lti.errors import InputError
-from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, simulate, simulate_many
-from nonlinear.export.build import system_compiler
+from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native, simulate, simulate_many
+from nonlinear._kernels.forms import forms
+from nonlinear.parameters import design_row
 
-needs_compiler = pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _own_folder(tmp_path_factory: pytest.TempPathFactory):  # type: ignore[no-untyped-def]
-    """A library of these kernels in a folder of the test's own."""
-    patch = pytest.MonkeyPatch()
-    patch.setattr(native, "_FOLDER", tmp_path_factory.mktemp("native"))
-    native.library_path.cache_clear()
-    native._opened.cache_clear()
-    if system_compiler() is not None:
-        native.build()
-    yield
-    patch.undo()
-    native.library_path.cache_clear()
-    native._opened.cache_clear()
+quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
 
 
-def both(monkeypatch: pytest.MonkeyPatch, work):  # type: ignore[no-untyped-def]
-    result = []
-    for choice in ("c", "numba"):
-        monkeypatch.setenv(native.SWITCH, choice)
-        result.append(work())
-    return result
-
-
-@needs_compiler
-@pytest.mark.parametrize("seed", range(12))
-def test_runs_have_the_same_bits(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@quiet
+@pytest.mark.parametrize("seed", range(10))
+def test_runs_have_the_bits_of_the_kernels_as_written(seed: int) -> None:
     rng = np.random.default_rng(300 + seed)
     design = random_elastic_drive(rng) if seed % 2 else random_drive(rng)
     probe = Probe(point="i_ref", injection=commands.sine(0.1, 40.0))
 
     def work() -> Trajectory:
         return simulate(
-            design, commands.chirp(0.05, 1.0, 40.0, 0.05), 0.05, loads.constant(2.0), energy=seed % 4 > 1,
-            probes=[probe] if seed % 3 == 0 else [], record_every=1 + seed % 2, raise_on_failure=False,
+            design, commands.chirp(0.05, 1.0, 40.0, 0.05), 150 * design.controller.period_s,
+            loads.constant(2.0), energy=seed % 4 > 1, probes=[probe] if seed % 3 == 0 else [],
+            record_every=1 + seed % 2, raise_on_failure=False,
         )  # fmt: skip
 
-    ours, theirs = both(monkeypatch, work)
+    ours = work()
+    with native.LIBRARY.written():
+        theirs = work()
     assert ours.parameters_hash == theirs.parameters_hash
     for name, values in ours.columns().items():
         assert values.tobytes() == theirs.columns()[name].tobytes(), name
@@ -65,51 +49,117 @@ def test_runs_have_the_same_bits(seed: int, monkeypatch: pytest.MonkeyPatch) -> 
     assert ours.limits == theirs.limits
 
 
-@needs_compiler
-def test_batches_have_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+@quiet
+@pytest.mark.parametrize("law", ["coulomb", "tanh"])
+@pytest.mark.parametrize("delay_ticks", [0.0, 0.3, 1.0, 1.7])
+def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(law: str, delay_ticks: float) -> None:
+    """Through stick, slip and limits; one form has just the numbers of this drive."""
+    design = load_design("ilr33-amber")
+    control = replace(design.controller, computing_delay_s=delay_ticks * design.controller.period_s)
+    friction = replace(design.friction, law=law)
+    design = replace(design, controller=control, friction=friction)
+    p, _ = native.parameters(design_row(design))
+    assert sum(all(p[place] == value for place, value in form.known.items()) for form in forms()) == 1
+
+    def work() -> Trajectory:
+        return simulate(design, commands.triangle(2e-3, 40.0), 600 * control.period_s, loads.constant(3.0))
+
+    ours = work()
+    with native.LIBRARY.written():
+        theirs = work()
+    assert law == "tanh" or ours.events > 3
+    assert ours.limit_flags.any()
+    for name, values in ours.columns().items():
+        assert values.tobytes() == theirs.columns()[name].tobytes(), name
+
+
+@quiet
+def test_batches_have_the_bits_of_the_kernels_as_written() -> None:
     rng = np.random.default_rng(5)
     runs = [
-        Run(design=replace(random_drive(rng)), command=commands.sine(0.02, 20.0), duration_s=0.2,
-            reducers=Reducers(window_ticks=500, harmonics=3, extremes=True, step_target_rad=0.02))
-        for _ in range(6)
+        Run(design=replace(random_drive(rng)), command=commands.sine(0.02, 20.0), duration_s=0.02,
+            reducers=Reducers(window_ticks=50, harmonics=3, extremes=True, step_target_rad=0.02))
+        for _ in range(3)
     ]  # fmt: skip
-    ours, theirs = both(monkeypatch, lambda: simulate_many(runs))
+    ours = simulate_many(runs)
+    with native.LIBRARY.written():
+        theirs = simulate_many(runs, threads=1)
     assert ours.outs.tobytes() == theirs.outs.tobytes()
     assert ours.status.tolist() == theirs.status.tolist()
 
 
-def test_one_switch(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(native.SWITCH, "fortran")
-    with pytest.raises(InputError, match="allowed: auto, c, numba"):
-        native.kernel_name()
-    monkeypatch.setenv(native.SWITCH, "numba")
-    assert native.kernel_name() == "numba"
-    if system_compiler() is not None:
-        monkeypatch.setenv(native.SWITCH, "auto")
-        assert native.kernel_name() == "C library"
+def test_figures_are_those_of_the_kernels_as_written() -> None:
+    """To rounding: Python's hypot is not the C library's."""
+    design = load_design("ctms-motor-position")
+    gain = design.parameters["control.position.gain"].value
+    population = Population(design, {"control.position.gain": gain * np.array([1.0, 1.1])}, 2)
+    ours = linear_figures(population, time_figures=False)
+    with FIGURES.written():
+        theirs = linear_figures(population, time_figures=False)
+    np.testing.assert_allclose(ours.raw, theirs.raw, rtol=1e-9)
 
 
-def test_without_a_library_auto_is_numba_and_c_is_an_error(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+def test_a_run_leaves_the_interpreter_to_other_threads() -> None:
+    """Somebody counts while a run is under way: the call has released the GIL."""
+    design, counted, done = load_design("ilr33-amber"), 0, threading.Event()
+
+    def run() -> None:
+        simulate(design, commands.sine(0.05, 1.0), 20.0, record_every=1000)
+        done.set()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    while not done.is_set():
+        counted += 1
+    thread.join()
+    assert counted > 10_000
+
+
+@pytest.fixture
+def library(tmp_path: Path) -> Library:
+    """The library of many designs' figures in a package of its own."""
+    return Library("figures", tmp_path, FIGURES.entries, FIGURES.sources)
+
+
+def test_a_library_is_named_by_its_sources(library: Library, tmp_path: Path) -> None:
+    changed = tmp_path / "_more.py"
+    changed.write_text("# more\n")
+    other = Library("figures", tmp_path, FIGURES.entries, (*FIGURES.sources, changed))
+    assert library.path().parent == tmp_path / "_native"
+    assert library.path() != other.path()
+    assert other.path("win32-AMD64").suffix == ".dll"
+
+
+@pytest.mark.skipif(compiler.system_compiler() is None, reason="no C compiler on this machine")
+def test_a_checkout_compiles_at_its_first_call_and_drops_what_is_old(library: Library) -> None:
+    old = library.path().with_name(f"figures-0123456789abcdef-{compiler.HERE}.so")
+    old.parent.mkdir()
+    old.write_bytes(b"")
+    assert library.functions.many_loops is not None
+    assert [path.name for path in old.parent.iterdir()] == [library.path().name]
+
+
+def test_without_a_compiler_an_error_says_which(library: Library, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiler, "system_compiler", lambda: None)
+    monkeypatch.setattr(compiler, "zig_command", lambda: None)
+    with pytest.raises(InputError, match="allowed: gcc, clang, or pip install ziglang"):
+        _ = library.functions
+    assert not library.path().parent.exists()
+
+
+def test_a_package_that_cannot_be_written_is_left_alone(
+    library: Library, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(native, "library_path", lambda: tmp_path / "none.so")
-    native._opened.cache_clear()
-    monkeypatch.setenv(native.SWITCH, "auto")
-    assert native.kernel_name() == "numba"
-    monkeypatch.setenv(native.SWITCH, "c")
-    with pytest.raises(InputError, match="no library of these kernels"):
-        native.kernel_name()
-    native._opened.cache_clear()
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(
+        InputError, match=r"no compiled kernels of these sources; allowed: python -m nonlinear"
+    ):
+        _ = library.functions
+    assert not library.path().parent.exists()
 
 
-@needs_compiler
-def test_numba_is_not_even_imported_where_the_library_is() -> None:
-    code = (
-        "import sys, pathlib, nonlinear.native as n; n._FOLDER = pathlib.Path(sys.argv[1])\n"
-        "from actuator_lti import load_design\nfrom nonlinear import commands, simulate\n"
-        "run = simulate(load_design('ilr33-amber'), commands.step(0.01), 0.1)\n"
-        "assert abs(run.output_angle_rad[-1] - 0.01) < 1e-3\nassert 'numba' not in sys.modules\n"
-    )
-    call = [sys.executable, "-c", code, str(native._FOLDER)]
-    done = subprocess.run(call, capture_output=True, text=True, env={**os.environ, native.SWITCH: "c"})
-    assert done.returncode == 0, done.stderr
+def test_a_library_of_another_machine_is_an_error_of_one_line(library: Library) -> None:
+    library.path().parent.mkdir()
+    library.path().write_bytes(b"\x7fELF of another machine")
+    with pytest.raises(InputError, match="does not load"):
+        _ = library.functions

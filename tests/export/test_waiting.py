@@ -6,13 +6,9 @@ import io
 import sys
 import threading
 
-import numpy as np
 import pytest
 
-import nonlinear._kernels.call as numba_call
-import nonlinear.native as native
 import nonlinear.waiting as waiting
-from nonlinear._kernels import layout
 
 
 class Terminal(io.StringIO):
@@ -59,20 +55,4 @@ def test_nothing_is_said_to_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stderr", log)
     with waiting.told_if_slow("the kettle boils", 0.0):
         pass
-
     assert log.getvalue() == ""
-
-
-def test_compiling_by_numba_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    terminal = terminal_of(monkeypatch)
-
-    def slow(*_: object) -> int:
-        assert terminal.written.wait(10.0)
-        return 0
-
-    monkeypatch.setenv(native.SWITCH, "numba")
-    monkeypatch.setattr(numba_call, "resume", slow)
-    nothing = np.zeros(0)
-    native.resume(np.zeros(layout.SIZE), *[nothing] * 3, np.zeros(0, np.uint16), *[nothing] * 2)
-    assert "numba compiles the simulator" in terminal.getvalue()
-    assert terminal.getvalue().count("\n") == 1

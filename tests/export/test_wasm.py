@@ -15,13 +15,12 @@ import pytest
 from random_drives import random_drive, random_inputs
 
 from actuator_lti import load_design
+from actuator_lti.compiled.compiler import zig_command
 from actuator_lti.design.model import Design, Instruments
 from nonlinear._kernels import layout as at
-from nonlinear._kernels.call import parameters
-from nonlinear._kernels.tick import tick
-from nonlinear.export.build import zig_command
 from nonlinear.export.c_files import exported
 from nonlinear.export.wasm_module import MOST_BYTES, build_wasm, kept_wasm, record, sources_hash
+from nonlinear.native import parameters, tick
 
 MODULE = Path(__file__).parents[2] / "nonlinear/export/wasm/drive.wasm"
 

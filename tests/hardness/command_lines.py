@@ -18,7 +18,7 @@ QUICK: dict[str, tuple[str, ...]] = {
     "corners": (DESIGN,), "duty": (DESIGN,), "keys": (), "designs": (), "pdf": ("FILE",),
     "init": ("OUT/new.toml",), "objects export": (DESIGN,), "identify": ("FILE",), "correlate": ("FILE",),
 }  # fmt: skip
-LEFT_OUT = {"--help", "--workers", "--scheduler", "--virtual-bench"}
+LEFT_OUT = {"--help", "--workers", "--scheduler"}
 VALUES = (
     "", "nan", "inf", "-inf", "-1", "0", "1", "1e-320", "1e308", "1e400", "9" * 5000, "-" + "9" * 30,
     "a\x1b[31mb\r\n", "\u202e", "\udc80", "x" * 300, "-", "--", "%s%n", "every", "=", "0x10", "1_000",

@@ -59,10 +59,10 @@ def attack(target: Target, seed: int, number: int) -> Find | None:
             warnings.simplefilter("ignore")
             target.attack(path)
     except InputError as error:
-        line = str(error)
-        if line.isprintable() and len(line) < 2000:
+        told = str(error)
+        if all(line.isprintable() and len(line) < 2000 for line in told.split("\n")):
             return None
-        return Find(target.name, number, "no printable line", repr(line[:300]), data)
+        return Find(target.name, number, "no printable line", repr(told[:300]), data)
     except NumericalError:
         return None
     except TooSlow:

@@ -1,4 +1,4 @@
-"""Kills nightlies at their file-system calls and SQL statements, one after the other; looks at what is left.
+"""Kills nightlies at their file-system calls, one after the other; looks at what is left.
 
 ``python kill_at_calls.py SITE KILLS SEED``: each round starts a nightly of a study that has changed and kills
 it with SIGKILL at one of its calls, then checks site and history. Prints one line of JSON.
@@ -10,7 +10,6 @@ import json
 import os
 import random
 import signal
-import sqlite3
 import sys
 import traceback
 from collections.abc import Callable
@@ -26,25 +25,19 @@ CALLS = ("open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.utime", "
 
 
 def count_calls(tick: Callable[[str], None]) -> None:
-    """Call ``tick`` before every call that changes or opens a file, every fsync, and every SQL statement."""
+    """Call ``tick`` before every call that changes or opens a file, and every fsync."""
 
     def audit(event: str, _arguments: tuple[object, ...]) -> None:
         if event in CALLS:
             tick(event)
 
-    class Watched(sqlite3.Connection):
-        def execute(self, *arguments):  # type: ignore[no-untyped-def]
-            tick("sql")
-            return super().execute(*arguments)
-
-    whole_fsync, whole_connect = os.fsync, sqlite3.connect
+    whole_fsync = os.fsync
 
     def fsync(handle: int) -> None:
         tick("fsync")
         whole_fsync(handle)
 
     os.fsync = fsync
-    sqlite3.connect = lambda *a, **k: whole_connect(*a, **{"factory": Watched, **k})  # type: ignore[assignment]
     sys.addaudithook(audit)
 
 
@@ -90,7 +83,7 @@ def main(site: Path, kills: int, seed: int) -> dict[str, object]:
         killed += os.WIFSIGNALED(status)
         assert os.WIFSIGNALED(status) or os.WEXITSTATUS(status) == 0, status
         check_whole(site)
-        check_history(site.with_name(site.name + ".state") / "history.sqlite")
+        check_history(site.with_name(site.name + ".state"))
     status, _ = child(site, kills + 2, 0)
     assert status == 0, status
     check_whole(site)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import signal
 import socket
 import ssl
+import subprocess
+import sys
+import time
 import warnings
 from pathlib import Path
 
@@ -14,9 +18,12 @@ import pytest
 from nightly_fakes import BUILD, CODE, job, study
 
 from actuator_lti.errors import InputError, NumericalError
-from analyses import engine
+from analyses import cluster as clusters
+from analyses import engine, proof
 from analyses.engine import Engine
-from reports.nightly.cache import Cache, CorruptEntry
+from reports.cli.main import main
+from reports.cli.options import engine_of
+from reports.nightly.cache import Cache
 from reports.nightly.night import Settings, run_night
 
 
@@ -70,7 +77,7 @@ def test_the_local_cluster_opens_no_door() -> None:
     import distributed
 
     before = set(listening())
-    with engine._local_cluster(1) as cluster:
+    with clusters.local_cluster(1) as cluster:
         doors = set(listening()) - before
         assert doors
         assert {ip for ip, _ in doors} == {"127.0.0.1"}
@@ -91,7 +98,7 @@ def test_two_local_clusters_do_not_ask_for_the_same_port() -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             before = set(listening())
-            with engine._local_cluster(1), engine._local_cluster(1):
+            with clusters.local_cluster(1), clusters.local_cluster(1):
                 doors = set(listening()) - before
                 assert {ip for ip, _ in doors} == {"127.0.0.1"}
                 assert [page for _, port in doors for page in pages(port)] == []
@@ -111,19 +118,149 @@ def test_items_come_back_whole_and_an_error_goes_its_way() -> None:
 
 
 def test_the_version_covers_the_package_of_the_task(monkeypatch, tmp_path) -> None:
-    assert engine._packages(doubled)[-1] == doubled.__module__.partition(".")[0]
-    assert engine._packages(engine._evaluate) == ("actuator_lti", "nonlinear", "analyses")
+    assert proof.packages_of(doubled)[-1] == doubled.__module__.partition(".")[0]
+    assert proof.packages_of(engine._evaluate) == proof.CODE
     from reports.nightly.compute import build
 
-    assert "reports" in engine._packages(build)
+    assert "reports" in proof.packages_of(build)
     package = tmp_path / "some_tasks"
     package.mkdir()
     (package / "__init__.py").write_text("")
     monkeypatch.syspath_prepend(str(tmp_path))
-    before = engine.code_version(("some_tasks",))
+    before = proof.code_version(("some_tasks",))
     (package / "work.py").write_text("x = 1")
-    assert engine.code_version(("some_tasks",)) != before
-    assert engine.code_version(("is_not_there",)) != before
+    assert proof.code_version(("some_tasks",)) != before
+    assert proof.code_version(("is_not_there",)) != before
+
+
+def started(processes: list, *command: str, **environment: str) -> None:
+    """A process of Dask without a nanny, which would set threads by itself."""
+    wanted = {**os.environ, **environment}
+    processes.append(
+        subprocess.Popen(
+            [sys.executable, "-m", "distributed.cli." + command[0], *command[1:]],
+            env={name: value for name, value in wanted.items() if value}, stderr=subprocess.DEVNULL,
+        )
+    )  # fmt: skip
+
+
+@pytest.fixture
+def bare(tmp_path, monkeypatch):
+    """A scheduler alone, which can be killed; its address, and a function that starts a worker."""
+    tests = Path(__file__).parents[1]
+    paths = os.pathsep.join(map(str, (tests / "hardness", tests / "nightly", tests.parent)))
+    monkeypatch.setenv("PYTHONPATH", paths)
+    processes: list = []
+    file = tmp_path / "scheduler.json"
+    common = ("--no-dashboard", "--host", "127.0.0.1")
+    started(processes, "dask_scheduler", *common, "--port", "0", "--scheduler-file", str(file))
+    end = time.monotonic() + 60.0
+    while not file.exists():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    worker = ("dask_worker", *common, "--no-nanny", "--nthreads", "1", "--scheduler-file", str(file))
+    address = json.loads(file.read_text())["address"]
+    yield address, processes, lambda **environment: started(processes, *worker, **environment)
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.parametrize(
+    ("environment", "words"),
+    [
+        ({"OPENBLAS_CORETYPE": "Prescott"}, "OPENBLAS_CORETYPE is Prescott, here"),
+        ({"OPENBLAS_NUM_THREADS": "3"}, "start it with .*OPENBLAS_NUM_THREADS=1"),
+    ],
+)
+def test_a_worker_that_adds_up_otherwise_gets_no_work(bare, environment, words, tmp_path, capsys) -> None:
+    address, _, worker = bare
+    worker(**environment)
+    got: list[int] = []
+    with pytest.raises(InputError, match=rf"worker tcp://\S+ is refused: .*{words}") as caught:
+        Engine(scheduler=address).map(doubled, range(3), lambda item, _: got.append(item))
+    assert "\n" not in str(caught.value)
+    assert got == []
+    command = ["montecarlo", "ilr33-amber", "--out", str(tmp_path / "out"), "--quiet", "--scheduler", address]
+    assert main(command) == 2
+    assert "is refused" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_worker_that_joins_late_proves_itself_first(bare) -> None:
+    address, _, worker = bare
+    worker()
+    got: list[int] = []
+
+    def take(item: int, _: int) -> None:
+        got.append(item)
+        if len(got) == 1:
+            worker(OPENBLAS_CORETYPE="Prescott")
+
+    with pytest.raises(InputError, match=r"process \d+ on \S+ is refused: OPENBLAS_CORETYPE is Prescott"):
+        Engine(scheduler=address).map(slowly, range(1000), take)
+    assert 0 < len(got) < 1000
+
+
+def slowly(number: int) -> int:
+    time.sleep(0.1)
+    return number
+
+
+@pytest.mark.parametrize("name", ["code", "numpy", "a sample of linear algebra", "sample 0 of the study"])
+def test_every_part_of_a_proof_counts(name: str) -> None:
+    class Study:
+        def sample(self) -> bytes:
+            return b"1.5"
+
+    here = proof.prove(proof.CODE, Study())
+    proof.hold_against(here, dict(here), "w")
+    for there in ({**here, name: "other"}, {key: value for key, value in here.items() if key != name}):
+        with pytest.raises(InputError, match=f"worker w is refused: {name} is .*, here {here[name]}"):
+            proof.hold_against(here, there, "w")
+    with pytest.raises(InputError, match="does not say what it computes with"):
+        proof.hold_against(here, AttributeError("prove"), "w")
+
+
+def test_a_scheduler_that_dies_is_one_line_and_what_is_done_is_kept(bare, tmp_path, capsys) -> None:
+    """The command ends with status 3; again, without a cluster, it computes only the rest."""
+    address, processes, worker = bare
+    worker()
+    out = tmp_path / "out"
+    words = ["montecarlo", "ilr33-amber", "--samples", "40000", "--no-worst", "--out", str(out), "--quiet"]
+    command = [str(Path(sys.executable).with_name("actuator-lti")), *words, "--scheduler", address]
+    study = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    end = time.monotonic() + 120.0
+    while len(list(out.rglob("*.parquet"))) < 2:
+        assert study.poll() is None
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    processes[0].kill()
+    _, said = study.communicate(timeout=120)
+    assert study.returncode == 3, said
+    assert said.count("\n") == 1
+    assert "the same command goes on" in said
+    kept = {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+    main(words)
+    capsys.readouterr()
+    after = {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+    assert len(after) == 10 > len(kept) >= 2
+    assert kept.items() <= after.items()
+
+
+@pytest.mark.parametrize(
+    ("address", "told"),
+    [
+        ("tcp://10.0.0.7:8786", True), ("tcp://cluster:8786", True), ("cluster:8786", True),
+        ("tcp://127.0.0.1:8786", False), ("tcp://localhost:8786", False), ("tcp://[::1]:8786", False),
+    ],
+)  # fmt: skip
+def test_an_address_that_anybody_can_reach_is_warned_about(address: str, told: bool, capsys) -> None:
+    assert bool(Engine(scheduler=address).caution) is told
+    engine_of(None, address, None)
+    said = capsys.readouterr().err
+    assert ("tls://" in said) is told
+    assert said.count("\n") == told
 
 
 @pytest.mark.parametrize(
@@ -143,7 +280,7 @@ def test_certificates_that_are_none_are_named(tmp_path) -> None:
     for made in range(3):
         with pytest.raises(InputError, match=r"\.pem"):
             Engine(scheduler="tls://127.0.0.1:9", tls=tmp_path).map(doubled, [1], lambda *_: None)
-        (tmp_path / list(engine._TLS_FILES.values())[made]).write_text("no certificate")
+        (tmp_path / list(clusters.TLS_FILES.values())[made]).write_text("no certificate")
     with pytest.raises((InputError, NumericalError)):
         Engine(scheduler="tls://127.0.0.1:9", tls=tmp_path).map(doubled, [1], lambda *_: None)
 
@@ -163,7 +300,7 @@ def cluster(tmp_path, monkeypatch):
     made = Security.temporary()
     tls = tmp_path / "tls"
     tls.mkdir()
-    for key, name in engine._TLS_FILES.items():
+    for key, name in clusters.TLS_FILES.items():
         (tls / name).write_text(getattr(made, key))
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, host="127.0.0.1", protocol="tls://", security=made,
@@ -250,17 +387,3 @@ def test_a_lost_worker_s_designs_of_a_comparison_are_done_again(cluster, tmp_pat
     assert len(result.all) == len(list((tmp_path / "designs").rglob("*.json"))) == 6
     here = compare(plan)
     assert [one.figures for one in result.all] == [one.figures for one in here.all]
-
-
-def test_an_entry_that_comes_damaged_is_not_kept(tmp_path) -> None:
-    store, other = Cache(tmp_path / "a"), Cache(tmp_path / "b")
-    store.write("k" * 64, {"x": 1}, {"f": b"abc"})
-    data = store.path("k" * 64).read_bytes()
-    for damaged in (data[:-1], b"", data[:60] + b"\0" + data[61:]):
-        with pytest.raises(CorruptEntry):
-            other.take("k" * 64, damaged)
-    with pytest.raises(CorruptEntry, match="another key"):
-        other.take("j" * 64, data)
-    assert not list((tmp_path / "b").rglob("*.entry"))
-    other.take("k" * 64, data)
-    assert other.read("k" * 64).meta["x"] == 1

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from fuzz import attack, written
 from mutate import damaged
-from targets import Target, history_file, parquet_file, small_report, targets
+from targets import Target, parquet_file, small_report, targets
 
 from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
-from analyses.identification.differentiation import filtered_motion
-from analyses.identification.least_squares import solve
+from analyses.estimation.least_squares import solve
+from analyses.records.differentiation import filtered_motion
 
 BY_NAME = {target.name: target for target in targets()}
 
@@ -79,13 +79,6 @@ def test_a_report_that_no_page_can_be_made_of(change, words: str) -> None:
     made = json.loads(small_report())
     change(made)
     assert words in refused("report", json.dumps(made).encode())
-
-
-def test_a_history_whose_broken_schema_is_quoted_in_the_error() -> None:
-    entry, broken = b"tablesnapshotssnapshots\x0eCREATE", b"table\x81napshotssnapshots\x0eDREATE"
-    assert entry in history_file()
-    line = refused("history", history_file().replace(entry, broken))
-    assert "is no history" in line
 
 
 def test_a_parquet_file_whose_columns_have_no_readable_names() -> None:

@@ -5,18 +5,19 @@ from __future__ import annotations
 import json
 import random
 import shutil
-import sqlite3
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from nightly_fakes import CODE, INLINE, job, study
 
 from actuator_lti.errors import InputError
 from reports.cli.main import main
-from reports.nightly import sums
-from reports.nightly.history import open_history
+from reports.nightly.history import _INDEX, FILE, open_history
 from reports.nightly.memory import HistoryLost, Memory, remembered
 from reports.nightly.night import Settings, approve, run_night
+from reports.nightly.text import sha256
 
 AGAIN = Settings(workers=0, build=INLINE.build, accept_lost_history=True)
 DAMAGE_ROUNDS = 250
@@ -45,34 +46,39 @@ def forget_all(site: Path) -> None:
 
 
 def forget_history(site: Path) -> None:
-    for path in state(site).glob("history.sqlite*"):
-        path.unlink()
+    (state(site) / FILE).unlink()
 
 
 def empty_history(site: Path) -> None:
-    forget_history(site)
-    (state(site) / "history.sqlite").touch()
+    (state(site) / FILE).write_bytes(b"")
+
+
+def rewritten(site: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    """Change the index, and its checksum with it."""
+    path = state(site) / FILE
+    sealed = json.loads(path.read_text())
+    change(sealed["index"])
+    try:
+        written = _INDEX.dump_json(_INDEX.validate_python(sealed["index"]))
+    except ValueError:
+        written = b""  # of no shape that could have been sealed
+    path.write_text(json.dumps({**sealed, "sha256": sha256(written)}))
 
 
 def forget_last_night(site: Path) -> None:
-    with sqlite3.connect(state(site) / "history.sqlite") as database:
-        database.execute("DELETE FROM results WHERE run = (SELECT max(id) FROM runs)")
-        database.execute("DELETE FROM runs WHERE id = (SELECT max(id) FROM runs)")
-    database.close()
+    rewritten(site, lambda index: index["runs"].pop())
 
 
 def forget_baseline(site: Path) -> None:
-    with sqlite3.connect(state(site) / "history.sqlite") as database:
-        database.execute("DELETE FROM baselines")
-    database.close()
+    rewritten(site, lambda index: index["baselines"].clear())
 
 
 def take_that_of_another(site: Path) -> None:
     other = site.with_name("other")
     for margin in (1.0, 2.0, 3.0):
         night(other, margin)
-    forget_history(site)
-    shutil.copy(state(other) / "history.sqlite", state(site) / "history.sqlite")
+    shutil.rmtree(state(site))
+    shutil.copytree(state(other), state(site))
 
 
 @pytest.mark.parametrize(
@@ -92,7 +98,7 @@ def test_a_lost_history_closes_the_gate_until_somebody_says_so(site, lose) -> No
     assert (site / "index.html").read_bytes() == index
     assert night(site, 12.0, AGAIN).exit_status in (0, 1)
     night(site, 12.0)  # from here on it is known again
-    with open_history(state(site) / "history.sqlite") as history:
+    with open_history(state(site)) as history:
         assert remembered(site) == history.memory()
 
 
@@ -121,134 +127,98 @@ def test_the_command_exits_1_with_one_line(tmp_path, capsys, monkeypatch) -> Non
     assert "7 night(s) and 1 approval(s)" in line
 
 
-def test_any_damage_is_told_or_harmless(site, tmp_path) -> None:
+def test_the_history_of_an_earlier_version_is_refused_and_left(site) -> None:
+    (state(site) / FILE).rename(state(site) / "history.sqlite")
+    for begin in (lambda: night(site, 3.0), lambda: approve(study(job("a")), site, by="x", reason="y")):
+        with pytest.raises(HistoryLost, match=r"earlier version.*--accept-lost-history"):
+            begin()
+    night(site, 3.0, AGAIN)
+    assert (state(site) / "history.sqlite").is_file()
+
+
+def test_any_damage_is_told_or_harmless(site) -> None:
     """Bytes are overwritten, cut off and inserted; a night never ends otherwise than well or named."""
-    path = state(site) / "history.sqlite"
-    with sqlite3.connect(path) as database:
-        database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-    database.close()
-    whole, draw, lines = path.read_bytes(), random.Random(18), []
-    target = tmp_path / "h.sqlite"
-    for _ in range(DAMAGE_ROUNDS):
+    paths = [state(site) / FILE, *sorted((state(site) / "nights").iterdir())]
+    draw, told = random.Random(18), []
+    before = everything(site)
+    for turn in range(DAMAGE_ROUNDS):
+        path = paths[turn % len(paths)]
+        whole = path.read_bytes()
         data = bytearray(whole)
         for _ in range(draw.choice((1, 1, 4, 40))):
             place = draw.randrange(len(data))
             data[place : place + draw.randrange(1, 9)] = draw.randbytes(draw.randrange(1, 9))
         if draw.random() < 0.1:
             del data[draw.randrange(len(data)) :]
-        target.write_bytes(bytes(data))
-        for beside in tmp_path.glob("h.*sqlite-*"):
-            beside.unlink()
+        path.write_bytes(bytes(data))
         try:
-            with open_history(target) as history:
-                everything(history)
+            assert everything(site) == before
         except InputError as error:
-            lines.append(str(error))
-    assert all(line.isprintable() and "h.sqlite" in line for line in lines)
-    assert len(lines) > DAMAGE_ROUNDS // 10
+            told.append((str(error), path.name))
+        path.write_bytes(whole)
+    assert all(line.isprintable() and name in line for line, name in told)
+    assert len(told) > 0.9 * DAMAGE_ROUNDS
 
 
-def everything(history) -> None:
-    history.runs()
-    history.baselines()
-    history.memory()
-    result = history.results()
-    for one in result:
-        history.figures(one.snapshot)
-        if one.snapshot is not None:
-            history.inputs(one.snapshot)
-    history.matrix(result, list(history.figure_table()))
+def everything(site: Path) -> list[object]:
+    with open_history(state(site)) as history:
+        results = [result for run in history.runs for result in history.night(run.id).results]
+        figures = [(history.figures(result), history.inputs(result)) for result in results]
+        return [history.index, figures, history.matrix(results, ["GM: value"]).tolist()]
 
 
-def rewritten(site: Path, statement: str, *values: object) -> None:
-    with sqlite3.connect(state(site) / "history.sqlite") as database:
-        database.execute("PRAGMA foreign_keys = OFF")
-        database.execute(statement, values)
-    database.close()
-
-
-@pytest.mark.parametrize(
-    ("statement", "value"),
-    [
-        ("UPDATE vectors SET numbers = zeroblob(length(numbers))", None),
-        ("UPDATE vectors SET numbers = substr(numbers, 9)", None),
-        ("UPDATE layouts SET figures = ?", b"no zlib"),
-        ("UPDATE inputs SET body = ?", b"\x78\x9c"),
-        ("UPDATE runs SET libraries = ?", "{"),
-        ("UPDATE runs SET started = ?", "yesterday"),
-        ("DELETE FROM figures WHERE id = 1", None),
-        ("DELETE FROM snapshots", None),
-    ],
-)
-def test_what_sqlite_cannot_see_is_told_when_it_is_read(site, statement, value) -> None:
-    rewritten(site, statement, *([] if value is None else [value]))
-    damaged = pytest.raises(InputError, match=r"history\.sqlite: is damaged .*restore it from a copy")
-    with damaged, open_history(state(site) / "history.sqlite") as history:
-        everything(history)
-    with pytest.raises((InputError, HistoryLost), match=r"history\.sqlite"):
-        night(site, 4.0)
+@pytest.mark.parametrize("name", ["", "000001.json", "000002.json"])
+def test_a_night_that_is_missing_is_told(site, name: str) -> None:
+    path = state(site) / "nights" / name
+    shutil.rmtree(path) if not name else path.unlink()
+    for read in (lambda: everything(site), lambda: night(site, 4.0)):
+        with pytest.raises(InputError, match=r"\d\.json: is damaged \(is missing\): restore it from a copy"):
+            read()
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("old", "new"),
     [
-        "UPDATE subjects SET name = 'c' WHERE name = 'a'",
-        "UPDATE subjects SET kind = 'studx' WHERE name = 'a'",
-        "UPDATE results SET status = 'error' WHERE run = 2",
-        "UPDATE results SET worst_id = worst_id || 'x' WHERE run = 1",
-        "UPDATE results SET failed = failed + 1 WHERE run = 1",
-        "UPDATE results SET message = 'x' WHERE run = 2",
-        "UPDATE figures SET unit = 'dC' WHERE id = 1",
-        "UPDATE figures SET name = name || 'x' WHERE id = 1",
-        "UPDATE figures SET better = better + 1 WHERE id = 1",
-        "UPDATE runs SET host = 'elsewhere' WHERE id = 1",
-        "UPDATE runs SET finished = '2020-01-01T00:00:00+00:00' WHERE id = 2",
-        "UPDATE baselines SET by = 'z'",
-        "UPDATE baselines SET run = 3 - run",
-        "UPDATE snapshots SET key = key || '0' WHERE id = 1",
+        ('"name":"a"', '"name":"c"'),
+        ('"kind":"design"', '"kind":"desigx"'),
+        ('"status":"pass"', '"status":"fail"'),
+        ('"worst_id":"GM"', '"worst_id":"GX"'),
+        ('"failed":0', '"failed":1'),
+        ('"message":""', '"message":"x"'),
+        ('"dB",1,', '"dB",-1,'),
+        ('"dB"', '"dC"'),
+        ('"GM: value"', '"GM: valux"'),
+        ('"key":"', '"key":"0'),
+        ('"values":"A', '"values":"B'),
+        ("10 1/s", "11 1/s"),
+        ('"host":"', '"host":"x'),
+        ('"finished":"20', '"finished":"21'),
+        ('"by":"x"', '"by":"z"'),
+        ('"run":1,"at"', '"run":2,"at"'),
+        ('"numpy":"2"', '"numpy":"3"'),
     ],
 )
-def test_a_changed_name_or_status_is_damage(site, change: str) -> None:
-    """Every text and count of the history is held by a checksum, not only its numbers."""
-    path = state(site) / "history.sqlite"
-    with sqlite3.connect(path) as database:
-        changed = database.execute(change).rowcount
-    database.close()
-    assert changed
-    with pytest.raises(InputError, match="is not what was written"), open_history(path):
-        pass
+def test_a_changed_name_or_status_is_damage(site, old: str, new: str) -> None:
+    """Every text and number of the history is held by a checksum."""
+    paths = [state(site) / FILE, state(site) / "nights" / "000001.json"]
+    path = next(path for path in paths if old in path.read_text())
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(InputError, match=r"is damaged \(is not what was written\)"):
+        everything(site)
 
 
 @pytest.mark.parametrize(
     "change",
     [
-        "UPDATE subjects SET name = x'ff00' WHERE id = 1",
-        "UPDATE figures SET better = 'x'",
-        "UPDATE figures SET unit = x'ff'",
-        "UPDATE baselines SET by = x'ff'",
-        "UPDATE results SET seconds = 'long'",
-        "UPDATE vectors SET numbers = 'none'",
+        lambda index: index["runs"][0].update(started=5),
+        lambda index: index["runs"][0].update(id="1"),
+        lambda index: index["runs"][0].pop("code"),
+        lambda index: index["runs"][0].update(libraries={"numpy": 2}),
+        lambda index: index["baselines"][0].update(by=None),
+        lambda index: index.update(interrupted="never"),
     ],
 )
-def test_a_value_of_another_kind_is_damage_even_with_its_sum(site, change: str) -> None:
-    path = state(site) / "history.sqlite"
-    database = sqlite3.connect(path)
-    database.row_factory = sqlite3.Row
-    with database:
-        assert database.execute(change).rowcount
-        database.execute("DELETE FROM sums")
-        sums.write(database)
-    database.close()
-    with pytest.raises(InputError, match="another kind than its column"), open_history(path):
+def test_a_value_of_another_kind_is_damage(site, change) -> None:
+    rewritten(site, change)
+    with pytest.raises(InputError, match="is damaged"), open_history(state(site)):
         pass
-
-
-def test_sums_are_written_once_and_hold_over_nights(site) -> None:
-    path = state(site) / "history.sqlite"
-    with open_history(path) as history:
-        before = history.connection.execute("SELECT * FROM sums ORDER BY kind, id").fetchall()
-    night(site, 11.0)
-    with open_history(path) as history:
-        after = history.connection.execute("SELECT * FROM sums ORDER BY kind, id").fetchall()
-    assert {tuple(row) for row in before} < {tuple(row) for row in after}
-    assert {row[0] for row in after} == {"run", "figure", "approval"}

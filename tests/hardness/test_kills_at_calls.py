@@ -1,4 +1,4 @@
-"""Killed at a file-system call or an SQL statement: the site stays whole and the history sound."""
+"""Killed at a file-system call: the site stays whole and the history sound."""
 
 from __future__ import annotations
 

@@ -7,7 +7,6 @@ import json
 import os
 import shutil
 import socket
-import sqlite3
 import stat
 import subprocess
 import sys
@@ -255,7 +254,7 @@ def test_a_state_inside_the_site_is_refused(state, tmp_path) -> None:
     assert not site.exists()
 
 
-@pytest.mark.parametrize("place", ["site.state", "site.state/cache"])
+@pytest.mark.parametrize("place", ["site.state", "site.state/cache", "site.state/nights"])
 @pytest.mark.parametrize("target", [None, "nowhere", "/dev/zero", "cache"])
 def test_a_state_that_is_no_folder_is_named(place, target, tmp_path) -> None:
     path = tmp_path / place
@@ -265,7 +264,9 @@ def test_a_state_that_is_no_folder_is_named(place, target, tmp_path) -> None:
         run_night(study(job("a")), tmp_path / "site", INLINE, code=CODE)
 
 
-@pytest.mark.parametrize("name", ["", "history.sqlite", "nightly.lock", "cache", "cache/ab"])
+@pytest.mark.parametrize(
+    "name", ["", "history.json", "nights", "nights/000001.json", "nightly.lock", "cache", "cache/ab"]
+)
 def test_a_state_that_leads_elsewhere_is_refused(name, tmp_path) -> None:
     site, state, elsewhere = tmp_path / "site", tmp_path / "site.state", tmp_path / "elsewhere"
     run_night(study(job("a")), site, INLINE, code=CODE)
@@ -317,11 +318,11 @@ def test_a_night_that_is_refused_creates_nothing(why, tmp_path) -> None:
         (site / "mine").write_text("mine")
     elif why == "history damaged":
         state.mkdir()
-        (state / "history.sqlite").write_bytes(b"no history" * 1000)
+        (state / "history.json").write_bytes(b"no history" * 1000)
     elif why == "history newer":
         run_night(study(job("a")), site, INLINE, code=CODE)
-        with contextlib.closing(sqlite3.connect(state / "history.sqlite")) as c:
-            c.execute("PRAGMA user_version = 999")
+        index = json.loads((state / "history.json").read_text())
+        (state / "history.json").write_text(json.dumps({**index, "version": 999}))
         shutil.rmtree(site)
     elif why == "locked":
         held = hold(state)

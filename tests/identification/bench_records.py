@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +15,22 @@ from nonlinear import Trajectory, commands, simulate
 
 Columns = dict[str, np.ndarray]
 NOISE_A = 0.02
+
+
+class Ran(NamedTuple):
+    """A command's status and what it printed."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def data(self) -> Any:
+        """Its JSON."""
+        return json.loads(self.out)
+
+
+Command = Callable[..., Ran]
 
 
 def motion(seed: int, *, load_Nm: float = 0.0, design: Design | None = None) -> Trajectory:
@@ -38,11 +56,17 @@ def columns_of(run: Trajectory, seed: int = 0, load_Nm: float | None = None) -> 
     return columns
 
 
-def write(path: Path, columns: Columns, change: Callable[[Columns], Columns] | None = None) -> Path:
+def write(
+    path: Path,
+    columns: Columns,
+    change: Callable[[Columns], Columns] | None = None,
+    mark: str = ",",
+    fmt: str = "%.12g",
+) -> Path:
     """A CSV file with a header line."""
     columns = columns if change is None else change(dict(columns))
     table = np.column_stack(list(columns.values()))
-    np.savetxt(path, table, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
+    np.savetxt(path, table, delimiter=mark, header=mark.join(columns), comments="", fmt=fmt)
     return path
 
 

@@ -1,10 +1,15 @@
-"""Where the measured records are."""
+"""Where the measured records are, a small campaign, and commands with what they say."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
+
+from actuator_lti.design import load_design
+from examples.virtual_bench import BenchPlan, measure_bench, simulate_bench, write_bench
+from reports.cli.main import main
+from tests.identification.bench_records import Command, Ran
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 
@@ -24,3 +29,23 @@ def emps_file() -> Path:
 @pytest.fixture(scope="session")
 def odrive_files() -> dict[str, Path]:
     return {name: _found(f"odrive/{name}.csv") for name in ("step1", "step2", "chirp1")}
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str]) -> Command:
+    """Run a command of `actuator-lti` in this process."""
+
+    def run(*words: object) -> Ran:
+        capsys.readouterr()
+        status = main([str(word) for word in words])
+        return Ran(int(status or 0), *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a small campaign: three speeds, three loads."""
+    plan = BenchPlan(speeds_rad_s=(105.0, 500.0, 940.0), loads_Nm=(0.0, 3.0, 8.0), duration_s=2.5)
+    logs, _ = measure_bench(simulate_bench(load_design("ilr33-amber"), plan), 2)
+    return write_bench(tmp_path_factory.mktemp("bench"), logs, design="ilr33-amber", seed=2).parent

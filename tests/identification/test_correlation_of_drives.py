@@ -90,12 +90,12 @@ def test_a_record_meets_the_drive_that_made_it(
     _record(tmp_path / "r.csv", run, ROTARY, **{column: factor * run.reference_rad})
     record = open_record(tmp_path / "r.csv")
     result = correlate_record(design, record)
-    assert {signal.name for signal in result.signals} == SIGNALS
-    for signal in result.signals:
+    assert {signal.name for signal in result.signals.values()} == SIGNALS
+    for signal in result.signals.values():
         assert signal.relative_error < 1e-7, signal.name
     viscous = design.friction.viscous_Nms_rad + 1e-4
     other = replace(design, friction=replace(design.friction, viscous_Nms_rad=viscous, points=()))
-    assert max(signal.relative_error for signal in correlate_record(other, record).signals) > 1e-3
+    assert max(signal.relative_error for signal in correlate_record(other, record).signals.values()) > 1e-3
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_an_inner_command_drives_the_loops_inside_it(
     assert driven is not None
     assert driven.stage == driven.design.controller.outermost == stage
     result = correlate_record(BASE, record)
-    for signal in result.signals:
+    for signal in result.signals.values():
         assert signal.relative_error < 1e-6, signal.name
     assert any("do not act" in note for note in result.notes)
 
@@ -128,7 +128,7 @@ def test_the_measured_voltage_drives_the_motor_when_asked_to(tmp_path: Path) -> 
     with pytest.raises(InputError, match='no command: the signal "reference" is needed'):
         correlate_record(BASE, record)
     result = correlate_record(BASE, record, command="voltage")
-    assert "voltage" not in {signal.name for signal in result.signals}
+    assert "voltage" not in {signal.name for signal in result.signals.values()}
     assert result["speed"].relative_error < 1e-6
     with pytest.raises(
         InputError, match=r'command "speed": one of reference, output_speed_reference, speed_reference'
@@ -146,7 +146,7 @@ def test_a_supply_over_time_drives_the_model(design: Design, scales: bool, tmp_p
     more = {"reference [rad]": run.reference_rad, "supply [V]": np.interp(run.time_s, time, bus)}
     record = open_record(_record(tmp_path / "r.csv", run, ROTARY, **more))
     result = correlate_record(design, record)
-    for signal in result.signals:
+    for signal in result.signals.values():
         assert signal.relative_error < 1e-6, signal.name
     flat = dict(record.signals) | {"supply": np.full(len(record), np.median(record["supply"]))}
     assert correlate_record(design, replace(record, signals=flat))["voltage"].relative_error > 0.05
@@ -163,7 +163,7 @@ def test_a_pendulum_that_begins_in_motion_under_a_speed_loop(tmp_path: Path) -> 
     }
     record = open_record(_record(tmp_path / "r.csv", run, ROTARY, **more)).slice(4000, 8000)
     result = correlate_record(design, record)
-    for signal in result.signals:
+    for signal in result.signals.values():
         assert signal.relative_error < 5e-3, signal.name
     assert result["speed"].modelled[0] == pytest.approx(record["speed"][0], rel=1e-3)
     assert result["current"].modelled[0] == pytest.approx(record["current"][0], rel=1e-3)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.cli.main import main
+from tests.identification.bench_records import Command
 
 GIMBAL = """
 [design]
@@ -48,14 +48,14 @@ full_deflection = "10 deg"
 
 @pytest.mark.parametrize(("resistance", "status"), [("2.6 ohm", 0), ("0.26 ohm", 1)])
 def test_its_own_record_fits_and_a_factor_of_ten_does_not(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], resistance: str, status: int
+    tmp_path: Path, command: Command, resistance: str, status: int
 ) -> None:
     """The record is the simulator's; u = R i + L di/dt + kE w holds in it."""
     design, record = tmp_path / "gimbal.toml", tmp_path / "run.csv"
     design.write_text(GIMBAL)
-    words = ["--command", "chirp", "--to", "20", "--duration", "2", "--amplitude", "3", "--csv", str(record)]
-    assert main(["simulate", str(design), *words, "--every", "4", "--quiet"]) == 0
+    words = ("--command", "chirp", "--to", 20, "--duration", 2, "--amplitude", 3, "--csv", record)
+    assert command("simulate", design, *words, "--every", 4, "--quiet").status == 0
     design.write_text(GIMBAL.replace('"2.6 ohm"', f'"{resistance}"'))
-    capsys.readouterr()
-    assert main(["correlate", str(design), str(record), "--quiet"]) == status
-    assert ("R i counts" in capsys.readouterr().out) == bool(status)
+    ran = command("correlate", design, record, "--quiet")
+    assert ran.status == status
+    assert ("R i counts" in ran.out) == bool(status)

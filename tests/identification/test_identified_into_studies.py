@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from bench_records import columns_of, motion, write
 
 from actuator_lti.design import load_design
 from actuator_lti.design.model import Tolerance
@@ -17,23 +15,21 @@ from analyses.identification.inverse import fit_records
 from analyses.records import open_record
 from analyses.sampling import sampler_of
 from analyses.tuning.problem import loop_requirements, problem_of
-from reports.cli.main import main
+from tests.identification.bench_records import Command, columns_of, motion, write
 
 NAMES = {"viscous": "friction.viscous", "dry": "friction.dry_torque", "offset": "friction.offset_torque"}
 
 
-def test_what_was_identified_is_what_the_studies_draw(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_was_identified_is_what_the_studies_draw(tmp_path: Path, command: Command) -> None:
     """Covariance of the fit = that of the samples (4096 draws, 5 %); tuning knows them; a study runs."""
     record = write(tmp_path / "a.csv", columns_of(motion(1)))
-    status = main(["identify", str(record), "--design", "ilr33-amber", "--out", str(tmp_path), "--json"])
-    result = json.loads(capsys.readouterr().out)
-    assert not status
+    ran = command("identify", record, "--design", "ilr33-amber", "--out", tmp_path, "--json")
+    assert not ran.status
+    result = ran.data
     design = load_design(tmp_path / "ilr33-amber-identified.toml")
-    fitted = list(result["parameters"])
+    fitted = result["model"]["names"]
     assert fitted == ["inertia", "viscous", "dry", "offset"]
-    wanted = np.array(result["covariance"])[1:, 1:]
+    wanted = np.array(result["model"]["covariance"])[1:, 1:]
     sampler = sampler_of(design)
     paths = [NAMES[name] for name in fitted[1:]]
     draws = sampler.draw(0, 4096)[:, [sampler.paths.index(path) for path in paths]]
@@ -41,13 +37,10 @@ def test_what_was_identified_is_what_the_studies_draw(
     assert np.cov((draws / size).T) == pytest.approx(wanted / np.outer(size, size), abs=0.05)
     corner = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
     assert set(paths) <= {factor.path for factor in corner.factors}
-    status = main(
-        ["montecarlo", str(tmp_path / "ilr33-amber-identified.toml"), "--samples", "64", "--no-worst",
-         "--out", str(tmp_path / "mc"), "--json"]
-    )  # fmt: skip
-    study = json.loads(capsys.readouterr().out)
-    assert not status
-    assert study["verdict"]["passed"] is True
+    drawn = ("--samples", "64", "--no-worst", "--out", tmp_path / "mc", "--json")
+    study = command("montecarlo", tmp_path / "ilr33-amber-identified.toml", *drawn)
+    assert not study.status
+    assert study.data["verdict"]["passed"] is True
 
 
 def test_the_tolerance_of_a_value_that_is_kept_counts_in_those_that_were_found(tmp_path: Path) -> None:

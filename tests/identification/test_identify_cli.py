@@ -3,50 +3,42 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import pytest
 
 from actuator_lti.design import load_design
-from analyses.virtual_bench import BenchPlan, simulate_bench
-from analyses.virtual_bench_files import write_bench
-from analyses.virtual_bench_instruments import measure_bench
-from reports.cli.main import main
+from examples.virtual_bench import BenchPlan
+from examples.virtual_bench.__main__ import main as simulate
 from reports.document import load as load_document
+from tests.identification.bench_records import Command
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small campaign: three speeds, three loads, one file missing."""
-    design = load_design("ilr33-amber")
-    plan = BenchPlan(speeds_rad_s=(105.0, 500.0, 940.0), loads_Nm=(0.0, 3.0, 8.0), duration_s=2.5)
-    logs, _ = measure_bench(simulate_bench(design, plan), 2)
-    path = write_bench(tmp_path_factory.mktemp("campaign"), logs, design="ilr33-amber", seed=2)
-    (path.parent / "run05_torque.csv").unlink()
-    return path
+def campaign(bench: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The small campaign with one file missing."""
+    folder = shutil.copytree(bench, tmp_path_factory.mktemp("campaign"), dirs_exist_ok=True)
+    (folder / "run05_torque.csv").unlink()
+    return folder / "campaign.toml"
 
 
-def _run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    status = main(list(arguments))
-    out, err = capsys.readouterr()
-    return int(status or 0), out, err
-
-
-def test_a_campaign_as_json(campaign: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    status, out, _ = _run(capsys, "identify", str(campaign), "--json", "--suggest", "2")
+def test_a_campaign_as_json(campaign: Path, command: Command) -> None:
+    status, out, _ = command("identify", str(campaign), "--json", "--suggest", "2")
     result = json.loads(out)
     assert status == 0
-    assert result["runs_listed"] == result["runs_used"] + len(result["set_aside"]) == 9
-    assert result["set_aside"][0]["id"] == "05"
-    assert result["rows_in"] >= result["rows_out"] > 0
-    low, high = result["coefficients"]["CM"]["interval_95"]
+    found = result["result"]
+    assert found["runs_listed"] == len(found["fit"]["points"]) + len(found["set_aside"]) == 9
+    assert found["set_aside"][0]["id"] == "05"
+    assert found["rows_in"] >= found["rows_out"] > 0
+    low, high = found["fit"]["parameters"]["CM"]["interval_95"]
     assert low < 1.34e-3 < high
-    assert [term["name"] for term in result["contributions"]["terms"]] == ["C0", "Cv", "CM"]
+    assert [term["name"] for term in result["shares"]] == ["C0", "Cv", "CM"]
     assert len(result["suggestion"]["runs"]) == 2
 
 
-def test_a_campaign_on_paper(campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    status, out, _ = _run(capsys, "identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
+def test_a_campaign_on_paper(campaign: Path, tmp_path: Path, command: Command) -> None:
+    status, out, _ = command("identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
     assert status == 0
     assert "8 of 9 runs" in out
     assert "run05_torque.csv: cannot be read: no such file" in " ".join(out.split())
@@ -63,71 +55,78 @@ def test_a_campaign_on_paper(campaign: Path, tmp_path: Path, capsys: pytest.Capt
     assert len(identified.correlations) >= 1
 
 
-def test_the_identified_design_goes_on_into_margins(
-    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _run(capsys, "identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
-    status, out, _ = _run(capsys, "margins", str(tmp_path / "ilr33-amber-identified.toml"), "--json")
+def test_the_identified_design_goes_on_into_margins(campaign: Path, tmp_path: Path, command: Command) -> None:
+    command("identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
+    status, out, _ = command("margins", str(tmp_path / "ilr33-amber-identified.toml"), "--json")
     assert status == 0
     assert json.loads(out)["loops"]
 
 
-def test_emps_on_the_command_line(
-    emps_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, out, _ = _run(capsys, "identify", "--dynamic", str(emps_file), "--json", "--refine")
+def test_emps_on_the_command_line(emps_file: Path, tmp_path: Path, command: Command) -> None:
+    status, out, _ = command("identify", str(emps_file), "--json", "--refine")
     result = json.loads(out)
     assert status == 0
-    assert round(result["parameters"]["inertia"]["value"], 4) == 95.1089
-    assert result["rows_in"] == 24841
-    assert result["refined"]["motor.rotor_inertia"] == pytest.approx(95.1089, rel=0.005)
-    status, out, _ = _run(capsys, "correlate", "emps", str(emps_file), "--json", "--out", str(tmp_path))
+    assert round(result["model"]["parameters"]["inertia"]["value"], 4) == 95.1089
+    assert result["model"]["rows_in"] == 24841
+    assert result["refined"]["parameters"]["motor.rotor_inertia"]["value"] == pytest.approx(
+        95.1089, rel=0.005
+    )
+    status, out, _ = command("correlate", "emps", str(emps_file), "--json", "--out", str(tmp_path))
     signals = json.loads(out)["records"][0]["signals"]
     assert status == 0
     assert 100.0 * signals["force"]["relative_error"] < 5.848
     assert (tmp_path / "correlation.html").stat().st_size > 10_000
 
 
-def test_the_results_become_sections_of_the_report(
-    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _run(capsys, "identify", str(campaign), "--out", str(tmp_path / "i"), "--suggest", "0")
+def test_the_results_become_sections_of_the_report(campaign: Path, tmp_path: Path, command: Command) -> None:
+    command("identify", str(campaign), "--out", str(tmp_path / "i"), "--suggest", "0")
     result, out = str(tmp_path / "i" / "identification.json"), str(tmp_path / "r")
-    _run(capsys, "report", "ilr33-amber", "--include", result, "--out", out)
+    command("report", "ilr33-amber", "--include", result, "--out", out)
     ids = [part["id"] for part in load_document(tmp_path / "r" / "report.json")["sections"]]
     assert "identification" in ids
     assert ids.count("provenance") == 1
 
 
-def test_the_chirp_on_the_command_line(
-    odrive_files: dict[str, Path], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_chirp_on_the_command_line(odrive_files: dict[str, Path], command: Command) -> None:
     chirp, step = str(odrive_files["chirp1"]), str(odrive_files["step1"])
-    status, out, _ = _run(capsys, "correlate", "emps", step, "--predict", chirp, "--json")
+    status, out, _ = command("correlate", "emps", step, "--predict", chirp, "--json")
     assert status == 0
-    assert json.loads(out)["relative_error"] < 0.025
+    assert json.loads(out)["chirp"]["whole"]["relative_error"] < 0.025
 
 
 def test_the_virtual_bench_writes_54_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from analyses import virtual_bench as module
-
     short = BenchPlan(duration_s=2.2)
-    monkeypatch.setattr(module, "BenchPlan", lambda: short)
-    status, out, _ = _run(capsys, "identify", "--virtual-bench", str(tmp_path), "--seed", "3")
-    assert status == 0
-    assert "54 runs written" in out
+    monkeypatch.setattr("examples.virtual_bench.campaign.BenchPlan", lambda: short)
+    simulate([str(tmp_path), "--seed", "3"])
+    assert "54 runs written" in capsys.readouterr().out
     assert len(list(tmp_path.glob("run*_drive.csv"))) == len(list(tmp_path.glob("run*_torque.csv"))) == 54
-    status, _, err = _run(capsys, "identify", "--virtual-bench", str(tmp_path), "--seed", "4")
-    assert (status, "--force" in err) == (2, True)
     assert "seed 3" in (tmp_path / "campaign.toml").read_text()
 
 
-def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ((), "--force"),
+        (("--force", "--design", "emps"), "rotary drive"),
+        (("--sweep", "--design", "fin"), "current loop and a coupling"),
+        (("--sweep", "--design", "ilr33-amber"), "current loop and a coupling"),
+    ],
+)
+def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(
+    arguments: tuple[str, ...], reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "campaign.toml").touch()
+    with pytest.raises(SystemExit, match="2"):
+        simulate([str(tmp_path), *arguments])
+    assert reason in capsys.readouterr().err
+
+
+def test_the_example_is_a_campaign_file(tmp_path: Path, command: Command) -> None:
     from analyses.records import load_campaign
 
-    status, out, _ = _run(capsys, "identify", "--example")
+    status, out, _ = command("identify", "--example")
     (tmp_path / "c.toml").write_text(out)
     assert status == 0
     assert load_campaign(tmp_path / "c.toml").runs[0].load_Nm == 2.0
@@ -136,18 +135,17 @@ def test_the_example_is_a_campaign_file(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.parametrize(
     ("arguments", "reason"),
     [
-        (("identify",), "give one of"),
+        (("identify",), "Missing argument 'FILE...'"),
         (("identify", "nowhere.toml"), "nowhere.toml: cannot be read: no such file"),
-        (("identify", "--dynamic", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
+        (("identify", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
         (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
-        (("identify", "--virtual-bench", "unwanted", "--design", "emps"), "rotary drive"),
         (("correlate", "no-such-design", "nowhere.csv"), "no such design"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(
-    arguments: tuple[str, ...], reason: str, capsys: pytest.CaptureFixture[str]
+    arguments: tuple[str, ...], reason: str, command: Command
 ) -> None:
-    status, out, err = _run(capsys, *arguments)
+    status, out, err = command(*arguments)
     assert (status, out) == (2, "")
     assert reason in err
     assert err.count("\n") == 1
@@ -170,13 +168,13 @@ def test_bad_input_is_one_line_and_status_2(
     ],
 )
 def test_a_bad_campaign_file_is_one_line_with_its_key(
-    old: str, new: str, reason: str, campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    old: str, new: str, reason: str, campaign: Path, tmp_path: Path, command: Command
 ) -> None:
     text = campaign.read_text()
     assert old in text
     path = tmp_path / "bad.toml"
     path.write_text(text.replace(old, new, 1))
-    status, _, err = _run(capsys, "identify", str(path))
+    status, _, err = command("identify", str(path))
     assert status == 2
     assert "bad.toml" in err
     assert reason in err

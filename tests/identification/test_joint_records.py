@@ -11,16 +11,9 @@ from scipy.signal import lfilter
 
 from actuator_lti.design import load_design
 from analyses.correlation.voltage_motor import fit_step
-from analyses.identification.least_squares import between_records, correlated_covariance, solve
+from analyses.estimation.least_squares import between_records, correlated_covariance, solve
 from analyses.records import open_record
-from reports.cli.main import main
-from tests.identification.bench_records import columns_of, motion, staircase, write
-
-
-def _run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    status = main(list(arguments))
-    out, err = capsys.readouterr()
-    return int(status or 0), out, err
+from tests.identification.bench_records import Command, columns_of, motion, staircase, write
 
 
 @pytest.fixture(scope="module")
@@ -38,19 +31,21 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_another(
-    files: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    files: dict[str, str], tmp_path: Path, command: Command
 ) -> None:
     """Truth: the coefficients of the design that was simulated (Table 1 of the paper)."""
     arguments = ("identify", files["a"], files["b"], files["loaded"], "--validate", files["unseen"])
-    status, out, _ = _run(
-        capsys, *arguments, "--design", "ilr33-amber", "--refine", "--json", "--out", str(tmp_path)
+    status, out, _ = command(
+        *arguments, "--design", "ilr33-amber", "--refine", "--json", "--out", str(tmp_path)
     )
     result = json.loads(out)
-    checks = {check["id"]: check for check in result["checks"]}
+    checks = {check["id"]: check for check in result["items"]}
     assert status == 0
     assert checks["held-out-unseen.csv"]["passed"]
-    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(1.5 * result["relative_residual"] + 0.02)
-    assert {one["record"] for one in result["written_design_against"]} == {
+    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(
+        1.5 * result["model"]["relative_residual"] + 0.02
+    )
+    assert {one["record"] for one in result["resimulated"]} == {
         "a.csv",
         "b.csv",
         "loaded.csv",
@@ -60,68 +55,67 @@ def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_anoth
     assert written.friction.load_coefficient == pytest.approx(1.34e-3, rel=3e-3)
     assert written.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=5e-3)
     assert written.friction.viscous_Nms_rad == pytest.approx(5.25e-6, rel=5e-3)
-    for path, value in result["refined"].items():
+    for path, refined in result["refined"]["parameters"].items():
         tolerance = written.parameters[path].tolerance
-        assert written.parameters[path].value == pytest.approx(value, rel=1e-6)
+        assert written.parameters[path].value == pytest.approx(refined["value"], rel=1e-6)
         assert tolerance is not None
-        assert tolerance.std == pytest.approx(result["refined_standard_errors"][path], rel=1e-5)
+        assert tolerance.std == pytest.approx(refined["standard_error"], rel=1e-5)
 
 
 def test_a_held_out_record_of_another_drive_fails(
-    files: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    files: dict[str, str], tmp_path: Path, command: Command
 ) -> None:
     from actuator_lti.design import with_values
 
     other = with_values(load_design("ilr33-amber"), {"friction.dry_torque": 3.5e-3})
     path = str(write(tmp_path / "other.csv", columns_of(motion(6, design=other), 7)))
-    status, out, _ = _run(
-        capsys, "identify", files["a"], "--validate", path, "--design", "ilr33-amber", "--json"
-    )
-    checks = {check["id"]: check for check in json.loads(out)["checks"]}
+    status, out, _ = command("identify", files["a"], "--validate", path, "--design", "ilr33-amber", "--json")
+    checks = {check["id"]: check for check in json.loads(out)["items"]}
     assert status == 1
     assert not checks["held-out-other.csv"]["passed"]
     assert checks["residual"]["passed"]
 
 
-def test_a_value_can_be_held(files: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_value_can_be_held(files: dict[str, str], command: Command) -> None:
     common = ("identify", files["loaded"], "--design", "ilr33-amber", "--json")
-    status, out, _ = _run(capsys, *common, "--fix", "friction.load_coefficient=1.34 mN*m/(N*m)")
+    status, out, _ = command(*common, "--fix", "friction.load_coefficient=1.34 mN*m/(N*m)")
     result = json.loads(out)
     assert status == 0
-    assert result["fixed"]["load_coefficient"] == {"value": 1.34e-3, "reason": "fixed as asked", "moves": {}}
-    assert result["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.05)
+    assert result["model"]["fixed"]["load_coefficient"] == {
+        "value": 1.34e-3,
+        "reason": "fixed as asked",
+        "moves": {},
+    }
+    assert result["model"]["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.05)
     for wrong, reason in (
         ("friction.load_coefficient", "KEY=VALUE is wanted"),
         ("friction.banana=1", "unknown parameter"),
         ("friction.viscous=1 kg", "wrong dimension"),
         ("motor.resistance=1 ohm", "can be fixed here"),
     ):
-        status, _, err = _run(capsys, *common, "--fix", wrong)
+        status, _, err = command(*common, "--fix", wrong)
         assert (status, reason in err) == (2, True), err
 
 
-def test_one_direction_says_what_it_cannot_tell_apart(
-    files: dict[str, str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, out, _ = _run(capsys, "identify", files["one way"], "--design", "ilr33-amber", "--json")
+def test_one_direction_says_what_it_cannot_tell_apart(files: dict[str, str], command: Command) -> None:
+    status, out, _ = command("identify", files["one way"], "--design", "ilr33-amber", "--json")
     result = json.loads(out)
     assert status == 0
     told = "cannot be told from dry: the design's value kept; an error of it moves dry by -1 times it"
-    assert result["fixed"]["offset"]["reason"] == told
+    assert result["model"]["fixed"]["offset"]["reason"] == told
     for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
-        value, std = (result["parameters"][name][key] for key in ("value", "standard_error_correlated"))
+        value, std = (result["model"]["parameters"][name][key] for key in ("value", "standard_error"))
         assert value == pytest.approx(truth, rel=0.03)
         assert abs(value - truth) < 3.0 * std
 
 
-def test_one_speed_has_errors_that_hold_the_truth(
-    files: dict[str, str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_speed_has_errors_that_hold_the_truth(files: dict[str, str], command: Command) -> None:
     """Dry and viscous friction are told by the run-up alone: poorly, and their errors say so."""
-    _, out, _ = _run(capsys, "identify", files["one speed"], "--design", "ilr33-amber", "--json")
-    result = json.loads(out)["parameters"]
+    result = command("identify", files["one speed"], "--design", "ilr33-amber", "--json").data["model"][
+        "parameters"
+    ]
     for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
-        assert abs(result[name]["value"] - truth) < 3.0 * result[name]["standard_error_correlated"]
+        assert abs(result[name]["value"] - truth) < 3.0 * result[name]["standard_error"]
 
 
 def test_errors_of_correlated_residuals_are_the_scatter_of_the_fits() -> None:
@@ -160,7 +154,7 @@ def test_scatter_between_records_is_found_again() -> None:
     assert np.sqrt(np.mean(np.square(result))) == pytest.approx(0.5, rel=0.05)
 
 
-def test_records_that_differ_widen_the_errors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_records_that_differ_widen_the_errors(tmp_path: Path, command: Command) -> None:
     """Six records whose dry friction differs by 10 % rms: the joint error is the scatter over root six."""
     from actuator_lti.design import with_values
 
@@ -171,11 +165,12 @@ def test_records_that_differ_widen_the_errors(tmp_path: Path, capsys: pytest.Cap
             motion(3, design=with_values(drive, {"friction.dry_torque": float(c)})), k)))
         for k, c in enumerate(true)
     ]  # fmt: skip
-    _, out, _ = _run(capsys, "identify", *paths, "--design", "ilr33-amber", "--json")
-    dry = json.loads(out)["parameters"]["dry"]
+    _, out, _ = command("identify", *paths, "--design", "ilr33-amber", "--json")
+    dry = json.loads(out)["model"]["parameters"]["dry"]
     assert dry["value"] == pytest.approx(true.mean(), rel=0.03)
-    assert dry["standard_error_correlated"] == pytest.approx(true.std(ddof=1) / np.sqrt(6.0), rel=0.2)
-    assert dry["standard_error"] < 0.3 * dry["standard_error_correlated"]
+    assert dry["standard_error"] == pytest.approx(true.std(ddof=1) / np.sqrt(6.0), rel=0.2)
+    white = json.loads(out)["model"]["white_errors"][2]
+    assert white < 0.3 * dry["standard_error"]
 
 
 def test_pooled_steps_agree_with_the_scatter_of_single_ones(odrive_files: dict[str, Path]) -> None:
@@ -189,9 +184,9 @@ def test_pooled_steps_agree_with_the_scatter_of_single_ones(odrive_files: dict[s
     assert together.time_constant_s < max(one.time_constant_s for one in alone)
 
 
-def test_correlation_over_several_records(files: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_correlation_over_several_records(files: dict[str, str], command: Command) -> None:
     paths = (files["a"], files["b"], files["loaded"])
-    status, out, _ = _run(capsys, "correlate", "ilr33-amber", *paths, "--json")
+    status, out, _ = command("correlate", "ilr33-amber", *paths, "--json")
     result = json.loads(out)
     own = [record["signals"]["current"] for record in result["records"]]
     summary = result["summary"]["current"]
@@ -203,18 +198,16 @@ def test_correlation_over_several_records(files: dict[str, str], capsys: pytest.
     assert own[0]["mean_error"] == pytest.approx(0.02 * np.sqrt(2.0 / np.pi), rel=0.05)
     worst = max(result["records"], key=lambda one: one["signals"]["angle"]["relative_error"])
     assert result["worst"] == worst["record"]
-    _, text, _ = _run(capsys, "correlate", "ilr33-amber", *paths)
+    _, text, _ = command("correlate", "ilr33-amber", *paths)
     assert (
         f"3 records against ilr33-amber; the motion of {Path(result['worst']).name} is furthest off" in text
     )
 
 
-def test_a_record_that_contradicts_itself_fails_the_correlation(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_record_that_contradicts_itself_fails_the_correlation(tmp_path: Path, command: Command) -> None:
     columns = columns_of(motion(2))
     columns["motor_speed_rad_s"] = columns.pop("motor_speed_rpm")
     path = str(write(tmp_path / "r.csv", columns))
-    status, out, _ = _run(capsys, "correlate", "ilr33-amber", path, "--json")
+    status, out, _ = command("correlate", "ilr33-amber", path, "--json")
     assert status == 1
     assert "60/2 pi" in json.dumps(json.loads(out)["records"][0]["findings"])

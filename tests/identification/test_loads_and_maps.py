@@ -11,10 +11,10 @@ from actuator_lti.design import load_design, read_design_text, with_values, writ
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.identification.bench import BenchSettings, identify_bench
-from analyses.identification.electrical import electrical_estimate, fit_electrical
+from analyses.identification.electrical import electrical_values, fit_electrical
 from analyses.identification.friction_map import fit_map
 from analyses.identification.inverse import fit_records
-from analyses.identification.to_design import design_with_estimate, joint_estimate, with_structure
+from analyses.identification.to_design import design_with_fit, joint_values, with_structure
 from analyses.records.record import Record, RowCounts
 from analyses.sampling import sampler_of
 
@@ -68,7 +68,7 @@ def test_a_pendulum_and_its_load_friction_are_found(drive: str) -> None:
     assert model["viscous"] == pytest.approx(2e-5, rel=0.02)
     assert model["dry"] == pytest.approx(4e-3, rel=0.02)
     assert model["load_coefficient"] == pytest.approx(1.5e-3, rel=0.02)
-    made = design_with_estimate(with_structure(design, model), joint_estimate(design, model, "record"))
+    made = design_with_fit(with_structure(design, model), joint_values(design, model), "record")
     gravity = read_design_text(write_design(made)).load.gravity
     assert gravity is not None
     assert gravity.peak_Nm == pytest.approx(9.80665 * 0.3, rel=2e-3)
@@ -165,7 +165,7 @@ def test_a_design_with_a_friction_map_is_moved_by_the_record_like_any_other() ->
     result = identify_bench(load_design("emps"), [record], settings=BenchSettings(form="map"))
     assert result.design.friction.points
     outcome = correlate_record(result.design, record)
-    assert all(np.isfinite(signal.relative_error) for signal in outcome.signals)
+    assert all(np.isfinite(signal.relative_error) for signal in outcome.signals.values())
     assert "torque needed for its motion" not in result.resimulated[0].how
 
 
@@ -186,7 +186,7 @@ def test_no_inductance_is_invented_where_the_record_does_not_show_it() -> None:
     """The same motor twice: a calm record tells R and kE only, a fast one the inductance as well."""
     calm = fit_electrical(_joint(), [_voltage_record(0.5, fast=False)])
     assert "inductance" not in calm.names
-    assert calm.not_shown["inductance"]
+    assert calm.fixed["inductance"].reason
     fast = fit_electrical(_joint(), [_voltage_record(0.05, fast=True)])
     assert fast["inductance"] == pytest.approx(3e-3, rel=0.02)
     for fit in (calm, fast):
@@ -197,7 +197,7 @@ def test_no_inductance_is_invented_where_the_record_does_not_show_it() -> None:
 def test_the_motors_one_constant_goes_into_the_design_as_one() -> None:
     design = _joint()
     fit = fit_electrical(design, [_voltage_record(0.5, fast=False)])
-    made = design_with_estimate(design, electrical_estimate(design, fit, "record"))
+    made = design_with_fit(design, electrical_values(design, fit), "record")
     back = read_design_text(write_design(made))
     assert back.motor.torque_constant_Nm_A == back.motor.back_emf_constant_Vs_rad
     assert back.motor.inductance_H == design.motor.inductance_H

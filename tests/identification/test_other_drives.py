@@ -17,9 +17,8 @@ from actuator_lti.design import load_design, write_design
 from actuator_lti.design.model import Design
 from nonlinear import Trajectory, commands, simulate
 from nonlinear.commands import Command
-from reports.cli.main import main
-
-Columns = dict[str, np.ndarray]
+from tests.identification.bench_records import Columns, write
+from tests.identification.bench_records import Command as Run
 
 
 def _bare(name: str) -> Design:
@@ -137,27 +136,23 @@ def _truth(design: Design, name: str) -> float:
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.log.__name__[1:] for case in CASES])
-def test_a_drive_is_found_from_its_record(
-    case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_drive_is_found_from_its_record(case: Case, tmp_path: Path, command: Run) -> None:
     design = _bare(case.name)
     run = simulate(design, case.command, case.seconds, record_every=case.every)
     table: Columns = case.log(run, np.random.default_rng(7))  # type: ignore[operator]
-    np.savetxt(tmp_path / "r.csv", np.column_stack(list(table.values())), delimiter=";",
-               header=";".join(table), comments="", fmt="%.10g")  # fmt: skip
+    write(tmp_path / "r.csv", table, mark=";")
     (tmp_path / "wrong.toml").write_text(write_design(_wrong(design)))
     record, out = str(tmp_path / "r.csv"), str(tmp_path / "o")
-    status = main(["identify", record, "--design", str(tmp_path / "wrong.toml"), "--out", out, "--json"])
-    result = json.loads(capsys.readouterr().out)
-    assert not status, [check for check in result["checks"] if check["passed"] is False]
+    ran = command("identify", record, "--design", tmp_path / "wrong.toml", "--out", out, "--json")
+    result = ran.data
+    assert not ran.status, [check for check in result["items"] if check["passed"] is False]
     for name, near in case.near.items():
-        value, std = (result["parameters"][name][key] for key in ("value", "standard_error_correlated"))
+        value, std = (result["model"]["parameters"][name][key] for key in ("value", "standard_error"))
         assert value == pytest.approx(_truth(design, name), rel=near), name
         assert abs(value - _truth(design, name)) < 2.5 * std, name
     errors = {}
     for label, path in (("found", next((tmp_path / "o").glob("*.toml"))), ("wrong", tmp_path / "wrong.toml")):
-        assert not main(["correlate", str(path), record, "--json"])
-        summary = json.loads(capsys.readouterr().out)["summary"]
+        summary = command("correlate", path, record, "--json").data["summary"]
         errors[label] = max(
             summary[name]["relative_error"] for name in ("current", "voltage") if name in summary
         )
@@ -167,7 +162,7 @@ def test_a_drive_is_found_from_its_record(
 @pytest.mark.parametrize("name", ["ballscrew", "fin"])
 @pytest.mark.parametrize("clock", [1.05, 0.95])
 def test_a_clock_that_is_off_shows_in_the_following_error(
-    name: str, clock: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, clock: float, tmp_path: Path, command: Run
 ) -> None:
     """A position and a current alone: inertia and friction agree with any clock, the loops' gains do not."""
     case = next(case for case in CASES if case.name == name)
@@ -176,13 +171,12 @@ def test_a_clock_that_is_off_shows_in_the_following_error(
     table: Columns = case.log(run, np.random.default_rng(7))  # type: ignore[operator]
     first = next(iter(table))
     table[first] = clock * table[first]
-    np.savetxt(tmp_path / "r.csv", np.column_stack(list(table.values())), delimiter=";",
-               header=";".join(table), comments="", fmt="%.10g")  # fmt: skip
+    write(tmp_path / "r.csv", table, mark=";")
     (tmp_path / "d.toml").write_text(write_design(design))
     out = tmp_path / "o"
-    arguments = ["identify", str(tmp_path / "r.csv"), "--design", str(tmp_path / "d.toml"), "--out", str(out)]
-    assert main([*arguments, "--json"]) == 1
-    checks = {one["id"]: one for one in json.loads(capsys.readouterr().out)["checks"]}
+    ran = command("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml", "--out", out, "--json")
+    assert ran.status == 1
+    checks = {one["id"]: one for one in ran.data["items"]}
     assert f"a clock about {100.0 * (clock - 1.0):+.1g}"[:15] in checks["following-r.csv"]["reason"]
     assert not list(out.glob("*.toml"))
 
@@ -200,23 +194,22 @@ def test_a_fault_on_a_linear_axis_is_named(
     status: int,
     reason: str,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    command: Run,
 ) -> None:
     """Friction behind the coupling counts in the common factor of a wrong scale of the current."""
     case = next(case for case in CASES if case.name == "ballscrew")
     run = simulate(_bare("ballscrew"), case.command, case.seconds, record_every=case.every)
     table = _linear(run, np.random.default_rng(7))
     changed = {change.get(k, (k, 1.0))[0]: change.get(k, (k, 1.0))[1] * v for k, v in table.items()}
-    np.savetxt(tmp_path / "r.csv", np.column_stack(list(changed.values())), delimiter=";",
-               header=";".join(changed), comments="", fmt="%.10g")  # fmt: skip
-    arguments = ["identify", str(tmp_path / "r.csv"), "--design", "ballscrew", "--out", str(tmp_path / "o")]
-    assert main([*arguments, "--json"]) == status
-    out, err = capsys.readouterr()
-    assert reason in (err if status == 2 else json.dumps(json.loads(out)["checks"]))
+    write(tmp_path / "r.csv", changed, mark=";")
+    out = tmp_path / "o"
+    ran = command("identify", tmp_path / "r.csv", "--design", "ballscrew", "--out", out, "--json")
+    assert ran.status == status
+    assert reason in (ran.err if status == 2 else json.dumps(ran.data["items"]))
     assert not list((tmp_path / "o").glob("*.toml"))
 
 
-def test_a_current_sampled_too_slowly_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_current_sampled_too_slowly_is_named(tmp_path: Path, command: Run) -> None:
     """Steps of the voltage: the current peaks within a millisecond, the log has one row for each."""
     base = _bare("ilr33-amber")
     controller = replace(base.controller, position=None, velocity=None, current=None)
@@ -224,56 +217,48 @@ def test_a_current_sampled_too_slowly_is_named(tmp_path: Path, capsys: pytest.Ca
     time = np.arange(0.0, 2.0, 1e-4)
     steps = 3.0 * np.sign(np.sin(2.0 * np.pi * 1.25 * time))
     run = simulate(design, commands.sampled(time, steps), 2.0, record_every=10)
-    table = np.column_stack([run.time_s, run.reference_rad, run.motor_speed_rad_s, run.current_A])
-    header = "time_s,voltage_command_V,motor_speed [rad/s],current_A"
-    np.savetxt(tmp_path / "r.csv", table, delimiter=",", header=header, comments="", fmt="%.10g")
+    columns = {"voltage_command_V": run.reference_rad, "motor_speed [rad/s]": run.motor_speed_rad_s}
+    write(tmp_path / "r.csv", {"time_s": run.time_s, **columns, "current_A": run.current_A})
     (tmp_path / "d.toml").write_text(write_design(design))
-    status = main(["identify", str(tmp_path / "r.csv"), "--design", str(tmp_path / "d.toml"), "--json"])
-    failed = [
-        check["reason"] for check in json.loads(capsys.readouterr().out)["checks"] if not check["passed"]
-    ]
-    assert status == 1
+    ran = command("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml", "--json")
+    failed = [check["reason"] for check in ran.data["items"] if not check["passed"]]
+    assert ran.status == 1
     assert any("sampled too slowly" in reason for reason in failed)
 
 
-def test_a_stepped_command_is_taken_as_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_stepped_command_is_taken_as_steps(tmp_path: Path, command: Run) -> None:
     """Logged at every tenth tick: taken as ramps of a millisecond, the current would be off by 20 %."""
     base = _bare("ilr33-amber")
     design = replace(base, controller=replace(base.controller, position=None))
     time = np.arange(0.0, 1.5, 1e-4)
     speed = np.select([time < 0.2, time < 0.6, time < 1.0], [0.0, 300.0, -450.0], 200.0)
     run = simulate(design, commands.sampled(time, speed / design.total_ratio), 1.5, record_every=10)
-    table = np.column_stack(
-        [run.time_s, design.total_ratio * run.reference_rad, run.motor_speed_rad_s, run.current_A]
-    )
-    header = "time_s,target_speed [rad/s],motor_speed [rad/s],current_A"
-    np.savetxt(tmp_path / "r.csv", table, delimiter=",", header=header, comments="", fmt="%.12g")
+    speed = {"target_speed [rad/s]": design.total_ratio * run.reference_rad}
+    speed["motor_speed [rad/s]"] = run.motor_speed_rad_s
+    write(tmp_path / "r.csv", {"time_s": run.time_s, **speed, "current_A": run.current_A})
     (tmp_path / "d.toml").write_text(write_design(design))
-    assert not main(["correlate", str(tmp_path / "d.toml"), str(tmp_path / "r.csv"), "--json"])
-    summary = json.loads(capsys.readouterr().out)["summary"]
+    summary = command("correlate", tmp_path / "d.toml", tmp_path / "r.csv", "--json").data["summary"]
     assert summary["current"]["relative_error"] < 1e-6
     assert summary["speed"]["relative_error"] < 1e-6
 
 
-def test_correlate_begins_with_its_result_and_judges_on_demand(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_correlate_begins_with_its_result_and_judges_on_demand(tmp_path: Path, command: Run) -> None:
     design = _bare("ctms-motor-position")
     run = simulate(design, commands.multisine(1.0, [0.5, 1.1], 4.0, 1e-3, seed=2), 4.0)
     table = _voltage(run, np.random.default_rng(1))
-    np.savetxt(tmp_path / "r.csv", np.column_stack(list(table.values())), delimiter=",",
-               header=",".join(table), comments="", fmt="%.10g")  # fmt: skip
+    write(tmp_path / "r.csv", table)
     (tmp_path / "w.toml").write_text(write_design(_wrong(design)))
-    arguments = ["correlate", str(tmp_path / "w.toml"), str(tmp_path / "r.csv")]
-    assert not main(arguments)
-    assert capsys.readouterr().out.startswith("PASS  ctms-motor-position: Motor angle of the model within")
-    assert main([*arguments, "--error-limit", "0.1"]) == 1
-    assert capsys.readouterr().out.startswith("FAIL  ctms-motor-position: Motor angle of the model within")
-    assert not main([*arguments, "--error-limit", "50"])
-    assert capsys.readouterr().out.startswith("PASS")
+    for limit, verdict in (
+        ((), "PASS"),
+        (("--error-limit", "0.1"), "FAIL"),
+        (("--error-limit", "50"), "PASS"),
+    ):
+        ran = command("correlate", tmp_path / "w.toml", tmp_path / "r.csv", *limit)
+        assert ran.status == int(verdict == "FAIL")
+        assert ran.out.startswith(f"{verdict}  ctms-motor-position: Motor angle of the model within")
 
 
-def test_signals_at_several_rates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_signals_at_several_rates(tmp_path: Path, command: Run) -> None:
     """The current every 5 ms among rows of 1 ms: rows are dropped, which is said, or kept."""
     design = _bare("ctms-motor-position")
     motor = replace(design.motor, inductance_H=2e-3)
@@ -291,11 +276,12 @@ def test_signals_at_several_rates(tmp_path: Path, capsys: pytest.CaptureFixture[
     (tmp_path / "d.toml").write_text(write_design(_wrong(current)))
     used = {}
     for name in ("r.csv", "r.toml"):
-        main(["identify", str(tmp_path / name), "--design", str(tmp_path / "d.toml"), "--json"])
-        result = json.loads(capsys.readouterr().out)
-        used[name] = result["records"][0]["rows_in"]
+        result = command("identify", tmp_path / name, "--design", tmp_path / "d.toml", "--json").data
+        used[name] = result["model"]["records"][0]["rows_in"]
         near = 0.01 if name == "r.toml" else 0.05
-        assert result["parameters"]["inertia"]["value"] == pytest.approx(design.inertia_kgm2, rel=near)
+        assert result["model"]["parameters"]["inertia"]["value"] == pytest.approx(
+            design.inertia_kgm2, rel=near
+        )
     assert used == {"r.csv": 800, "r.toml": 4000}
-    main(["identify", str(tmp_path / "r.csv"), "--design", str(tmp_path / "d.toml")])
-    assert 'missing = "interpolate"' in " ".join(capsys.readouterr().out.split())
+    told = command("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml").out
+    assert 'missing = "interpolate"' in " ".join(told.split())

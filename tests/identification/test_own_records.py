@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +10,13 @@ import pytest
 from actuator_lti import load_design
 from analyses.records.consistency import check_record
 from analyses.records.record import Record, RowCounts
-from reports.cli.main import main
+from tests.identification.bench_records import Command
 
 AMBER = load_design("ilr33-amber")
 
 
 @pytest.mark.parametrize(
-    ("design", "command"),
+    ("design", "motion"),
     [
         ("ilr33-amber", "--command step --amplitude 1 --duration 10"),
         ("ballscrew", "--command chirp --amplitude 1 --duration 0.5"),
@@ -25,17 +24,14 @@ AMBER = load_design("ilr33-amber")
         ("emps", "--command step --amplitude 1 --duration 0.3"),
     ],
 )
-def test_own_record(design: str, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_own_record(design: str, motion: str, tmp_path: Path, command: Command) -> None:
     path = tmp_path / "run.csv"
-    assert main(f"simulate {design} {command} --csv {path} --quiet".split()) == 0
-    capsys.readouterr()
-    assert main(f"correlate {design} {path} --json --quiet".split()) == 0
-    data = json.loads(capsys.readouterr().out)
+    assert command(*f"simulate {design} {motion} --csv {path} --quiet".split()).status == 0
+    data = command("correlate", design, path, "--json").data
     assert data["passed"] is True
     for name, one in data["records"][0]["signals"].items():
         assert one["relative_error"] < 1e-9, name
-    assert main(f"correlate {design} {path} --quiet".split()) == 0
-    assert capsys.readouterr().out.startswith("PASS  ")
+    assert command("correlate", design, path).out.startswith("PASS  ")
 
 
 def _noisy(clock: float = 1.0) -> Record:

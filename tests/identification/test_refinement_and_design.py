@@ -12,9 +12,9 @@ import pytest
 from actuator_lti.design import load_design, parameter_value, read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.campaign_design import SuggestedRun, suggest_runs
+from analyses.estimation.fit import Fit
 from analyses.identification.bench import BenchSettings, identify_bench
-from analyses.identification.dynamic import Recipe
+from analyses.identification.campaign_design import SuggestedRun, suggest_runs
 from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import refine_by_output_error
 from analyses.identification.points import SteadyPoint
@@ -22,10 +22,9 @@ from analyses.identification.steady import SteadyWindow
 from analyses.identification.surface import fit_surface, gain_matrix, torque_covariance
 from analyses.identification.surface_fit import SurfaceFit
 from analyses.identification.systematic import effects_of, shared_errors
-from analyses.identification.to_design import Estimate, design_with_estimate, joint_estimate
+from analyses.identification.to_design import design_with_fit, joint_values
 from analyses.records import open_record
 from analyses.records.campaign_file import Instruments
-from analyses.records.record import Record, RowCounts
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
 BOUNDS = Instruments(torque_accuracy=0.005, current_gain=0.005, current_offset_A=0.002)
@@ -179,7 +178,7 @@ def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:
     )
     result = refine_by_output_error(start, paths, force, force(design))
     for path in paths:
-        assert result.values[path] == pytest.approx(parameter_value(design, path), rel=2e-3)
+        assert result[path] == pytest.approx(parameter_value(design, path), rel=2e-3)
     assert result.error_after < 0.05 * result.error_before
 
 
@@ -188,9 +187,9 @@ def test_refinement_on_emps_lowers_the_force_error_and_is_what_is_written(emps_f
     result = identify_bench(design, [record], settings=BenchSettings(refine=True))
     assert result.refined is not None
     assert result.refined.error_after < result.refined.error_before < 0.05848
-    for path, value in result.refined.values.items():
+    for path, value in zip(result.refined.names, result.refined.values, strict=True):
         assert parameter_value(read_design_text(result.text), path) == pytest.approx(value, rel=1e-6)
-    assert result.refined.values["motor.rotor_inertia"] == pytest.approx(95.1, abs=1.0)
+    assert result.refined["motor.rotor_inertia"] == pytest.approx(95.1, abs=1.0)
     assert result.resimulated[0].relative_error == pytest.approx(result.refined.error_after, rel=1e-4)
 
 
@@ -198,7 +197,7 @@ def test_the_emps_result_becomes_a_design(emps_file: Path) -> None:
     design, record = load_design("emps"), open_record(emps_file)
     for form in ("symmetric", "per-direction"):
         model = fit_records(design, [record], form=form)  # type: ignore[arg-type]
-        identified = design_with_estimate(design, joint_estimate(design, model, "EMPS"))
+        identified = design_with_fit(design, joint_values(design, model), "EMPS")
         back = read_design_text(write_design(identified))
         assert back.motor.rotor_inertia_kgm2 == pytest.approx(model["inertia"], rel=1e-6)
         if form == "per-direction":
@@ -208,25 +207,7 @@ def test_the_emps_result_becomes_a_design(emps_file: Path) -> None:
             assert back.friction.offset_torque_Nm == pytest.approx(model["offset"], rel=1e-6)
 
 
-def test_a_rotary_drive_is_identified_from_its_own_simulation() -> None:
-    """Inverse model of a simulated ilr33-amber: inertia and friction at the motor come back."""
-    from nonlinear import commands, simulate
-
-    design = load_design("ilr33-amber")
-    run = simulate(design, commands.multisine(0.005, [0.7, 1.9, 4.3], 6.0, 1e-4, seed=2), 6.0)
-    signals = {"angle": run.motor_angle_rad, "current": run.current_A}
-    counts = RowCounts(rows_in=len(run.time_s), rows_out=len(run.time_s))
-    units = {"angle": "rad", "current": "A"}
-    record = Record(name="run", time_s=run.time_s, signals=signals, units=units, counts=counts)
-    model = fit_records(design, [record], recipe=Recipe(cutoff_hz=1000.0))
-    assert model["inertia"] == pytest.approx(design.inertia_kgm2, rel=0.01)
-    assert model["dry"] == pytest.approx(2.25e-3, rel=0.01)
-    assert model["viscous"] == pytest.approx(5.25e-6, rel=0.02)
-
-
 def test_an_estimate_that_no_drive_has_is_refused_with_advice() -> None:
-    estimate = Estimate(
-        paths=("friction.viscous",), values=np.array([-1e-6]), covariance=np.eye(1) * 1e-14, source="a step"
-    )
+    fit = Fit(names=("friction.viscous",), values=np.array([-1e-6]), covariance=np.eye(1) * 1e-14)
     with pytest.raises(InputError, match=r"identified friction\.viscous = -1e-06.* longer motion"):
-        design_with_estimate(load_design("ilr33-amber"), estimate)
+        design_with_fit(load_design("ilr33-amber"), fit, "test")

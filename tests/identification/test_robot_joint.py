@@ -5,7 +5,7 @@ Records of the simulator seen through instruments: gravity, load friction, a sup
 
 from __future__ import annotations
 
-import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from actuator_lti.design import load_design, write_design
 from actuator_lti.design.model import Design, Gravity, PositionLoop
 from nonlinear import commands, simulate
 from nonlinear.commands import Command
-from reports.cli.main import main
+from tests.identification.bench_records import Ran, write
 
 RATIO = 100.0
 DURATION = 8.0
@@ -92,10 +92,7 @@ def _record(folder: Path, name: str, seed: int) -> str:
         "voltage [V]": run.voltage_V[every] + 0.03 * rng.standard_normal(rows),
         "supply [V]": np.interp(run.time_s[every], time, bus),
     }
-    path = folder / f"{name}.csv"
-    np.savetxt(path, np.column_stack(list(table.values())), delimiter=";", header=";".join(table),
-               comments="", fmt="%.8g")  # fmt: skip
-    return str(path)
+    return str(write(folder / f"{name}.csv", table, mark=";", fmt="%.8g"))
 
 
 @pytest.fixture(scope="module")
@@ -107,31 +104,21 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 def test_the_joint_is_identified_and_meets_its_records_within_0_06_rad(
-    files: dict[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    files: dict[str, str], tmp_path: Path, command: Callable[..., Ran]
 ) -> None:
     """Identified from two motions, held against all of them; the guess misses them by more."""
-    arguments = ["identify", files["waves"], files["lifting"], "--validate", files["steps"]]
-    arguments += [
-        "--design",
-        files["guess"],
-        "--inertia-to",
-        "load.inertia",
-        "--out",
-        str(tmp_path),
-        "--json",
-    ]
-    status = main(arguments)
-    result = json.loads(capsys.readouterr().out)
-    assert status in (0, None), [check for check in result["checks"] if check["passed"] is False]
+    ran = command(
+        "identify", files["waves"], files["lifting"], "--validate", files["steps"],
+        "--design", files["guess"], "--inertia-to", "load.inertia", "--out", tmp_path, "--json",
+    )  # fmt: skip
+    assert ran.status == 0, [check for check in ran.data["items"] if check["passed"] is False]
     written = tmp_path / "joint-identified.toml"
     gravity = load_design(written).load.gravity
     assert gravity is not None
     assert gravity.peak_Nm == pytest.approx(0.8 * 9.80665 * 0.15, rel=0.05)
     records = [files[name] for name in MOTIONS]
-    main(["correlate", str(written), *records, "--json"])
-    after = json.loads(capsys.readouterr().out)
+    after = command("correlate", written, *records, "--json").data
     for record in after["records"]:
         assert record["signals"]["output_angle"]["mean_error"] < 0.06
-    main(["correlate", files["guess"], *records, "--json"])
-    before = json.loads(capsys.readouterr().out)["summary"]["output_angle"]
+    before = command("correlate", files["guess"], *records, "--json").data["summary"]["output_angle"]
     assert after["summary"]["output_angle"]["mean_error"] < 0.5 * before["mean_error"]

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from actuator_lti.errors import InputError
-from analyses.identification.means import correlated_means, correlation_time
+from analyses.estimation.means import correlated_means, correlation_time
 from analyses.identification.steady import SteadyCriterion, find_steady_window
 
 

@@ -22,7 +22,7 @@ from actuator_lti.design.model import (
 )
 from actuator_lti.errors import InputError
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
-from analyses.virtual_bench_two_mass import TwoMassPlan, reversal_record, sweep_record
+from examples.virtual_bench import TwoMassPlan, reversal_record, sweep_record
 
 TRUTH = {
     "motor_inertia": 2e-5,
@@ -132,6 +132,12 @@ def test_the_errors_of_the_stiffness_are_in_that_of_the_play() -> None:
     share = result.fit.std("stiffness") / result.fit["stiffness"]
     torque = 0.05 * 10.0 * 0.5  # N m at the coupling: half of the motor's peak, as the inertias are equal
     assert result.play.half_std_rad > 0.3 * share * torque / 400.0
+
+
+def test_a_motion_on_one_flank_does_not_tell_the_play() -> None:
+    part = reversal_record(_design(), seed=0).slice(0, 100)
+    with pytest.raises(InputError, match="must reverse"):
+        identify_frequency(_guess(), sweep_record(_design(), seed=0), play_record=part)
 
 
 def test_the_bench_says_where_it_cannot_measure() -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
 
 from actuator_lti.design import load_design
-from reports.cli.main import main
+from examples.virtual_bench.__main__ import main as simulate
+from tests.identification.bench_records import Command
 
 WRONG = ("motor.rotor_inertia=1.1 kg*cm^2", "load.inertia=0.4 kg*m^2", "coupling.stiffness=1.7e4 N*m/rad")
 
@@ -17,54 +17,34 @@ def _set(*changes: str) -> list[str]:
     return [part for change in changes for part in ("--set", change)]
 
 
-def test_a_robot_joint_from_its_simulated_bench(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_robot_joint_from_its_simulated_bench(tmp_path: Path, command: Command) -> None:
     """Truth: the shipped joint with 2 mrad of play; start: inertias and stiffness 20 to 30 % off.
 
     Its friction grows with the load (CM) and it has dry friction on both sides: both are in the truth.
     """
     bench, out = tmp_path / "bench", tmp_path / "o"
     made = _set("instruments.current_noise=30 mA", "coupling.play=2 mrad")
-    write = ["identify", "--virtual-bench", str(bench), "--frequency-response", "--design", "joint"]
-    assert not main([*write, "--seed", "3", *made])
-    told = capsys.readouterr().out.split()
-    assert {str(bench / "sweep.csv"), str(bench / "reversal.csv")} <= set(told)
-    read = [
-        "identify",
-        "--frequency-response",
-        str(bench / "sweep.csv"),
-        "--play",
-        str(bench / "reversal.csv"),
-    ]
-    status = main([*read, "--design", "joint", *_set(*WRONG), "--out", str(out), "--json"])
-    result = json.loads(capsys.readouterr().out)
-    assert not status, result["checks"]
+    simulate([str(bench), "--sweep", "--design", "joint", "--seed", "3", *made])
+    files = ["--frequency-response", bench / "sweep.csv", "--play", bench / "reversal.csv"]
+    ran = command("identify", *files, "--design", "joint", *_set(*WRONG), "--out", out, "--json")
+    result = ran.data
+    assert not ran.status, result["items"]
     design = load_design("joint")
     assert design.coupling is not None
     truth = {
-        "Inertia before the coupling, at the motor": design.motor_side_inertia_kgm2,
-        "Inertia behind it, at its own shaft": design.load_side_inertia_kgm2,
-        "Stiffness": design.coupling.stiffness_Nm_rad,
-        "Damping": design.coupling.damping_Nms_rad,
-        "Play, total": 2e-3,
+        "motor_inertia": design.motor_side_inertia_kgm2,
+        "load_inertia": design.load_side_inertia_kgm2,
+        "stiffness": design.coupling.stiffness_Nm_rad,
+        "damping": design.coupling.damping_Nms_rad,
+        "play": 2e-3,
     }
     for label, value in truth.items():
-        found = result["values"][label]
+        found = result["found"]["parameters"][label]
         assert found["value"] == pytest.approx(value, abs=3.0 * found["standard_error"]), label
         assert found["standard_error"] < 0.03 * value, label
     written = load_design(next(out.glob("*.toml")))
     assert written.coupling is not None
     assert written.coupling.play_rad == pytest.approx(2e-3, rel=0.06)
-    assert main([*write, "--seed", "3"]) == 2  # what is there stays
-    assert "--force" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("design", "reason"),
-    [("fin", "current loop and a coupling"), ("ilr33-amber", "current loop and a coupling")],
-)
-def test_a_drive_that_this_bench_cannot_take(
-    design: str, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    folder = str(tmp_path / "b")
-    assert main(["identify", "--virtual-bench", folder, "--frequency-response", "--design", design]) == 2
-    assert reason in capsys.readouterr().err
+    assert written.parameters["coupling.play"].tolerance is not None
+    assert {check["id"]: check for check in result["items"]}["written-sweep.csv"]["value"] < 0.05
+    assert "two-mass" in (out / "identification.html").read_text()

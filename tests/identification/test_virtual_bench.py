@@ -14,13 +14,19 @@ from analyses.identification.campaign import CampaignResult, identify_campaign
 from analyses.identification.contributions import contributions
 from analyses.identification.surface import fit_surface
 from analyses.identification.surface_fit import PATHS
-from analyses.identification.to_design import design_with_estimate, surface_estimate
+from analyses.identification.to_design import design_with_fit
 from analyses.records import import_campaign, load_campaign
-from analyses.records.campaign_file import Campaign, Instruments, RunEntry
+from analyses.records.campaign_file import Campaign, Join, RunEntry
 from analyses.records.campaign_import import ImportedCampaign, assemble_run
-from analyses.virtual_bench import BenchPlan, TrueRun, simulate_bench
-from analyses.virtual_bench_files import DRIVE_SPEC, SENSOR_SPEC, write_bench
-from analyses.virtual_bench_instruments import BenchInstruments, RunLogs, measure_bench
+from examples.virtual_bench import (
+    BenchInstruments,
+    BenchPlan,
+    TrueRun,
+    measure_bench,
+    simulate_bench,
+    write_bench,
+)
+from examples.virtual_bench.files import DRIVE_SPEC, SENSOR_SPEC
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
 INSTRUMENTS = BenchInstruments()
@@ -37,43 +43,23 @@ def runs(design: Design) -> tuple[TrueRun, ...]:
     return simulate_bench(design, BenchPlan(duration_s=2.5))
 
 
-def bench_campaign(logs: tuple[RunLogs, ...], design: str, bounds: Instruments) -> Campaign:
-    """The campaign that the files describe, without the files: for runs that are in memory."""
-    folder = Path()
-    runs = [
-        RunEntry(
-            id=log.id,
-            drive=folder / f"run{log.id}_drive.csv",
-            sensor=folder / f"run{log.id}_torque.csv",
-            speed_rad_s=log.speed_setting_rad_s,
-            load_Nm=log.load_setting_Nm,
-            offset_s=None,
-        )
-        for log in logs
-    ]
-    return Campaign(
-        name="virtual bench",
-        design=design,
-        drive=DRIVE_SPEC,
-        sensor=SENSOR_SPEC,
-        join_method="correlation",
-        join_drive_signal="speed",
-        join_sensor_signal="torque",
-        instruments=bounds,
-        runs=tuple(runs),
-        origin=str(folder),
-    )
-
-
 def _imported(runs: tuple[TrueRun, ...], seed: int) -> ImportedCampaign:
     """A campaign in memory, with the sensor's clock known: the joining has tests of its own."""
     logs, _ = measure_bench(runs, seed, INSTRUMENTS)
-    campaign = replace(bench_campaign(logs, "ilr33-amber", INSTRUMENTS.bounds), join_method="given")
-    joined = [
-        assemble_run(campaign, replace(entry, offset_s=log.sensor_offset_s), log.drive, log.sensor)
-        for entry, log in zip(campaign.runs, logs, strict=True)
-    ]
-    return ImportedCampaign(campaign=campaign, runs=tuple(joined), set_aside=())
+    entries = tuple(
+        RunEntry(
+            id=log.id, drive=Path(), offset_s=log.sensor_offset_s,
+            speed_rad_s=log.speed_setting_rad_s, load_Nm=log.load_setting_Nm,
+        )
+        for log in logs
+    )  # fmt: skip
+    campaign = Campaign(
+        name="virtual bench", drive=DRIVE_SPEC, sensor=SENSOR_SPEC, join=Join(method="given"),
+        instruments=INSTRUMENTS.bounds, runs=entries, origin="",
+    )  # fmt: skip
+    pairs = zip(entries, logs, strict=True)
+    joined = tuple(assemble_run(campaign, entry, log.drive, log.sensor) for entry, log in pairs)
+    return ImportedCampaign(campaign=campaign, runs=joined, set_aside=())
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +67,6 @@ def from_files(
     design: Design, runs: tuple[TrueRun, ...], tmp_path_factory: pytest.TempPathFactory
 ) -> CampaignResult:
     """All the way: files written, read by the importers, joined by correlation, one file broken."""
-    "broken."
     folder = tmp_path_factory.mktemp("bench")
     logs, _ = measure_bench(runs, 11, INSTRUMENTS)
     path = write_bench(folder, logs, design="ilr33-amber", seed=11)
@@ -201,7 +186,7 @@ def test_the_shared_errors_are_in_the_interval(from_files: CampaignResult) -> No
 
 
 def test_the_result_becomes_a_design_with_tolerances(from_files: CampaignResult, design: Design) -> None:
-    identified = design_with_estimate(design, surface_estimate(from_files.fit, "a bench"))
+    identified = design_with_fit(design, from_files.fit.by_key(), "a bench")
     back = read_design_text(write_design(identified))
     for k, path in enumerate(PATHS):
         tolerance = back.parameters[path].tolerance

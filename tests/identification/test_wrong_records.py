@@ -13,17 +13,7 @@ import pytest
 from actuator_lti.design import load_design, parameter_value
 from actuator_lti.errors import InputError
 from analyses.identification.to_design import inertia_share
-from analyses.virtual_bench import BenchPlan, simulate_bench
-from analyses.virtual_bench_files import write_bench
-from analyses.virtual_bench_instruments import measure_bench
-from reports.cli.main import main
-from tests.identification.bench_records import Columns, columns_of, motion, write
-
-
-def _run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    status = main(list(arguments))
-    out, err = capsys.readouterr()
-    return int(status or 0), out, err
+from tests.identification.bench_records import Columns, Command, columns_of, motion, write
 
 
 @pytest.fixture(scope="module")
@@ -57,13 +47,11 @@ WRONG = {
 
 
 @pytest.mark.parametrize("fault", WRONG)
-def test_a_wrong_record_gives_no_design(
-    fault: str, right: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_record_gives_no_design(fault: str, right: Columns, tmp_path: Path, command: Command) -> None:
     change, reason = WRONG[fault]
     record = str(write(tmp_path / "r.csv", right, change))
-    status, out, err = _run(
-        capsys, "identify", record, "--design", "ilr33-amber", "--out", str(tmp_path / "o"), "--json"
+    status, out, err = command(
+        "identify", record, "--design", "ilr33-amber", "--out", str(tmp_path / "o"), "--json"
     )
     assert not list((tmp_path / "o").glob("*.toml"))
     if status == 2:
@@ -72,24 +60,23 @@ def test_a_wrong_record_gives_no_design(
     result = json.loads(out)
     assert status == 1
     assert not result["passed"]
-    assert result["design"] is None
-    assert reason in " ".join(check["reason"] for check in result["checks"])
+    assert reason in " ".join(check["reason"] for check in result["items"])
 
 
 def test_the_right_record_gives_the_drive_that_made_it(
-    right: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    right: Columns, tmp_path: Path, command: Command
 ) -> None:
     """The whole inertia at the motor is the drive's: what gears and load have is taken off the rotor's."""
     record, out = str(write(tmp_path / "r.csv", right)), tmp_path / "o"
-    status, text, _ = _run(capsys, "identify", record, "--design", "ilr33-amber", "--out", str(out), "--json")
+    status, text, _ = command("identify", record, "--design", "ilr33-amber", "--out", str(out), "--json")
     truth, result = load_design("ilr33-amber"), load_design(out / "ilr33-amber-identified.toml")
     assert status == 0
     assert result.inertia_kgm2 == pytest.approx(truth.inertia_kgm2, rel=0.01)
     assert result.motor.rotor_inertia_kgm2 == pytest.approx(truth.motor.rotor_inertia_kgm2, rel=0.01)
     assert result.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=0.03)
-    again = json.loads(text)["written_design_against"][0]
+    again = json.loads(text)["resimulated"][0]
     assert again["relative_error"] < 0.03
-    status, text, _ = _run(capsys, "correlate", str(out / "ilr33-amber-identified.toml"), record, "--json")
+    status, text, _ = command("correlate", str(out / "ilr33-amber-identified.toml"), record, "--json")
     assert status == 0
     own = json.loads(text)["records"][0]["signals"]["current"]["relative_error"]
     assert own == pytest.approx(again["relative_error"], rel=1e-9)
@@ -108,28 +95,36 @@ def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
         inertia_share(design, 1e-6, "gear.worm.ratio")
 
 
+def test_a_load_in_another_unit_shows_in_the_load_friction(tmp_path: Path, command: Command) -> None:
+    """N m written as kN m: all else is right, and the load friction comes out a thousand times too large."""
+    free, loaded = columns_of(motion(2), 1, load_Nm=0.0), columns_of(motion(5, load_Nm=5.0), 3, load_Nm=5e-3)
+    files = [write(tmp_path / name, table) for name, table in (("free.csv", free), ("loaded.csv", loaded))]
+    ran = command("identify", *files, "--design", "ilr33-amber", "--json")
+    size = {check["id"]: check for check in ran.data["items"]}["size"]
+    assert ran.status == 1
+    assert "times the design's: factor 1000" in size["reason"]
+
+
 def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
-    right: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    right: Columns, tmp_path: Path, command: Command
 ) -> None:
     rng = np.random.default_rng(1)
     noisy = {**right, "current_A": right["current_A"] + 1.5 * rng.standard_normal(len(right["time_s"]))}
     record, out = str(write(tmp_path / "r.csv", noisy)), tmp_path / "o"
     arguments = ["identify", record, "--design", "ilr33-amber", "--out", str(out)]
-    assert _run(capsys, *arguments, "--cutoff", "400")[0] == 1
+    assert command(*arguments, "--cutoff", "400")[0] == 1
     assert not list(out.glob("*.toml"))
-    status, text, _ = _run(capsys, *arguments, "--cutoff", "400", "--accept")
+    status, text, _ = command(*arguments, "--cutoff", "400", "--accept")
     assert status == 1
     assert "accepted, a check failed" in " ".join(text.split())
     assert list(out.glob("*.toml"))
 
 
-def test_every_column_is_accounted_for(
-    right: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_every_column_is_accounted_for(right: Columns, tmp_path: Path, command: Command) -> None:
     more = {**right, "temperature_C": right["time_s"], "current_mA": 1e3 * right["current_A"]}
     record = str(write(tmp_path / "r.csv", more))
-    _, out, _ = _run(capsys, "identify", record, "--design", "ilr33-amber", "--json")
-    inputs = {row["column"]: row["use"] for row in json.loads(out)["records"][0]["inputs"]}
+    _, out, _ = command("identify", record, "--design", "ilr33-amber", "--json")
+    inputs = {row["column"]: row["use"] for row in json.loads(out)["inputs"]["r.csv"]}
     assert set(inputs) == set(more)
     assert inputs["current_A"].startswith("drive")
     assert inputs["temperature_C"] == "no: no name that is known"
@@ -147,12 +142,12 @@ def test_every_column_is_accounted_for(
     ],
 )
 def test_a_signal_that_nothing_reads_is_refused(
-    signal: str, reason: str, right: Columns, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    signal: str, reason: str, right: Columns, tmp_path: Path, command: Command
 ) -> None:
     write(tmp_path / "r.csv", right)
     text = f'file = "r.csv"\ntime = {{ column = "time_s" }}\n{signal}\n'
     (tmp_path / "r.toml").write_text(text)
-    status, _, err = _run(capsys, "identify", str(tmp_path / "r.toml"), "--design", "ilr33-amber")
+    status, _, err = command("identify", str(tmp_path / "r.toml"), "--design", "ilr33-amber")
     assert status == 2
     assert reason in err
     assert err.count("\n") == 1
@@ -169,7 +164,7 @@ def test_the_designs_slope_of_the_load_is_used_by_correlate(tmp_path: Path) -> N
     run.to_csv(tmp_path / "whole.csv")
     _without(tmp_path / "whole.csv", "load_Nm", tmp_path / "r.csv")
     result = correlate_record(design, open_record(tmp_path / "r.csv"))
-    assert max(signal.relative_error for signal in result.signals) < 1e-9
+    assert max(signal.relative_error for signal in result.signals.values()) < 1e-9
     without = correlate_record(load_design("ilr33-amber"), open_record(tmp_path / "r.csv"))
     assert without["current"].relative_error > 0.1
 
@@ -179,15 +174,6 @@ def _without(path: Path, column: str, to: Path) -> None:
     rows = [line.split(",") for line in path.read_text().splitlines()]
     left_out = rows[0].index(f'"{column}"')
     to.write_text("".join(",".join(row[:left_out] + row[left_out + 1 :]) + "\n" for row in rows))
-
-
-@pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    plan = BenchPlan(speeds_rad_s=(105.0, 500.0, 940.0), loads_Nm=(0.0, 3.0, 8.0), duration_s=2.5)
-    logs, _ = measure_bench(simulate_bench(load_design("ilr33-amber"), plan), 2)
-    folder = tmp_path_factory.mktemp("bench")
-    write_bench(folder, logs, design="ilr33-amber", seed=2)
-    return folder
 
 
 def _slow_sensor(folder: Path) -> None:
@@ -229,66 +215,59 @@ WRONG_BENCH = {
 
 
 @pytest.mark.parametrize("fault", WRONG_BENCH)
-def test_a_wrong_campaign_gives_no_design(
-    fault: str, campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_wrong_campaign_gives_no_design(fault: str, bench: Path, tmp_path: Path, command: Command) -> None:
     change, reason = WRONG_BENCH[fault]
     folder = tmp_path / "bench"
-    shutil.copytree(campaign, folder)
+    shutil.copytree(bench, folder)
     change(folder)
     arguments = ("--suggest", "0", "--json", "--out", str(tmp_path / "o"))
-    status, out, err = _run(capsys, "identify", str(folder / "campaign.toml"), *arguments)
+    status, out, err = command("identify", str(folder / "campaign.toml"), *arguments)
     assert status in (1, 2)
     assert reason in out + err
     assert not list((tmp_path / "o").glob("*.toml"))
 
 
-def test_a_right_campaign_is_simulated_again_with_what_was_written(
-    campaign: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    status, out, _ = _run(capsys, "identify", str(campaign / "campaign.toml"), "--suggest", "0", "--json")
-    checks = {check["id"]: check for check in json.loads(out)["checks"]}
+def test_a_right_campaign_is_simulated_again_with_what_was_written(bench: Path, command: Command) -> None:
+    status, out, _ = command("identify", str(bench / "campaign.toml"), "--suggest", "0", "--json")
+    checks = {check["id"]: check for check in json.loads(out)["items"]}
     assert status == 0
     assert checks["written-the runs"]["value"] < 0.005
-    inputs = {(row["file"], row["column"]) for row in json.loads(out)["inputs"]}
+    inputs = {(row["file"], row["column"]) for row in json.loads(out)["result"]["inputs"]}
     assert inputs >= {("drive", "Current"), ("drive", "Position"), ("sensor", "torque")}
 
 
-def test_unloaded_runs_say_what_they_do_not_tell(
-    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_unloaded_runs_say_what_they_do_not_tell(bench: Path, tmp_path: Path, command: Command) -> None:
     """The commonest friction test: no load, so CM stays the design's, and that is said."""
     folder = tmp_path / "bench"
-    shutil.copytree(campaign, folder)
-    head, *runs = (campaign / "campaign.toml").read_text().split("[[run]]")
+    shutil.copytree(bench, folder)
+    head, *runs = (bench / "campaign.toml").read_text().split("[[run]]")
     text = head + "".join(f"[[run]]{run}" for run in (*runs[:3], runs[1].replace('id = "02"', 'id = "99"')))
     (folder / "unloaded.toml").write_text(text)
-    status, out, _ = _run(capsys, "identify", str(folder / "unloaded.toml"), "--json")
+    status, out, _ = command("identify", str(folder / "unloaded.toml"), "--json")
     result = json.loads(out)
     assert status == 0
-    assert result["held"] == {"CM": "no run is loaded: the design's value kept"}
-    assert result["coefficients"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
-    assert result["coefficients"]["CM"]["value"] == 1.34e-3
+    fit = result["result"]["fit"]
+    assert {name: one["reason"] for name, one in fit["fixed"].items()} == {
+        "CM": "no run is loaded: the design's value kept"
+    }
+    assert fit["parameters"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
+    assert fit["parameters"]["CM"]["value"] == 1.34e-3
 
 
-def test_a_coefficient_of_a_campaign_can_be_fixed(
-    campaign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    arguments = ("identify", str(campaign / "campaign.toml"), "--json", "--out", str(tmp_path))
-    status, out, _ = _run(capsys, *arguments, "--fix", "friction.viscous=5.25 uN*m*s/rad")
+def test_a_coefficient_of_a_campaign_can_be_fixed(bench: Path, tmp_path: Path, command: Command) -> None:
+    arguments = ("identify", str(bench / "campaign.toml"), "--json", "--out", str(tmp_path))
+    status, out, _ = command(*arguments, "--fix", "friction.viscous=5.25 uN*m*s/rad")
     result = json.loads(out)
     assert status == 0
-    assert result["held"] == {"Cv": "fixed as asked"}
+    assert result["result"]["fit"]["fixed"]["Cv"]["reason"] == "fixed as asked"
     assert load_design(tmp_path / "ilr33-amber-identified.toml").friction.viscous_Nms_rad == 5.25e-6
-    status, _, _ = _run(capsys, *arguments[:3], "--fix", "friction.load_coefficient=0")
+    status, _, _ = command(*arguments[:3], "--fix", "friction.load_coefficient=0")
     assert status == 1
-    status, _, err = _run(capsys, *arguments[:3], "--fix", "motor.resistance=1 ohm")
+    status, _, err = command(*arguments[:3], "--fix", "motor.resistance=1 ohm")
     assert (status, "a campaign can fix" in err) == (2, True)
 
 
-def test_the_designs_slope_of_the_load_is_used_by_simulate(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_designs_slope_of_the_load_is_used_by_simulate(tmp_path: Path, command: Command) -> None:
     """What `simulate` writes without being told of the slope is what the slope gives, and correlates."""
     from actuator_lti.design import with_values, write_design
 
@@ -296,12 +275,12 @@ def test_the_designs_slope_of_the_load_is_used_by_simulate(
     (tmp_path / "d.toml").write_text(write_design(design))
     run = ("--command", "sine", "--amplitude", "4", "--frequency", "2", "--duration", "0.4")
     own, bare = ("simulate", str(tmp_path / "d.toml"), *run), ("simulate", "ilr33-amber", *run)
-    assert _run(capsys, *own, "--csv", str(tmp_path / "a.csv"))[0] == 0
-    assert _run(capsys, *bare, "--load-slope", "-60", "--csv", str(tmp_path / "b.csv"))[0] == 0
-    assert _run(capsys, *bare, "--csv", str(tmp_path / "c.csv"))[0] == 0
+    assert command(*own, "--csv", str(tmp_path / "a.csv"))[0] == 0
+    assert command(*bare, "--load-slope", "-60", "--csv", str(tmp_path / "b.csv"))[0] == 0
+    assert command(*bare, "--csv", str(tmp_path / "c.csv"))[0] == 0
     a, b, c = ((tmp_path / f"{name}.csv").read_text() for name in "abc")
     assert a == b
     assert a != c
-    status, out, _ = _run(capsys, "correlate", str(tmp_path / "d.toml"), str(tmp_path / "a.csv"), "--json")
+    status, out, _ = command("correlate", str(tmp_path / "d.toml"), str(tmp_path / "a.csv"), "--json")
     assert status == 0
     assert json.loads(out)["summary"]["current"]["relative_error"] < 1e-9

@@ -14,6 +14,9 @@ from pathlib import Path
 
 import pytest
 
+from actuator_lti.batch.library import LIBRARY as figures
+from nonlinear.native import LIBRARY as run
+
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -31,8 +34,8 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], set[str],
         pytest.skip(f"the build back-end of this environment is not {BACK_END}")
     source, dist = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("dist")
     for name in (*PACKAGES, "tests"):
-        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__", "*.so"))
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copytree(ROOT / name, source / name, ignore=shutil.ignore_patterns("__pycache__", "_native"))
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, source / name)
     done = subprocess.run(
         [sys.executable, "-c", BUILD, str(source), str(dist)], capture_output=True, text=True, check=False
@@ -70,7 +73,7 @@ def test_nothing_that_is_needed_is_left_out(built: tuple[set[str], set[str], str
     assert wanted - names == set()
     assert wanted - inside == set()
     assert any(name.endswith("licenses/LICENSE") for name in names)
-    assert {"LICENSE", "README.md", "pyproject.toml"} <= inside
+    assert {"LICENSE", "README.md", "pyproject.toml", "setup.py"} <= inside
 
 
 def test_no_test_and_nothing_else_is_installed(built: tuple[set[str], set[str], str]) -> None:
@@ -78,7 +81,14 @@ def test_no_test_and_nothing_else_is_installed(built: tuple[set[str], set[str], 
     tops = {name.partition("/")[0] for name in names}
     assert {top for top in tops if not top.endswith(".dist-info")} == set(PACKAGES)
     assert not [name for name in names if re.search(r"(^|/)(tests?|conftest)(/|\.py|_)", name)]
-    assert not [name for name in names if name.endswith((".so", ".pyc"))]
+    assert not [name for name in names if name.endswith(".pyc")]
+
+
+def test_the_wheel_holds_the_compiled_kernels_of_this_machine(built: tuple[set[str], set[str], str]) -> None:
+    names, inside, _ = built
+    libraries = {name for name in names if "_native/" in name}
+    assert libraries == {str(each.path().relative_to(ROOT)) for each in (figures, run)}
+    assert not [name for name in inside if "_native" in name]
 
 
 def test_the_core_is_light(built: tuple[set[str], set[str], str]) -> None:
@@ -89,6 +99,6 @@ def test_the_core_is_light(built: tuple[set[str], set[str], str]) -> None:
         if line.startswith("Requires-Dist") and "extra ==" not in line
     }
     assert core == {
-        "control", "numpy", "scipy", "numba", "pydantic", "typer", "rich", "jinja2", "tomli-w",
+        "control", "numpy", "scipy", "pydantic", "typer", "rich", "jinja2", "tomli-w",
         "defusedxml", "python-flint",
     }  # fmt: skip

@@ -56,11 +56,15 @@ def test_k2_velocity_loop() -> None:
 
 
 def test_k3_notch() -> None:
-    face = biquad(NOTCH, 2e-4).sampled
-    b = [face.D, face.B[0] + face.D * -face.A[0][0], face.B[1] + face.D * -face.A[1][0]]
+    realisation = biquad(NOTCH, 2e-4).sampled
+    b = [
+        realisation.D,
+        realisation.B[0] + realisation.D * -realisation.A[0][0],
+        realisation.B[1] + realisation.D * -realisation.A[1][0],
+    ]
     np.testing.assert_allclose(b, [0.9721668107471211, -1.922292822062545, 0.9659816575798147], rtol=1e-13)
     np.testing.assert_allclose(
-        [-face.A[0][0], -face.A[1][0]], [-1.922292822062545, 0.9381484683269357], rtol=1e-13
+        [-realisation.A[0][0], -realisation.A[1][0]], [-1.922292822062545, 0.9381484683269357], rtol=1e-13
     )
     loop = assemble_loops(drive_d(NOTCH)).velocity
     assert loop is not None

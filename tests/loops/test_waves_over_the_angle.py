@@ -22,7 +22,7 @@ from actuator_lti.design.model import (
     Validation,
 )
 from actuator_lti.design.writing import write_design
-from actuator_lti.drive.angle import bends_with_angle, follows_angle, holding_torque_Nm, level, straight
+from actuator_lti.drive.angle import follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
@@ -158,10 +158,8 @@ def test_it_is_asked_without_its_name(case: Case) -> None:
     plain = rotor()
     design = case.put(plain)
     assert follows_angle(design)
-    assert bends_with_angle(design)
     for other in (plain, level(design), straight(design)):
         assert not follows_angle(other)
-        assert not bends_with_angle(other)
     held = TickProgram(wire(design, Operating(torques_held=True)), "voltage").tick(0)
     assert np.array_equal(held.A, TickProgram(wire(plain), "voltage").tick(0).A)
 

@@ -24,14 +24,13 @@ def kernels() -> list[str]:
 
 
 def kinds() -> dict[str, dict[str, str]]:
-    """Kernels, two threads, numpy without its vector instructions, numba for any processor."""
+    """Kernels, two threads, numpy without its vector instructions."""
     one = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     result = {name: {**one, "OPENBLAS_CORETYPE": name} for name in kernels()}
     result["two threads"] = {"OPENBLAS_NUM_THREADS": "2", "MKL_NUM_THREADS": "2"}
     plain = [name for name in __cpu_dispatch__ if __cpu_features__.get(name)]
     if plain:
         result["plain numpy"] = {**one, "NPY_DISABLE_CPU_FEATURES": " ".join(plain)}
-    result["any processor"] = {**one, "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
     return result
 
 

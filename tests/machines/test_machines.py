@@ -15,7 +15,7 @@ import pytest
 from machine_kinds import kernels, kinds
 
 SCRIPT = Path(__file__).with_name("machine_facts.py")
-_ASKED = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
+_ASKED = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")
 
 
 @functools.cache

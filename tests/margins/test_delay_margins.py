@@ -177,3 +177,18 @@ def test_what_overflows_and_a_pole_met_exactly_are_numerical_errors() -> None:
     undamped = delay_form(DelaySystem.from_system(control.tf([1], [1, 0, 4])) * DelaySystem.delay(1e-3))
     with pytest.raises(NumericalError, match=r"overflows|pole"):
         evaluate_intervals(undamped, np.array([1.5]), np.array([2.5]))
+
+
+@pytest.mark.parametrize("delay_s", [500.0, 2e4, 3e5])
+def test_a_delay_of_many_turns_is_summarised(delay_s: float) -> None:
+    """1/s: crossings of the real axis at w = (2 k + 1/2) pi/delay with ratio w, all by hand."""
+    m = stability_margins(control.tf([1.0], [1.0, 0.0]), delay_s=delay_s)
+    low, high = m.band_rad_s
+    crossings = (2.0 * np.arange(delay_s * max(high, 1.0)) + 0.5) * np.pi / delay_s
+    assert m.agreement.unstable_nyquist == 2 * np.count_nonzero(crossings < 1.0)
+    assert m.gain_margin is not None
+    assert m.gain_margin.ratio == pytest.approx(crossings[np.abs(np.log(crossings)).argmin()], rel=1e-9)
+    np.testing.assert_allclose([g.ratio for g in m.gain_margins], crossings[crossings < high], rtol=1e-9)
+    assert (low, m.evidence) == (0.0, "checked")
+    assert "are not listed" in m.notes[0]
+    assert m.modulus_margin == pytest.approx(abs(1.0 - 1.0 / m.gain_margin.ratio), rel=1e-2)  # as delay grows

@@ -14,8 +14,6 @@ from actuator_lti.design.access import with_values
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import assemble_loops
 from actuator_lti.margins import stability_margins
-from actuator_lti.margins.level_crossings import _values
-from actuator_lti.margins.loop import rational_loop
 from actuator_lti.margins.nyquist import slope_at_dc
 from actuator_lti.margins.results import Agreement, StabilityMargins
 
@@ -222,11 +220,3 @@ def test_the_sensitivity_of_an_unstable_loop_has_no_peak() -> None:
         else:
             assert np.isnan(peaks[k])
             assert m.sensitivity_peak_db is None
-
-
-def test_a_pole_where_a_search_looks_is_no_failure() -> None:
-    """L = 0.1/(z - p): at z = p exactly the equations are singular; the other points are as they were."""
-    loop = rational_loop(control.ss([[0.75]], [[1.0]], [[0.1]], [[0.0]], 1e-3))
-    values = _values(loop, np.array([0.5, 0.75, 1.0]))
-    assert values[[0, 2]] == pytest.approx([-0.4, 0.4], rel=1e-14)
-    assert np.isnan(values[1])

@@ -10,7 +10,6 @@ import json
 import os
 import random
 import signal
-import sqlite3
 import sys
 import time
 import traceback
@@ -20,6 +19,7 @@ import ruptures  # noqa: F401 - here, not in every child
 from nightly_fakes import CODE, INLINE, job, study
 from site_checks import check_whole
 
+from reports.nightly.history import open_history
 from reports.nightly.night import run_night
 
 DESIGNS = 6
@@ -48,18 +48,17 @@ def child(site: Path, round_: int) -> int:
     return number
 
 
-def check_history(path: Path) -> int:
-    """Every finished night has all of its results, and the file is sound; how many finished."""
-    database = sqlite3.connect(path)
-    assert database.execute("PRAGMA integrity_check").fetchone()[0] == "ok"
-    assert not database.execute("PRAGMA foreign_key_check").fetchall()
-    rows = database.execute(
-        "SELECT r.state, count(x.run) FROM runs r LEFT JOIN results x ON x.run = r.id GROUP BY r.id"
-    ).fetchall()
-    database.close()
-    for state, count in rows:
-        assert count == (DESIGNS if state == "done" else 0), (state, count)
-    return sum(state == "done" for state, _ in rows)
+def check_history(state: Path) -> int:
+    """Every finished night has all of its results, and the files are sound; how many finished."""
+    with open_history(state) as history:
+        for run in history.runs:
+            results = history.night(run.id).results
+            assert len(results) == DESIGNS, run
+            for result in results:
+                assert history.figures(result), result
+        assert len({run.id for run in history.runs}) == len(history.runs)
+        assert history.index.begun >= len(history.runs) + len(history.index.interrupted)
+        return len(history.runs)
 
 
 def main(site: Path, kills: int, seed: int) -> dict[str, object]:
@@ -82,7 +81,7 @@ def main(site: Path, kills: int, seed: int) -> dict[str, object]:
             assert os.WEXITSTATUS(status) == 0, status
             finished += 1
         check_whole(site)
-        check_history(site.with_name(site.name + ".state") / "history.sqlite")
+        check_history(site.with_name(site.name + ".state"))
         round_ += 1
     number = child(site, round_)
     _, status = os.waitpid(number, 0)

@@ -90,7 +90,6 @@ def job(name: str, margin: float = 10.0, **more: Any) -> Job:
         payload=payload,
         design_hash=f"{margin}",
         parameters={"control.position.gain": f"{margin:g} 1/s"},
-        title=str(more.get("title", name)),
     )
 
 

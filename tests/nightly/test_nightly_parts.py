@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from nightly_fakes import fake_document
 
 from actuator_lti.errors import InputError
-from reports.nightly.cache import Cache, CorruptEntry
+from reports.nightly.cache import Cache, CorruptEntry, sealed
 from reports.nightly.code_version import code_version, commits_between
 from reports.nightly.figures import digest, figures_of
 from reports.nightly.lock import hold
@@ -56,7 +57,7 @@ def test_numbers_and_words_in_csv_stay_as_they_are(text: str) -> None:
 
 def test_the_cache_gives_back_what_it_was_given(tmp_path) -> None:
     cache = Cache(tmp_path)
-    cache.write("ab12", {"failed": 0}, {"report.html": b"x" * 1000})
+    cache.take("ab12", sealed("ab12", {"failed": 0}, {"report.html": b"x" * 1000}))
     entry = cache.read("ab12")
     assert entry is not None
     assert entry.meta["failed"] == 0
@@ -64,32 +65,28 @@ def test_the_cache_gives_back_what_it_was_given(tmp_path) -> None:
     assert cache.read("cd34") is None
 
 
-@pytest.mark.parametrize("where", [0, 10, 60, 120, -1])
-def test_any_damaged_byte_of_a_cache_entry_is_found(tmp_path, where: int) -> None:
+def flipped(data: bytes, where: int) -> bytes:
+    return data[:where] + bytes([data[where] ^ 1]) + data[where:][1:]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        *(partial(flipped, where=where) for where in (0, 10, 60, 120, -1)),
+        *(lambda data, size=size: data[:size] for size in (0, 1, 50, 200, -1)),
+        lambda _: sealed("ab34", {}, {"report.html": b"x"}),
+    ],
+)
+def test_an_entry_that_is_damaged_or_another_s_is_neither_read_nor_kept(tmp_path, damage) -> None:
     cache = Cache(tmp_path)
-    cache.write("ab12", {}, {"report.html": b"x"})
-    data = bytearray(cache.path("ab12").read_bytes())
-    data[where] ^= 1
-    cache.path("ab12").write_bytes(bytes(data))
+    data = sealed("ab12", {}, {"report.html": b"x"})
+    cache.take("ab12", data)
+    cache.path("ab12").write_bytes(damage(data))
     with pytest.raises(CorruptEntry):
         cache.read("ab12")
-
-
-@pytest.mark.parametrize("size", [0, 1, 50, 200])
-def test_a_truncated_cache_entry_is_found(tmp_path, size: int) -> None:
-    cache = Cache(tmp_path)
-    cache.write("ab12", {}, {"report.html": b"x"})
-    cache.path("ab12").write_bytes(cache.path("ab12").read_bytes()[:size])
     with pytest.raises(CorruptEntry):
-        cache.read("ab12")
-
-
-def test_an_entry_under_another_name_is_refused(tmp_path) -> None:
-    cache = Cache(tmp_path)
-    cache.write("ab12", {}, {})
-    cache.path("ab34").write_bytes(cache.path("ab12").read_bytes())
-    with pytest.raises(CorruptEntry, match="another key"):
-        cache.read("ab34")
+        Cache(tmp_path / "other").take("ab12", damage(data))
+    assert not (tmp_path / "other").exists()
 
 
 def test_digest_knows_verdicts_and_every_number_of_a_table() -> None:

@@ -25,8 +25,7 @@ from actuator_lti.design.model import (
 )
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
-from nonlinear._kernels.call import parameters
-from nonlinear._kernels.tick import tick
+from nonlinear.native import parameters, tick
 from nonlinear.parameters import design_row
 
 MOTOR = Motor(

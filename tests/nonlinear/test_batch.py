@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -135,42 +131,3 @@ def test_refusals() -> None:
         simulate_many([long_window])
     with pytest.raises(InputError, match="harmonics"):
         Reducers(harmonics=40).write(np.zeros(layout.SIZE))
-
-
-PURE = """
-import json
-from dataclasses import replace
-from actuator_lti import load_design
-from nonlinear import Probe, commands, simulate
-design = load_design("ilr33-amber-multirate")
-friction = replace(design.friction, breakaway_ratio=1.2, dry_torque_reverse_Nm=0.003)
-design = replace(design, friction=replace(friction, law=LAW),
-                 encoder=replace(design.encoder, speed="difference", difference_samples=2),
-                 controller=replace(design.controller, computing_delay_s=1.3e-4))
-probe = Probe(point="i_ref", gain=1.1, delay_samples=1.4, injection=commands.chirp(0.3, 20.0, 400.0, 0.05))
-run = simulate(design, commands.triangle(1e-3, 40.0), TICKS * 1e-4, 5.0, probes=[probe], energy=True)
-print(json.dumps({"th": run.motor_angle_rad.tolist(), "i": run.current_A.tolist(), "events": run.events,
-                  "copper": run.energy.copper_loss_J, "flags": run.limit_flags.tolist()}))
-"""
-
-
-@pytest.mark.parametrize(("law", "ticks"), [("coulomb", 500), ("tanh", 60)])
-def test_compiled_against_pure_python(law: str, ticks: int) -> None:
-    code = PURE.replace("LAW", repr(law)).replace("TICKS", str(ticks))
-    results = []
-    for disabled in ("0", "1"):
-        out = subprocess.run(
-            [sys.executable, "-c", code],
-            env={**__import__("os").environ, "NUMBA_DISABLE_JIT": disabled},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        results.append(json.loads(out.stdout))
-    compiled, pure = results
-    assert compiled["events"] == pure["events"]
-    assert compiled["flags"] == pure["flags"]
-    if law == "coulomb":
-        assert compiled["events"] > 3
-    for name in ("th", "i", "copper"):
-        np.testing.assert_allclose(compiled[name], pure[name], rtol=1e-10, atol=1e-12)

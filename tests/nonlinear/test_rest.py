@@ -207,3 +207,14 @@ def test_the_same_state_has_the_same_end_however_it_is_reached() -> None:
     assert rest is not None
     assert rest.comes_to_rest
     assert rest.error == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("part", "period_s", "amplitude_deg"), [(0.05, 58.4, 0.01746), (0.5, 303.0, 0.0311)])
+def test_a_joint_that_hunts_for_minutes(part: float, period_s: float, amplitude_deg: float) -> None:
+    """Slips minutes apart, several a cycle, one cycle for each start: figures of plain runs over 900 s."""
+    design = load_design("joint")
+    rest = settle(design, 0.0, part * design.validation.full_deflection_rad).rest
+    assert rest.verdict == "limit cycle"
+    assert 1.0 / rest.frequency_hz == pytest.approx(period_s, rel=2e-3)
+    assert DEG * rest.amplitude == pytest.approx(amplitude_deg, rel=5e-3)
+    assert rest.ticks < 1_000_000

@@ -33,7 +33,7 @@ def test_every_margin_of_a_report_is_certified(survey):
 
 
 def test_the_page_says_so(survey):
-    made = margins.section(survey.figures)
+    made = margins.of_loops(survey.figures)
     assert made["result"].startswith("All 3 loops are stable, certified; ")
     assert "exact arithmetic on the numbers of the loop" in made["intro"]
     rows = made["blocks"][0]["rows"]
@@ -49,7 +49,7 @@ def test_a_withheld_margin_gives_its_reason(survey):
     result = LoopFigures(loop, None, stability_margins(undetermined, certify=True), None, None, None)
     assert result.margins.evidence == "withheld"
     figures = {**survey.figures, "velocity": result}
-    made = margins.section(figures)
+    made = margins.of_loops(figures)
     assert made["status"] == "warn"
     texts = [block["text"] for block in made["blocks"] if block["kind"] == "text"]
     assert any(text.startswith("Velocity loop, withheld: ") for text in texts)

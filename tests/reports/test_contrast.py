@@ -6,7 +6,8 @@ import re
 
 import pytest
 
-from reports.html import asset
+from reports.html import script
+from reports.scripts import asset
 
 TEXT, GRAPHICS = 4.5, 3.0
 PAIRS = [
@@ -60,4 +61,4 @@ def test_text_and_figures_stand_out(scheme: str) -> None:
 
 def test_nothing_moves_for_a_reader_who_wants_no_motion() -> None:
     assert "prefers-reduced-motion: reduce" in asset("style.css")
-    assert "smooth" not in asset("live.js") + asset("hands.js") + asset("page.js")
+    assert "smooth" not in script(live=True)

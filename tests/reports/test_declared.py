@@ -23,7 +23,7 @@ COMMANDS = typer.main.get_command(build()).commands  # type: ignore[attr-defined
 @pytest.mark.parametrize("one", ANALYSES, ids=lambda one: one.name)
 def test_every_field_of_a_request_is_an_option_of_the_command(one: Analysis) -> None:
     given = {parameter.name: parameter for parameter in COMMANDS[one.name].params}
-    common = {"design", "changes", "out", "as_json", "quiet"}
+    common = {"design", "changes", "out", "as_json", "quiet", *(["example"] if one.example else [])}
     if one.request is None:
         assert set(given) == common
         return

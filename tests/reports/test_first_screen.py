@@ -9,7 +9,7 @@ import pytest
 from built_report import Built
 
 from actuator_lti import load_design
-from analyses.validation.by_amplitude import AmplitudeMargin
+from analyses.large_signal.by_amplitude import AmplitudeMargin
 from reports import document as doc
 from reports.build import design_report
 from reports.findings import Finding, gathered

@@ -67,7 +67,7 @@ def test_no_shipped_design_is_left_out() -> None:
 def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page], tmp_path: Path) -> None:
     name, page = shown
     agree(read(page), command_line(saved(page, tmp_path / "same.toml")))
-    verdicts_agree(page, command_line(tmp_path / "same.toml", "verdicts"))
+    verdicts_agree(page, command_line(tmp_path / "same.toml", "requirements"))
     before = read(page)
     for key, value in CHANGES[name].items():
         type_value(page, key, value)
@@ -77,7 +77,7 @@ def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page],
     after = read(page)
     assert after != before
     agree(after, command_line(changed))
-    verdicts_agree(page, command_line(changed, "verdicts"))
+    verdicts_agree(page, command_line(changed, "requirements"))
     for key in CHANGES[name]:
         assert parameter_value(load_design(changed), key) != parameter_value(load_design(name), key)
 
@@ -218,7 +218,7 @@ def test_requirements_on_the_whole_drive_follow(browser: Browser, tmp_path: Path
     design = replace(load_design("fin"), requirements=tuple(limits))
     trouble: list[str] = []
     page = opened(browser, written(design, tmp_path), trouble)
-    verdicts_agree(page, command_line(saved(page, tmp_path / "a.toml"), "verdicts"))
+    verdicts_agree(page, command_line(saved(page, tmp_path / "a.toml"), "requirements"))
     first = page.eval_on_selector_all(
         "table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)"
     )
@@ -228,7 +228,7 @@ def test_requirements_on_the_whole_drive_follow(browser: Browser, tmp_path: Path
         field = f'.row[data-path="{key}"] .field'
         if page.locator(field).count():
             type_value(page, key, factor * float(page.input_value(field)))
-    verdicts_agree(page, command_line(saved(page, tmp_path / "b.toml"), "verdicts"))
+    verdicts_agree(page, command_line(saved(page, tmp_path / "b.toml"), "requirements"))
     then = page.eval_on_selector_all("table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)")
     assert all(a != b for a, b in zip(first, then, strict=True))
     page.context.close()

@@ -97,7 +97,7 @@ def test_a_requirement_that_fails_is_said_at_once(page: Page, tmp_path: Path) ->
     type_value(page, "control.position.gain", 590.0)
     failing = int(page.get_attribute(".state", "data-failing") or 0)
     done = CliRunner().invoke(build(), ["margins", str(saved(page, tmp_path / "hot.toml")), "--json"])
-    verdicts = [item for item in json.loads(done.stdout)["verdicts"] if item["verdict"] == "not met"]
+    verdicts = [item for item in json.loads(done.stdout)["requirements"] if item["verdict"] == "not met"]
     assert failing == sum(item["loop"] is not None for item in verdicts) > 0
     assert f"{failing} of " in page.inner_text(".state")
 

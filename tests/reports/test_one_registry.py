@@ -12,7 +12,7 @@ from actuator_lti.quantities import CORNERED, LOOP_QUANTITIES, QUANTITIES
 from analyses.corners import corners
 from analyses.loop_figures import all_loop_figures
 from reports import document as doc
-from reports.html import asset
+from reports.html import script
 from reports.live import live_model
 from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure, figures_of
@@ -47,8 +47,8 @@ def test_the_live_page_knows_no_figure_by_itself(monkeypatch) -> None:
     ]  # fmt: skip
     monkeypatch.setitem(LOOP_QUANTITIES, "modulus_margin", NEW)
     assert "New figure" in [one["label"] for one in live_model(DESIGN)["figures"]]
-    script = asset("hands.js").lower()
-    assert not [of.label for of in LOOP_QUANTITIES.values() if f'"{of.label.lower()}"' in script]
+    words = script(live=True).lower()
+    assert not [of.label for of in LOOP_QUANTITIES.values() if f'"{of.label.lower()}"' in words]
 
 
 def test_a_night_ranks_figures_as_they_are_declared() -> None:

@@ -36,6 +36,23 @@ def test_no_value_is_broken_and_no_line_is_too_long(
         assert all(value in out for value in row.values())
 
 
+@pytest.mark.parametrize("width", range(70, 140, 5))
+def test_headings_break_before_a_word_of_a_cell_is_cut(
+    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A table whose headings are longer than its cells, narrower than they are, wider than the cells."""
+    monkeypatch.setenv("COLUMNS", str(width))
+    labels = ["Cause", "Dry friction", "Kind", "Predicted, peak", "at", "Simulated", "at", "Verdict"]
+    columns = [doc.column(f"c{k}", label, "Hz" * (3 <= k < 7)) for k, label in enumerate(labels)]
+    cells = ["quantised output sensor", "left out", "attracting", "45.5", "35.3", "46.5", "30.8", "confirmed"]
+    print_blocks([doc.table("A table", columns, [{f"c{k}": cell for k, cell in enumerate(cells)}])])
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= width
+    words = out.replace("\n", " ").lower().split()
+    for word in " ".join([*labels[1:], *cells]).lower().split():  # stacked, the first column needs no name
+        assert any(one.startswith(word) for one in words), word
+
+
 @pytest.mark.parametrize("width", [60, 80, 120])
 def test_margins_say_the_verdict_first_and_fit(
     width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

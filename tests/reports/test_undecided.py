@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from analyses import loop_figures
+from analyses.margins import run
 from reports.cli.main import main
 
 
@@ -22,7 +23,7 @@ def test_a_loop_whose_stability_is_not_known_is_no_pass(
         current = figures["current"]
         return {**figures, "current": replace(current, margins=replace(current.margins, stable=None))}
 
-    monkeypatch.setattr(loop_figures, "all_loop_figures", undecided)
+    monkeypatch.setattr(run, "all_loop_figures", undecided)
     assert main(["margins", "ilr33-amber"]) == 1
     first = capsys.readouterr().out.splitlines()[0]
     assert first.startswith("NOT PROVEN  ilr33-amber: stability not known: Current loop.")

@@ -55,7 +55,7 @@ def test_every_view_is_looked_at(fin: Design, survey: LoopSurvey) -> None:
         assert (place, "position", "") in seen
     assert any(place.startswith("at rest, load ") for place, _, _ in seen)
     assert {cut for place, _, cut in seen if place == "all loops closed"} == set(survey.break_points)
-    assert ("worst phase margin", "velocity", "") in seen
+    assert ("tolerances of the worst phase margin", "velocity", "") in seen
     assert not any("speed amplitude" in place for place, _, _ in seen)
 
 
@@ -110,7 +110,7 @@ def test_the_spread_is_that_of_the_operating_points(fin: Design) -> None:
 def test_margins_shows_the_spread_and_names_the_points(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["margins", "fin", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
-    assert data["operating_points"]["position"]["gain_margin"]["where"] == "motor driven by the load"
+    assert data["spread"]["position"]["gain_margin"]["where"] == "motor driven by the load"
     assert main(["margins", "--help"]) == 0
     said = capsys.readouterr().out
     for name in ("sliding", "rest", "describing-function", "driving", "driven", "gap"):

@@ -17,8 +17,11 @@ from actuator_lti.design import design_hash, read_design_text, with_overrides, w
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.profile import CommandMean, command_mean
 from actuator_lti.errors import InputError
+from actuator_lti.limiters import onset
 from actuator_lti.step import step_figures
 from analyses.isolation import isolated
+from analyses.large_signal.at_rest import free_amplitude, sweep_from_rest
+from analyses.large_signal.map import amplitude_map
 from analyses.loop_figures import all_loop_figures
 from analyses.requirements import evaluate_requirements
 from analyses.responses import answer_curve, response_at
@@ -53,6 +56,18 @@ def test_the_ball_screw_follows_its_command_to_5_6_hz_its_reference_to_115(screw
     assert "rate and acceleration" not in to_reference.reason
 
 
+def test_the_feedback_loop_of_the_ball_screw_is_a_third_signal(screw: Design) -> None:
+    """|L/(1 + L)| = 1/sqrt(2) at 16.18 Hz, from L alone; the feed-forward takes the reference to 114.8 Hz."""
+    loops = assemble_loops(screw)
+    assert loops.position is not None
+    hz = closed_loop_bandwidth(loops.position.closed_loop).minus3db_hz
+    assert hz == pytest.approx(16.18, abs=0.005)
+    z = np.exp(2j * np.pi * hz * loops.position.period_s)
+    L = complex(loops.position.open_loop(z))
+    assert abs(L / (1.0 + L)) == pytest.approx(np.sqrt(0.5), rel=1e-9)
+    assert closed_loop_bandwidth(loops.reference_to_output).minus3db_hz == pytest.approx(114.8, abs=0.05)
+
+
 def test_what_rate_and_acceleration_leave_is_simulated(screw: Design) -> None:
     """The sentence beside the requirement, against a run of the simulator read by hand."""
     (verdict,) = evaluate_requirements(asking(screw, to="command"))
@@ -67,6 +82,35 @@ def test_what_rate_and_acceleration_leave_is_simulated(screw: Design) -> None:
     gain_db = 20.0 * np.log10(2.0 * abs(np.mean((y - y.mean()) * turn)) / full)
     said = float(verdict.reason.partition("50 mm: ")[2].partition(" dB")[0])
     assert said == pytest.approx(gain_db, abs=0.1)
+
+
+def test_a_sine_from_rest_is_compared_with_the_response_to_the_command(screw: Design) -> None:
+    """Below the profile's limits a drive without dry friction is linear, the mean included."""
+    friction = replace(screw.friction, dry_torque_Nm=0.0, load_coefficient=0.0)
+    still = replace(screw, friction=friction, load=replace(screw.load, friction=None))
+    hz = np.array([2.0, 5.0, 9.0, 20.0])
+    loops = assemble_loops(still)
+    sweep = sweep_from_rest(still, hz, free_amplitude(still, loops, hz, 1.0), 40_000)
+    assert np.abs(sweep.measured / sweep.sliding - 1.0).max() < 1e-3
+    large = amplitude_map(still, loops, friction_on=False, counts=(3, 6))
+    omega = 2.0 * np.pi * large.frequency_hz[:5]  # the last one is near Nyquist: the images of a held signal
+    mean = command_mean(screw)
+    assert mean is not None
+    behind = np.abs(large.linear[:5]) / np.abs(response_at(loops.plain_response, omega))
+    np.testing.assert_allclose(behind, np.abs(mean.response(omega)), rtol=1e-4)
+
+
+@pytest.mark.parametrize("hz", [0.5, 1.0, 6.0, 60.0])
+def test_the_profile_acts_from_its_closed_form_on(screw: Design, hz: float) -> None:
+    """Rate and acceleration limit of the command are limiters like the others."""
+    loops = assemble_loops(screw)
+    found = onset(loops, np.array([2.0 * np.pi * hz])).each_rad["profile"][0]
+    assert found == pytest.approx(min(0.4 / (2 * np.pi * hz), 4.0 / (2 * np.pi * hz) ** 2), rel=3e-3)
+    time = np.arange(0.0, 3.0 / hz, 5e-4)
+    for share, acts in ((0.99, False), (1.01, True)):  # from the crest on: no kink, nothing to catch up
+        wave = share * found * (1.0 - np.cos(2.0 * np.pi * hz * time))
+        run = simulate(screw, commands.sampled(time, wave), time[-1])
+        assert bool(((run.limit_flags & 128) != 0).any()) is acts
 
 
 @settings(max_examples=12, deadline=None)

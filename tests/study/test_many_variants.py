@@ -16,7 +16,8 @@ from analyses.slugs import slug
 from analyses.study import Variant, study_of
 from analyses.variants import Comparison, compare
 from reports import document as doc
-from reports.sections.compare import overview, sections
+from reports.sections.compare import overview
+from reports.sections.compare import section as sections
 from reports.sections.compare_many import MANY, choice, table_text
 from reports.verdict_summary import verdict_of
 

@@ -10,8 +10,9 @@ import tomli_w
 from actuator_lti import load_design, read_design_text, write_design
 from actuator_lti.errors import InputError
 from analyses.engine import Engine
-from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay
-from analyses.monte_carlo.store import Store
+from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
+from analyses.monte_carlo.reduction import Reduction, reduced, unpacked
+from analyses.monte_carlo.sketch import MOST
 from analyses.sampling import sampler_of
 
 
@@ -49,7 +50,7 @@ def test_the_worst_case_lies_beyond_the_worst_sample_in_the_corner(study, design
     corner = (2.25e-3 + 1.6 * 1.34e-3 * 8 + 5.25e-6 * 942.5) / 5.9e-3
     assert case.sampled < case.value == pytest.approx(corner, rel=1e-9)
     assert not case.passed
-    assert not study.met
+    assert study.verdict == "not met"
     saved = load_design(case.file)
     assert saved.friction.load_coefficient == pytest.approx(1.6 * 1.34e-3)
     margin = next(w for w in study.worst if w.requirement == "gain-margin")
@@ -105,10 +106,63 @@ def test_another_study_does_not_mix_into_a_folder(study, design):
         monte_carlo(design, study.folder, MonteCarloSettings(samples=1000, seed=4))
 
 
-def test_blocks_do_not_follow_the_chunks(tmp_path):
-    store = Store.open(tmp_path, {}, 7)
-    for first, count in store.chunks(50):
-        store.write((first, count), {"x": np.arange(first, first + count, dtype=float)})
-    blocks = [b["x"] for b in store.blocks(50, size=16)]
-    assert [len(b) for b in blocks] == [16, 16, 16, 2]
-    assert np.array_equal(np.concatenate(blocks), np.arange(50.0))
+@pytest.mark.parametrize("engine", [Engine(threads=2), Engine(workers=1)])
+def test_more_samples_than_are_kept_come_to_the_same(engine, study, design, tmp_path, monkeypatch):
+    """Reduced where they are computed, in parts of another size: the same to the last bit, none kept."""
+    monkeypatch.setattr(run, "KEPT", 999)
+    monkeypatch.setattr(run, "PARTS", 4)
+    monkeypatch.setattr(run, "BLOCK", 70)
+    settings = MonteCarloSettings(samples=1000, seed=3, worst_cases=False)
+    result = monte_carlo(design, tmp_path, settings, engine=engine)
+    assert result.columns == study.columns
+    assert result.odds == study.odds
+    assert not list(tmp_path.glob("*.parquet"))
+    assert "not kept" in " ".join(result.notes)
+
+
+@pytest.mark.parametrize("damage", [None, 0, 200, -40])
+def test_a_reduced_study_that_was_interrupted_goes_on(damage, study, design, tmp_path, monkeypatch):
+    """With what was noted, or from the beginning where that is damaged."""
+    monkeypatch.setattr(run, "KEPT", 999)
+    monkeypatch.setattr(run, "PARTS", 10)
+    monkeypatch.setattr(run, "BLOCK", 25)
+    settings = MonteCarloSettings(samples=1000, seed=3, worst_cases=False)
+
+    def interrupt(done, _):
+        if done >= 400:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        monte_carlo(design, tmp_path, settings, engine=Engine(threads=1), progress=interrupt)
+    (noted,) = tmp_path.glob("reduced-*.npz")
+    if damage is not None:
+        data = noted.read_bytes()
+        noted.write_bytes(data[:damage] + bytes(8) + data[damage:][8:])
+    steps = []
+    result = monte_carlo(design, tmp_path, settings, progress=lambda *step: steps.append(step))
+    assert result.columns == study.columns
+    assert result.odds == study.odds
+    assert steps[-1] == ((600, 600) if damage is None else (1000, 1000))
+
+
+@pytest.mark.parametrize("count", [20_000, 400_000])
+def test_what_many_samples_come_to_does_not_grow(count, design):
+    """At most so many bins a column, in memory and in the file, with all counts right."""
+    task = SampleTask(design, sampler_of(design), time_figures=False)
+    names, whole = task.evaluate(0, 1).keys(), Reduction()
+    rng = np.random.default_rng(count)
+    for first in range(0, count, 20_000):
+        block = {name: rng.normal(10.0, 1.0, 20_000) for name in names}
+        whole = whole.merged(reduced(task, {**block, "sample": np.arange(first, first + 20_000)}))
+    assert all(len(sketch.keys) <= MOST for sketch in whole.columns.values())
+    assert {sketch.finite for sketch in whole.columns.values()} == {whole.count} == {count}
+    data = whole.packed([(0, 5)])
+    assert len(data) < 16 * MOST * len(whole.columns) + 100_000
+    again, done = unpacked(data)
+    assert (again.count, again.together, again.tallies, done) == (
+        count,
+        whole.together,
+        whole.tallies,
+        [(0, 5)],
+    )
+    assert again.packed(done) == data

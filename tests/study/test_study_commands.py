@@ -61,10 +61,8 @@ def test_json_goes_to_standard_output_alone(app, tmp_path):
         app, "montecarlo", "--samples", 64, "--out", tmp_path, "--json", "--no-worst", "--step", "1 deg"
     )
     made = json.loads(done.output)
-    assert made["kind"] == "montecarlo"
-    names = [row["figure"] for block in made["sections"][0]["blocks"] if block["kind"] == "table"
-             for row in block["rows"] if "figure" in row]  # fmt: skip
-    assert "nonlinear step: overshoot" in names
+    assert made["verdict"] == "met"
+    assert made["columns"]["nonlinear.overshoot"]["unit"] == "%"
 
 
 @pytest.mark.parametrize("words", [

@@ -8,7 +8,8 @@ import pytest
 from actuator_lti.design import load_design, read_design_text, write_design
 from actuator_lti.design.model import Correlation, Design, Tolerance
 from actuator_lti.errors import InputError
-from analyses.identification.to_design import Estimate, design_with_estimate
+from analyses.estimation.fit import Fit
+from analyses.identification.to_design import design_with_fit
 from analyses.sampling import correlation_of, sampler_of, semidefinite_root
 from analyses.tuning.problem import loop_requirements, problem_of
 
@@ -70,8 +71,8 @@ def test_an_identified_covariance_comes_out_of_the_samples() -> None:
     std = 0.01 * values
     correlation = np.array([[1.0, -0.999, 0.3], [-0.999, 1.0, -0.3], [0.3, -0.3, 1.0]])
     covariance = correlation * np.outer(std, std)
-    estimate = Estimate(paths=paths, values=values, covariance=covariance, source="test")
-    design = read_design_text(write_design(design_with_estimate(load_design("ilr33-amber"), estimate)))
+    fit = Fit(names=paths, values=values, covariance=covariance)
+    design = read_design_text(write_design(design_with_fit(load_design("ilr33-amber"), fit, "test")))
     assert correlation_of(design, list(paths)) == pytest.approx(correlation, abs=2e-6)
     sampler = sampler_of(design)
     draws = sampler.draw(0, 4096)[:, [sampler.paths.index(path) for path in paths]]
@@ -80,10 +81,8 @@ def test_an_identified_covariance_comes_out_of_the_samples() -> None:
 
 def test_a_value_poorly_known_is_cut_off_where_no_drive_is() -> None:
     """A friction of 2 +- 1.5 would be negative in one draw of eleven: its distribution ends at zero."""
-    estimate = Estimate(
-        paths=("friction.viscous",), values=np.array([2e-6]), covariance=np.array([[2.25e-12]]), source="test"
-    )
-    design = read_design_text(write_design(design_with_estimate(load_design("ilr33-amber"), estimate)))
+    fit = Fit(names=("friction.viscous",), values=np.array([2e-6]), covariance=np.array([[2.25e-12]]))
+    design = read_design_text(write_design(design_with_fit(load_design("ilr33-amber"), fit, "test")))
     tolerance = design.parameters["friction.viscous"].tolerance
     assert tolerance is not None
     assert tolerance.kind == "truncated-normal"

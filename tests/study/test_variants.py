@@ -192,7 +192,7 @@ def test_a_slower_gear_fails_the_rate_and_nothing_else(compared):
 
 
 def test_requirements_are_rows_and_designs_are_columns(compared):
-    from reports.sections.compare import sections
+    from reports.sections.compare import section as sections
 
     made = {part["id"]: part for part in sections(compared)}
     table = made["verdicts"]["blocks"][0]

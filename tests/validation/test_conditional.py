@@ -11,15 +11,15 @@ import pytest
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.design.model import Design
-from analyses.validation import QUICK, validate
-from analyses.validation.conditional import (
+from analyses.large_signal.conditional import (
     Conditional,
     conditional_stability,
     saturation_gain,
     saturation_ratio,
     step_threshold,
 )
-from analyses.validation.settling import settling_ticks_of
+from analyses.large_signal.settling_ticks import settling_ticks_of
+from analyses.validation import QUICK, validate
 from nonlinear import commands, simulate
 from reports.sections.conditional import section
 

@@ -112,19 +112,16 @@ def test_friction_keeps_an_unstable_loop_quiet_up_to_the_foreseen_amplitude(
     cycles = limit_cycles(design, load, 1e-4)
     assert len(cycles.confirmations) == 1
     item = cycles.confirmations[0]
-    assert not item.foreseen.stable
-    assert item.confirmed
-    assert item.simulated_ratio == pytest.approx(1.0, rel=0.15)
-    assert item.simulated_hz == pytest.approx(item.foreseen.frequency_hz, rel=0.08)
+    assert not item.cycle.stable
+    assert item.verdict == "confirmed"
+    assert item.ratio == pytest.approx(1.0, rel=0.15)
+    assert item.frequency_hz == pytest.approx(item.cycle.frequency_hz, rel=0.08)
 
 
 def test_the_foreseen_amplitude_grows_with_friction(amber: Design) -> None:
     """The slope 4 Tc/(pi W) at the border is the same, so W goes with Tc."""
     design = with_values(amber, {"control.velocity.gain": 3.0})
-    small, large = (
-        limit_cycles(design, load, 1e-4).confirmations[0].foreseen.speed_amplitude_rad_s
-        for load in (0.0, 8.0)
-    )
+    small, large = (limit_cycles(design, load, 1e-4).confirmations[0].cycle.inner_rad for load in (0.0, 8.0))
     friction = design.friction
     assert large / small == pytest.approx(friction.dry_Nm(8.0) / friction.dry_Nm(0.0), rel=1e-9)
 
@@ -141,7 +138,7 @@ def test_stick_slip_is_foreseen(amber: Design, integral_time: float, gain: float
     cycles = friction_effects(with_values(amber, values)).points[0].cycles
     assert cycles.stick_slip is not None
     assert cycles.stick_slip.stable
-    assert cycles.as_foreseen
+    assert cycles.as_predicted
     swing = cycles.settlings[-1]
     assert swing.hunting
     assert swing.swing_rad == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=0.06)
@@ -151,7 +148,7 @@ def test_stick_slip_is_foreseen(amber: Design, integral_time: float, gain: float
 def test_stick_slip_needs_breakaway_above_friction_and_an_integral(amber: Design) -> None:
     for point in friction_effects(amber).points:
         assert point.cycles.stick_slip is None
-        assert point.cycles.as_foreseen
+        assert point.cycles.as_predicted
     emps = with_values(load_design("emps"), {"friction.breakaway_ratio": 2.0})
     assert friction_effects(emps).points[0].cycles.stick_slip is None
 

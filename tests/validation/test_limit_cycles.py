@@ -16,7 +16,7 @@ from actuator_lti.drive.operating import dead_zone
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.limit_cycles import limit_cycles
-from analyses.limit_cycles.foreseen import (
+from analyses.limit_cycles.describing import (
     cycles_of_play,
     cycles_of_quantisation,
     without_nonlinearities,
@@ -101,7 +101,7 @@ def test_section_and_refusal() -> None:
     made = section(limit_cycles(load_design("ballscrew")))
     assert (
         made["result"]
-        == "The drive as it is comes to rest after every step; 0 of 1 foreseen cycles confirmed."
+        == "The drive as it is comes to rest after every step; 0 of 1 predicted cycles confirmed."
     )
     design: Design = load_design("fin")
     with pytest.raises(InputError, match="position loop"):

@@ -10,12 +10,9 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.design.model import Design
-from analyses.friction_effects import FrictionEffects
-from analyses.friction_effects.cycles import LimitCycles
-from analyses.friction_effects.result import FrictionPoint
+from analyses.large_signal.at_rest import RestSweep
 from analyses.settling import Settling
 from analyses.validation import CHECKS, Validation, validate
-from analyses.validation.at_rest import RestSweep
 from analyses.validation.places import Bench
 from analyses.validation.row import judged
 from nonlinear import tangent
@@ -72,11 +69,10 @@ def hunting(step_rad: float, swing_rad: float, hertz: float) -> Settling:
 
 def test_a_hunting_drive_fails_by_name() -> None:
     swing = hunting(0.01, 2e-3, 0.13)
-    point = FrictionPoint(0.0, 0.1, None, None, LimitCycles((), None, (swing,)))
     rows = (judged("bandwidth", "position", 1.0, 1.0, 0.1, unit="Hz"),)
     quiet = Validation(design=EMPS, rows=rows, figures={})
     assert quiet.verdict == "met"
-    hunts = replace(quiet, friction=FrictionEffects(EMPS, (point,), ""))
+    hunts = replace(quiet, settlings=(swing,))
     assert hunts.verdict == "not met"
     assert "does not come to rest" in str(hunts)
 
@@ -86,9 +82,7 @@ def test_a_swing_that_nothing_shows_fails_nothing(part: float, hunts: bool) -> N
     """Seed 100035 hunts by 8e-14 rad of 4e-4 (plain integration says the same): a verdict of no use."""
     size = part * EMPS.validation.full_deflection_rad
     swing = hunting(size, size, 3.0)
-    point = FrictionPoint(0.0, 1e-3, None, None, LimitCycles((), None, (swing,)))
-    friction = FrictionEffects(EMPS, (point,), "velocity")
-    found = Validation(design=EMPS, rows=(), figures={}, friction=friction).hunting
+    found = Validation(design=EMPS, rows=(), figures={}, settlings=(swing,)).hunting
     assert (found is not None) is hunts
 
 

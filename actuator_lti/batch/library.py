@@ -1,0 +1,46 @@
+"""The compiled figures of many designs, by the library of this package's kernels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.batch._run import room
+from actuator_lti.compiled.kinds import Kind
+from actuator_lti.compiled.library import Entry, Library, source_files
+
+Floats = npt.NDArray[np.float64]
+
+_FOLDER = Path(__file__).parent
+_ROW: Kind = "row"
+_LOOPS: tuple[Kind, ...] = ("int", "int", *(_ROW,) * 5, "int", _ROW)
+LIBRARY = Library(
+    "figures",
+    _FOLDER,
+    (Entry("actuator_lti.batch._run", "many_loops", (*_LOOPS, *(_ROW,) * len(room(1)))),),
+    source_files(_FOLDER, wanted="_*.py"),
+)
+
+
+def many_loops(
+    A: Floats, B: Floats, C: Floats, poles: Floats, leads: Floats, time_figures: bool, out: Floats
+) -> None:
+    """Fill ``out[k]`` with the figures of every open loop A[k], B[k], C[k].
+
+    Parameters
+    ----------
+    A, B, C : ndarray, shapes (count, n, n), (count, n), (count, n)
+    poles : ndarray, shape (count, 4, n)
+        Real and imaginary parts of the open loop's, then of the closed loop's; where the first is NaN, the
+        row is left as it is.
+    leads : ndarray, shape (count,)
+        See `actuator_lti.batch._run.one_loop`.
+    time_figures : bool
+    out : ndarray, shape (count, columns)
+    """
+    count, n = B.shape
+    flat = [each.reshape(-1) for each in (A, B, C, poles, leads)]
+    lent = [np.zeros(length) for length in room(n)]
+    LIBRARY.functions.many_loops(count, n, *flat, int(time_figures), out.reshape(-1), *lent)

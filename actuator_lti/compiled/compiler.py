@@ -1,0 +1,143 @@
+"""A C compiler for emitted code: gcc or clang of the machine, or the one that comes with ziglang."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from actuator_lti.compiled.portable_executable import without_time
+from actuator_lti.errors import InputError
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-strict-aliasing")
+# values do not depend on these: nobody reads errno or the flags of exceptions
+LIBRARY_FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math")
+ZIG_TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu", "wasm": "wasm32-wasi"}
+
+
+@dataclass(frozen=True)
+class Target:
+    """A kind of machine that a library can be compiled for anywhere: names for zig and for a wheel."""
+
+    zig: str
+    wheel: str
+    suffix: str
+    flags: tuple[str, ...]
+
+
+TARGETS = {
+    "linux-x86_64": Target("x86_64-linux-gnu.2.17", "manylinux_2_17_x86_64", ".so", ("-shared", "-fPIC")),
+    "linux-aarch64": Target("aarch64-linux-gnu.2.17", "manylinux_2_17_aarch64", ".so", ("-shared", "-fPIC")),
+    "win32-AMD64": Target("x86_64-windows-gnu", "win_amd64", ".dll", ("-shared",)),
+    "darwin-x86_64": Target("x86_64-macos.11.0", "macosx_11_0_x86_64", ".dylib", ("-shared", "-fPIC")),
+    "darwin-arm64": Target("aarch64-macos.11.0", "macosx_11_0_arm64", ".dylib", ("-shared", "-fPIC")),
+}
+HERE = f"{sys.platform}-{platform.machine()}"
+
+
+def system_compiler() -> str | None:
+    """Path of the machine's C compiler: ``CC``, else gcc, clang, cc; None where there is none."""
+    wanted = os.environ.get("CC")
+    names = (wanted,) if wanted else ("gcc", "clang", "cc")
+    return next((result for name in names if name and (result := shutil.which(name))), None)
+
+
+def zig_command() -> list[str] | None:
+    """How to call the C compiler of ziglang; None where it is not installed."""
+    if importlib.util.find_spec("ziglang") is None:
+        return None
+    return [sys.executable, "-m", "ziglang", "cc"]
+
+
+def compiler_for(target: str) -> list[str]:
+    """Command and target flags of a compiler for ``linux64``, ``win64`` or ``wasm``.
+
+    ziglang's comes first, as its Linux binary runs with any glibc from 2.17 on; ``CC`` names another.
+
+    Raises
+    ------
+    InputError
+        Where this machine has none; says which package brings one.
+    """
+    compiler = system_compiler()
+    zig = zig_command()
+    native = target == "linux64" and HERE == "linux-x86_64"
+    if native and compiler and (zig is None or os.environ.get("CC")):
+        return [compiler]
+    if zig is None:
+        wanted = "gcc or clang, or " if target == "linux64" else ""
+        raise InputError(f"no C compiler for {target}; allowed: {wanted}pip install 'actuator-lti[export]'")
+    return [*zig, "-target", ZIG_TARGETS[target]]
+
+
+def compile_library(text: str, output: str, target: str, *, portable: bool = False) -> bytes:
+    """Compile one C file to a shared library for `HERE` or another of `TARGETS`.
+
+    Parameters
+    ----------
+    text : str
+    output : str
+        Its file name.
+    target : str
+    portable : bool
+        For every machine of the target, as in a wheel: by zig, with an old C library.
+
+    Raises
+    ------
+    InputError
+        Where there is no compiler, or it fails.
+    """
+    compiler, zig = system_compiler(), zig_command()
+    if target == HERE and compiler and not portable:
+        command = [compiler]
+    elif zig is None:
+        raise InputError(f"no C compiler for {target}; allowed: gcc, clang, or pip install ziglang")
+    else:
+        command = [*zig, *(["-target", TARGETS[target].zig] if target in TARGETS else [])]
+    own = TARGETS[target].flags if target in TARGETS else ("-shared", "-fPIC")
+    return compile_files({"kernels.c": text}, output, target, (*LIBRARY_FLAGS, *own), command=command)
+
+
+def compile_files(
+    texts: Mapping[str, str],
+    output: str,
+    target: str,
+    extra: Sequence[str] = (),
+    *,
+    command: Sequence[str] | None = None,
+) -> bytes:
+    """Compile C files given as text; returns the bytes of ``output``.
+
+    Raises
+    ------
+    InputError
+        Where there is no compiler, or it fails; with the first line that it says.
+    """
+    chosen = list(command or compiler_for(target))
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for file, text in texts.items():
+            (folder / file).write_text(text, encoding="utf-8")
+        sources = sorted(file for file in texts if file.endswith(".c"))
+        # relative names: the bytes do not depend on where the folder lies
+        call = [*chosen, *FLAGS, *extra, *sources, "-o", output, "-lm"]
+        try:
+            done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False, timeout=600)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise InputError(f"the C compiler cannot be run: {error}", where=chosen[0]) from error
+        if done.returncode != 0:
+            said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
+            raise InputError(f"the C compiler for {target} fails: {said}", where=chosen[0])
+        data = (folder / output).read_bytes()
+    return without_time(data) if output.endswith(".dll") else data
+
+
+if __name__ == "__main__":  # for the makefile
+    sys.stdout.write(" ".join(TARGETS))

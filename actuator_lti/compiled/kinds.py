@@ -1,0 +1,89 @@
+"""The kinds of values that the subset knows, and how C spells them."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+# bytes: a row of small whole numbers that knows its length
+Kind = Literal["float", "int", "bool", "row", "bytes"]
+
+C_TYPES: dict[Kind, str] = {"float": "double", "int": "int", "bool": "bool"}
+
+# names that C, its standard headers or its compilers take
+_KEYWORDS = """
+    auto bool break case char const continue default do double else enum extern false float for goto if inline
+    int long register restrict return short signed sizeof static struct switch true typedef union unsigned
+    void volatile while complex imaginary I NULL NAN INFINITY HUGE_VAL errno index gamma y0 y1 yn j0 j1 jn
+    near far
+"""
+FUNCTIONS = """
+    sqrt exp expm1 log log1p sin cos tan asin acos atan atanh asinh acosh atan2 sinh cosh tanh hypot copysign
+    ldexp fabs ceil floor abs isfinite isnan isinf
+"""
+RESERVED = frozenset((_KEYWORDS + FUNCTIONS).split())
+
+
+class EmitError(ValueError):
+    """A construct that the emitter does not know, with its file and line."""
+
+
+@dataclass
+class Function:
+    """One function of the program, analysed for one list of argument kinds.
+
+    Attributes
+    ----------
+    name : str
+    module : str
+    tree : ast.FunctionDef
+    scope : dict
+        The globals of its module.
+    arguments : dict of str to Kind
+    prefix : str
+        In front of its name in C.
+    returns : tuple of Kind or None
+        None where nothing is returned; one kind is a plain value.
+    variables : dict of str to Kind
+        Local variables in order of first assignment, loop indices apart.
+    written : set of str
+        Row arguments whose elements it, or a function it calls, assigns.
+    """
+
+    name: str
+    module: str
+    file: str
+    first_line: int
+    tree: ast.FunctionDef
+    scope: dict[str, Any]
+    arguments: dict[str, Kind]
+    prefix: str
+    returns: tuple[Kind, ...] | None = None
+    variables: dict[str, Kind] = field(default_factory=dict)
+    written: set[str] = field(default_factory=set)
+
+    @property
+    def c_name(self) -> str:
+        """Its name in C."""
+        return f"{self.prefix}{self.name}"
+
+    def error(self, node: ast.AST, text: str) -> EmitError:
+        """The error of one place in the source."""
+        line = self.first_line + getattr(node, "lineno", 1) - 1
+        return EmitError(f"{self.file}:{line}: {self.name}: {text}")
+
+
+def c_name(name: str) -> str:
+    """A variable's name in C."""
+    return f"{name}_" if name in RESERVED else name
+
+
+def c_float(value: float) -> str:
+    """A literal that reads back as the same double."""
+    if value != value:
+        return "NAN"
+    if value in (float("inf"), float("-inf")):
+        return "INFINITY" if value > 0 else "(-INFINITY)"
+    text = repr(value)
+    return text if any(c in text for c in ".e") else text + ".0"

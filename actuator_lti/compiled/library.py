@@ -1,0 +1,239 @@
+"""The compiled form of a package's kernels: a library of emitted C in the package, called with arrays.
+
+It is compiled at installation, or comes inside the wheel; its name holds a hash of the sources that it was
+made of, so that one of other sources is never loaded. Where it is missing and the sources lie in a checkout
+that may be written, the first call compiles it. A call leaves the GIL to other threads.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from actuator_lti.compiled.compiler import HERE, LIBRARY_FLAGS, TARGETS, compile_library
+from actuator_lti.compiled.form import Form
+from actuator_lti.compiled.kinds import Kind
+from actuator_lti.errors import InputError
+
+_BUILD = "python -m nonlinear.native"
+_OURS = Path(__file__).parent
+
+
+class _Bytes(ctypes.Structure):
+    _fields_ = (("at", ctypes.c_void_p), ("length", ctypes.c_int))
+
+
+_C_TYPES: dict[Kind | None, Any] = {
+    "row": ctypes.c_void_p, "bytes": _Bytes, "int": ctypes.c_int, "float": ctypes.c_double, None: None,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A kernel that is called from Python: where it is written, kinds of its arguments and of its result."""
+
+    module: str
+    name: str
+    arguments: tuple[Kind, ...]
+    returns: Kind | None = None
+
+    @property
+    def function(self) -> Callable[..., Any]:
+        """As it is written."""
+        function: Callable[..., Any] = getattr(import_module(self.module), self.name)
+        return function
+
+
+class Compiled:
+    """A function of an opened library; takes arrays of float64 for rows, of uint16 for bytes."""
+
+    def __init__(self, opened: ctypes.CDLL, entry: Entry) -> None:
+        self._function = getattr(opened, f"drive_{entry.name}")
+        self._function.argtypes = [_C_TYPES[kind] for kind in entry.arguments]
+        self._function.restype = _C_TYPES[entry.returns]
+        self._passing = [_PASSED[kind] for kind in entry.arguments]
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it."""
+        return self._function(*[way(each) for way, each in zip(self._passing, arguments, strict=True)])
+
+    def bound(self, *arguments: Any) -> Callable[[], Any]:
+        """The call with these arguments, to be made many times; the caller keeps the arrays."""
+        passed = [way(each) for way, each in zip(self._passing, arguments, strict=True)]
+        return lambda: self._function(*passed)
+
+
+class Written:
+    """The same function as it is written, run by Python."""
+
+    def __init__(self, entry: Entry) -> None:
+        self._function = entry.function
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it."""
+        return self._function(*arguments)
+
+    def bound(self, *arguments: Any) -> Callable[[], Any]:
+        """The call with these arguments."""
+        return lambda: self._function(*arguments)
+
+
+def _row(array: Any) -> int:
+    assert array.flags.c_contiguous
+    place: int = array.ctypes.data
+    return place
+
+
+def _bytes(array: Any) -> _Bytes:
+    return _Bytes(array.ctypes.data, array.size)
+
+
+def _itself(number: Any) -> Any:
+    return number
+
+
+_PASSED: dict[Kind, Callable[[Any], Any]] = {
+    "row": _row, "bytes": _bytes, "int": _itself, "float": _itself,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Library:
+    """A library of kernels.
+
+    Attributes
+    ----------
+    name : str
+        Stem of its file.
+    folder : Path
+        Of the package; the file lies in ``_native`` there.
+    entries : tuple of Entry
+        What Python calls.
+    sources : tuple of Path
+        Modules that its C is emitted from, beside the emitter's.
+    forms : callable
+        Second forms of its functions, see `emit_c`.
+    """
+
+    name: str
+    folder: Path
+    entries: tuple[Entry, ...]
+    sources: tuple[Path, ...]
+    forms: Callable[[], tuple[Form, ...]] = tuple
+    _others: list[Any] = field(default_factory=list)
+
+    def path(self, target: str = HERE) -> Path:
+        """Where the library of today's sources lies, or would lie, on a kind of machine."""
+        suffix = TARGETS[target].suffix if target in TARGETS else ".so"
+        return self.folder / "_native" / f"{self.name}-{self._digest}-{target}{suffix}"
+
+    @cached_property
+    def _digest(self) -> str:
+        digest = hashlib.sha256(" ".join((*LIBRARY_FLAGS, repr(self.entries))).encode())
+        for path in (*self.sources, *sorted(_OURS.glob("*.py"))):
+            digest.update(path.read_bytes())
+        return digest.hexdigest()[:16]
+
+    def text(self) -> str:
+        """Its C."""
+        from actuator_lti.compiled.program import emit_c
+
+        entries = {entry.function: entry.arguments for entry in self.entries}
+        return emit_c(entries, forms=self.forms()).source
+
+    def build(self) -> Path:
+        """Emit, compile and keep the library, if it is not there; older ones of this kind of machine go.
+
+        Raises
+        ------
+        InputError
+            Without a C compiler, or where the folder cannot be written.
+        """
+        path = self.path()
+        if not path.is_file():
+            self.write(self.folder)
+        for old in path.parent.glob(f"{self.name}-*-{HERE}.*"):
+            if old != path:
+                old.unlink(missing_ok=True)
+        return path
+
+    def write(self, package: Path, target: str = "") -> None:
+        """Compile the library into a package, for this machine or for every one of `TARGETS[target]`.
+
+        Raises
+        ------
+        InputError
+            As `build`.
+        """
+        from actuator_lti.atomic import write_bytes
+
+        name = self.path(target or HERE).name
+        data = compile_library(self.text(), name, target or HERE, portable=bool(target))
+        write_bytes(package / "_native" / name, data)
+
+    @property
+    def functions(self) -> Any:
+        """The entries by name, to be called.
+
+        Raises
+        ------
+        InputError
+            Where the library is missing and cannot be compiled here, or does not load.
+        """
+        return self._others[-1] if self._others else self._opened
+
+    @cached_property
+    def _opened(self) -> Any:
+        path = self.path()
+        if not path.is_file():
+            self._compile_in_checkout(path)
+        try:
+            return self.loaded(path)
+        except OSError as error:
+            raise InputError(f"{path.name}: does not load ({error}); allowed: {_BUILD}") from None
+
+    def _compile_in_checkout(self, path: Path) -> None:
+        if not os.access(self.folder, os.W_OK):
+            raise InputError(f"{path.name}: no compiled kernels of these sources; allowed: {_BUILD} first")
+        self.build()
+
+    def loaded(self, path: Path) -> Any:
+        """The entries of a library file of this text."""
+        opened = ctypes.CDLL(str(path))
+        return SimpleNamespace(**{entry.name: Compiled(opened, entry) for entry in self.entries})
+
+    @contextmanager
+    def borrowed(self, path: Path) -> Iterator[None]:
+        """Let every call of this process go through another library file of this text."""
+        with self._instead(self.loaded(path)):
+            yield
+
+    @contextmanager
+    def written(self) -> Iterator[None]:
+        """Let Python run the kernels as they are written, for a debugger or as the reference."""
+        with self._instead(SimpleNamespace(**{entry.name: Written(entry) for entry in self.entries})):
+            yield
+
+    @contextmanager
+    def _instead(self, functions: Any) -> Iterator[None]:
+        self._others.append(functions)
+        try:
+            yield
+        finally:
+            self._others.pop()
+
+
+def source_files(*places: Path, wanted: str = "*.py") -> tuple[Path, ...]:
+    """Files, and of folders the Python files, in order."""
+    return tuple(
+        path for place in places for path in (sorted(place.glob(wanted)) if place.is_dir() else [place])
+    )

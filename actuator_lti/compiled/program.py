@@ -1,0 +1,234 @@
+"""A whole program: the entry functions and all that they call, callees first."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from actuator_lti.compiled.expressions import Constant
+from actuator_lti.compiled.form import Form
+from actuator_lti.compiled.kernel import is_seldom
+from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name
+from actuator_lti.compiled.statements import INDENT, Statements, result_type
+
+_INCLUDES = "#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n"
+_BYTES = "typedef struct { unsigned short *at; int length; } @bytes;"
+_MINMAX = {
+    "min": "static inline double @min(double a, double b) { return (b < a) ? b : a; }",
+    "max": "static inline double @max(double a, double b) { return (b > a) ? b : a; }",
+    "min_int": "static inline int @min_int(int a, int b) { return (b < a) ? b : a; }",
+    "max_int": "static inline int @max_int(int a, int b) { return (b > a) ? b : a; }",
+}
+
+__all__ = ["EmitError", "Program", "emit_c"]
+
+
+@dataclass(frozen=True)
+class Program:
+    """C text of functions and what they need.
+
+    Attributes
+    ----------
+    constants : mapping of str to int or float
+        Named constants used, in the order of first use.
+    types : str
+        Structures of functions with several results.
+    functions : str
+        Definitions, callees first; entries have external linkage, all others are static.
+    declarations : mapping of str to str
+        Prototype of each entry function.
+    prefix : str
+        In front of every function and type name.
+    """
+
+    constants: Mapping[str, Constant]
+    types: str
+    functions: str
+    declarations: Mapping[str, str]
+    prefix: str
+
+    @property
+    def helpers(self) -> list[str]:
+        """Minimum and maximum as Python has them, those that are called."""
+        known = {name: text.replace("@", self.prefix) for name, text in _MINMAX.items()}
+        return [text for name, text in known.items() if f"{self.prefix}{name}(" in self.functions]
+
+    @property
+    def source(self) -> str:
+        """All of it as one file."""
+        parts = [_INCLUDES, _BYTES.replace("@", self.prefix), self.constants_text(), *self.helpers]
+        return "\n".join([*parts, self.types, *self.declarations.values(), self.functions])
+
+    def constants_text(self, notes: Mapping[str, str] | None = None) -> str:
+        """The constants as C, whole numbers as one enum; ``notes`` says what each is."""
+        notes = notes or {}
+        whole = [(name, value) for name, value in self.constants.items() if isinstance(value, int)]
+        lines = ["enum {"]
+        for name, number in sorted(whole, key=lambda item: (item[1], item[0])):
+            note = f" /* {_plain(notes[name])} */" if notes.get(name) else ""
+            lines.append(f"{INDENT}{name} = {number},{note}")
+        lines.append("};")
+        for name, value in self.constants.items():
+            if isinstance(value, float):
+                lines.append(f"static const double {name} = {c_float(value)};")
+            elif isinstance(value, tuple):
+                whole_numbers = type(value[0]) is int
+                texts = ", ".join(str(item) if whole_numbers else c_float(item) for item in value)
+                kind = "int" if whole_numbers else "double"
+                lines.append(f"static const {kind} {name}[{len(value)}] = {{{texts}}};")
+        return "\n".join(lines)
+
+
+def emit_c(
+    entries: Mapping[Any, Sequence[Kind]], prefix: str = "drive_", forms: Sequence[Form] = ()
+) -> Program:
+    """C99 for compiled functions and everything that they call.
+
+    Parameters
+    ----------
+    entries : mapping of compiled function to sequence of {"float", "int", "bool", "row"}
+        The functions to be called from outside, with the kinds of their arguments.
+    prefix : str
+        In front of every function and type name.
+    forms : sequence of Form
+        Second forms of functions that these call; the function itself chooses by its row, at every call.
+
+    Raises
+    ------
+    EmitError
+        At the first construct outside the subset, with its file and line.
+    """
+    collector = _Collector(prefix)
+    names = [collector.call(python, list(kinds), None, None).name for python, kinds in entries.items()]
+    texts, types, declarations = [], [], {}
+    second = [_Formed(collector, form) for form in forms]
+    done = [*collector.done.values(), *(each for formed in second for each in formed.done.values())]
+    for function, lines in done:
+        head = collector.head(function)
+        public = function.prefix == prefix and function.name in names
+        if public:
+            declarations[function.name] = f"{head};"
+        if function.returns is not None and len(function.returns) > 1:
+            types.append(_structure(function))
+        inner = function.prefix != prefix and all(function is not formed.root for formed in second)
+        linkage = "" if public else _INLINED if inner else "static "
+        texts.append(_definition(function, linkage + head, lines))
+    texts = [f"static {collector.head(formed.root)};" for formed in second] + texts
+    return Program(collector.constants, "\n".join(types), "\n".join(texts), declarations, prefix)
+
+
+class _Collector:
+    def __init__(self, prefix: str, helpers: str = "", form: Form | None = None) -> None:
+        self.prefix, self.helpers, self.form = prefix, helpers or prefix, form
+        self.constants: dict[str, Constant] = {}
+        self.done: dict[str, tuple[Function, list[str]]] = {}
+        self.open: list[str] = []
+
+    def call(self, python: Any, kinds: list[Kind], node: ast.AST | None, caller: Function | None) -> Function:
+        """A function analysed for these kinds of arguments."""
+        name = python.__name__
+        if name in self.done:
+            known = self.done[name][0]
+            if known.module != python.__module__:
+                raise EmitError(f"two functions are called {name}: in {known.module} and {python.__module__}")
+            if list(known.arguments.values()) != kinds:
+                expected = ", ".join(known.arguments.values())
+                text = f"{name} is called with ({', '.join(kinds)}), elsewhere with ({expected})"
+                raise caller.error(node, text) if caller is not None and node is not None else EmitError(text)
+            return known
+        if name in self.open:
+            raise EmitError(f"{name} calls itself: recursion is not in the subset")
+        function = _parsed(python, kinds, self.prefix)
+        self.open.append(name)
+        lines = Statements(function, self.call, self.constants, self.helpers, self.form).body()
+        self.open.pop()
+        self.done[name] = (function, lines)
+        return function
+
+    def head(self, function: Function) -> str:
+        """The C prototype without its semicolon."""
+        parts = []
+        for name, kind in function.arguments.items():
+            if kind == "row":
+                const = "" if name in function.written else "const "
+                parts.append(f"{const}double *{c_name(name)}")
+            elif kind == "bytes":
+                parts.append(f"{self.prefix}bytes {c_name(name)}")
+            else:
+                parts.append(f"{C_TYPES[kind]} {c_name(name)}")
+        return f"{_returned(function)} {function.c_name}({', '.join(parts) or 'void'})"
+
+
+def _returned(function: Function) -> str:
+    if function.returns is None:
+        return "void"
+    return C_TYPES[function.returns[0]] if len(function.returns) == 1 else result_type(function)
+
+
+_INLINED = "static inline __attribute__((always_inline)) "
+
+
+class _Formed(_Collector):
+    """The functions of a form; those marked `seldom` are those of the program."""
+
+    def __init__(self, program: _Collector, form: Form) -> None:
+        super().__init__(f"{program.prefix}{form.name}_", program.helpers, form)
+        self.program, self.constants = program, program.constants
+        self.chooser, lines = program.done[form.of]
+        self.root = self.call(self.chooser.scope[form.of], list(self.chooser.arguments.values()), None, None)
+        given = ", ".join(map(c_name, self.root.arguments))
+        chosen = f"return {self.root.c_name}({given});"
+        lines[:0] = [f"{INDENT}if ({form.test()}) {{", f"{INDENT * 2}{chosen}", f"{INDENT}}}"]
+
+    def call(self, python: Any, kinds: list[Kind], node: ast.AST | None, caller: Function | None) -> Function:
+        """A function of the form, or one of the program."""
+        return (self.program.call if is_seldom(python) else super().call)(python, kinds, node, caller)
+
+
+def _parsed(python: Any, kinds: list[Kind], prefix: str) -> Function:
+    lines, first = inspect.getsourcelines(python)
+    tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
+    assert isinstance(tree, ast.FunctionDef)
+    names = [argument.arg for argument in tree.args.args]
+    file = Path(inspect.getsourcefile(python) or "?").name
+    arguments = dict(zip(names, kinds, strict=False))
+    scope = python.__globals__
+    function = Function(python.__name__, python.__module__, file, first, tree, scope, arguments, prefix)
+    if len(names) != len(kinds) or tree.args.defaults or tree.args.vararg or tree.args.kwonlyargs:
+        raise function.error(tree, f"takes ({', '.join(names)}); defaults and stars are not in the subset")
+    return function
+
+
+def _structure(function: Function) -> str:
+    fields = " ".join(f"{C_TYPES[kind]} r{n};" for n, kind in enumerate(function.returns or ()))
+    return f"typedef struct {{ {fields} }} {result_type(function)};"
+
+
+_ZERO: dict[Kind, str] = {"float": "0.0", "int": "0", "bool": "false"}
+
+
+def _definition(function: Function, head: str, lines: list[str]) -> str:
+    about = _plain(ast.get_docstring(function.tree) or "")
+    described = [f" * {line}".rstrip() for line in about.splitlines()]
+    comment = ["/*", *described, f" * ({function.file}, line {function.first_line})", " */"]
+    declared = [
+        f"{INDENT}{C_TYPES[kind]} {c_name(name)} = {_ZERO[kind]};"
+        for name, kind in function.variables.items()
+    ]
+    text = "\n".join(lines)
+    unused = [
+        f"{INDENT}(void){c_name(name)};"
+        for name in function.arguments
+        if not re.search(rf"\b{c_name(name)}\b", text)
+    ]
+    return "\n".join([*comment, head, "{", *declared, *unused, *lines, "}", ""])
+
+
+def _plain(text: str) -> str:
+    return text.replace("*/", "* /").replace("`", "")

@@ -1,0 +1,134 @@
+"""All mistakes of a design file at once, each with the line of its key."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from actuator_lti.errors import InputError, Mistakes
+from actuator_lti.reading import shown
+from actuator_lti.tree import Tree
+
+MOST = 30  # told at once
+_KEY = r"(?:[\w-]+|\"[^\"]*\"|'[^']*')"
+_HEADER = re.compile(rf"\s*(\[\[?)\s*({_KEY}(?:\s*\.\s*{_KEY})*)\s*\]")
+_ENTRY = re.compile(rf"\s*({_KEY}(?:\s*\.\s*{_KEY})*)\s*=")
+_PARTS = re.compile(_KEY)
+
+Refusal = tuple[str, object, str]
+"""Key, value as it is to be shown ("" for none), and what is allowed."""
+
+
+def refusal_text(refusal: Refusal) -> str:
+    """``key = value: what is allowed``."""
+    path, given, reason = refusal
+    value = f"{given}"
+    return f"{shown(path, 200)[1:-1]}{f' = {value}' if value else ''}: {reason}"
+
+
+class Findings:
+    """What is wrong in one file; ``lines`` gives the line of a dotted key, where there is a text."""
+
+    def __init__(self, where: str, lines: Mapping[str, int] | None = None) -> None:
+        self.where = where
+        self.lines = lines or {}
+        self.found: list[tuple[int, InputError]] = []
+
+    def note(self, path: str, given: object, reason: str) -> None:
+        """Keep a mistake."""
+        line = self._line(path)
+        at = f"line {line}: " if line else ""
+        text = f"{at}{refusal_text((path, given, reason))}"
+        self.found.append((line, InputError(text, where=self.where)))
+
+    def extend(self, refusals: Iterable[Refusal]) -> None:
+        """Keep many."""
+        for refusal in refusals:
+            self.note(*refusal)
+
+    def refuse(self) -> None:
+        """Refuse the file if anything was found.
+
+        Raises
+        ------
+        InputError
+            The only mistake, or all of them (`actuator_lti.errors.Mistakes`), in the order of the file.
+        """
+        errors = [error for _, error in sorted(self.found, key=lambda item: item[0])]
+        if len(errors) > MOST:
+            errors[MOST:] = [InputError(f"and {len(errors) - MOST} more mistakes", where=self.where)]
+        if errors:
+            raise errors[0] if len(errors) == 1 else Mistakes(errors)
+
+    def _line(self, path: str) -> int:
+        while path and path not in self.lines:
+            path = path.rpartition("[" if path.endswith("]") else ".")[0]
+        return self.lines.get(path, 0)
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """`` (nearest known: "x")``, or nothing where none is near."""
+    near = get_close_matches(word, list(known), 1, 0.5)
+    return f' (nearest known: "{near[0]}")' if near else ""
+
+
+def lines_of(text: str, tree: Tree) -> dict[str, int]:
+    """The line of each table and key of a TOML text, by its dotted path.
+
+    A repeated table stands by its name or id, by its number and as ``gear[1]``.
+
+    Examples
+    --------
+    >>> text = '[[gear]]\\nname = "worm"\\nratio = 3'
+    >>> lines_of(text, {"gear": [{"name": "worm", "ratio": 3}]})["gear.worm.ratio"]
+    3
+    """
+    lines: dict[str, int] = {}
+    counts: dict[str, int] = {}
+    tables: tuple[str, ...] = ("",)
+    for number, line in _outside_texts(text):
+        if header := _HEADER.match(line):
+            names = [_plain(name) for name in _PARTS.findall(header[2])]
+            counts["\0".join(names)] = counts.get("\0".join(names), 0) + (header[1] == "[[")
+            tables = _paths(names, tree, counts)
+            for path in tables:
+                lines[path] = number
+            lines.setdefault(".".join(names), number)
+        elif entry := _ENTRY.match(line):
+            names = [_plain(name) for name in _PARTS.findall(entry[1])]
+            for table in tables:
+                for depth in range(1, len(names) + 1):
+                    lines.setdefault(".".join(filter(None, (table, *names[:depth]))), number)
+    return lines
+
+
+def _plain(name: str) -> str:
+    return name[1:-1] if name[0] in "\"'" else name
+
+
+def _outside_texts(text: str) -> Iterator[tuple[int, str]]:
+    """Numbered lines that do not begin inside a text of several lines."""
+    inside = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        if not inside:
+            yield number, line
+        for mark in re.findall(r'"""|' + "'''", line):
+            inside = "" if inside == mark else inside or mark
+
+
+def _paths(names: list[str], tree: Any, counts: Mapping[str, int]) -> tuple[str, ...]:
+    """The spellings of a table's path, with the label of each repeated table on the way."""
+    spelled: tuple[str, ...] = ("",)
+    for depth, name in enumerate(names, 1):
+        tree = tree.get(name) if isinstance(tree, dict) else None
+        labels = [f".{name}"]
+        if isinstance(tree, list):
+            count = counts.get("\0".join(names[:depth]), 0)
+            tree = tree[count - 1] if 0 < count <= len(tree) else None
+            known = [tree.get(key) for key in ("name", "id", "requirement")] if isinstance(tree, dict) else []
+            texts = [label for label in known if isinstance(label, str)]
+            labels = [f".{name}.{label}" for label in (*texts[:1], count)] + [f".{name}[{count}]"]
+        spelled = tuple(f"{begin}{label}" for begin in spelled for label in labels)
+    return tuple(path[1:] for path in spelled)

@@ -1,0 +1,66 @@
+"""How data sheets write numbers and units: each spelling becomes a number and a product of names."""
+
+from __future__ import annotations
+
+import re
+from math import isfinite, nan
+
+from actuator_lti.reading import shown
+
+_NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
+_THOUSANDS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9])")
+_COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
+_SIGNS = str.maketrans({"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"'}) | {
+    ord(raised): f"^{digit}" for raised, digit in zip("²³", "23", strict=True)
+}
+# How data sheets write what is not a product of names: each becomes one, in this order.
+_SPELLINGS = (
+    (re.compile(r"\*\*"), "^"),
+    (re.compile(r"°C"), " degC"),
+    (re.compile(r"°"), " deg"),
+    (re.compile(r"%"), " percent"),
+    (re.compile(r"''|\""), " arcsec"),
+    (re.compile(r"'"), " arcmin"),
+    (re.compile(r"(?<=[AV]) ?_?(?:DC|dc)\b"), ""),  # of the motor that the model has: direct
+    (re.compile(r"(?<=[A-Za-z])\^?-([123])\b"), r"^-\1"),  # min-1
+    (re.compile(r"(?<=[A-Za-z])([23])(?![0-9])"), r"^\1"),  # cm2
+    (re.compile(r"(?<=[A-Za-z23])-(?=[A-Za-z])"), "*"),  # oz-in
+    (re.compile(r"\b(?:r|U|tr|rev)/min\b"), "rpm"),
+    (re.compile(r"/ *\(? *1000 *(rpm|1/min|min\^-1)\b *\)?"), r"/(1000*(\1))"),
+    (re.compile(r"\b(k?g)(c?m\^2)"), r"\1*\2"),  # gcm2
+)
+_POWER_OF_TEN = re.compile(r"(?<=[0-9.])\s*[x×·*]\s*10\s*\^?\s*([+-]?[0-9]{1,3})\b")
+_RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+_OVER = re.compile(r"\s*([0-9]+\.?[0-9]*)\s*([/:])\s*([0-9]+\.?[0-9]*)\s*\Z")
+LONGEST = 120  # characters of a quantity
+
+
+def tidy(unit: str) -> str:
+    """A unit as a product of names, powers and signs."""
+    text = unit.strip().translate(_SIGNS)
+    for spelling, product in _SPELLINGS:
+        text = spelling.sub(product, text)
+    return text.rstrip()
+
+
+def split_quantity(text: str) -> tuple[float, str]:
+    """Number and unit of a written quantity; ``43:1`` and ``343/8`` are numbers without one."""
+    if over := _OVER.match(text) if len(text) <= LONGEST else None:
+        above, below = float(over[1]), float(over[3])
+        if over[2] == ":" and above < below:
+            raise ValueError(f'a reduction is written "{over[3]}:{over[1]}"')
+        return above / below if below else nan, ""
+    text = _POWER_OF_TEN.sub(r"e\1", text.translate(_RAISED) if "10" in text else text)
+    match = _NUMBER.match(text) if len(text) <= LONGEST else None
+    if match is None:
+        raise ValueError("a number and a unit are wanted")
+    if _THOUSANDS.match(text):
+        raise ValueError(
+            f"a comma; write {shown(text.replace(',', '', 1))} or {shown(text.replace(',', '.', 1))}"
+        )
+    if _COMMA.match(text):
+        raise ValueError(f"a decimal comma; use a decimal point: {shown(text.replace(',', '.', 1))}")
+    number = float(match.group(1))
+    if not isfinite(number):
+        raise ValueError("must be finite")
+    return number, match.group(2).strip()

@@ -1,0 +1,134 @@
+"""The plant by itself, its inputs and outputs named: what a controller made elsewhere is designed for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+
+from actuator_lti.design.loader import as_design
+from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.wiring import COMMANDS, Drive, wire
+from actuator_lti.errors import InputError
+from actuator_lti.loops.flow import ALL, SOURCES, FlowProgram
+from actuator_lti.loops.result import Form
+from actuator_lti.loops.tick import TickProgram
+from actuator_lti.plain_delays import PlainDelaySystem
+
+if TYPE_CHECKING:
+    import control
+
+    from actuator_lti.delay_system import DelaySystem
+    from actuator_lti.design.model import Design
+    from actuator_lti.drive.operating import OperatingPoint, RotorState
+
+PlantInput = Literal["u", "i_ref"]
+OUTPUTS = {"current": "i", "speed": "w", "angle": "th", "output_angle": "output_angle", "twist": "twist"}
+
+
+def plant(
+    design: Design | str | PathLike[str],
+    form: Form = "sampled",
+    rotor: RotorState = "free",
+    command: PlantInput = "u",
+    operating_point: OperatingPoint = "sliding",
+    load_Nm: float = 0.0,
+) -> control.StateSpace | DelaySystem:
+    """The drive without its velocity and position controller, as a python-control system.
+
+    Parameters
+    ----------
+    design : Design, str or path
+        A design, a shipped name, or the path of a design file.
+    form : {"sampled", "continuous", "ideal"}
+        ``sampled``: exact, at the base period Ts, behind the hold and the computing delay d. ``continuous``:
+        the command late by exactly d + Ts/2 (a `DelaySystem`). ``ideal``: without delay.
+    rotor : {"free", "locked"}
+        Locked: only the electrical part.
+    command : {"u", "i_ref"}
+        The first input: the voltage in V (of an ideal source its drive signal), or the current command in A
+        of the design's own current loop.
+    operating_point : str
+        Slope of the friction and contact of the coupling, see `actuator_lti.drive.operating.Operating`.
+    load_Nm : float
+        Load torque at the output shaft in N m: more dry friction.
+
+    Returns
+    -------
+    control.StateSpace or DelaySystem
+        Inputs: ``command``, and ``load_torque`` in N m, which pushes the output shaft forward (held over the
+        tick; without effect where the load path locks itself). Outputs, those that the drive has:
+        ``current`` in A, ``speed`` and ``angle`` of the motor in rad/s and rad, ``output_angle`` in rad,
+        ``twist`` of the coupling in rad at its own shaft (linear axis: m for rad, N for N m).
+
+    Raises
+    ------
+    InputError
+        For an unknown form or input, or a design that has no current loop.
+
+    Examples
+    --------
+    >>> system = plant("joint")
+    >>> system.input_labels, system.output_labels
+    (['u', 'load_torque'], ['current', 'speed', 'angle', 'output_angle', 'twist'])
+    """
+    design = as_design(design)
+    for name, value, known in (("form", form, Form), ("command", command, PlantInput)):
+        if value not in get_args(known):
+            raise InputError(f"{name} = {value!r}: one of {', '.join(get_args(known))}")
+    control = replace(design.controller, position=None, velocity=None)
+    if command == "u":
+        control = replace(control, current=None)
+    elif control.current is None:
+        raise InputError(f"command = 'i_ref': the design {design.name} has no current loop")
+    at = Operating(point=operating_point, load_Nm=load_Nm, rotor=rotor)
+    wired = wire(replace(design, controller=control), at)
+    assert COMMANDS[wired.outermost] == command
+    return _sampled(wired, command) if form == "sampled" else _continuous(wired, command, form)
+
+
+def _names(signals: dict[str, Any], command: str) -> tuple[list[str], dict[str, Any]]:
+    """The signals behind the outputs that there are, and the names for python-control."""
+    present = {label: signal for label, signal in OUTPUTS.items() if signal in signals}
+    return list(present.values()), {
+        "inputs": [command, "load_torque"], "outputs": list(present), "name": "plant",
+    }  # fmt: skip
+
+
+def _sampled(wired: Drive, command: str) -> control.StateSpace:
+    import control
+
+    program = TickProgram(wired, wired.outermost)
+    tick, n = program.tick(0), len(program.states)
+    columns = [program.inputs.index(name) for name in ("ref", "moment")]
+    signals, names = _names(tick.signals, command)
+    rows = np.array([tick.signals[signal] for signal in signals])
+    parts = (tick.A, tick.B[:, columns], rows[:, :n], rows[:, n:][:, columns], wired.tick_s)
+    states = [state.replace(".", "_") for state in program.states]
+    return control.ss(*parts, remove_useless_states=False, states=states, **names)
+
+
+def _continuous(wired: Drive, command: str, form: Form) -> control.StateSpace | DelaySystem:
+    flow = FlowProgram(wired, wired.outermost, None, (), ALL if form == "continuous" else frozenset()).flow()
+    n, k = len(flow.states), len(flow.delays_s)
+    u = [n + k + SOURCES.index(name) for name in ("ref", "moment")]
+    signals, names = _names(flow.signals, command)
+    rows = np.array([flow.signals[signal] for signal in signals])
+    x, z = slice(0, n), slice(n, n + k)
+    states = tuple(state.replace(".", "_") for state in flow.states)
+    if form == "ideal":
+        import control
+
+        parts = (flow.rates[:, x], flow.rates[:, u], rows[:, x], rows[:, u])
+        return control.ss(*parts, remove_useless_states=False, states=list(states), **names)
+    from actuator_lti.delay_system import DelaySystem
+
+    plain = PlainDelaySystem(
+        A=flow.rates[:, x], B1=flow.rates[:, u], B2=flow.rates[:, z],
+        C1=rows[:, x], D11=rows[:, u], D12=rows[:, z],
+        C2=flow.delayed[:, x], D21=flow.delayed[:, u], D22=flow.delayed[:, z],
+        delays_s=flow.delays_s, states=states,
+    )  # fmt: skip
+    return DelaySystem.of(plain, **names)

@@ -1,0 +1,128 @@
+"""What any identification gives: values by name with their covariance, and what was fixed, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+COVERAGE = 1.959963984540054
+"""Standard errors of a normal value in half of its 95 % interval."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fixed:
+    """A value (SI) that was not found, and why.
+
+    ``moves``: by how much each value that was found is too large where this one is too small by one.
+    """
+
+    value: float
+    reason: str
+    moves: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Found:
+    """One value in SI with its standard error and 95 % interval, None where it was fixed."""
+
+    value: float
+    standard_error: float | None = None
+    interval_95: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit:
+    """Values in SI by name, shape (p,), their covariance, shape (p, p), and those that were fixed.
+
+    The names are those of `analyses.estimation.parameters`, which knows label, unit and key of each, or keys
+    of a design.
+    """
+
+    names: tuple[str, ...]
+    values: FloatArray
+    covariance: FloatArray
+    fixed: Mapping[str, Fixed] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.values[self.names.index(name)]) if name in self.names else self.fixed[name].value
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.names or name in self.fixed
+
+    def get(self, name: str, default: float) -> float:
+        """A value, or another where it is not among them."""
+        if name not in self:
+            return default
+        return self[name]
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Standard errors, shape (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def std(self, name: str) -> float:
+        """Standard error of one value; 0 where it was fixed."""
+        return float(self.standard_errors[self.names.index(name)]) if name in self.names else 0.0
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """95 % interval of one value."""
+        half = COVERAGE * self.std(name)
+        return self[name] - half, self[name] + half
+
+    @property
+    def parameters(self) -> dict[str, Found]:
+        """Every value by name, those that were fixed last."""
+        fixed = {name: Found(one.value) for name, one in self.fixed.items()}
+        found = {n: Found(self[n], self.std(n), self.interval(n)) for n in self.names if n not in fixed}
+        return found | fixed
+
+    @property
+    def correlation(self) -> FloatArray:
+        """Correlation matrix; 0 beside a value without an error."""
+        std = np.where(self.standard_errors > 0.0, self.standard_errors, 1.0)
+        return np.asarray(self.covariance / np.outer(std, std))
+
+    def mapped(
+        self, slopes: Mapping[str, Mapping[str, float]], values: Mapping[str, float] | None = None
+    ) -> Fit:
+        """The fit of other values: each by its slopes over those of this one, first order.
+
+        A value that is not given is the sum of slopes times values.
+
+        Examples
+        --------
+        >>> one = Fit(names=("a", "b"), values=np.array([1.0, 2.0]), covariance=np.diag([0.01, 0.04]))
+        >>> both = one.mapped({"sum": {"a": 1.0, "b": 1.0}, "shifted": {"a": 10.0}}, {"shifted": 7.0})
+        >>> both.values.tolist(), both.covariance.round(6).tolist()
+        ([3.0, 7.0], [[0.05, 0.1], [0.1, 1.0]])
+        """
+        table = np.array([[own.get(name, 0.0) for name in self.names] for own in slopes.values()])
+        table = table.reshape(len(slopes), len(self.names))
+        own = dict(zip(slopes, (table @ self.values).tolist(), strict=True)) | dict(values or {})
+        return Fit(
+            names=tuple(slopes),
+            values=np.array([own[name] for name in slopes]),
+            covariance=table @ self.covariance @ table.T,
+        )
+
+    def renamed(self, names: Mapping[str, str]) -> Fit:
+        """The values that have a new name, under it, and their covariance."""
+        rows = [k for k, name in enumerate(self.names) if name in names]
+        return Fit(
+            names=tuple(names[self.names[k]] for k in rows),
+            values=self.values[rows],
+            covariance=self.covariance[np.ix_(rows, rows)],
+        )
+
+    def beside(self, name: str, value: float, std: float) -> Fit:
+        """The fit and one more value, found on its own."""
+        count = len(self.names)
+        wide = np.zeros((count + 1, count + 1))
+        wide[:count, :count], wide[count, count] = self.covariance, std**2
+        values = np.append(self.values, value)
+        return Fit(names=(*self.names, name), values=values, covariance=wide, fixed=self.fixed)

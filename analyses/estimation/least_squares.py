@@ -1,0 +1,194 @@
+"""Least squares of one or several records: what they tell, what they do not, and how sure it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from actuator_lti.errors import InputError
+from analyses.estimation.fit import Fit
+from analyses.estimation.means import correlation_time
+
+FloatArray = NDArray[np.float64]
+
+LEAST_OWN_SHARE = 0.03
+"""A column of which less than this is its own, beside those before it, is not told apart from them."""
+BLOCK_TIMES = 5.0
+MIN_BLOCKS = 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class NotTold:
+    """A parameter that the rows do not tell, and which others it cannot be told from.
+
+    ``moves``: its column is about the sum of these factors times those of the others.
+    """
+
+    name: str
+    like: tuple[str, ...]
+    moves: Mapping[str, float] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return f"cannot be told from {' and '.join(self.like)}" if self.like else "is not excited at all"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """Values and covariances: ``white`` as if the residuals were white, ``correlated`` as they are."""
+
+    values: FloatArray
+    white: FloatArray
+    correlated: FloatArray
+    residual: FloatArray
+    condition: float
+
+
+def told_apart(w: FloatArray, names: Sequence[str]) -> tuple[tuple[int, ...], tuple[NotTold, ...]]:
+    """Which columns can be told apart, the first named having the right of way.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> w = np.column_stack([np.arange(4.0), np.ones(4), np.ones(4), np.zeros(4)])
+    >>> kept, left = told_apart(w, ("viscous", "dry", "offset", "load"))
+    >>> kept, [f"{one.name} {one}" for one in left]
+    ((0, 1), ['offset cannot be told from dry', 'load is not excited at all'])
+    """
+    kept: list[int] = []
+    basis: list[FloatArray] = []
+    left = []
+    for k, name in enumerate(names):
+        size = float(np.linalg.norm(w[:, k]))
+        if size == 0.0:
+            left.append(NotTold(name=name, like=()))
+            continue
+        unit = w[:, k] / size
+        rest = unit - sum((b * float(b @ unit) for b in basis), np.zeros(len(unit)))
+        own = float(np.linalg.norm(rest))
+        if own < LEAST_OWN_SHARE:
+            sizes = np.linalg.norm(w[:, kept], axis=0)
+            share = np.linalg.lstsq(w[:, kept] / sizes, unit, rcond=None)[0]
+            chosen = np.flatnonzero(np.abs(share) > 0.2 * np.abs(share).max())
+            moves = {names[kept[j]]: float(share[j] * size / sizes[j]) for j in chosen}
+            left.append(NotTold(name=name, like=tuple(moves), moves=moves))
+            continue
+        kept.append(k)
+        basis.append(rest / own)
+    return tuple(kept), tuple(left)
+
+
+def solve(w: FloatArray, y: FloatArray, ends: Sequence[int] = ()) -> Solution:
+    """Ordinary least squares of ``y = w p``.
+
+    Parameters
+    ----------
+    w, y : array, shape (n, p) and (n,)
+    ends : sequence of int
+        Where each record ends, so that no block of rows reaches over two of them.
+
+    Raises
+    ------
+    InputError
+        Where there are no more rows than values.
+
+    Notes
+    -----
+    ``white``: variance of the residual about its mean, over n - 1 rows, as in the published EMPS figures.
+    ``correlated``: the sums of ``w' e`` over blocks of five correlation times of the residual (at least eight
+    blocks) scatter as the blocks are; blocks are taken as independent.
+    """
+    if len(y) <= w.shape[1]:
+        raise InputError(
+            f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s); allowed: longer motion"
+        )
+    scale = np.linalg.norm(w, axis=0)
+    values = np.linalg.lstsq(w / scale, y, rcond=None)[0] / scale
+    residual = np.asarray(y - w @ values)
+    white = np.asarray(np.var(residual, ddof=1) * np.linalg.inv(w.T @ w))
+    return Solution(
+        values=values,
+        white=white,
+        correlated=correlated_covariance(w, residual, ends),
+        residual=residual,
+        condition=float(np.linalg.cond(w / scale)),
+    )
+
+
+def correlated_covariance(w: FloatArray, residual: FloatArray, ends: Sequence[int] = ()) -> FloatArray:
+    """Covariance of least-squares values whose residuals are correlated in time, from sums over blocks.
+
+    Nowhere below what white residuals would give: where few blocks come out lower by chance, the white
+    covariance takes their place, each deviation grown to the larger of the two.
+    """
+    inverse = np.linalg.inv(w.T @ w)
+    white = np.asarray(np.var(residual, ddof=1) * inverse)
+    sums = _block_sums(w, residual, ends or (len(residual),))
+    few = len(sums) / max(len(sums) - w.shape[1], 1)
+    correlated = np.asarray(inverse @ (few * sums.T @ sums) @ inverse)
+    ratio = np.diag(correlated) / np.maximum(np.diag(white), 1e-300)
+    if np.all(ratio >= 1.0):
+        return correlated
+    grown = np.sqrt(np.maximum(ratio, 1.0))
+    return np.asarray(white * np.outer(grown, grown))
+
+
+def _block_sums(w: FloatArray, residual: FloatArray, ends: Sequence[int]) -> FloatArray:
+    """Sums of w' e over blocks, shape (blocks, p)."""
+    sums, start = [], 0
+    for end in ends:
+        own = residual[start:end]
+        if len(own) > 1:
+            length = BLOCK_TIMES * correlation_time(own)
+            blocks = int(np.clip(len(own) / length, min(MIN_BLOCKS, len(own)), len(own)))
+            edges = np.linspace(start, end, blocks + 1).astype(int)
+            products = w[start:end] * own[:, None]
+            sums.append(np.add.reduceat(products, edges[:-1] - start, axis=0))
+        start = end
+    return np.concatenate(sums)
+
+
+def between_records(values: Sequence[float], stds: Sequence[float]) -> float:
+    """Standard deviation between records beyond their own errors (Mandel and Paule); 0 for one record.
+
+    The scatter with which ``sum((x - mean)^2 / (std^2 + scatter^2))`` is one less than the number of records.
+
+    Examples
+    --------
+    >>> round(between_records([1.0, 3.0], [1e-6, 1e-6]), 6)
+    1.414214
+    >>> between_records([1.0, 1.1], [1.0, 1.0])
+    0.0
+    """
+    x, s = np.asarray(values, dtype=float), np.asarray(stds, dtype=float)
+    if len(x) < 2:
+        return 0.0
+
+    def excess(variance: float) -> float:
+        weight = 1.0 / np.maximum(s**2 + variance, 1e-300)
+        mean = float(weight @ x / weight.sum())
+        return float(weight @ (x - mean) ** 2) - (len(x) - 1)
+
+    if excess(0.0) <= 0.0:
+        return 0.0
+    return float(np.sqrt(brentq(excess, 0.0, float(np.ptp(x)) ** 2 * len(x), xtol=1e-300, rtol=1e-12)))
+
+
+def scatter_of_joint(stds: Sequence[float], scatter: float) -> float:
+    """What a scatter between records does to their joint value, each weighed by its own error."""
+    weight = (np.min(stds) / np.maximum(np.asarray(stds, dtype=float), 1e-300)) ** 2
+    return float(scatter * np.sqrt(weight @ weight) / weight.sum())
+
+
+def by_record(estimates: Sequence[Fit], names: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """For each parameter: the scatter between the records that tell it, and of their joint value."""
+    out = {}
+    for name in names:
+        own = [one for one in estimates if name in one]
+        stds = [one.std(name) for one in own]
+        scatter = between_records([one[name] for one in own], stds)
+        out[name] = (scatter, scatter_of_joint(stds, scatter) if scatter else 0.0)
+    return out

@@ -1,0 +1,70 @@
+"""What a record can tell of a drive: name, label and unit of each value, and the key that it goes to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One value. ``key`` is empty where it is shared out among keys; ``linear``: label on a linear axis."""
+
+    label: str
+    unit: str
+    key: str = ""
+    linear: str = ""
+    scale: float = 1.0
+    """Of the value in SI, to the unit in which it is shown."""
+
+
+TORQUE, VISCOUS, INERTIA = "N m", "N m s/rad", "kg m²"
+ON_A_LINE = {TORQUE: "N", VISCOUS: "N s/m", INERTIA: "kg", "N m/(N m)": "N/N"}
+
+PARAMETERS = {
+    "inertia": Parameter("Inertia, all at the motor", INERTIA, linear="Mass"),
+    "viscous": Parameter("Viscous friction", VISCOUS, "friction.viscous"),
+    "dry": Parameter("Dry friction", TORQUE, "friction.dry_torque"),
+    "offset": Parameter("Offset", TORQUE, "friction.offset_torque"),
+    "viscous_forward": Parameter("Viscous friction, forward", VISCOUS, "friction.viscous"),
+    "dry_forward": Parameter("Dry friction, forward", TORQUE, "friction.dry_torque"),
+    "viscous_reverse": Parameter("Viscous friction, reverse", VISCOUS, "friction.viscous_reverse"),
+    "dry_reverse": Parameter("Dry friction, reverse", TORQUE, "friction.dry_torque_reverse"),
+    "load_coefficient": Parameter("Load friction", "N m/(N m)", "friction.load_coefficient"),
+    "gravity_sin": Parameter("Gravity, m g l cos(offset)", TORQUE),
+    "gravity_cos": Parameter("Gravity, m g l sin(offset)", TORQUE),
+    "motor_inertia": Parameter("Inertia before the coupling, at the motor", INERTIA, "motor.rotor_inertia"),
+    "load_inertia": Parameter("Inertia behind it, at its own shaft", INERTIA, "load.inertia"),
+    "stiffness": Parameter("Stiffness", "N m/rad", "coupling.stiffness"),
+    "damping": Parameter("Damping", VISCOUS, "coupling.damping"),
+    "load_viscous": Parameter("Viscous friction of the load", VISCOUS, "load.friction.viscous"),
+    "antiresonance": Parameter("Antiresonance", "rad/s"),
+    "resonance": Parameter("Resonance", "rad/s"),
+    "play": Parameter("Play, total", "rad", "coupling.play"),
+    "resistance": Parameter("Resistance R", "ohm", "motor.resistance"),
+    "back_emf": Parameter("Back-EMF constant kE (kM follows)", "V s/rad", "motor.back_emf_constant"),
+    "inductance": Parameter("Inductance L", "H", "motor.inductance"),
+    "voltage_offset": Parameter("Offset of the voltage", "V"),
+    "C0": Parameter("C0, static", "mN m", "friction.dry_torque", scale=1e3),
+    "Cv": Parameter("Cv, viscous", "µN m s/rad", "friction.viscous", scale=1e6),
+    "CM": Parameter("CM, load", "mN m/(N m)", "friction.load_coefficient", scale=1e3),
+}
+
+
+def parameter(name: str, axis: str = "rotary") -> Parameter:
+    """A parameter by its name, with label and unit as an axis has them; a key of a design is its own label.
+
+    Examples
+    --------
+    >>> parameter("inertia", "linear").label, parameter("dry", "linear").unit, parameter("map_0").key
+    ('Mass', 'N', 'friction.point.1.torque')
+    """
+    one = PARAMETERS.get(name)
+    if name.startswith("map_"):
+        number = int(name[4:]) + 1
+        one = Parameter(f"Friction map, point {number}", TORQUE, f"friction.point.{number}.torque")
+    if one is None:
+        like = next((each for each in PARAMETERS.values() if each.key == name and each.scale == 1.0), None)
+        one = Parameter(name, like.unit if like else "SI", name)
+    if axis != "linear":
+        return one
+    return Parameter(one.linear or one.label, ON_A_LINE.get(one.unit, one.unit), one.key, scale=one.scale)

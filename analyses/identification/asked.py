@@ -1,0 +1,157 @@
+"""What is asked of an identification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from actuator_lti.errors import InputError
+from analyses.request import Option
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+Friction = Literal["symmetric", "per-direction", "map"]
+Criterion = Literal["margins", "D"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """Files, and what is looked for in them: friction of a campaign, a motion's model, or two masses."""
+
+    files: Annotated[
+        list[Path],
+        Option(
+            words="A campaign file (TOML), or records: CSV, Parquet, .mat, record files (TOML).",
+            metavar="FILE...",
+            argument=True,
+        ),
+    ]
+    validate: Annotated[
+        list[Path] | None,
+        Option(words="A record the fit does not see; repeatable.", metavar="RECORD"),
+    ] = None
+    frequency_response: Annotated[
+        bool, Option(words="Of one record with a periodic excitation: a compliant two-mass drive.")
+    ] = False
+    play: Annotated[
+        Path | None,
+        Option(words="With --frequency-response: a reversing motion, both angles.", metavar="RECORD"),
+    ] = None
+    period_s: Annotated[
+        float | None,
+        Option(words="Period of the excitation (default: found from the command).", metavar="s"),
+    ] = None
+    fix: Annotated[
+        list[str] | None,
+        Option(words="Hold a value, such as friction.load_coefficient=0; repeatable.", metavar="KEY=VALUE"),
+    ] = None
+    accept: Annotated[
+        bool, Option(words="Write the design even where a check fails (the status stays 1).")
+    ] = False
+    residual_limit: Annotated[
+        float,
+        Option(words="Largest relative residual for which a design is written; 20.", metavar="PERCENT"),
+    ] = 20.0
+    inertia_to: Annotated[
+        str,
+        Option(
+            words="Where the inertia goes, less the design's others: motor.rotor_inertia (default) or "
+            "load.inertia.",
+            metavar="KEY",
+        ),
+    ] = "motor.rotor_inertia"
+    friction: Annotated[
+        Friction,
+        Option(
+            words="Of records: symmetric (default), per-direction, or map (over the speed, where it is "
+            "clearly better)."
+        ),
+    ] = "symmetric"
+    gravity: Annotated[
+        bool, Option(words="Of records: look for a pendulum at the output, m g l sin(angle).")
+    ] = False
+    electrical: Annotated[
+        bool, Option(words="Of records: R, kE and kM from u = R i + kE w first (L if it shows).")
+    ] = False
+    refine: Annotated[
+        bool, Option(words="Of records: refine by simulation; the design gets the refined values.")
+    ] = False
+    cutoff_hz: Annotated[
+        float | None,
+        Option(words="Of records: low-pass cut-off (default 100, or 0.1 of the rate).", metavar="Hz"),
+    ] = None
+    decimation: Annotated[
+        int | None, Option(words="Of records: decimation (default: to the cut-off).", metavar="N")
+    ] = None
+    suggest: Annotated[int, Option(words="Suggest so many further runs of a campaign; 6.", metavar="N")] = 6
+    criterion: Annotated[Criterion, Option(words="What suggested runs serve: margins (default), or D.")] = (
+        "margins"
+    )
+
+    def __post_init__(self) -> None:
+        """Refuse what no identification can do."""
+        for option, value, low, high in (
+            ("residual-limit", self.residual_limit, 0.0, None),
+            ("decimation", self.decimation or 1, 1, None),
+            ("suggest", self.suggest, 0, 50),
+        ):
+            if not low <= value or (high is not None and value > high):
+                allowed = f"{low:g} or more" if high is None else f"{low:g} to {high:g}"
+                raise InputError(f"--{option} {value:g}; allowed: {allowed}")
+        if self.frequency_response and len(self.files) != 1:
+            raise InputError("--frequency-response takes one record (and --play RECORD for the play)")
+        if self.is_campaign and (self.validate or self.refine):
+            raise InputError("--validate and --refine go with records, not with a campaign")
+
+    @property
+    def is_campaign(self) -> bool:
+        """Whether a single TOML file is given that lists runs, and is no record file."""
+        first = self.files[0]
+        if self.frequency_response or len(self.files) != 1 or first.suffix.lower() != ".toml":
+            return False
+        from analyses.records.toml_tables import read_toml
+
+        return "file" not in read_toml(first)
+
+    @classmethod
+    def design_of(cls, chosen: Mapping[str, Any]) -> str:
+        """The design where none is named: the campaign's, looked for beside its file too, or emps."""
+        asked = cls(files=chosen["files"], frequency_response=chosen["frequency_response"])
+        if not asked.is_campaign:
+            return "ilr33-amber" if asked.frequency_response else "emps"
+        from analyses.records.campaign_file import load_campaign
+
+        design = load_campaign(asked.files[0]).design
+        near = asked.files[0].parent / design
+        return str(near) if near.suffix == ".toml" and near.exists() else design
+
+
+def fixed_values(design: Design, texts: Sequence[str] | None) -> dict[str, float]:
+    """``KEY=VALUE`` texts as SI values by key; a bare number is in SI.
+
+    Raises
+    ------
+    InputError
+        For a text without ``=``, an unknown key, or a value that does not fit.
+    """
+    from actuator_lti.design.access import located
+    from actuator_lti.design.fields import Structure
+    from actuator_lti.design.units import parse_quantity
+
+    result = {}
+    for text in texts or ():
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not equals or not value:
+            raise InputError(f'--fix "{text}": KEY=VALUE is wanted, such as friction.load_coefficient=0')
+        field, _ = located(design, key)
+        try:
+            result[key] = float(value)
+        except ValueError:
+            try:
+                result[key] = parse_quantity(value, field.unit(Structure.of(design)))
+            except InputError as error:
+                raise InputError(f"--fix {key} = {value}: {error.message}") from None
+    return result

@@ -1,0 +1,106 @@
+"""The identification that the files ask for: of a campaign, of records of a motion, or of two masses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from actuator_lti.design import read_design_text, write_design
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.identification.asked import Asked, fixed_values
+from analyses.identification.bench import BenchResult, BenchSettings, identify_bench
+from analyses.identification.campaign import CampaignResult, campaign_items, identify_campaign
+from analyses.identification.campaign_design import CampaignSuggestion, suggest_runs
+from analyses.identification.contributions import Contribution, contributions
+from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
+from analyses.identification.resimulation import steady_current_error
+from analyses.identification.surface_fit import NAMES, PATHS
+from analyses.identification.to_design import design_with_fit, with_fixed
+from analyses.identification.verdict import Identified
+from analyses.records import import_campaign, load_campaign, open_record
+from analyses.records.record import named_apart
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CampaignAnswer(Identified):
+    """A campaign's result, the shares of its coefficients at a load and speed, and what to measure next."""
+
+    result: CampaignResult
+    shares: tuple[Contribution, ...]
+    load_Nm: float
+    speed_rad_s: float
+    suggestion: CampaignSuggestion | None = None
+
+
+def identify(
+    design: Design, asked: Asked, *, progress: Progress | None = None
+) -> BenchResult | CampaignAnswer | FrequencyResult:
+    """Identify a drive from its records, and hold the design that comes of it against them.
+
+    Raises
+    ------
+    InputError
+        Where a file cannot be read, or no design can be made of it.
+    """
+    of = _of_campaign if asked.is_campaign else _of_response if asked.frequency_response else _of_records
+    return replace(of(design, asked, progress), accepted=asked.accept)
+
+
+def _of_records(design: Design, asked: Asked, progress: Progress | None) -> BenchResult:
+    settings = BenchSettings(
+        form=asked.friction,
+        gravity=asked.gravity,
+        electrical=asked.electrical,
+        cutoff_hz=asked.cutoff_hz,
+        decimation=asked.decimation,
+        fixed=fixed_values(design, asked.fix),
+        inertia_to=asked.inertia_to,
+        refine=asked.refine,
+        residual_limit=asked.residual_limit / 100.0,
+    )
+    records = named_apart([open_record(path) for path in asked.files])
+    unseen = named_apart([open_record(path) for path in asked.validate or ()], [r.name for r in records])
+    return identify_bench(design, records, validation=unseen, settings=settings, progress=progress)
+
+
+def _of_response(design: Design, asked: Asked, _: Progress | None) -> FrequencyResult:
+    play = None if asked.play is None else open_record(asked.play)
+    fixed = fixed_values(design, asked.fix)
+    record = open_record(asked.files[0])
+    return identify_frequency(design, record, play_record=play, period_s=asked.period_s, fixed=fixed)
+
+
+def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> CampaignAnswer:
+    listed = load_campaign(asked.files[0])
+    fixed = fixed_values(design, asked.fix)
+    names = dict(zip(PATHS, NAMES, strict=True))
+    for key in fixed:
+        if key not in names:
+            raise InputError(f"--fix {key}: a campaign can fix {', '.join(PATHS)}")
+    imported = import_campaign(listed, progress=progress)
+    result = identify_campaign(imported, design, fixed={names[key]: v for key, v in fixed.items()})
+    fit, count = result.fit, asked.suggest
+    made = design_with_fit(
+        with_fixed(design, fixed), fit.by_key(), f"identified from {len(fit.points)} runs, {listed.name}"
+    )
+    text = write_design(made)
+    simulated = steady_current_error(read_design_text(text), fit.points, progress=progress)
+    load, speed = design.load.moment_max_Nm, design.limits.speed_rad_s
+    load = load if load > 0.0 else max(p.load_Nm for p in fit.points)
+    speed = speed if math.isfinite(speed) else max(p.speed_rad_s for p in fit.points)
+    return CampaignAnswer(
+        design=made,
+        text=text,
+        items=campaign_items(design, result, simulated, asked.residual_limit / 100.0),
+        result=result,
+        shares=contributions(fit.values, fit.covariance, load_Nm=load, speed_rad_s=speed),
+        load_Nm=load,
+        speed_rad_s=speed,
+        suggestion=suggest_runs(design, fit, count=count, criterion=asked.criterion, progress=progress)
+        if count and not fit.fixed
+        else None,
+    )

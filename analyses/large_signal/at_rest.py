@@ -1,0 +1,145 @@
+"""The command to the output without bias motion, where dry friction has no small-signal gain.
+
+Each frequency is commanded from rest at a stated amplitude and compared twice: with the sliding loop, which
+cannot hold here, and with the describing-function operating point at the speed amplitude that was seen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.profile import command_mean
+from actuator_lti.drive.wiring import wire
+from actuator_lti.errors import InputError
+from analyses.large_signal.coherent import coherent
+from analyses.responses import response_at
+from nonlinear import LIMITERS, Rows
+from nonlinear.reduced import BatchResult
+
+if TYPE_CHECKING:
+    from actuator_lti.loops import Loops
+
+Floats = npt.NDArray[np.float64]
+Complexes = npt.NDArray[np.complex128]
+NO_MOTION = 1e-3  # of the command
+
+
+@dataclass(frozen=True)
+class RestSweep:
+    """Response from rest, one entry a frequency.
+
+    Attributes
+    ----------
+    frequency_hz, amplitude_rad : ndarray, shape (K,)
+        Command at the output shaft, peak.
+    measured, sliding, described : ndarray of complex, shape (K,)
+        Output over command: simulated; sliding loop; describing function at ``speed_rad_s`` (NaN where
+        nothing moves).
+    speed_rad_s : ndarray, shape (K,)
+        Amplitude of the motor speed that was seen.
+    stick_fraction, distortion, unsteadiness : ndarray, shape (K,)
+        Of the last window; distortion of the motor speed.
+    limiter : tuple of str
+        Limit that acted in the last window, or empty.
+    """
+
+    frequency_hz: Floats
+    amplitude_rad: Floats
+    measured: Complexes
+    sliding: Complexes
+    described: Complexes
+    speed_rad_s: Floats
+    stick_fraction: Floats
+    distortion: Floats
+    unsteadiness: Floats
+    limiter: tuple[str, ...]
+
+
+def sweep_from_rest(
+    design: Design,
+    frequency_hz: npt.ArrayLike,
+    amplitude_rad: npt.ArrayLike,
+    settle_ticks: int,
+    *,
+    load_Nm: float = 0.0,
+    described: bool = True,
+) -> RestSweep:
+    """Command sines from rest and compare with the describing function of dry friction.
+
+    Parameters
+    ----------
+    frequency_hz : array_like, shape (K,)
+    amplitude_rad : array_like
+        Of the command at the output, one for all or one a frequency.
+    settle_ticks : int
+        Before the two windows.
+    described : bool
+        Whether there is dry friction to be described.
+    """
+    tick_s, n = design.controller.period_s, design.controller.position_loop.every
+    asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
+    if not (asked > 0.0).all() or not (asked < 0.5 / (n * tick_s)).all():
+        raise InputError(f"frequency_hz: positive and below {0.5 / (n * tick_s):g} Hz (Nyquist)")
+    window = coherent(asked, tick_s, n, least_cycles=2)
+    amplitude = np.broadcast_to(np.asarray(amplitude_rad, dtype=float), asked.shape).copy()
+    rows = Rows.of(design, asked.size)
+    rows["load"] = load_Nm
+    rows["ticks"] = settle_ticks + 2 * window.ticks + np.ceil(4 * window.ticks / window.cycles)
+    rows.window(window.ticks, window.cycles)
+    rows.sine("command", amplitude, window.frequency_hz)
+    result = rows.run()
+    measured = result.phasor("output_angle_rad") / amplitude
+    speed = np.abs(result.phasor("motor_speed_rad_s"))
+    moving = np.abs(measured) > NO_MOTION
+    expected = np.full(asked.size, np.nan, complex)
+    for k in np.flatnonzero(moving & described):
+        expected[k] = _linear(design, window.frequency_hz[k : k + 1], load_Nm, float(speed[k]))[0]
+    return RestSweep(
+        frequency_hz=window.frequency_hz,
+        amplitude_rad=amplitude,
+        measured=measured,
+        sliding=_linear(design, window.frequency_hz, load_Nm, None),
+        described=expected,
+        speed_rad_s=speed,
+        stick_fraction=result.window_stick_fraction,
+        distortion=result.distortion("motor_speed_rad_s"),
+        unsteadiness=result.unsteadiness("output_angle_rad"),
+        limiter=tuple(_acting(result, k) for k in range(asked.size)),
+    )
+
+
+def _acting(result: BatchResult, k: int) -> str:
+    """Name of the limit that acted longest in the last window of a run."""
+    used = {name: float(result.window_limit_fraction(name)[k]) for name in LIMITERS}
+    name = max(used, key=lambda item: used[item])
+    return name if used[name] > 0.0 else ""
+
+
+def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: float | None) -> Complexes:
+    """Command to output at frequencies; sliding, or described at a speed amplitude.
+
+    The output is looked at in every tick, as the simulator does; at the instants of the position loop the
+    answer is the same but for the images of a held signal.
+    """
+    from actuator_lti.loops.sampled import reference_to_output
+
+    point = "sliding" if speed_rad_s is None else "describing-function"
+    at = Operating(point=point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_rad_s)  # type: ignore[arg-type]
+    omega, mean = 2.0 * np.pi * frequency_hz, command_mean(design)
+    response = response_at(reference_to_output(wire(design, at)), omega)
+    return response if mean is None else response * mean.response(omega)
+
+
+def free_amplitude(design: Design, loops: Loops, frequency_hz: Floats, part: float) -> Floats:
+    """Command amplitude: a part of full deflection, at most half of what reaches a limit."""
+    from actuator_lti.limiters import onset
+
+    full = design.validation.full_deflection_rad
+    border = onset(loops, 2.0 * np.pi * frequency_hz).amplitude_rad
+    return np.minimum(part * full, 0.5 * border)

@@ -1,0 +1,241 @@
+"""What the counts of an encoder do, beside the small signals, which are measured without them.
+
+The motor's counts are seen in the speed made of them (model.md section 2), the output's in its position,
+and in a speed made of it.  Four things: a standing error, ripple at constant speed, a limit cycle about the
+edge of a count (by describing function and in the simulator), and the amplitude from which the loop is linear
+again.
+
+An angle of amplitude A about a bias d, counted in steps q, has the fundamental ``n(A/q, d) A`` with
+
+    n = (2 q/(pi A)) sum_k sqrt(1 - ((k + d) q/A)^2),  all k with |k + d| q < A.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from math import inf, pi
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from analyses.large_signal.coherent import coherent
+from analyses.large_signal.conditional import step_rows
+from analyses.large_signal.settling_ticks import LONGEST_TICKS, full_range
+from analyses.loop_figures import loop_figures
+from analyses.responses import response_at
+from nonlinear import Rows
+
+if TYPE_CHECKING:
+    from actuator_lti.loops import Loops
+    from analyses.limit_cycles import Confirmation
+
+Sensor = Literal["motor", "output"]
+Floats = npt.NDArray[np.float64]
+WITHIN = 0.05  # of its value: a gain that is off by less counts as linear
+RATIOS, OFFSETS = np.geomspace(0.2, 60.0, 600), np.linspace(0.0, 1.0, 21)
+SPEEDS = (0.05, 0.382, 1.382, 5.1)  # counts a sample: few, and so that no pattern repeats soon
+PART = 0.3  # of the drive's speed: no faster is looked at
+SAMPLES = 2000  # of a window at constant speed
+TRIED = np.array([0.1, 0.3, 1.0, 2.0, 4.0, 16.0, 64.0, 256.0])  # of the amplitude from which it is linear
+RESTS = 0.5  # of a count: an output that moves by more does not rest
+
+
+@dataclass(frozen=True)
+class Counts:
+    """What the counts of one encoder do.
+
+    Attributes
+    ----------
+    sensor : {"motor", "output"}
+    quantum_rad : float
+        One count, at the sensor's shaft.
+    standing_rad : float
+        Error of the output that a count may leave: the output's own count; the motor's leaves none.
+    standing_seen_rad : float
+        What a step of the drive as it is ends with, less what it ends with without counts.
+    speed_step_rad_s : float or None
+        By which a speed made of counts jumps (motor side); ``None`` where the speed is not made of them.
+    ripple_rad_s, ripple_at_rad_s : float
+        Largest ripple of the motor's speed (peak) that counts add at constant speed, and that speed.
+    cycles : tuple of Confirmation
+        Foreseen limit cycles, each with what the simulator says of it.
+    resting_rad : float
+        Half of what the output of the drive as it is still moves by after a step, where it does not without
+        counts; 0: it rests.
+    linear_rad : float
+        Amplitude at the sensor from which the gain of the counts is 1 within 5 %, about any bias.
+    linear_seen_rad : float or None
+        Smallest amplitude tried from which the response to the command, at the bandwidth, is off by less than
+        5 % in the simulator: more, where counts shake the drive. ``None``: none up to 256 times as much, or
+        the drive is unstable without friction.
+    off : ndarray
+        What that response is off by (relative) at `TRIED` times ``linear_rad``.
+    """
+
+    sensor: Sensor
+    quantum_rad: float
+    standing_rad: float
+    standing_seen_rad: float
+    speed_step_rad_s: float | None
+    ripple_rad_s: float
+    ripple_at_rad_s: float
+    cycles: tuple[Confirmation, ...]
+    resting_rad: float
+    linear_rad: float
+    linear_seen_rad: float | None
+    off: Floats
+
+
+def counted_gain(ratio: float, offset: float = 0.0) -> float:
+    """Gain of counts for a sine of amplitude ``ratio`` counts about a bias of ``offset`` counts off an edge.
+
+    Examples
+    --------
+    >>> round(counted_gain(0.5) - 4.0 / 3.141592653589793, 12), round(counted_gain(1e3), 3)
+    (0.0, 1.0)
+    """
+    edges = np.arange(np.ceil(-ratio - offset), np.floor(ratio - offset) + 1.0) + offset
+    inside = np.abs(edges) < ratio
+    return float(2.0 / (pi * ratio) * np.sqrt(1.0 - (edges[inside] / ratio) ** 2).sum())
+
+
+@cache
+def linear_ratio() -> float:
+    """Amplitude in counts from which the gain is 1 to `WITHIN`, whatever the bias."""
+    off = np.array([max(abs(counted_gain(r, d) - 1.0) for d in OFFSETS) for r in RATIOS])
+    return float(RATIOS[int(np.flatnonzero(off > WITHIN)[-1]) + 1])
+
+
+def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, ...]:
+    """Look at every encoder of a position drive whose counts a loop sees.
+
+    Parameters
+    ----------
+    settle_ticks : int
+        In which the linear position loop settles.
+    """
+    from analyses.limit_cycles.describing import counts_matter
+
+    there: list[Sensor] = []
+    if counts_matter(design, "motor-quantisation"):
+        there.append("motor")
+    if counts_matter(design, "quantisation"):
+        there.append("output")
+    return tuple(_one(design, loops, sensor, settle_ticks) for sensor in there)
+
+
+def without_counts(design: Design, *sensors: Sensor) -> Design:
+    """The same drive with some encoders free of counts."""
+    if "motor" in sensors:
+        design = replace(design, encoder=replace(design.encoder, counts_per_rev=None))
+    if "output" in sensors:
+        design = replace(design, output_encoder=replace(design.output_encoder, counts_per_rev=None))
+    return design
+
+
+def _one(design: Design, loops: Loops, sensor: Sensor, settle_ticks: int) -> Counts:
+    from analyses.limit_cycles.describing import cycles_of_quantisation
+    from analyses.limit_cycles.run import confirm
+
+    cause = "motor-quantisation" if sensor == "motor" else "quantisation"
+    quantum = (design.angle_quantum_rad if sensor == "motor" else design.output_quantum_rad) or 0.0
+    other: Sensor = "output" if sensor == "motor" else "motor"
+    alone, ideal = without_counts(design, other), without_counts(design, "motor", "output")
+    ripple, at = _ripple(alone, ideal, sensor, quantum, settle_ticks)
+    standing, resting = _rest(alone, ideal, quantum / (design.total_ratio if sensor == "motor" else 1.0))
+    off = _linearity(alone, ideal, loops, sensor, quantum, settle_ticks)
+    good = np.logical_and.accumulate((off <= WITHIN)[::-1])[::-1]  # here and at all that is larger
+    return Counts(
+        sensor=sensor,
+        quantum_rad=quantum,
+        standing_rad=quantum if sensor == "output" else 0.0,
+        standing_seen_rad=standing,
+        speed_step_rad_s=_speed_step(design, sensor, quantum),
+        ripple_rad_s=ripple,
+        ripple_at_rad_s=at,
+        cycles=tuple(confirm(design, one) for one in cycles_of_quantisation(design) if one.cause == cause),
+        resting_rad=resting,
+        linear_rad=linear_ratio() * quantum,
+        linear_seen_rad=float(TRIED[good][0]) * linear_ratio() * quantum if good.any() else None,
+        off=off,
+    )
+
+
+def _span_s(design: Design) -> float:
+    """Time over which a speed is made of counts, or between two looks at the position."""
+    control, encoder = design.controller, design.encoder
+    velocity = control.velocity
+    if velocity is None:
+        return control.position_loop.every * control.period_s
+    samples = encoder.difference_samples if encoder.speed == "difference" else 1
+    return samples * velocity.every * control.period_s
+
+
+def _speed_step(design: Design, sensor: Sensor, quantum: float) -> float | None:
+    """Jump of a speed that is a difference of counts, motor side: ``q/(m T)``."""
+    velocity = design.controller.velocity
+    if velocity is None or velocity.sensor != sensor or design.encoder.speed != "difference":
+        return None
+    return quantum * (design.total_ratio if sensor == "output" else 1.0) / _span_s(design)
+
+
+def _ripple(
+    design: Design, ideal: Design, sensor: Sensor, quantum: float, settle_ticks: int
+) -> tuple[float, float]:
+    """Largest ripple that counts add to the motor's speed on a ramp of the command, and its speed."""
+    count = quantum * (design.total_ratio if sensor == "output" else 1.0)
+    span = _span_s(design)
+    speeds = np.minimum(np.array(SPEEDS) * count / span, PART * full_range(design)["velocity"])
+    window = round(SAMPLES * span / design.controller.period_s)
+    found = []
+    for one in (design, ideal):
+        rows = Rows.of(one, speeds.size)
+        rows.ramp("command", speeds / one.total_ratio)
+        rows["ticks"] = settle_ticks + 2 * window
+        rows.window(window, 1, 0)
+        low, high = rows.run().span("motor_speed_rad_s")
+        found.append(0.5 * (high - low))
+    added = found[0] - found[1]
+    k = int(np.argmax(added))
+    return max(float(added[k]), 0.0), float(speeds[k])
+
+
+def _rest(design: Design, ideal: Design, count_rad: float) -> tuple[float, float]:
+    """Error that counts leave after a step, and half of what the output still moves by because of them."""
+    size = np.array([min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad])
+    ends = []
+    for one in (design, ideal):
+        result = step_rows(one, size, LONGEST_TICKS // 4).run()
+        low, high = (float(x[0]) for x in result.span("output_angle_rad"))
+        ends.append((abs(0.5 * (low + high) - float(size[0])), 0.5 * (high - low)))
+    moves = ends[0][1] - ends[1][1]
+    return abs(ends[0][0] - ends[1][0]), moves if moves > 0.5 * RESTS * count_rad else 0.0
+
+
+def _linearity(
+    design: Design, ideal: Design, loops: Loops, sensor: Sensor, quantum: float, settle_ticks: int
+) -> Floats:
+    """What the response to the command is off by with counts, at `TRIED` times the linear amplitude."""
+    from analyses.limit_cycles.describing import without_nonlinearities
+
+    band = loop_figures(loops.present["position"], loops.plain_response).bandwidth
+    if band is None or band.minus3db_hz is None:
+        return np.full(TRIED.size, inf)
+    base = design.controller.position_loop.every
+    window = coherent([band.minus3db_hz], design.controller.period_s, base, least_cycles=8)
+    gain = abs(complex(response_at(loops.plain_response, 2.0 * pi * window.frequency_hz)[0]))
+    wanted = linear_ratio() * quantum / (design.total_ratio if sensor == "motor" else 1.0) / gain
+    amplitude = wanted * TRIED
+    seen, there = [], np.ones(TRIED.size, dtype=bool)
+    for one in (design, ideal):  # nothing else that is not linear: no play, no friction
+        rows = Rows.of(without_nonlinearities(one), TRIED.size, friction_on=False, limits_on=False)
+        rows.sine("command", amplitude, window.frequency_hz[0])
+        rows["ticks"] = settle_ticks + 2 * window.ticks[0]
+        rows.window(window.ticks[0], window.cycles[0])
+        run = rows.run()
+        seen.append(run.phasor("output_angle_rad"))
+        there &= run.ok  # without friction a drive may be unstable
+    return np.abs(np.divide(seen[0], seen[1], out=np.full(TRIED.size, inf, complex), where=there) - 1.0)

@@ -1,0 +1,277 @@
+"""Cycles of play and quantisation by describing function inside the exact sampled loop.
+
+Play: the coupling's torque is a dead zone of the twist.  For a twist of amplitude A its fundamental is that
+of the coupling with k and c times ``n(x) = 1 - (2/pi)(asin x + x sqrt(1 - x^2))``, x = b/A (the damping acts
+in contact only, and its share is the same n).  A cycle is foreseen where an oscillating eigenvalue of the
+closed loop lies on the unit circle.  Dry friction of either side adds ``4 Tc/(pi W)``, W the amplitude of its
+speed in the same cycle; friction by load is left out.
+
+Quantisation: an angle that swings about the edge of a count is a relay of one count, ``2 q/(pi A)`` up to
+A = q.  The sensor multiplies the loop that it stands in by it (the output's that of the position, the
+motor's that of the speed made of it), so a cycle is foreseen at the gain g that brings this loop to its
+border: ``A = 2 q/(pi g)``, stable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import exp, log, pi
+
+import numpy as np
+from scipy.optimize import brentq
+
+from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction
+from actuator_lti.drive.operating import Operating, dead_zone, described_dry, slope_at
+from actuator_lti.drive.wiring import wire
+from actuator_lti.loops import assemble_loops
+from actuator_lti.loops.periodic import exact_margins, point_blocks
+from actuator_lti.loops.tick import TickProgram
+from analyses.limit_cycles.result import Cause, Cycle
+
+LEAST, MOST, POINTS = 1.02, 300.0, 48  # of the half play: amplitudes of the twist that are looked at
+MOST_GAIN, GAINS = 1e3, 73  # of a speed made of counts
+_TURNS = 1e-6  # least angle of an eigenvalue that oscillates
+_STEPS = 60  # of the fixed point between the amplitudes of both speeds
+
+
+@dataclass(frozen=True)
+class Mode:
+    """The least damped oscillation of the loop over a position period, of any size."""
+
+    radius: float
+    frequency_hz: float
+    shape: dict[str, complex]
+
+
+def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
+    """Every cycle with a twist between `LEAST` and `MOST` times the half play, smallest first."""
+    coupling = design.coupling
+    if coupling is None or coupling.play_rad <= 0.0 or design.controller.position is None:
+        return ()
+    half = 0.5 * coupling.play_rad
+    grid = np.geomspace(LEAST * half, MOST * half, POINTS)
+    modes: list[Mode | None] = []
+    for A in grid:
+        modes.append(_at_twist(design, float(A), friction, modes[-1] if modes else None))
+    result = []
+    for k in range(POINTS - 1):
+        a, b = modes[k], modes[k + 1]
+        if a is None or b is None or (a.radius - 1.0) * (b.radius - 1.0) >= 0.0:
+            continue
+        made = _border(design, friction, (float(grid[k]), float(grid[k + 1])), a)
+        if made is not None and made[1].frequency_hz > 0.0:
+            result.append(_cycle(design, *made, friction, stable=a.radius > 1.0))
+    return tuple(result)
+
+
+def _border(
+    design: Design, friction: bool, ends: tuple[float, float], near: Mode
+) -> tuple[float, Mode] | None:
+    """The twist between two amplitudes at which the oscillation keeps its size, and its shape there."""
+
+    def mode(log_A: float) -> Mode | None:
+        return _at_twist(design, exp(log_A), friction, near)
+
+    def excess(log_A: float) -> float:
+        result = mode(log_A)
+        return -1.0 if result is None else result.radius - 1.0
+
+    low, high = map(log, ends)
+    if excess(low) * excess(high) >= 0.0:
+        return None
+    root = float(brentq(excess, low, high, xtol=1e-8))
+    there = mode(root)
+    return None if there is None else (exp(root), there)
+
+
+def _at_twist(design: Design, A: float, friction: bool, near: Mode | None) -> Mode | None:
+    """The least damped oscillation at a twist of amplitude A, the speeds in it being its own.
+
+    With friction a fixed point, begun with the shape of an oscillation ``near``.
+    """
+    speeds = _speeds(near, A)
+    for _ in range(_STEPS):
+        mode = mode_at(_equivalent(design, A, *speeds, friction), Operating())
+        if mode is None or not friction:
+            return mode
+        now = _speeds(mode, A)
+        if max(abs(log(new / old)) for new, old in zip(now, speeds, strict=True)) < 1e-7:
+            break
+        speeds = now[0] ** 0.6 * speeds[0] ** 0.4, now[1] ** 0.6 * speeds[1] ** 0.4
+    return mode
+
+
+def _speeds(mode: Mode | None, A: float) -> tuple[float, float]:
+    """Amplitudes of the motor's and the load's speed at a twist of amplitude A."""
+    if mode is None:
+        return 1.0, 1.0
+    size = A / abs(mode.shape["twist"])
+    return max(size * abs(mode.shape["w"]), 1e-12), max(size * abs(mode.shape["W"]), 1e-12)
+
+
+def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) -> Design:
+    """The linear drive of the same fundamentals."""
+    coupling, behind = design.coupling, design.load.friction or LoadFriction()
+    assert coupling is not None
+    n = dead_zone(0.5 * coupling.play_rad / A)
+    own = replace(design.friction, load_coefficient=0.0)
+    slope = own.viscous_Nms_rad
+    if friction:
+        at = Operating(point="describing-function", speed_amplitude_rad_s=W)
+        slope = slope_at(replace(design, friction=own), at)
+    load_slope = behind.viscous_Nms_rad + (described_dry(behind.dry_torque_Nm, W_l) if friction else 0.0)
+    return replace(
+        design,
+        coupling=Coupling(
+            stiffness_Nm_rad=n * coupling.stiffness_Nm_rad,
+            damping_Nms_rad=n * coupling.damping_Nms_rad,
+            after=coupling.after,
+        ),
+        friction=Friction(viscous_Nms_rad=slope),
+        load=replace(design.load, friction=LoadFriction(viscous_Nms_rad=load_slope)),
+    )
+
+
+def mode_at(design: Design, at: Operating) -> Mode | None:
+    """The least damped oscillation of the linear loop at an operating point; None without any."""
+    program = TickProgram(wire(design, at), "position")
+    return _oscillation(_over_a_period(program), program.states, design)
+
+
+def _over_a_period(program: TickProgram) -> np.ndarray:
+    A = np.eye(len(program.states))
+    for k in range(program.ticks):
+        A = program.tick(k).A @ A
+    return A
+
+
+def _cycle(design: Design, A: float, mode: Mode, friction: bool, *, stable: bool) -> Cycle:
+    """The cycle at its amplitude; phi = th/N_c - twist."""
+    state = {name: A / mode.shape["twist"] * value for name, value in mode.shape.items()}
+    output = abs(output_of(design, state))
+    return Cycle("play", friction, output, A, mode.frequency_hz, stable, state)
+
+
+def output_of(design: Design, state: dict[str, complex]) -> complex:
+    if design.coupling is None:
+        return state["th"] / design.total_ratio
+    phi = state["th"] / design.ratio_to_coupling - state["twist"]
+    return phi / design.ratio_behind_coupling
+
+
+def cycles_of_quantisation(design: Design) -> tuple[Cycle, ...]:
+    """The cycles about the edge of a count of each sensor, friction left out."""
+    return (*_of_counts(design, "quantisation"), *_of_counts(design, "motor-quantisation"))
+
+
+def quantum_of(design: Design, cause: Cause) -> float | None:
+    """One count of a sensor: of the output's in rad at the output, of the motor's in rad at the motor."""
+    return design.output_quantum_rad if cause == "quantisation" else design.angle_quantum_rad
+
+
+def counts_matter(design: Design, cause: Cause) -> bool:
+    """Whether a loop sees the counts of a sensor (the motor's: where a speed is made of them)."""
+    control, estimated = design.controller, design.encoder.speed != "ideal"
+    if control.position is None or quantum_of(design, cause) is None:
+        return False
+    by_speed = control.velocity is not None and estimated
+    if cause == "quantisation":
+        return control.position.sensor == "output"
+    return by_speed and control.velocity is not None and control.velocity.sensor == "motor"
+
+
+def _of_counts(design: Design, cause: Cause) -> tuple[Cycle, ...]:
+    """The cycle of one sensor: where the loop needs the gain ``2 q/(pi A)`` of its counts to keep it up."""
+    q = quantum_of(design, cause)
+    if q is None or not counts_matter(design, cause):
+        return ()
+    free = without_nonlinearities(design)
+    found = _border_of_speed(free) if cause == "motor-quantisation" else _border_at_output(free)
+    if found is None:
+        return ()
+    border, mode = found
+    amplitude = 2.0 * q / (pi * border)
+    seen = output_of(free, mode.shape) if cause == "quantisation" else mode.shape["th"]
+    state = {name: amplitude / seen * value for name, value in mode.shape.items()}
+    output = abs(output_of(free, state))
+    return (Cycle(cause, False, output, amplitude, mode.frequency_hz, True, state),)
+
+
+def _border_at_output(free: Design) -> tuple[float, Mode] | None:
+    """Gain of a sensor at the output that brings the loop to its border, and the oscillation there.
+
+    Where the speed is made of that angle too, all that is behind it goes through the velocity controller: its
+    loop is that at this controller's output.
+    """
+    control, point = free.controller, "output"
+    velocity = control.velocity
+    if velocity is not None and velocity.sensor == "output" and free.encoder.speed != "ideal":
+        point = "u" if control.current is None else "i_ref"
+    border = exact_margins(assemble_loops(free), point, 0.0).gain_upper
+    if not np.isfinite(border):  # none, or the linear loop is unstable
+        return None
+    blocks = point_blocks(wire(free, Operating()), point)
+    A = np.eye(len(blocks[0].states))
+    for block in blocks:
+        A = (block.A - border * block.B @ block.C) @ A
+    mode = _oscillation(A, blocks[0].states, free, at_border=True)
+    return None if mode is None else (border, mode)
+
+
+def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
+    """Gain of the speed made of the motor's angle that brings the loop to its border."""
+
+    def mode(log_gain: float) -> Mode | None:
+        velocity = free.controller.velocity
+        assert velocity is not None
+        gain = Filter(kind="biquad", on="speed", b=(exp(log_gain),), a=(0.0,))
+        louder = replace(velocity, filters=(*velocity.filters, gain))
+        design = replace(free, controller=replace(free.controller, velocity=louder))
+        program = TickProgram(wire(design, Operating()), "position")
+        return _oscillation(_over_a_period(program), program.states, design)
+
+    def excess(log_gain: float) -> float:
+        found = mode(log_gain)
+        return -1.0 if found is None else found.radius - 1.0
+
+    if excess(0.0) >= 0.0:
+        return None
+    grid = np.log(np.geomspace(1.0, MOST_GAIN, GAINS))
+    for low, high in pairwise(map(float, grid)):
+        if excess(high) >= 0.0:
+            root = float(brentq(excess, low, high, xtol=1e-10))
+            there = mode(root)
+            return None if there is None else (exp(root), there)
+    return None
+
+
+def _oscillation(
+    A: np.ndarray, states: Sequence[str], design: Design, *, at_border: bool = False
+) -> Mode | None:
+    """The largest eigenvalue that turns, or that nearest to the unit circle; None without any."""
+    values, vectors = np.linalg.eig(A)
+    turning = np.flatnonzero(np.angle(values) > _TURNS)
+    if not turning.size:
+        return None
+    size = np.abs(values[turning])
+    k = int(turning[np.argmin(np.abs(size - 1.0)) if at_border else np.argmax(size)])
+    period = wire(design, Operating()).period_s("position")
+    frequency = float(np.angle(values[k])) / (2.0 * pi * period)
+    shape = dict(zip(states, map(complex, vectors[:, k]), strict=True))
+    return Mode(float(abs(values[k])), frequency, shape)
+
+
+def without_nonlinearities(design: Design) -> Design:
+    """The drive in contact, without play, friction by load and dry friction."""
+    coupling, behind = design.coupling, design.load.friction
+    return replace(
+        design,
+        coupling=None if coupling is None else replace(coupling, play_rad=0.0),
+        friction=Friction(viscous_Nms_rad=design.friction.viscous_Nms_rad),
+        load=replace(
+            design.load,
+            friction=None if behind is None else LoadFriction(viscous_Nms_rad=behind.viscous_Nms_rad),
+        ),
+    )

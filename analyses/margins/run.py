@@ -1,0 +1,101 @@
+"""Margins, bandwidths and requirements of a design at one operating point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from actuator_lti.design.model import Design
+from actuator_lti.loops import Loops, assemble_loops
+from actuator_lti.verdict import Tally, Verdict
+from analyses.loop_figures import LoopFigures, all_loop_figures, loop_figures
+from analyses.loop_survey import OperatingPointFigures, operating_points
+from analyses.margins.asked import Asked
+from analyses.requirements import RequirementVerdict, evaluate_requirements, tally
+from analyses.weakest import Spread, spread
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margins:
+    """The loops of a design, and whether it does.
+
+    Attributes
+    ----------
+    design : Design
+    asked : Asked
+    loops : mapping of str to LoopFigures
+        By name, innermost first.
+    requirements : tuple of RequirementVerdict
+        Of the sampled loops with sliding friction, whatever is asked.
+    around : mapping of str to LoopFigures
+        The loop that is closed around the drive, broken at the drive's command.
+    operating_points : tuple of OperatingPointFigures
+    """
+
+    design: Design
+    asked: Asked
+    loops: Mapping[str, LoopFigures]
+    requirements: tuple[RequirementVerdict, ...]
+    around: Mapping[str, LoopFigures]
+    operating_points: tuple[OperatingPointFigures, ...]
+
+    @property
+    def spread(self) -> Mapping[str, Mapping[str, Spread]]:
+        """Least and largest margins over the operating points, by loop."""
+        return spread(self.operating_points)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The requirements, and that every loop is stable."""
+        sound = Tally.of(Verdict.of(one.sound) for one in (*self.loops.values(), *self.around.values()))
+        return (tally(self.requirements) + sound).verdict
+
+    @property
+    def passed(self) -> bool:
+        """Whether all is met."""
+        return self.verdict.passes()
+
+
+def margins(design: Design, asked: Asked | None = None) -> Margins:
+    """Find the certified margins of every loop and judge the requirements.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> str(margins(load_design("emps")).verdict)
+    'met'
+
+    Raises
+    ------
+    InputError, NumericalError
+        Where the loops cannot be assembled as asked, or the margins of one not be found.
+    """
+    asked = asked or Asked()
+    loops = assemble_loops(
+        design,
+        form=asked.form,  # type: ignore[arg-type]
+        operating_point=asked.operating_point,  # type: ignore[arg-type]
+        load_Nm=asked.load_Nm,
+    )
+    step = asked.form != "continuous"  # with delays it takes its time
+    around = {} if asked.around is None else _around(loops, asked.around, step=step)
+    figures = all_loop_figures(loops, step=step, certify=True, locked=True)
+    usual = (asked.form, asked.operating_point) == ("sampled", "sliding")
+    return Margins(
+        design=design,
+        asked=asked,
+        loops=figures,
+        requirements=evaluate_requirements(design, figures if usual else None),
+        around=around,
+        operating_points=tuple(operating_points(design, [], described=False, certify=False)),
+    )
+
+
+def _around(loops: Loops, file: Path, *, step: bool) -> dict[str, LoopFigures]:
+    """The figures of the loop of the file, by its name."""
+    from analyses.outer_loop import loop_around
+    from analyses.outer_loop_file import read_outer_loop
+
+    outer = read_outer_loop(file)
+    return {outer.name: loop_figures(loop_around(loops, outer), step=step, certify=True)}

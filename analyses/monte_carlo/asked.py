@@ -1,0 +1,87 @@
+"""What is asked of a Monte Carlo study."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from actuator_lti.errors import InputError
+from analyses.request import LOAD, POINT, OnMachines, Option
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.monte_carlo.result import MonteCarloResult
+    from analyses.monte_carlo.run import MonteCarloSettings
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked(OnMachines):
+    """A study of the tolerances."""
+
+    samples: Annotated[int, Option(words="Number of samples; 10000.", metavar="N")] = 10_000
+    seed: Annotated[int, Option(words="Seed, 0 or more; 0.", metavar="N")] = 0
+    from_samples: Annotated[
+        Path | None, Option(words="CSV or Parquet of identified parameters, SI.", metavar="FILE")
+    ] = None
+    step: Annotated[
+        float | None,
+        Option(words='Nonlinear step of every sample, such as "1 deg".', metavar="ANGLE", kind="output"),
+    ] = None
+    duration_s: Annotated[float, Option(words="Duration of that step; 0.5.", metavar="S")] = 0.5
+    load_Nm: Annotated[float, LOAD] = 0.0
+    operating_point: Annotated[str, POINT] = "sliding"
+    at_least: Annotated[
+        float | None,
+        Option(
+            words="Probability that is enough, with 95 % confidence; else every sample must pass.",
+            metavar="P",
+        ),
+    ] = None
+    worst: Annotated[
+        bool, Option(words="Seek the worst case of each requirement.", flag="worst/--no-worst")
+    ] = True
+    sample: Annotated[
+        int | None, Option(words="Only print sample number K as a design file.", metavar="K")
+    ] = None
+
+    def __post_init__(self) -> None:
+        """Refuse a probability that is none."""
+        if self.at_least is not None and not 0.0 <= self.at_least <= 1.0:
+            raise InputError(f"--at-least {self.at_least:g}: allowed: a probability from 0 to 1")
+
+    def settings(self, design: Design) -> MonteCarloSettings:
+        """What the study is to do."""
+        from actuator_lti.batch import variable_paths
+        from analyses.monte_carlo.run import MonteCarloSettings
+        from analyses.monte_carlo.stepping import StepCheck
+        from analyses.sampling import read_table
+
+        table = None if self.from_samples is None else read_table(self.from_samples, variable_paths(design))
+        check = None if self.step is None else StepCheck(self.step, self.duration_s, self.load_Nm)
+        return MonteCarloSettings(
+            self.samples, self.seed, self.operating_point, self.load_Nm, check, table, self.worst  # type: ignore[arg-type]
+        )  # fmt: skip
+
+
+def study(
+    design: Design, asked: Asked, *, out: Path, progress: Callable[[int, int], None] | None = None
+) -> MonteCarloResult | Design:
+    """The study, its samples kept in a folder of its own under ``out``; or the one sample that is asked for.
+
+    Raises
+    ------
+    InputError
+        If nothing has a tolerance, or what is asked is no study.
+    """
+    from analyses.monte_carlo.run import monte_carlo, sample_folder
+    from analyses.monte_carlo.task import replay
+    from analyses.sampling import sampler_of
+
+    settings = asked.settings(design)
+    if asked.sample is not None:
+        return replay(design, sampler_of(design, seed=settings.seed, table=settings.table), asked.sample)
+    folder = sample_folder(design, settings, out)
+    result = monte_carlo(design, folder, settings, engine=asked.engine, progress=progress)
+    return replace(result, at_least=asked.at_least)

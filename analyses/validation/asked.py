@@ -1,0 +1,29 @@
+"""What is asked of a validation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from analyses.request import Option
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.validation.settings import Settings
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """How much is looked at beside the checks."""
+
+    quick: Annotated[bool, Option(words="Checks and verdict only, on the page and in JSON, too.")] = False
+    large: Annotated[
+        bool, Option(words="What is large, starts from rest or is shaken by counts, on the terminal, too.")
+    ] = False
+
+    @classmethod
+    def of(cls, design: Design, *, quick: bool = False, large: bool = False) -> Settings:
+        """The settings of `analyses.validation.validate`."""
+        from analyses.validation.settings import QUICK, Settings
+
+        return Settings() if large and not quick else QUICK

@@ -1,0 +1,48 @@
+"""The scripts of a page: modules by room in ``templates/page``, put together into the one that it carries.
+
+A page runs from disk and asks for nothing, so it cannot load modules. Each becomes a function here that gives
+what it exports, in the order of the imports, which go one way. A module says these in two forms only:
+``import { a, b } from "./name.js";`` and ``export const`` or ``export class``.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+from jinja2 import Environment, PackageLoader
+
+IMPORT = re.compile(r'^import \{ ([\w, ]+) \} from "\./(\w+)\.js";\n', re.MULTILINE)
+EXPORT = re.compile(r"^export (const|class) (\w+)", re.MULTILINE)
+
+
+@cache
+def asset(name: str) -> str:
+    """Give the text of a style sheet or script that stands beside the templates."""
+    source, _, _ = PackageLoader("reports").get_source(Environment(autoescape=True), name)
+    return source
+
+
+@cache
+def bundled(*entries: str) -> str:
+    """Give one script of some modules and all that they import, each once."""
+    made: dict[str, str] = {}
+    for entry in entries:
+        _take(entry, made, ())
+    return f'"use strict";\n(() => {{\n{"".join(made.values())}}})();\n'
+
+
+def _take(name: str, made: dict[str, str], above: tuple[str, ...]) -> None:
+    """Add a module behind those that it imports."""
+    if name in above:
+        raise ValueError(f"scripts import each other: {' -> '.join([*above, name])}")
+    if name in made:
+        return
+    text = asset(f"page/{name}.js")
+    wanted = IMPORT.findall(text)
+    for _, other in wanted:
+        _take(other, made, (*above, name))
+    taken = "".join(f"const {{ {names} }} = {other}$;\n" for names, other in wanted)
+    given = ", ".join(name for _, name in EXPORT.findall(text))
+    body = EXPORT.sub(r"\1 \2", IMPORT.sub("", text))
+    made[name] = f"const {name}$ = (() => {{\n{taken}{body}return {{ {given} }};\n}})();\n"

@@ -1,0 +1,108 @@
+"""What the sections of all identifications share: the verdict, and one table of values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from analyses.estimation.parameters import parameter
+from reports import document as doc
+from reports.document_schema import Block, Column, Row, Section, Status
+from reports.numbers import show
+
+if TYPE_CHECKING:
+    from analyses.estimation.fit import Fit
+    from analyses.identification.verdict import Identified, Item
+
+
+def judged(
+    id: str, title: str, found: Identified, blocks: Sequence[Block], *, result: str, intro: str
+) -> Section:
+    """Put the section of one kind together: its verdict first, in words and item by item."""
+    status: Status = "pass" if found.passed else "fail"
+    first = [verdict_block(found.items)]
+    if not found.passed:
+        said = (
+            "The design is written as it was accepted, a check failed"
+            if found.accepted
+            else "No design is written, as a check fails; --accept writes it all the same"
+        )
+        first.append(doc.remark(said))
+    words = verdict_words(found.items, result)
+    return doc.section(id, title, [*first, *blocks], result=words, intro=intro, status=status)
+
+
+def verdict_words(items: Sequence[Item], result: str) -> str:
+    """One sentence: what was found, or which checks fail and why."""
+    wrong = [item for item in items if item.passed is False]
+    if not wrong:
+        return result
+    first = wrong[0]
+    why = f": {first.reason}" if first.reason else ""
+    more = f" ({len(wrong) - 1} more of {len(items)} checks fail)" if len(wrong) > 1 else ""
+    return f"{first.label} fails{why}{more}. {result}"
+
+
+def verdict_block(items: Sequence[Item]) -> Block:
+    """The verdict, item by item; shares in per cent."""
+    made = []
+    for item in items:
+        value = None if item.value is None else 100.0 * item.value
+        limit = None if item.limit is None else 100.0 * item.limit
+        made.append(
+            doc.verdict(
+                item.id,
+                item.label,
+                value=value,
+                limit=limit,
+                unit="%" if value is not None else "",
+                distance=None if value is None or limit is None else limit - value,
+                passed=item.passed,
+                reason=item.reason,
+                comparison="<=" if limit is not None else "",
+            )
+        )
+    return doc.verdicts(made, "bench checks")
+
+
+def value_words(fit: Fit, name: str, axis: str = "rotary") -> str:
+    """A value with its standard error and unit; 95.11 ± 0.28 kg."""
+    one = parameter(name, axis)
+    value, std = show(one.scale * fit[name], "sig:4"), show(one.scale * fit.std(name), "sig:2")
+    return f"{value} {one.unit} (fixed)" if name in fit.fixed else f"{value} ± {std} {one.unit}"
+
+
+def parameter_table(
+    caption: str,
+    fit: Fit,
+    note: str = "",
+    *,
+    axis: str = "rotary",
+    more: Sequence[tuple[Column, Mapping[str, float | None]]] = (),
+) -> Block:
+    """Every value with standard error and 95 % interval; what was fixed, and why.
+
+    ``more`` are further columns, each with its numbers by name.
+    """
+    columns = [
+        doc.column("name", "Parameter"),
+        doc.column("value", "Value", format="sig:7"),
+        doc.column("std", "Standard error", format="sig:3"),
+        doc.column("low", "95 % from", format="sig:5"),
+        doc.column("high", "to", format="sig:5"),
+        doc.column("unit", "Unit"),
+        *(column for column, _ in more),
+        *([doc.column("why", "Fixed because")] if fit.fixed else []),
+    ]
+    rows: list[Row] = []
+    for name, one in fit.parameters.items():
+        known = parameter(name, axis)
+        row: Row = {"name": known.label, "value": known.scale * one.value, "unit": known.unit}
+        if one.interval_95 is None:
+            row["why"] = fit.fixed[name].reason
+        else:
+            low, high = (known.scale * end for end in one.interval_95)
+            row |= {"std": known.scale * (one.standard_error or 0.0), "low": low, "high": high}
+            row |= {column["key"]: numbers.get(name) for column, numbers in more}
+        rows.append(row)
+    return doc.table(caption, columns, rows, note)

@@ -1,0 +1,248 @@
+"""The identification of a campaign: coefficients, runs, residuals, contributions, what to measure next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import groupby
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reports import document as doc
+from reports.document_schema import Block, Column, Row, Section
+from reports.sections.campaign_figures import (
+    NAMES,
+    region_figure,
+    residual_figure,
+    surface_figure,
+    window_figures,
+)
+from reports.sections.identified import judged, parameter_table, value_words
+from reports.sections.record_tables import input_table
+
+if TYPE_CHECKING:
+    from analyses.identification.campaign import CampaignResult
+    from analyses.identification.campaign_design import CampaignSuggestion, MarginSpread
+    from analyses.identification.contributions import Contribution
+    from analyses.identification.richer import LawScore, RicherLaws
+    from analyses.identification.run import CampaignAnswer
+    from analyses.identification.surface_fit import Outlier, SurfaceFit
+    from analyses.records.campaign_import import SetAside
+
+
+def section(answer: CampaignAnswer) -> Section:
+    """Make the section of a campaign's result."""
+    result = answer.result
+    fit = result.fit
+    blocks = [
+        coefficient_table(fit),
+        contribution_table(answer),
+        surface_figure(fit),
+        *([region_figure(fit)] if len(fit.told) > 1 else []),
+        residual_figure(fit),
+        *window_figures(result),
+        shared_table(fit),
+    ]
+    if result.laws is not None:
+        blocks.append(law_table(result.laws))
+    if answer.suggestion is not None:
+        blocks += suggestion_blocks(answer.suggestion)
+    blocks += [*account_blocks(result), input_table("Inputs of all runs", result.inputs)]
+    blocks.append(doc.details("Every run", [run_table(result)]))
+    found = ", ".join(f"{name} = {value_words(fit, name)}" for name in NAMES)
+    return judged(
+        "identification", "Identified friction", answer, blocks,
+        result=f"{found}, from {len(fit.points)} runs.", intro=_intro(result),
+    )  # fmt: skip
+
+
+def _intro(result: CampaignResult) -> str:
+    fit = result.fit
+    return (
+        f"{len(fit.points)} of {result.runs_listed} runs, {result.rows_in} rows in, {result.rows_out} out. "
+        f"M = kM i with kM = {result.torque_constant_Nm_A:g} N m/A, averaged over the steady part of each "
+        f"run ({result.criterion}), then M = C0 + Cv w + CM |M_ext| with errors in all variables."
+        + "".join(f" {name} is not fitted: {one.reason}." for name, one in fit.fixed.items())
+    )
+
+
+def coefficient_table(fit: SurfaceFit) -> Block:
+    """Values, standard errors, 95 % intervals, and how they go together."""
+    random = np.diag(fit.random_covariance) / np.maximum(np.diag(fit.covariance), 1e-300)
+    more: list[tuple[Column, dict[str, float | None]]] = [
+        (
+            doc.column("scatter", "Share of scatter", "%", format="fix:0"),
+            dict(zip(NAMES, (100.0 * random).tolist(), strict=True)),
+        )
+    ]
+    for j, (key, name) in enumerate((("c0", "C0"), ("cv", "Cv"))):
+        both: dict[str, float | None] = {
+            NAMES[k]: float(fit.correlation[k, j]) for k in fit.told if j < k and j in fit.told
+        }
+        more.append((doc.column(key, f"r with {name}", format="fix:2"), both))
+    note = (
+        "Intervals by propagated distributions (GUM Supplement 1): Student for the scatter of the runs, "
+        "uniform for the instruments' shared errors."
+    )
+    return parameter_table("Friction coefficients", fit, note, more=more)
+
+
+def contribution_table(answer: CampaignAnswer) -> Block:
+    """Table 1 of the paper."""
+    terms = {"C0": "C0", "Cv": "Cv w", "CM": "CM |M_ext|"}
+    columns: list[tuple[Column, Callable[[Contribution], Any]]] = [
+        (doc.column("name", "Term"), lambda one: terms[one.name]),
+        (doc.column("torque", "Torque", "mN m", format="sig:4"), lambda one: 1e3 * one.torque_Nm),
+        (doc.column("share", "Share", "%", format="fix:1"), lambda one: 100.0 * one.share),
+        (doc.column("std", "Standard error", "%", format="fix:2"), lambda one: 100.0 * one.share_std),
+    ]
+    caption = f"Contributions at {answer.load_Nm:g} N m and {answer.speed_rad_s:g} rad/s"
+    return doc.listing(caption, answer.shares, columns)
+
+
+def shared_table(fit: SurfaceFit) -> Block:
+    """What the bound of each shared error does to each coefficient."""
+    columns = [doc.column("name", "Systematic error, at its bound")]
+    columns += [doc.column(name, name, "%", format="fix:3") for name in NAMES]
+    rows = [
+        {"name": name, **{n: 100.0 * s / v for n, s, v in zip(NAMES, shift, fit.values, strict=True) if v}}
+        for name, shift in fit.shared_shifts.items()
+    ]
+    note = (
+        f"Scatter between runs beyond their own noise: {1e6 * fit.run_scatter_Nm:.2g} µN m; "
+        f"Birge ratio without it {fit.birge_ratio:.2f} (1: the noise explains the residuals)."
+    )
+    return doc.table("Systematic errors", columns, rows, note)
+
+
+def law_table(laws: RicherLaws) -> Block:
+    """Richer laws by cross-validation."""
+
+    def shown(name: str, scale: float) -> Callable[[LawScore], float | None]:
+        return lambda one: scale * getattr(one, name) if one.possible else None
+
+    def verdict(one: LawScore) -> str:
+        return "–" if one.name == "plain" else "yes" if one.warranted else one.reason or "no"
+
+    columns: list[tuple[Column, Callable[[LawScore], Any]]] = [
+        (doc.column("name", "Law"), lambda one: one.name),
+        (doc.column("formula", "Terms"), lambda one: one.formula),
+        (
+            doc.column("error", "Error, unseen runs", "µN m", format="sig:3"),
+            shown("error_Nm", 1e6),
+        ),
+        (
+            doc.column("gain", "Squared error less by", "%", format="fix:1"),
+            shown("gain", 100.0),
+        ),
+        (doc.column("std", "± standard error", "%", format="fix:1"), shown("gain_std", 100.0)),
+        (doc.column("verdict", "Warranted"), verdict),
+    ]
+    note = (
+        f"Cross-validation over {laws.folds} folds of runs; a law is warranted where it predicts runs it has "
+        f"not seen better by twice the standard error and 5 %. Chosen: {laws.best}."
+    )
+    return doc.listing("Is a richer law warranted?", laws.scores, columns, note)
+
+
+def suggestion_blocks(suggestion: CampaignSuggestion) -> list[Block]:
+    """What to measure next, and for which margins."""
+    columns = [
+        doc.column("order", "Run"),
+        doc.column("speed", "Speed", "rad/s", format="fix:1"),
+        doc.column("load", "Load", "N m", format="fix:2"),
+        doc.column("remaining", "Random variance remaining", "%", format="fix:1"),
+    ]
+    rows = _grouped(suggestion)
+    note = ""
+    if suggestion.largest_shared is not None:
+        note = (
+            f"{100.0 * suggestion.shared_part:.0f} % of the margins' variance comes from errors that all "
+            "runs share "
+            f"and no further run reduces; the largest is the {suggestion.largest_shared}."
+        )
+    margins: list[tuple[Column, Callable[[MarginSpread], Any]]] = [
+        (doc.column("label", "Margin"), lambda one: one.label),
+        (doc.column("value", "Value", format="sig:4"), lambda one: one.value),
+        (doc.column("std", "Standard deviation", format="sig:2"), lambda one: one.std),
+        (doc.column("floor", "Systematic part", format="sig:2"), lambda one: one.floor_std),
+        (doc.column("unit", "Unit"), lambda one: one.unit),
+    ]
+    goal = "the margins'" if suggestion.criterion == "margins" else "the coefficients'"
+    return [
+        doc.table(f"Runs that would shrink {goal} uncertainty most", columns, rows),
+        *([doc.text(note)] if note else []),
+        doc.listing(
+            "Margins and their uncertainty from the friction, slow motion", suggestion.margins, margins
+        ),
+    ]
+
+
+def _grouped(suggestion: CampaignSuggestion) -> list[Row]:
+    """Suggested runs, the same point several times in one row."""
+    rows: list[Row] = []
+    for point, runs in groupby(suggestion.runs, key=lambda run: (run.speed_rad_s, run.load_Nm)):
+        same = list(runs)
+        first, last = same[0].order, same[-1].order
+        order = str(first) if first == last else f"{first} to {last}"
+        rows.append(
+            {"order": order, "speed": point[0], "load": point[1], "remaining": 100.0 * same[-1].remaining}
+        )
+    return rows
+
+
+def account_blocks(result: CampaignResult) -> list[Block]:
+    """Outliers and runs set aside, by name."""
+    outlier: list[tuple[Column, Callable[[Outlier], Any]]] = [
+        (doc.column("run", "Outlier, run"), lambda one: one.run),
+        (doc.column("size", "Residual, standard deviations", format="fix:1"), lambda one: one.standardised),
+        (doc.column("limit", "Limit", format="fix:1"), lambda one: one.limit),
+        (doc.column("state", "Treatment"), lambda one: "set aside" if one.set_aside else "kept"),
+    ]
+    aside: list[tuple[Column, Callable[[SetAside], Any]]] = [
+        (doc.column("run", "Run"), lambda one: one.id),
+        (doc.column("reason", "Reason"), lambda one: one.reason),
+    ]
+    outliers, gone = result.fit.outliers, result.set_aside
+    return [
+        doc.listing("Outliers", outliers, outlier) if outliers else doc.text("No run is an outlier."),
+        doc.listing("Runs set aside", gone, aside, status=lambda _: "warn")
+        if gone
+        else doc.text("No run was set aside."),
+    ]
+
+
+def run_table(result: CampaignResult) -> Block:
+    """One row a run: means, window, rows, clock."""
+    columns = [
+        doc.column("run", "Run"),
+        doc.column("speed", "Speed", "rad/s", format="fix:2"),
+        doc.column("load", "Load", "N m", format="fix:3"),
+        doc.column("torque", "Torque", "mN m", format="fix:4"),
+        doc.column("residual", "Residual", "µN m", format="fix:2"),
+        doc.column("std", "σ", "µN m", format="fix:2"),
+        doc.column("start", "Steady from", "s", format="fix:2"),
+        doc.column("stop", "to", "s", format="fix:2"),
+        doc.column("rows", "Rows in, out"),
+        doc.column("clock", "Clock of the sensor"),
+    ]
+    runs = {run.id: run for run in result.imported.runs}
+    rows = []
+    residuals = zip(result.fit.residuals_Nm, result.fit.residual_stds_Nm, strict=True)
+    for point, (residual, std) in zip(result.fit.points, residuals, strict=True):
+        run = runs[point.run]
+        rows.append(
+            {
+                "run": point.run,
+                "speed": point.direction * point.speed_rad_s,
+                "load": point.load_Nm,
+                "torque": 1e3 * point.torque_Nm,
+                "residual": 1e6 * residual,
+                "std": 1e6 * std,
+                "start": point.window.start_s,
+                "stop": point.window.stop_s,
+                "rows": str(run.record.counts),
+                "clock": "; ".join(run.record.notes) or "one recorder",
+            }
+        )
+    return doc.table("Runs", columns, rows)

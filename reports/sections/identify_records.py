@@ -1,0 +1,166 @@
+"""The identification from records of a motion: parameters, refinement by simulation, laws, inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from analyses.estimation.parameters import parameter
+from reports import document as doc
+from reports.charts import style
+from reports.charts.style import Chart
+from reports.document_schema import Block, Column, Section
+from reports.sections.identified import judged, parameter_table, value_words
+from reports.sections.record_tables import finding_table, input_table
+
+if TYPE_CHECKING:
+    from analyses.identification.bench import BenchResult
+    from analyses.identification.friction_map import LawChoice
+    from analyses.identification.joint_model import JointModel
+    from analyses.identification.output_error import OutputErrorResult
+
+
+def section(result: BenchResult) -> Section:
+    """Make the section of an identification from records."""
+    axis, model = result.design.axis, result.model
+    blocks = [_parameters(model, axis)]
+    if result.refined is not None:
+        blocks.append(_refined(result.refined, axis))
+    if result.electrical is not None:
+        residual = 100.0 * result.electrical.relative_residual
+        note = f"u = R i + kE w + L di/dt; relative residual {residual:.3g} %."
+        blocks.append(parameter_table("Voltage equation", result.electrical, note))
+    if result.laws:
+        blocks.append(law_table(result, axis))
+    if len(result.records) > 1:
+        blocks.append(scatter_table(model, axis))
+    for part, record in zip(model.records, result.records, strict=True):
+        blocks += [
+            input_table(f"Inputs: {record.name}", result.inputs[record.name]),
+            finding_table(record.name, result.findings[record.name]),
+            *[doc.text(f"{part.name}: {note}") for note in (str(record.counts), *part.notes)],
+        ]
+    blocks += [finding_table(record.name, result.findings[record.name]) for record in result.validation]
+    blocks.append(_figure(model, axis))
+    return judged(
+        "dynamic-identification", "Dynamic identification", result, blocks,
+        result=_result(result, axis), intro=_intro(result),
+    )  # fmt: skip
+
+
+def _result(result: BenchResult, axis: str) -> str:
+    """The values that matter with their standard errors, and how the written design meets its records."""
+    model = result.model
+    main = [n for n in model.names if n.partition("_")[0] in ("inertia", "dry", "viscous") or n == "map_0"]
+    labels = {name: parameter(name, axis).label.partition(",")[0].lower() for name in main[:3]}
+    parts = [f"{label} {value_words(model, name, axis)}" for name, label in labels.items()]
+    if result.refined is not None:  # these are the design's
+        keys = result.refined.names[:3]
+        parts = [f"{key} {value_words(result.refined, key, axis)}" for key in keys]
+        parts[0] = f"refined by simulation: {parts[0]}"
+    worst = max(result.resimulated, key=lambda one: one.relative_error)
+    met = "The written design meets "
+    met += "its records" if len(result.resimulated) > 1 else worst.record
+    words = f"{', '.join(parts)}. {met} within {100.0 * worst.relative_error:.3g} % ({worst.how})."
+    return words[0].upper() + words[1:]
+
+
+def _intro(result: BenchResult) -> str:
+    model = result.model
+    recipe = model.recipe
+    many = f"{len(result.records)} records, " if len(result.records) > 1 else ""
+    rest = sum(record.rows_at_rest for record in model.records)
+    return (
+        f"{many}{model.rows_in} rows in, {model.rows_used} used. Position filtered at "
+        f"{recipe.cutoff_hz:g} Hz (Butterworth of order {recipe.filter_order}, forward and backward), "
+        "differentiated twice, the first "
+        f"{recipe.skip_samples} samples dropped, decimated by {recipe.decimation}"
+        f"{f', {rest} rows at rest left out' if rest else ''}; inverse dynamic model by least squares. "
+        "Relative residual "
+        f"{100.0 * model.relative_residual:.4f} %."
+    )
+
+
+def _parameters(model: JointModel, axis: str) -> Block:
+    """Values, their standard errors as published recipes give them, and as the record really tells."""
+    white = dict(zip(model.names, model.white_errors.tolist(), strict=True))
+    more = [(doc.column("white", "Standard error if white", format="sig:4"), white)]
+    if model.bias:
+        more.append((doc.column("bias", "Bias removed", format="sig:3"), dict(model.bias)))
+    note = (
+        "White residuals: ordinary least squares, as is usually published. Standard error: with the "
+        "autocorrelation of the residuals, and the scatter between records where there are several; this one "
+        "goes into the design." + (f" Bias of the fit: {model.bias_told}." if model.bias_told else "")
+    )
+    return parameter_table("Identified parameters", model, note, axis=axis, more=more)
+
+
+def _refined(refined: OutputErrorResult, axis: str) -> Block:
+    """The values refined by simulation, which are those of the design."""
+    note = (
+        "Simulation with each record's own command: the relative error of the signal that is fitted falls "
+        f"from {100 * refined.error_before:.3f} % to {100 * refined.error_after:.3f} % in "
+        f"{refined.iterations} iterations. These values are the design's."
+    )
+    return parameter_table("Refined by simulation", refined, note, axis=axis)
+
+
+def law_table(result: BenchResult, axis: str) -> Block:
+    """The friction laws that were tried, by the Bayesian criterion."""
+    unit = "m/s" if axis == "linear" else "rad/s"
+    columns: list[tuple[Column, Callable[[LawChoice], Any]]] = [
+        (doc.column("name", "Law"), lambda one: one.name),
+        (
+            doc.column("breaks", f"Break points, {unit}"),
+            lambda one: ", ".join(f"{speed:.4g}" for speed in one.breaks_rad_s) or "–",
+        ),
+        (doc.column("parameters", "Parameters", format="short:3"), lambda one: one.parameters),
+        (
+            doc.column("residual", "Relative residual", "%", format="sig:4"),
+            lambda one: 100.0 * one.relative_residual,
+        ),
+        (doc.column("criterion", "BIC difference", format="fix:1"), lambda one: one.criterion),
+        (doc.column("taken", "Chosen", format="yesno"), lambda one: one.taken),
+    ]
+    note = (
+        "BIC (Bayesian information criterion): n ln(mean square residual) + p ln n, n the effective number "
+        "of independent rows; the difference is to the plain law. A map is chosen where it is below -6."
+    )
+    return doc.listing("Friction laws", result.laws, columns, note)
+
+
+def scatter_table(model: JointModel, axis: str) -> Block:
+    """Each record alone, and the scatter between them."""
+    columns = [doc.column("name", "Parameter")]
+    count = max((len(values) for values in model.singles.values()), default=0)
+    columns += [doc.column(f"r{k}", f"record {k + 1} alone", format="sig:5") for k in range(min(count, 6))]
+    columns += [
+        doc.column("between", "Scatter between records", format="sig:3"),
+        doc.column("unit", "Unit"),
+    ]
+    rows = []
+    for name in model.names:
+        one = parameter(name, axis)
+        own = {f"r{k}": value for k, value in enumerate(model.singles.get(name, ())[:6])}
+        rows.append({"name": one.label, "between": model.between[name], "unit": one.unit, **own})
+    note = (
+        "Scatter: standard deviation between records beyond the error of each. A parameter that one record "
+        "does not determine is fixed at its joint value there."
+    )
+    return doc.table("Fits of single records", columns, rows, note)
+
+
+def _figure(model: JointModel, axis: str) -> Block:
+    unit = "N" if axis == "linear" else "N m"
+    chart = Chart(width=style.WIDE, height=320.0)
+    panel = chart.panel()
+    panel.curve(np.arange(len(model.residual)), model.residual, "residual")
+    panel.x.label, panel.y.label = "row after decimation", f"residual, {unit}"
+    return doc.figure(
+        "residual",
+        chart,
+        caption="Residual of the inverse dynamic model",
+        alt="Residual of the drive force over the record",
+    )

@@ -1,0 +1,66 @@
+"""The identification of a two-mass drive: parameters, resonances, play, and the response with its fit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from reports import document as doc
+from reports.charts import style
+from reports.charts.style import Chart
+from reports.document_schema import Block, Section
+from reports.sections.identified import judged, parameter_table, value_words
+from reports.sections.record_tables import finding_table, input_table
+
+if TYPE_CHECKING:
+    from analyses.identification.frequency_bench import FrequencyResult
+
+
+def section(result: FrequencyResult) -> Section:
+    """Make the section of a frequency response's identification."""
+    fit = result.fit
+    blocks = [
+        parameter_table("Identified two-mass drive", result.found),
+        *response_figures(result),
+        input_table(f"Inputs: {result.record.name}", result.inputs),
+        *(finding_table(name, rows) for name, rows in result.findings.items()),
+    ]
+    intro = (
+        f"{fit.lines} lines of a period of {result.period_s:g} s, means over {result.lines.periods} periods; "
+        "two-mass drive by maximum likelihood with the noise of every line from the spectrum beside it. "
+        f"Misfit {fit.misfit:.2f} (1: the noise explains the residuals)."
+    )
+    low, high = fit.antiresonance_rad_s[0] / (2.0 * np.pi), fit.resonance_rad_s[0] / (2.0 * np.pi)
+    words = f"Antiresonance {low:.4g} Hz, resonance {high:.4g} Hz, stiffness {value_words(fit, 'stiffness')}"
+    if result.play is not None:
+        words += f", play {2e3 * result.play.half_rad:.3g} mrad"
+    return judged(
+        "frequency-identification", "Two-mass drive", result, blocks, result=f"{words}.", intro=intro
+    )
+
+
+def response_figures(result: FrequencyResult) -> list[Block]:
+    """Motor angle (and load angle) over motor torque: measured lines and the model."""
+    from analyses.identification.frequency import response
+    from analyses.identification.two_mass import NAMES, angle_responses
+
+    lines, fit = result.lines, result.fit
+    own = {name: fit[name] for name in NAMES}
+    model = angle_responses(lines.omega_rad_s, own, fit.reduction, fit.reaction)
+    hertz = lines.omega_rad_s / (2.0 * np.pi)
+    figures = []
+    for k, (signal, label) in enumerate((("angle", "motor angle"), ("load_angle", "load angle"))):
+        if signal not in lines.names:
+            continue
+        measured, _ = response(lines, signal, lines.names[0])
+        chart = Chart(width=style.WIDE, height=320.0)
+        panel = chart.panel()
+        panel.x.log = panel.y.log = True
+        panel.points(hertz, np.abs(measured), "measured", colour=style.BLUE)
+        panel.curve(hertz, np.abs(model[k]), "two-mass model", **style.series(1))
+        panel.x.label, panel.y.label = "frequency, Hz", f"{label} over torque, rad/(N m)"
+        caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
+        alt = f"Magnitude of {label} over motor torque against frequency, measured and fitted"
+        figures.append(doc.figure("response", chart, caption=caption, alt=alt))
+    return figures

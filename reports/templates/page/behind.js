@@ -1,0 +1,77 @@
+// What takes too long for a moving slider: once nothing has moved for a moment, one piece at a time.
+import { border } from "./border.js";
+import { BEHIND, PLACE, STABLE, chart, data, desk, find, outer, root, tell } from "./desk.js";
+import { figures, stageOf, view, x } from "./module.js";
+import { state } from "./requirements.js";
+import { cell, linearAt, startUp, toneOf } from "./sines.js";
+import { table } from "./table.js";
+import { html } from "./words.js";
+
+// what takes too long for a moving slider: once nothing has moved for a moment, one piece at a time
+const QUIET = 150, SLICE = 12; // ms
+let pieces = [], waits = 0, inView = false;
+const nextPiece = () => {
+  const end = performance.now() + SLICE;
+  while (pieces.length && performance.now() < end) pieces.shift()();
+  if (!pieces.length) { root.dataset.behind = "done"; return; }
+  waits = setTimeout(nextPiece, 0);
+};
+export const fillBehind = () => {
+  clearTimeout(waits);
+  root.dataset.behind = "waits";
+  pieces = [...timedPieces(desk.now), ...periodicPieces(desk.before), ...(desk.now === desk.before ? [] : periodicPieces(desk.now)), table, ...mapPieces(desk.now)];
+  waits = setTimeout(nextPiece, QUIET);
+};
+const mapPieces = (found) => {
+  const loop = found.loops[outer];
+  if (found.cells) { drawMap(found.cells); return []; }
+  drawMap([]);
+  if (!border.map || !inView || !loop.figures || loop.figures[STABLE] !== 1) return [];
+  const { hertz, amplitude } = border.map, { row } = found, cells = [];
+  const tones = hertz.map((f) => toneOf(f, row[data.places.outer] * row[data.places.period]));
+  const settling = loop.figures[PLACE.settling_time], wait = 1.5 * (Number.isFinite(settling) ? settling : 400 * loop.period);
+  const ticks = startUp(row, wait);
+  let linear = null;
+  const listed = [() => { linear = linearAt(row, tones.map((tone) => tone.hertz)); }];
+  for (let j = amplitude.length - 1; j >= 0; j--) {
+    for (let k = 0; k < tones.length; k++) listed.push(() => {
+      const cause = linear && cell(row, tones[k], amplitude[j], linear[k], ticks);
+      if (cause) cells.push({ j, k, cause, ticks, tone: tones[k], amplitude: amplitude[j] });
+    });
+    listed.push(() => drawMap(cells));
+  }
+  listed.push(() => { found.cells = cells; });
+  return listed;
+};
+const drawMap = (cells) => {
+  if (!border.map) return;
+  const edges = (list, k) => { const half = Math.sqrt(list[1] / list[0]); return [list[k] / half, list[k] * half]; };
+  const { hertz, amplitude } = border.map;
+  tell("border", "chart:cells", { panel: 0, cells: cells.filter(({ cause }) => cause !== "none").map(({ j, k, cause }) => ({
+    x: edges(hertz, k), y: edges(amplitude, j).map((value) => value / data.step.factor), colour: data.map.colours[cause], words: data.map.words[cause],
+  })) });
+  const seen = [...new Set(cells.map(({ cause }) => cause))], line = find(".map-keys");
+  line.replaceChildren(...(seen.length ? [html("span", "", "Sine from rest, simulated: ")] : []), ...seen.map((cause) => {
+    const item = html("span", "map-key", data.map.words[cause]);
+    if (cause !== "none") { const box = html("i"); box.style.background = `var(--${data.map.colours[cause]})`; item.prepend(box); }
+    return item;
+  }));
+  root.dataset.cells = JSON.stringify(cells.map(({ cause, ticks, tone, amplitude }) => [cause, ticks, tone.hertz, tone.count, amplitude]));
+};
+const timedPieces = (found) => data.loops.filter((name) => found.loops[name].waits).map((name) => () => {
+  view(x.p_at(), found.row.length).set(found.row);
+  found.loops[name] = figures(stageOf(name), 1);
+  state("");
+});
+const periodicPieces = (found) => Object.keys(data.points).filter((name) => found.points[name].n === BEHIND).map((name) => () => {
+  view(x.p_at(), found.row.length).set(found.row);
+  found.points[name] = figures(data.points[name], 0);
+});
+// the map is computed only where somebody may see it
+export const watchMap = () => {
+  new IntersectionObserver(([entry]) => {
+    if (entry.isIntersecting === inView) return;
+    inView = entry.isIntersecting;
+    if (inView && root.dataset.ready) fillBehind();
+  }, { rootMargin: "200px" }).observe(chart("border"));
+};

@@ -1,0 +1,74 @@
+// Bode, Nyquist, sensitivity and step of one loop, as designed and as changed.
+import { PLACE, desk, tell } from "./desk.js";
+import { respond, stepOf } from "./module.js";
+
+const grid = (name) => {
+  const own = desk.before.loops[name], top = 0.5 / own.period * (1 - 1e-4), band = own.figures[PLACE.bandwidth];
+  const low = Math.min(Number.isFinite(band) && band > 0 ? band / 100 : top / 1e4, top / 30), points = [];
+  for (let k = 0; k <= 320; k++) points.push(low * (top / low) ** (k / 320));
+  return points;
+};
+const unwrapped = (re, im, hertz) => {
+  const phase = [];
+  let last = null, turn = 0;
+  const slope = Math.round(Math.log(Math.hypot(re[1], im[1]) / Math.hypot(re[0], im[0])) / Math.log(hertz[1] / hertz[0])) || 0;
+  for (let k = 0; k < re.length; k++) {
+    let angle = Math.atan2(im[k], re[k]) * 180 / Math.PI;
+    if (last === null) turn = -360 * Math.ceil((angle - 90 * slope - 90) / 360); // as actuator_lti.phase's branch
+    if (last !== null) turn -= 360 * Math.round((angle + turn - last) / 360);
+    angle += turn;
+    phase.push(angle);
+    last = angle;
+  }
+  return phase;
+};
+const db = (value) => 20 * Math.log10(value);
+export const curvesOf = (name, hertz) => {
+  const found = respond(name, hertz);
+  if (!found) return null;
+  const { re, im } = found, s = [], t = [];
+  for (let k = 0; k < re.length; k++) {
+    const distance = Math.hypot(1 + re[k], im[k]);
+    s.push(-db(distance));
+    t.push(db(Math.hypot(re[k], im[k]) / distance));
+  }
+  return { re, im, gain: re.map((_, k) => db(Math.hypot(re[k], im[k]))), phase: unwrapped(re, im, hertz), s, t };
+};
+const CUT = 2.5 * 1.6;
+const near = (curves) => curves.re.map((value, k) => Math.hypot(1 + value, curves.im[k]) < CUT);
+export const kept = {}; // the curves as designed, by loop
+export const designed = (name) => {
+  if (kept[name]) return kept[name];
+  const hertz = grid(name), own = desk.before.loops[name];
+  const settling = own.figures[PLACE.settling_time], end = Number.isFinite(settling) && settling > 0 ? 2.2 * settling : 400 * own.period;
+  const count = Math.min(Math.max(Math.ceil(end / own.period), 40), 3000);
+  kept[name] = { hertz, curves: curvesOf(name, hertz), step: stepOf(name, count), count };
+  return kept[name];
+};
+export const thinned = (count, most = 700) => Math.max(1, Math.ceil(count / most));
+export const draw = (label, part, name) => {
+  const { hertz } = kept[name], { curves, step } = part, keep = curves && near(curves);
+  if (curves) {
+    tell("bode", "chart:redraw", { panel: 0, curve: label, x: hertz, y: curves.gain });
+    tell("bode", "chart:redraw", { panel: 1, curve: label, x: hertz, y: curves.phase });
+    const cut = (list) => list.map((value, k) => (keep[k] ? value : NaN));
+    tell("nyquist", "chart:redraw", { panel: 0, curve: label, x: cut(curves.re), y: cut(curves.im), parameter: hertz });
+    tell("sensitivity", "chart:redraw", { panel: 0, curve: "S " + label, x: hertz, y: curves.s });
+    tell("sensitivity", "chart:redraw", { panel: 0, curve: "T " + label, x: hertz, y: curves.t });
+  }
+  if (!step) return;
+  const T = (label === "as designed" ? desk.before : desk.now).loops[name].period * 1e3, stride = thinned(step.length);
+  const at = step.map((_, k) => k).filter((k) => k % stride === 0);
+  tell("step", "chart:redraw", { panel: 0, curve: label, x: at.map((k) => k * T), y: at.map((k) => step[k]) });
+};
+export const range = (list, low, high) => [Math.max(low, Math.min(...list.filter(Number.isFinite))), Math.min(high, Math.max(...list.filter(Number.isFinite)))];
+export const frame = (name) => {
+  const part = kept[name], ends = [part.hertz[0], part.hertz[part.hertz.length - 1]], { gain, phase, s, t } = part.curves;
+  const [low, high] = range(gain, -90, 90), [lag, lead] = range(phase, -900, 180), [, peak] = range([...s, ...t], -60, 60);
+  tell("bode", "chart:axes", { panel: 0, x: ends, y: [Math.max(low, high - 100) - 6, high + 12] });
+  tell("bode", "chart:axes", { panel: 1, x: ends, y: [lag - 60, lead + 30] });
+  tell("sensitivity", "chart:axes", { panel: 0, x: ends, y: [-45, Math.max(peak, 3) + 9] });
+  const end = part.count * desk.before.loops[name].period * 1e3;
+  tell("step", "chart:axes", { panel: 0, x: [0, end], y: [-0.1, Math.max(1.5, Math.max(...(part.step || [1])) + 0.2)] });
+  tell("step", "chart:redraw", { panel: 0, curve: "command", x: [0, end], y: [1, 1] });
+};

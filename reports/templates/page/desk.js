@@ -1,0 +1,20 @@
+// What the sliders of a page share: its data, its elements, and what is found now.
+
+const holder = document.getElementById("live-data");
+export const root = document.getElementById("hands-on");
+/** @type {any} */
+export const data = holder && JSON.parse(holder.textContent);
+/** @type {(selector: string) => any} */
+export const find = (selector) => root.querySelector(selector);
+export const chart = (name) => find(`[data-chart="${name}"] .chart`);
+export const tell = (name, type, detail) => chart(name).dispatchEvent(new CustomEvent(type, { detail }));
+export const outer = data.loops[data.loops.length - 1];
+export const PLACE = Object.fromEntries(data.quantities.map((name, k) => [name, k]));
+export const STABLE = data.quantities.length;
+export const LOOP_NAMES = { current: "Current loop", velocity: "Velocity loop", position: "Position loop" };
+export const POINT_NAMES = { "at w_ref": "Cut at the speed command", "at i_ref": "Cut at the current command", "at u": "Cut at the voltage" };
+export const BEHIND = -9; // a loop that follows in a moment, and one whose stability rounding decides
+export const DOUBT = -3;
+// as designed, as changed, the loop whose curves are seen, the limits that acted in the last run (bits)
+/** @type {any} */
+export const desk = { before: null, now: null, shown: outer, record: null, acted: 0, follow: () => {} };

@@ -1,0 +1,26 @@
+// Every figure of the page is made to live, and a row of a table that names a crossing shows it there.
+import { Chart } from "./chart.js";
+import { all, html } from "./words.js";
+
+const charts = all(".chart").map((root) => new Chart(root));
+for (const row of all("tr[data-loop][data-hz]")) {
+  const own = charts.filter((c) => c.loop === row.dataset.loop && c.panels.some((p) => p.x.log && p.x.unit === "Hz"));
+  if (!own.length) continue;
+  let kept = false;
+  const show = () => own.forEach((c) => c.mark(+row.dataset.hz));
+  const hide = () => { if (!kept) own.forEach((c) => c.hide()); };
+  const button = html("button", "find", "show");
+  button.type = "button";
+  button.setAttribute("aria-label", "Show this crossing in the figures");
+  row.querySelector("th").append(" ", button);
+  row.addEventListener("pointerenter", () => { kept = false; show(); });
+  row.addEventListener("pointerleave", hide);
+  button.addEventListener("focus", show);
+  button.addEventListener("click", () => {
+    kept = true;
+    const main = own.find((c) => c.root.closest("section[id^=loop]")) || own[0];
+    main.root.scrollIntoView({ block: "center", behavior: "auto" });
+    show();
+  });
+}
+if (charts.length) document.documentElement.classList.add("live");

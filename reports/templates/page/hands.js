@@ -1,0 +1,128 @@
+// The sliders: keys of the design -> row of the simulator -> loops, margins, curves and a run, all in the module.
+import { fillBehind, watchMap } from "./behind.js";
+import { border, borderStart, drawBorder } from "./border.js";
+import { curvesOf, designed, draw, frame, kept } from "./curves.js";
+import { LOOP_NAMES, chart, data, desk, find, root, tell } from "./desk.js";
+import { holdCurves, marginMarks, stepGain } from "./drag.js";
+import { changedText, copy, save, sheet } from "./file.js";
+import { fragment, fromFragment, keys, past, redo, reset, start, undo } from "./history.js";
+import { borderOf, compute, load, slow, stepOf } from "./module.js";
+import { take } from "./record.js";
+import { state } from "./requirements.js";
+import { makePanel, show } from "./sliders.js";
+import { table } from "./table.js";
+import { drawRun, misfit, runKeys, runStart, trial, tried, unitOf } from "./trial.js";
+import { all, digits, html } from "./words.js";
+
+let lastGood = start.slice();
+const unfit = (wanted) => { // why values do not go together; empty where they do
+  const at = (path) => wanted[keys.findIndex((key) => key.path === path)];
+  for (const [path, of] of data.multiples) if (at(path) % at(of) > 0) return `${path} = ${at(path)} is no multiple of ${of} = ${at(of)}: nothing follows until it is one.`;
+  return "";
+};
+const drawLoop = (name) => {
+  const own = desk.now.loops[name], seen = kept[name];
+  if (!own.figures || !seen) return;
+  const count = Math.min(Math.ceil(seen.count * desk.before.loops[name].period / own.period), 3000);
+  const curves = curvesOf(name, seen.hertz);
+  draw("as changed", { curves, step: stepOf(name, count) }, name);
+  if (curves) marginMarks(seen.hertz, curves);
+};
+const update = () => {
+  const began = performance.now();
+  let refused = "";
+  const apart = unfit(past.values), found = apart ? null : compute(past.values);
+  if (found && data.loops.every((name) => found.loops[name].n !== 0)) { desk.now = found; lastGood = past.values; } else {
+    refused = apart || "The last value needs another structure of the drive: save the file and make a new report.";
+    desk.now = { ...desk.now, ...compute(keys.map((key, k) => lastGood[k])) };
+  }
+  show();
+  table();
+  state(refused);
+  drawLoop(desk.shown);
+  drawBorder("as changed", borderOf(desk.now.row, border.grid));
+  const part = tried(desk.now.row);
+  drawRun("as changed", part, unitOf()[0]);
+  const acting = data.limiters.filter(([, bit]) => desk.acted & bit).map(([name]) => name);
+  find(".acting").textContent = acting.length ? `Limits that act as changed: ${acting.join(", ")}.` : "No limit acts as changed.";
+  if (desk.record && part.y) find(".record").textContent = `${desk.record.name}: ${desk.record.time.length} samples. Model as changed: ${digits(misfit(part), 3)} % rms of the largest command; as designed: ${digits(misfit(trial.designed), 3)} %.`;
+  root.dataset.ms = (performance.now() - began).toFixed(1);
+  fillBehind();
+  root.dataset.count = String(+(root.dataset.count || 0) + 1);
+};
+const choose = (name) => {
+  desk.shown = name;
+  for (const button of all(".tabs button", root)) button.setAttribute("aria-pressed", String(button.dataset.loop === name));
+  compute(start);
+  designed(name);
+  frame(name);
+  draw("as designed", kept[name], name);
+  update();
+};
+
+const begin = () => {
+  root.hidden = false;
+  all(".to-hands").forEach((item) => (item.hidden = false));
+  makePanel();
+  desk.before = desk.now = compute(start, true);
+  slow.clear(); // the first run pays for the compiler
+  if (!desk.before) throw new Error("the design as written is refused");
+  const followed = data.loops.filter((name) => desk.before.loops[name].figures);
+  if (!followed.includes(desk.shown)) desk.shown = followed[followed.length - 1];
+  for (const name of followed) {
+    const button = html("button", "", LOOP_NAMES[name]);
+    button.type = "button";
+    button.dataset.loop = name;
+    button.addEventListener("click", () => choose(name));
+    find(".tabs").append(button);
+  }
+  watchMap();
+  holdCurves();
+  chart("bode").addEventListener("keydown", (/** @type {any} */ event) => {
+    const by = { PageUp: 0.5, PageDown: -0.5 }[event.key];
+    if (!by || !event.target.matches(".plots")) return;
+    event.preventDefault();
+    stepGain(by);
+  });
+  for (const name of ["bode", "nyquist", "sensitivity"]) chart(name).addEventListener("chart:at", (/** @type {any} */ event) => {
+    for (const other of ["bode", "nyquist", "sensitivity"]) if (other !== name) tell(other, "chart:show", event.detail);
+  });
+  runKeys();
+  runStart();
+  borderStart();
+  choose(desk.shown);
+  const acts = {
+    undo, redo, reset,
+    save, file: () => sheet(changedText()), link: () => sheet(location.href.split("#")[0] + fragment()),
+    copy, close: () => { find(".sheet").hidden = true; },
+  };
+  root.addEventListener("click", (/** @type {any} */ event) => {
+    const button = event.target.closest("[data-do]");
+    if (button) acts[button.dataset.do]();
+  });
+  root.addEventListener("keydown", (/** @type {any} */ event) => {
+    if (!(event.ctrlKey || event.metaKey) || event.target.matches("textarea, .field")) return;
+    if (event.key === "z" && !event.shiftKey) acts.undo();
+    else if (event.key === "y" || (event.key === "z" && event.shiftKey)) acts.redo();
+    else return;
+    event.preventDefault();
+  });
+  find('input[type="file"]').addEventListener("change", (event) => { if (event.target.files[0]) take(event.target.files[0]); });
+  addEventListener("dragover", (event) => { if ([...event.dataTransfer.types].includes("Files")) event.preventDefault(); });
+  addEventListener("drop", (event) => {
+    if (!event.dataTransfer.files.length) return;
+    event.preventDefault();
+    take(event.dataTransfer.files[0]);
+  });
+  addEventListener("hashchange", fromFragment);
+  fromFragment();
+  root.dataset.ready = "1";
+};
+if (typeof WebAssembly === "object") {
+  const bytes = Uint8Array.from(atob(document.getElementById("live-module").textContent.trim()), (letter) => letter.charCodeAt(0));
+  WebAssembly.instantiate(bytes, {}).then(({ instance }) => {
+    load(instance);
+    desk.follow = update;
+    begin();
+  });
+}

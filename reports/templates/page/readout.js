@@ -1,0 +1,71 @@
+// What a figure says of the place that is pointed at.
+import { placeOf } from "./place.js";
+import { html, show } from "./words.js";
+
+export const read = (chart, picture, event) => {
+  const found = placeOf(picture, event);
+  if (!found) { chart.hide(); return false; }
+  return readAt(chart, picture, found.panel, found.x, found.y);
+};
+export const readAt = (chart, picture, panel, px, py) => {
+  for (const p of chart.panels) p.clear();
+  const rows = panel.byPoint ? point(chart, panel, px, py) : level(chart, picture, panel, px);
+  if (rows.length < 2) { chart.readout.hidden = true; return false; }
+  fill(chart, rows);
+  const hertz = hertzAt(chart, panel, px, py);
+  if (hertz) chart.root.dispatchEvent(new CustomEvent("chart:at", { detail: { hertz } }));
+  const box = picture.svg.getBoundingClientRect(), own = chart.root.getBoundingClientRect();
+  const scale = box.width / picture.svg.viewBox.baseVal.width;
+  const x = box.left - own.left + px * scale, y = box.top - own.top + py * scale;
+  const width = chart.readout.offsetWidth;
+  chart.readout.style.left = `${Math.max(0, x + 14 + width > own.width ? x - width - 14 : x + 14)}px`;
+  chart.readout.style.top = `${Math.max(0, y - chart.readout.offsetHeight - 10)}px`;
+  return true;
+};
+// the frequency that is pointed at, along an axis or along a curve
+const hertzAt = (chart, panel, px, py) => {
+  if (panel.byPoint) { const best = panel.nearest(chart, px, py); return best?.curve.parameter?.[best.k]; }
+  return panel.x.unit === "Hz" ? panel.x.value(panel.back(px, 0)[0]) : undefined;
+};
+const level = (chart, picture, panel, px) => {
+  const [origin] = panel.back(px, 0);
+  const value = panel.x.value(origin);
+  const rows = [["", panel.x.name || "x", panel.x.words(value)]];
+  for (const p of chart.linked(panel)) {
+    p.cursor(origin, "cursor");
+    if (!picture.panels.includes(p)) continue;
+    for (const curve of p.seen(chart)) {
+      const q = p.at(curve, origin);
+      if (!q) continue;
+      p.dot(q);
+      rows.push([curve.node.style.stroke, nameOf(chart, curve, p), p.y.words(p.y.value(q[1]))]);
+    }
+  }
+  return rows;
+};
+const point = (chart, panel, px, py) => {
+  const best = panel.nearest(chart, px, py);
+  if (!best || best.d > 60) return [];
+  panel.dot(best.q);
+  const rows = [[best.curve.node.style.stroke, chart.labels[best.curve.key] || "curve", ""]];
+  if (best.curve.parameter) rows.push(["", "frequency", show(best.curve.parameter[best.k]) + " Hz"]);
+  for (const [axis, k] of [[panel.x, 0], [panel.y, 1]])
+    if (!axis.fixed) rows.push(["", axis.name, axis.words(axis.value(best.q[k]))]);
+  return rows;
+};
+const nameOf = (chart, curve, panel) => {
+  const label = chart.labels[curve.key];
+  return label ? `${label}: ${panel.y.name}` : panel.y.name;
+};
+const fill = (chart, rows) => {
+  const table = html("table");
+  for (const [colour, name, value] of rows) {
+    const row = html("tr"), dot = html("td", "bead");
+    if (colour) dot.style.color = colour;
+    dot.textContent = colour ? "●" : "";
+    row.append(dot, html("td", "", name), html("td", "value", value));
+    table.append(row);
+  }
+  chart.readout.replaceChildren(table);
+  chart.readout.hidden = false;
+};

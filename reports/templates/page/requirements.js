@@ -1,0 +1,65 @@
+// What the design asks for: as found, met or not, in words.
+import { DOUBT, LOOP_NAMES, PLACE, STABLE, data, desk, find } from "./desk.js";
+import { changes } from "./history.js";
+import { digits, html, minus } from "./words.js";
+
+// a requirement as found: its value (NaN: none), and whether it is met (null: not proven)
+export const judged = (found) => data.requirements.map((item, k) => {
+  const loop = found.loops[item.loop];
+  if (item.loop && (!loop || !loop.figures)) return { item, value: NaN, met: null };
+  if (item.loop && loop.figures[STABLE] !== 1) return { item, value: NaN, met: false, words: "unstable" };
+  if (item.loop && loop.waits && item.timed) return { item, value: NaN, met: null, words: "…" };
+  let value = item.loop ? loop.figures[PLACE[item.quantity]] : found.drive[k] ?? NaN;
+  if (item.absolute) value = Math.abs(value);
+  return { item, value, met: Number.isNaN(value) ? null : value >= (item.minimum ?? -Infinity) && value <= (item.maximum ?? Infinity) };
+});
+export const calm = (value, unit) => (["dB", "deg", "%"].includes(unit) && Math.abs(value) < 1 ? Math.round(value * 1e4) / 1e4 : value); // no -3e-5 dB
+
+// the line at the top, and the table of requirements
+export const state = (refused) => {
+  const line = find(".state"), all = judged(desk.now), was = judged(desk.before), total = all.length;
+  const fails = all.filter(({ met }) => met === false), old = was.filter(({ met }) => met === false), open = all.filter(({ met, words }) => met === null && words !== "…");
+  const unstable = data.loops.filter((name) => desk.now.loops[name].figures && desk.now.loops[name].figures[STABLE] !== 1);
+  const unknown = data.loops.filter((name) => desk.now.loops[name].n === DOUBT), words = [];
+  if (unknown.length) words.push(`Stability not known: ${unknown.join(", ")}.`);
+  if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
+  const met = all.filter((one) => one.met).length, count = (many, word) => (many ? `, ${many} ${word}` : "");
+  const designed = changes().length ? ` (as designed: ${old.length} not met)` : "";
+  if (total) words.push(`${met} of ${total} requirements met${count(fails.length, "not met")}${count(open.length, "not proven")}${designed}.`);
+  else if (!data.apart.length) words.push("The design states no requirements.");
+  if (data.apart.length) words.push(`${data.apart.length} found by a simulation of its own ${data.apart.length === 1 ? "does" : "do"} not follow: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
+  if (refused) words.push(refused);
+  line.className = `state ${unstable.length || fails.length ? "fail" : unknown.length || open.length ? "warn" : total ? "pass" : "info"}`;
+  line.textContent = words.filter(Boolean).join(" ");
+  line.dataset.failing = fails.length;
+  demands(all, was);
+};
+const placed = (item) => (item.loop ? LOOP_NAMES[item.loop] : item.load ? `at ${minus(String(item.load))} ${data.axis === "linear" ? "N" : "N m"}` : "");
+const demands = (all, was) => {
+  const box = find("table.demands");
+  box.closest(".scroll").hidden = !all.length;
+  const top = html("tr"), limit = ({ minimum, maximum }) => [minimum !== null ? `≥ ${minus(String(minimum))}` : "", maximum !== null ? `≤ ${minus(String(maximum))}` : ""].filter(Boolean).join(", ");
+  for (const [words, side] of [["Requirement", "left"], ["Where", "left"], ["Limit", "right"], ["As designed", "right"], ["As changed", "right"], ["Verdict", "left"]]) {
+    const th = html("th", side, words);
+    th.scope = "col";
+    top.append(th);
+  }
+  const rest = all.map(({ item, value, met, words }, k) => {
+    const row = html("tr"), th = html("th", "left", item.words[0].toUpperCase() + item.words.slice(1)), last = html("td", "left");
+    th.scope = "row";
+    th.title = item.id;
+    const found = (one) => one.words || `${digits(calm(one.value, one.item.unit), 4)} ${one.item.unit}`;
+    const cellNow = html("td", met === false ? "right bad" : "right", found({ item, value, words }));
+    row.dataset.id = item.id;
+    row.dataset.loop = item.loop || "";
+    row.dataset.value = value;
+    row.dataset.met = met;
+    last.append(html("span", `mark ${met === null ? "warn" : met ? "pass" : "fail"}`, met === null ? "not proven" : met ? "met" : was[k].met === false ? "not met" : "now not met"));
+    row.append(th, html("td", "left", placed(item)), html("td", "right", `${limit(item)} ${item.unit}`), html("td", "right", found(was[k])), cellNow, last);
+    return row;
+  });
+  const head = html("thead"), body = html("tbody");
+  head.append(top);
+  body.append(...rest);
+  box.replaceChildren(box.querySelector("caption"), head, body);
+};

@@ -1,0 +1,77 @@
+// Pure parts of the page's scripts, by node's own runner: make page.
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+const row = { lines: [], row: [0, "inf", 2], requirements: [], loops: ["current"], quantities: [], places: {}, stages: {} };
+const page = { "live-data": { textContent: JSON.stringify(row) }, "hands-on": {} };
+globalThis.document = { getElementById: (name) => page[name] ?? null };
+
+const { Axis } = await import("../../reports/templates/page/axis.js");
+const { recordOf } = await import("../../reports/templates/page/columns.js");
+const { rowOf, statementOf } = await import("../../reports/templates/page/row.js");
+const { degreeTicks, linearTicks, logTicks } = await import("../../reports/templates/page/ticks.js");
+const { digits, show } = await import("../../reports/templates/page/words.js");
+
+const near = (found, wanted) => assert.ok(Math.abs(found - wanted) <= 1e-12 * Math.max(1, Math.abs(wanted)), `${found} for ${wanted}`);
+
+test("an axis goes from value to place and back", () => {
+  for (const words of ["log 0.1 1000 40 400", "lin -3 5 400 40"]) {
+    const axis = new Axis(words, "frequency, Hz");
+    assert.deepEqual([axis.name, axis.unit], ["frequency", "Hz"]);
+    for (const value of [0.1, 0.7, 3]) near(axis.value(axis.px(value)), value);
+  }
+  near(new Axis("log 1 100 0 200", "f").px(10), 100); // halfway on a logarithmic axis
+});
+
+test("a phase is read in quarters of a turn, at any zoom", () => {
+  assert.deepEqual(degreeTicks(-540, 0, 8).map(([value]) => value), [-540, -450, -360, -270, -180, -90, 0]);
+  for (const [low, high, room] of [[-2000, 180, 6], [-190, -90, 5], [-300, 40, 4]]) {
+    const found = degreeTicks(low, high, room).map(([value]) => value);
+    assert.ok(found.length <= room + 1 && found.every((value) => value % 15 === 0), String(found));
+  }
+});
+
+test("ticks lie within the ends, evenly", () => {
+  for (const [low, high] of [[0, 1], [-37.2, 91], [1e-7, 3e-7], [1e5, 9e8]]) {
+    const found = linearTicks(low, high, 6).map(([value]) => value);
+    assert.ok(found.length >= 2 && found.length <= 8);
+    assert.ok(found.every((value) => value >= low - 1e-9 * high && value <= high * (1 + 1e-9)));
+    for (let k = 2; k < found.length; k++) near((found[k] - found[k - 1]) / (found[1] - found[0]), 1);
+  }
+  assert.deepEqual(logTicks(0.5, 2000, 9), [[1, "1"], [10, "10"], [100, "100"], [1000, "1k"]]);
+});
+
+test("numbers keep their digits and their sign", () => {
+  assert.equal(digits(-0.0123456, 4), "−0.01235");
+  assert.equal(digits(Infinity, 4), "unlimited");
+  assert.equal(digits(NaN, 4), "–");
+  assert.equal(show(1.5e8), "1.50×10⁸");
+});
+
+test("statements are what they say", () => {
+  const k = [3, 4], cases = [
+    ["+", ["k[0]", "k[1]"], 7], ["-", ["k[0]"], -3], ["-", ["k[0]", 5], -2], ["pow", ["k[0]", 2], 9], ["fabs", [-2], 2],
+    ["where", ["v1", "k[0]", "k[1]"], 4], ["zero_below", ["k[0]", 3.5], 0], ["", ["inf"], Infinity], ["/", ["k[0]", "k[1]"], 0.75],
+    ["<", ["k[0]", "k[1]"], 1], ["&&", ["k[0]", 0], 0], ["floor", [2.7], 2],
+  ];
+  for (const [does, terms, wanted] of cases) {
+    const p = [], v = [0, 0];
+    assert.equal(statementOf(["store", 2, does, ...terms])(k, v, p), true);
+    assert.equal(p[2], wanted, does);
+  }
+  assert.equal(statementOf(["condition", 1, ">", "k[0]", "k[1]"])(k, [], []), false);
+  assert.equal(statementOf(["condition", 0, ">", "k[0]", "k[1]"])(k, [], []), true);
+  assert.throws(() => statementOf(["value", 1, "system", 1]), /no function/);
+  assert.deepEqual([...rowOf([])], [0, Infinity, 2]);
+});
+
+test("columns of a record are found by name and unit, or refused in words", () => {
+  const found = recordOf("a.csv", "# bench\ntime_ms;note;angle_deg;command_deg\n10;x;0;0\n20;x;90;180\n".replaceAll("x", "1"));
+  assert.deepEqual(found.time, [0, 0.01]);
+  near(found.angle[1], Math.PI / 2);
+  near(found.scale, Math.PI);
+  assert.deepEqual(recordOf("b.csv", "0,1,2\n1,1,2\n").command, [1, 1]);
+  assert.throws(() => recordOf("c.csv", "time,angle\n0,1\n1,2\n"), /command/);
+  assert.throws(() => recordOf("d.csv", "time,command,angle\n1,0,0\n0,0,0\n"), /backwards/);
+  assert.throws(() => recordOf("e.csv", "time,command,angle\n1,0,0\n"), /two rows/);
+});

@@ -1,0 +1,197 @@
+"""Curves of the live page taken hold of: a drag by so many decibels is a gain by so much, and nothing else.
+
+The truth is the axis: what lies between two places on a scale in dB is a factor, in closed form.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from live_page import opened, read, settled, written
+
+from actuator_lti import load_design
+from actuator_lti.design import with_values
+from actuator_lti.design.control import Filter
+from actuator_lti.design.model import Design
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+VALUE = "JSON.parse(document.getElementById('live-data').textContent)"
+# a place on a curve where nothing lies above it, on the screen
+MIDDLE = """(node) => {
+    for (const part of [0.5, 0.6, 0.7, 0.8, 0.9, 0.4, 0.3]) {
+        const place = node.getPointAtLength(part * node.getTotalLength());
+        const at = place.matrixTransform(node.getScreenCTM());
+        if (document.elementFromPoint(at.x, at.y) === node) return [at.x, at.y];
+    }
+}"""
+# px on the screen to units of an axis of a panel: [per px along x (ratio if logarithmic), along y]
+SCALE = """([chart, k]) => {
+    const svg = document.querySelector(`[data-chart="${chart}"] .plot`);
+    const group = svg.querySelectorAll(".panel")[k];
+    const ends = (name) => [...group.querySelectorAll(name)].map((node) => node);
+    const zoom = svg.getScreenCTM().a;
+    const at = (node, key) => Number(node.getAttribute(key));
+    const number = (node) => Number(node.textContent.replace("−", "-").replace("k", "e3").replace("M", "e6"));
+    const xs = ends(".xt text"), ys = ends(".yt text");
+    const along = (list, key) => {
+        const [a, b] = [list[0], list[list.length - 1]];
+        return [number(a), number(b), (at(b, key) - at(a, key)) * zoom];
+    };
+    return [along(xs.length ? xs : [...svg.querySelectorAll(".xt text")], "x"), along(ys, "y")];
+}"""
+
+
+def drive() -> Design:
+    amber = load_design("ilr33-amber")
+    velocity = amber.controller.velocity
+    assert velocity is not None
+    notch = Filter(
+        kind="notch", frequency_rad_s=2.0 * math.pi * 200.0, width_rad_s=2.0 * math.pi * 60.0, depth=0.3
+    )
+    return replace(amber, controller=replace(amber.controller, velocity=replace(velocity, filters=(notch,))))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(drive(), tmp_path_factory.mktemp("drag"))
+
+
+@pytest.fixture
+def page(browser: Browser, made: Path) -> Iterator[Page]:
+    trouble: list[str] = []
+    result = opened(browser, made, trouble)
+    settled(result, lambda: result.locator(".tabs button", has_text="Velocity").click())
+    result.locator('[data-chart="bode"]').scroll_into_view_if_needed()
+    yield result
+    result.context.close()
+    assert trouble == []
+
+
+def value(page: Page, key: str) -> float:
+    """Give a key's value in its unit, as its slider says it."""
+    return float(page.input_value(f'.row[data-path="{key}"] .field'))
+
+
+def drag(page: Page, at: tuple[float, float], dx: float, dy: float) -> None:
+    """Move by whole pixels: a browser tells a script no parts of one."""
+    x, y = (round(place) for place in at)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for k in range(1, 6):
+        page.mouse.move(x + round(dx * k / 5), y + round(dy * k / 5))
+    settled(page, page.mouse.up)
+
+
+def decibels(page: Page, pixels: float) -> float:
+    low, high, apart = page.evaluate(SCALE, ["bode", 0])[1]
+    return pixels * (high - low) / apart
+
+
+def test_the_magnitude_is_dragged_by_decibels_and_undone_in_one_step(page: Page) -> None:
+    before = read(page)["velocity"]
+    grab = page.locator('[data-chart="bode"] path.grab')
+    drag(page, tuple(grab.evaluate(MIDDLE)), 0.0, -8.0)
+    by = decibels(page, -8.0)
+    assert by > 3.0
+    assert value(page, "control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (by / 20.0), rel=2e-3)
+    after = read(page)["velocity"]
+    assert after["gain_margin"] == pytest.approx(before["gain_margin"] - by, abs=0.02)
+    page.click('[data-do="undo"]')
+    page.wait_for_function("() => document.querySelector('[data-do=\"undo\"]').disabled")
+    assert value(page, "control.velocity.gain") == pytest.approx(0.12)
+    assert read(page)["velocity"] == before
+
+
+def test_the_nyquist_curve_is_dragged_outwards(page: Page) -> None:
+    grab = page.locator('[data-chart="nyquist"] path.grab')
+    x, y = grab.evaluate(MIDDLE)
+    origin = page.evaluate(
+        """() => { const svg = document.querySelector('[data-chart="nyquist"] .plot');
+        const told = svg.querySelector(".panel").dataset;
+        const ends = (name) => told[name].split(" ").slice(1).map(Number);
+        const scale = ([low, high, from, to]) => (to - from) / (high - low);
+        const zero = (axis) => axis[2] - axis[0] * scale(axis);
+        const [a, b] = [ends("x"), ends("y")];
+        const at = new DOMPoint(zero(a), zero(b)).matrixTransform(svg.getScreenCTM());
+        return [at.x, at.y]; }"""
+    )
+    away = (x - origin[0], y - origin[1])
+    drag(page, (x, y), 0.4 * away[0], 0.4 * away[1])
+    assert value(page, "control.velocity.gain") == pytest.approx(0.12 * 1.4, rel=2e-2)
+
+
+def test_the_corner_and_the_notch_are_moved_by_their_handles(page: Page) -> None:
+    def middle(name: str) -> tuple[float, float]:
+        box = page.locator(f'[data-chart="bode"] circle[data-name="{name}"]').bounding_box()
+        assert box is not None
+        return box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0
+
+    low, high, apart = page.evaluate(SCALE, ["bode", 1])[0]
+    ratio = (high / low) ** (15.0 / apart)
+    drag(page, middle("corner of velocity"), 15.0, 0.0)
+    assert value(page, "control.velocity.integral_time") == pytest.approx(15.0 / ratio, rel=5e-3)
+    name = next(key["path"] for key in page.evaluate(VALUE)["keys"] if key["path"].endswith(".frequency"))
+    notch, width = name.removesuffix(".frequency"), name.replace(".frequency", ".width")
+    first, wide = value(page, name), value(page, width)
+    drag(page, middle(notch), 15.0, 0.0)
+    moved = value(page, name)
+    assert moved == pytest.approx(first * ratio, rel=5e-3)
+    page.keyboard.down("Shift")
+    drag(page, middle(notch), 15.0, 0.0)
+    page.keyboard.up("Shift")
+    assert value(page, width) == pytest.approx(wide * ratio, rel=5e-3)
+    assert value(page, name) == moved
+
+
+def test_marks_stand_where_the_margins_are(page: Page) -> None:
+    """The stem of the gain margin is as long as the figure says, and so is that of the phase margin."""
+    page.locator('[data-chart="bode"] .plots').focus()
+    for _ in range(3):
+        settled(page, lambda: page.keyboard.press("PageUp"))
+    assert value(page, "control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (1.5 / 20.0), rel=1e-3)
+    own = read(page)["velocity"]
+    for panel, name in ((0, "gain_margin"), (1, "phase_margin")):
+        low, high, apart = page.evaluate(SCALE, ["bode", panel])[1]
+        length = page.evaluate(
+            """(k) => { const svg = document.querySelector('[data-chart="bode"] .plot');
+            const stem = svg.querySelectorAll(".panel")[k].querySelector(".live-marks .stem");
+            const [, from, to] = stem.getAttribute("d").match(/M[-\\d.]+ ([-\\d.]+)V([-\\d.]+)/).map(Number);
+            return (to - from) * svg.getScreenCTM().a; }""",
+            panel,
+        )
+        assert abs(length * (high - low) / apart) == pytest.approx(abs(own[name]), rel=0.02, abs=0.3), name
+
+
+def test_a_value_that_does_not_parse_is_said_beside_itself(page: Page) -> None:
+    before, row = read(page), '.row[data-path="control.velocity.gain"]'
+    page.fill(f"{row} .field", "fast")
+    page.press(f"{row} .field", "Enter")
+    assert page.inner_text(f"{row} .was") == '"fast": a number above 0'
+    assert read(page) == before
+
+
+def test_a_design_with_a_limit_that_fails_marks_only_that(browser: Browser, tmp_path: Path) -> None:
+    trouble: list[str] = []
+    late = with_values(load_design("ilr33-amber"), {"control.velocity.gain": 0.75})
+    page = opened(browser, written(late, tmp_path), trouble)
+    settled(page, lambda: page.locator(".tabs button", has_text="Velocity").click())
+    colours = page.eval_on_selector_all(
+        '[data-chart="bode"] .live-marks .stem', "(all) => all.map((n) => n.style.stroke)"
+    )
+    rows = page.eval_on_selector_all(
+        "table.demands tr[data-loop=velocity]", "(all) => all.map((r) => [r.dataset.id, r.dataset.met])"
+    )
+    met = dict(rows)
+    assert colours == [
+        f"var(--{'fail' if met[name] == 'false' else 'pass'})" for name in ("gain-margin", "phase-margin")
+    ]
+    assert "var(--fail)" in colours
+    assert trouble == []
+    page.context.close()
