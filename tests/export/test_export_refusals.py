@@ -116,7 +116,7 @@ def test_unknown_versions_and_platforms(
 
 
 def test_no_name_ends_a_comment_or_turns_the_code_round() -> None:
-    hostile = "*/ int evil; /* \" int evil; \\ \u202e\u2066 \x85 two\nlines"
+    hostile = '*/ int evil; /* " int evil; \\ \u202e\u2066 \x85 two\nlines'
     texts = c_export(replace(load_design("ctms-motor-position"), name=hostile, title=hostile))
     for name in ("drive_design.h", "drive_design.c", "README.md"):
         assert all(c.isprintable() or c == "\n" for c in texts[name]), name
