@@ -21,6 +21,13 @@ Refusal = tuple[str, object, str]
 """Key, value as it is to be shown ("" for none), and what is allowed."""
 
 
+def refusal_text(refusal: Refusal) -> str:
+    """``key = value: what is allowed``."""
+    path, given, reason = refusal
+    value = f"{given}"
+    return f"{shown(path, 200)[1:-1]}{f' = {value}' if value else ''}: {reason}"
+
+
 class Findings:
     """What is wrong in one file; ``lines`` gives the line of a dotted key, where there is a text."""
 
@@ -33,8 +40,7 @@ class Findings:
         """Keep a mistake."""
         line = self._line(path)
         at = f"line {line}: " if line else ""
-        value = f" = {given}" if given != "" else ""
-        text = f"{at}{shown(path, 200)[1:-1]}{value}: {reason}"
+        text = f"{at}{refusal_text((path, given, reason))}"
         self.found.append((line, InputError(text, where=self.where)))
 
     def extend(self, refusals: Iterable[Refusal]) -> None:

@@ -1,4 +1,4 @@
-"""`actuator-lti export`: the running drive as C99 or as an FMU."""
+"""`actuator-lti export`: the running drive as C99 or as an FMU, the linear one as state spaces."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import typer
 
 from actuator_lti.tree import Tree
 from reports.cli.drive import SetOption, load_drive
+from reports.cli.export_linear import linear
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
 from reports.cli.targets import folder_for_results, refuse_existing
 
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
     from actuator_lti.design import Design
     from analyses.code_check import CodeCheck
 
-app = typer.Typer(help="The running drive outside of Python: C99 or FMU.", no_args_is_help=True)
+app = typer.Typer(help="The drive outside of Python: C99, FMU, linear models.", no_args_is_help=True)
+app.command("linear")(linear)
 
 CheckOption = Annotated[
     bool,
