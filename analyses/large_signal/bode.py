@@ -67,7 +67,8 @@ def amplitude_bode(design: Design, amplitude_map: AmplitudeMap) -> AmplitudeBode
     hz, unsteady = amplitude_map.frequency_hz, amplitude_map.waveform == WAVEFORMS.index("not steady")
     gain = np.where(unsteady, np.nan, amplitude_map.gain_db)
     phase = np.where(unsteady, np.nan, amplitude_map.phase_deg)
-    linear_db = 20.0 * np.log10(np.abs(amplitude_map.linear))
+    with np.errstate(divide="ignore"):  # the mean of a limited jerk has zeros
+        linear_db = 20.0 * np.log10(np.abs(amplitude_map.linear))
     linear_deg = np.degrees(np.unwrap(np.angle(amplitude_map.linear)))
     first_3 = np.array([_crossing(hz, row, MINUS_3DB) for row in gain])
     first_90 = np.array([_crossing(hz, row, -90.0) for row in phase])

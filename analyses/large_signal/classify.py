@@ -84,6 +84,7 @@ def causes(
 
 def not_linear(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -> np.ndarray:
     """Whether the fundamental of each run is off the linear one by more than `CAUSE_RULE` says."""
-    ratio = result.phasor("output_angle_rad") / (linear * amplitude_rad)
+    with np.errstate(divide="ignore", invalid="ignore"):  # at a zero of the command's mean nothing is linear
+        ratio = result.phasor("output_angle_rad") / (linear * amplitude_rad)
     off = np.abs(20.0 * np.log10(np.maximum(np.abs(ratio), 1e-300))) > FRICTION_DB
     return off | (np.abs(np.degrees(np.angle(ratio))) > FRICTION_DEG)

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.wiring import wire
 from analyses.loop_figures import LoopFigures, loop_figures
 from analyses.validation.small_signal import Place
 from nonlinear import tangent
@@ -164,7 +165,6 @@ class Bench:
 
     def _delayed(self, more_s: float) -> tuple[Tangent, Complexes]:
         """Tangent at the voltage, and predicted poles over a base period, under a longer computing delay."""
-        from actuator_lti.drive.wiring import wire
         from actuator_lti.loops import periodic_loop_of
 
         longer = Bench(_later(self.design, more_s), _later(self.model, more_s))

@@ -16,6 +16,7 @@ from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.verdict import Verdict
 from analyses.isolation import attempt
+from analyses.large_signal import large_signals
 from analyses.large_signal.at_rest import RestSweep, free_amplitude, sweep_from_rest
 from analyses.large_signal.by_amplitude import margins_by_amplitude
 from analyses.large_signal.conditional import Conditional, conditional_stability
@@ -249,8 +250,6 @@ class _Work:
         return counts_of(self.design, self._loops, self._settle())
 
     def _large(self) -> Any:
-        from analyses.large_signal import large_signals
-
         return large_signals(self.design, self._whole, counts=self.settings.map_counts)
 
     def _friction(self) -> Any:

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from actuator_lti.design import load_design, read_design_text, with_values
 from actuator_lti.design.model import Design
@@ -27,6 +28,7 @@ TRUTH = {
 }
 N, RATE, PERIODS, KM = 10.0, 2000, 8, 0.05
 HERTZ = np.arange(2.0, 400.0, 2.0)
+HALF_PLAY = 1e-3
 
 
 def _design() -> Design:
@@ -143,3 +145,49 @@ def test_what_the_design_cannot_hold_is_fixed_or_refused() -> None:
     blind = replace(record, signals={name: v for name, v in record.signals.items() if name != "angle"})
     with pytest.raises(InputError, match="motor angle is needed"):
         identify_frequency(_design(), blind)
+
+
+@lru_cache(maxsize=1)
+def _reversal() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A slow reversing torque across the play, written out and integrated apart from the simulator."""
+    jm, jl, k, c = (TRUTH[name] for name in ("motor_inertia", "load_inertia", "stiffness", "damping"))
+
+    def rates(t: float, s: np.ndarray) -> tuple[float, float, float, float]:
+        th, w, phi, v = s
+        twist, rate = th / N - phi, w / N - v
+        over = twist - np.clip(twist, -HALF_PLAY, HALF_PLAY)
+        spring = np.sign(over) * max(0.0, np.sign(over) * (k * over + c * rate))
+        torque = 0.03 * np.sin(2.0 * np.pi * 1.5 * t) - TRUTH["viscous"] * w - spring / N
+        return w, torque / jm, v, (spring - 0.05 * v) / jl
+
+    time = np.arange(0.0, 3.0, 1e-3)
+    motion = solve_ivp(rates, (0.0, 3.0), np.zeros(4), t_eval=time, rtol=1e-8, atol=1e-10, max_step=5e-4)
+    return time, motion.y[0], motion.y[2]
+
+
+def _play_record(seed: int) -> Record:
+    rng = np.random.default_rng(1000 + seed)
+    time, motor, load = _reversal()
+    quantum = 2.0 * np.pi / 4096
+    angle = np.floor(motor / quantum + rng.uniform()) * quantum
+    output = load + 1e-5 * rng.standard_normal(len(load))
+    return Record(
+        name="reversal", time_s=time, signals={"angle": angle, "output_angle": output}, units={},
+        counts=RowCounts(),
+    )  # fmt: skip
+
+
+def test_the_play_is_within_its_interval() -> None:
+    """Truth: half-play 1 mrad; 20 draws of the instruments' noise."""
+    held = 0
+    for seed in range(20):
+        play = identify_frequency(_design(), _record(seed), play_record=_play_record(seed)).play
+        assert play is not None
+        assert play.half_rad == pytest.approx(HALF_PLAY, rel=0.02)
+        held += abs(play.half_rad - HALF_PLAY) <= 1.96 * play.half_std_rad
+    assert held >= 17
+
+
+def test_a_motion_on_one_flank_does_not_tell_the_play() -> None:
+    with pytest.raises(InputError, match="must reverse"):
+        identify_frequency(_design(), _record(0), play_record=_play_record(0).slice(0, 200))
