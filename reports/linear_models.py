@@ -1,6 +1,7 @@
 """`actuator-lti export linear`: every loop and response of a design as state space, for other programs.
 
-The sampled form is exact; the continuous one carries its delays apart (`actuator_lti.delay_system`). What is
+The sampled form is exact; the continuous one carries its delays apart
+(`actuator_lti.systems.delay_system`). What is
 written is one tree of names, units, matrices and margins; `read_models` gives it back from any of the files,
 and `system_of` one of its systems as margins, bandwidths and step figures take it.
 """
@@ -19,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.errors import InputError
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -45,7 +46,7 @@ def system(entry):
     """The python-control system of an entry of matrices; one with delays is actuator-lti's DelaySystem."""
     names = {{"inputs": [entry["input"]], "outputs": [entry["output"]], "name": entry["name"]}}
     if "delays_s" in entry:
-        from actuator_lti.delay_system import DelaySystem
+        from actuator_lti.systems.delay_system import DelaySystem
 
         parts = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays_s")
         return DelaySystem(*(entry[part] for part in parts), **names)
@@ -149,8 +150,8 @@ def _system(system: Any, unit_in: str, unit_out: str) -> Tree:
 
 def system_of(entry: Tree) -> Any:
     """A system of a tree, written by any of the formats."""
-    from actuator_lti.plain_delays import PlainDelaySystem
-    from actuator_lti.plain_system import PlainSystem
+    from actuator_lti.systems.plain_delays import PlainDelaySystem
+    from actuator_lti.systems.plain_system import PlainSystem
 
     n = isqrt(np.size(entry["A"]))
     names: dict[str, Any] = {

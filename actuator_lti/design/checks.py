@@ -15,7 +15,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.quantities import QUANTITIES
 from actuator_lti.design.sections import parts_of
-from actuator_lti.reading import shown
+from actuator_lti.files.reading import shown
 
 CHECKS = "validation"  # what the ids of checks by simulation begin with
 _ELECTRICAL = {

@@ -8,8 +8,8 @@ from difflib import get_close_matches
 from typing import Any
 
 from actuator_lti.errors import InputError, Mistakes
-from actuator_lti.reading import shown
-from actuator_lti.tree import Tree
+from actuator_lti.files.reading import shown
+from actuator_lti.files.tree import Tree
 
 MOST = 30  # told at once
 _KEY = r"(?:[\w-]+|\"[^\"]*\"|'[^']*')"

@@ -14,11 +14,11 @@ from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
-from nonlinear.elastic import is_elastic
 from nonlinear.export.program import c_text, header_text, single, source_hash, source_text, template
 from nonlinear.export.rows import place_words
 from nonlinear.native import parameters
-from nonlinear.parameters import design_row
+from nonlinear.row.elastic import is_elastic
+from nonlinear.row.parameters import design_row
 
 Floats = npt.NDArray[np.float64]
 SPARE_LEVELS = 3  # halvings of the period beyond those of the design

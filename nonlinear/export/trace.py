@@ -19,7 +19,7 @@ from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout as at
 from nonlinear.export.statement import Statement, Term, used
-from nonlinear.parameters import design_row
+from nonlinear.row.parameters import design_row
 
 
 class NotTraceable(TypeError):

@@ -33,7 +33,7 @@ def linear(
     as_json: JsonOption = False,
 ) -> None:
     """Write every loop, break point, command and load response as state space, with units and margins."""
-    from actuator_lti.atomic import write_bytes
+    from actuator_lti.files.atomic import write_bytes
     from reports.cli.output import print_json, print_line
     from reports.linear_models import FORMS, SUFFIXES, linear_models, written_models
 

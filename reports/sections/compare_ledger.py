@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from actuator_lti.verdict import Tally
+from actuator_lti.asked.verdict import Tally
 from reports import document as doc
 from reports.document_schema import Block, Row, Section, Status
 from reports.numbers import significant
 from reports.sections.validation import loop_name, quantity_name
 
 if TYPE_CHECKING:
+    from analyses.comparison.variants import Compared, Comparison
     from analyses.validation.row import Row as Check
-    from analyses.variants import Compared, Comparison
 
 Key = tuple[str, str, str]
 ROUNDING = 1e-9  # of a value

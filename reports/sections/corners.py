@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from actuator_lti.quantities import CORNERED, QUANTITIES, Quantity
+from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
 from reports import document as doc
 from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
@@ -13,7 +13,7 @@ from reports.sections.names import figure_column, loop_words
 
 if TYPE_CHECKING:
     from analyses.corners import Corner, Corners
-    from analyses.loop_figures import LoopFigures
+    from analyses.linear.loop_figures import LoopFigures
 
 PER_LOOP = [QUANTITIES[name] for name in (*CORNERED, "bandwidth")]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from analyses.settling import words
+from analyses.motion.settling import words
 from reports import document as doc
 from reports.document_schema import Block, Row, Section
 from reports.findings import Finding
@@ -12,7 +12,7 @@ from reports.sections.large_signal import load_unit, output_unit
 
 if TYPE_CHECKING:
     from analyses.limit_cycles import Confirmation, LimitCycles
-    from analyses.settling import Settling
+    from analyses.motion.settling import Settling
 
 CAUSES = {
     "play": "play",

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.design.model import Command
-from analyses.settling import largest_swing
-from analyses.settling import words as end_words
+from analyses.motion.settling import largest_swing
+from analyses.motion.settling import words as end_words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart

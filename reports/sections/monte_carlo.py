@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
-from actuator_lti.verdict import Verdict
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -19,7 +19,7 @@ from reports.terminal import Brief
 
 if TYPE_CHECKING:
     from analyses.monte_carlo import ColumnStatistics, MonteCarloResult, Odds, WorstCase
-    from analyses.verdicts import RequirementVerdict
+    from analyses.specification.verdicts import RequirementVerdict
 
 ODDS_COLUMNS = [
     doc.column("label", "Requirement"),

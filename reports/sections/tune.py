@@ -7,17 +7,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_lti.atomic import write_text
 from actuator_lti.design import write_design
+from actuator_lti.files.atomic import write_text
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Column, Section, VerdictItem
 
 if TYPE_CHECKING:
+    from analyses.specification.verdicts import RequirementVerdict
     from analyses.tuning import BindingRequirement, GainSetting, TuningResult
     from analyses.tuning.result import NonlinearCheck
-    from analyses.verdicts import RequirementVerdict
 
 
 def section(result: TuningResult) -> Section:

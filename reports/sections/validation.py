@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
-from actuator_lti.verdict import Verdict
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc

@@ -26,7 +26,7 @@ from nonlinear import commands, loads, simulate
 from nonlinear.export import fmu_bytes
 from nonlinear.export.trace import trace_keys
 from nonlinear.export.variables import structured
-from nonlinear.parameters import design_row
+from nonlinear.row.parameters import design_row
 from reports.cli.app import build
 
 LINUX = ("linux64",)
