@@ -10,6 +10,8 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import profile_onset_rad
 from actuator_lti.loops import assemble_loops
+from analyses.large_signal.grid import tone
+from analyses.large_signal.steady_start import linear_steady_state
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,6 @@ def command_limits(design: Design, frequency_hz: float) -> CommandLimits | None:
         return None
     if onset >= full:
         return CommandLimits(frequency_hz, onset, full, None, 0.0)
-    from analyses.large_signal.grid import tone
-    from analyses.large_signal.steady_start import linear_steady_state
     from analyses.large_signal.tones_run import run_tones
 
     chosen = tone(frequency_hz, design)

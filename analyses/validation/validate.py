@@ -14,6 +14,7 @@ from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
+from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
 from analyses.isolation import attempt
 from analyses.large_signal import large_signals
@@ -188,7 +189,6 @@ class _Work:
 
     def _held_by_friction(self) -> tuple[str, ...]:
         """Loops that are not stable as they are tested, but are with the friction that is left out there."""
-        from actuator_lti.loops import assemble_loops
 
         bench, model = self.bench, on_the_bench(self.bench.model)
         if bench.linear.friction == model.friction:
