@@ -14,7 +14,8 @@ from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
-from actuator_lti.loops.assemble import assemble_loops, loops_at
+from actuator_lti.loops import assemble_loops
+from actuator_lti.loops.assemble import loops_at
 from analyses.isolation import attempt
 from analyses.large_signal import large_signals
 from analyses.large_signal.at_rest import RestSweep, free_amplitude, sweep_from_rest
@@ -188,6 +189,7 @@ class _Work:
 
     def _held_by_friction(self) -> tuple[str, ...]:
         """Loops that are not stable as they are tested, but are with the friction that is left out there."""
+
         bench, model = self.bench, on_the_bench(self.bench.model)
         if bench.linear.friction == model.friction:
             return ()
