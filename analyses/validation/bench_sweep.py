@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import Place
-from nonlinear.differences import RETURNED
+from nonlinear.injection import RETURNED
 from nonlinear.loop_setup import LoopSetup
 from nonlinear.stepper import Stepper
 

@@ -24,7 +24,7 @@ from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
 from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, pole_near
 from nonlinear import tangent
-from nonlinear.differences import RETURNED
+from nonlinear.injection import RETURNED
 from nonlinear.loop_setup import LoopSetup
 from nonlinear.stepper import Stepper
 
