@@ -22,39 +22,14 @@ from reports.charts.paint import (
     SKY,
     Style,
     series,
-)
+)  # fmt: skip
 from reports.numbers import hertz, time_unit, to_minus
 
 SMALL, HALF, WIDE = 340.0, 430.0, 900.0
 __all__ = [
-    "BLUE",
-    "BROWN",
-    "GREEN",
-    "HALF",
-    "INK",
-    "MUTED",
-    "ORANGE",
-    "PURPLE",
-    "RED",
-    "SERIES",
-    "SKY",
-    "SMALL",
-    "WIDE",
-    "Chart",
-    "Panel",
-    "Style",
-    "Values",
-    "bound",
-    "differences",
-    "frequency",
-    "hertz",
-    "known",
-    "phase_axis",
-    "powers",
-    "series",
-    "time_axis",
-    "time_unit",
-    "to_minus",
+    "BLUE", "BROWN", "GREEN", "HALF", "INK", "MUTED", "ORANGE", "PURPLE", "RED", "SERIES", "SKY", "SMALL",
+    "WIDE", "Chart", "Panel", "Style", "Values", "bound", "differences", "frequency", "hertz", "known",
+    "phase_axis", "powers", "series", "time_axis", "time_unit", "to_minus",
 ]  # fmt: skip
 
 Values = Sequence[float | None]  # of a curve; null is a gap

@@ -9,14 +9,7 @@ from analyses.loop_figures import LoopFigures
 from analyses.loop_survey import BreakPoint
 from reports import document as doc
 from reports.document_schema import Row, Section
-from reports.sections.margins import (
-    MARGIN_COLUMNS,
-    evidence_notes,
-    finite,
-    margin_row,
-    times,
-    worst_status,
-)
+from reports.sections.margins import MARGIN_COLUMNS, evidence_notes, finite, margin_row, times, worst_status
 from reports.sections.names import POINTS
 
 COLUMNS = [
@@ -54,14 +47,12 @@ def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures])
     if exact:
         words = (
             "A fast loop cut inside slower ones is periodically time-varying; the rows above describe its "
-            "fundamental. "
-            "The exact borders of stability follow from the eigenvalues over one period."
+            "fundamental. The exact borders of stability follow from the eigenvalues over one period."
         )
         blocks += [doc.text(words), doc.table("Exact borders of periodic loops", EXACT_COLUMNS, exact)]
     intro = (
         "In the finished drive a gain error or a delay occurs at one point, with every other loop closed. "
-        "The matrix "
-        "shows what the drive tolerates at each point."
+        "The matrix shows what the drive tolerates at each point."
     )
     status = worst_status([point.stable for point in points.values()])
     return doc.section(

@@ -196,19 +196,14 @@ def _bar_label(bar: Sensitivity) -> str:
 
 def _slopes(comparison: Comparison) -> Block:
     """Slopes of the strongest figures, one row a parameter and figure."""
-    columns = [
-        doc.column("figure", "Figure"),
-        doc.column("path", "Parameter"),
-        doc.column("slope", "Change per +1 %", format="sig:3"),
-        doc.column("low", "At its low end", format="sig:5"),
-        doc.column("base", "Nominal", format="sig:5"),
-        doc.column("high", "At its high end", format="sig:5"),
-    ]
     known = comparison.sensitivities
-    rows = [
-        {"figure": key, "path": e.path, "slope": e.per_percent, "low": e.low, "base": known.base[key],
-         "high": e.high}
-        for key in known.base
-        for e in known.tornado(key)[:MOST_BARS]
-    ]  # fmt: skip
-    return doc.table("Slopes and ranges, the ten strongest parameters of each figure", columns, rows)
+    columns = [
+        doc.of(lambda pair: pair[0], "figure", "Figure"),
+        doc.of(lambda pair: pair[1].path, "path", "Parameter"),
+        doc.of(lambda pair: pair[1].per_percent, "slope", "Change per +1 %", format="sig:3"),
+        doc.of(lambda pair: pair[1].low, "low", "At its low end", format="sig:5"),
+        doc.of(lambda pair: known.base[pair[0]], "base", "Nominal", format="sig:5"),
+        doc.of(lambda pair: pair[1].high, "high", "At its high end", format="sig:5"),
+    ]
+    slopes = [(key, one) for key in known.base for one in known.tornado(key)[:MOST_BARS]]
+    return doc.listing("Slopes and ranges, the ten strongest parameters of each figure", slopes, columns)

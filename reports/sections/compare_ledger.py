@@ -9,6 +9,7 @@ from actuator_lti.verdict import Tally
 from reports import document as doc
 from reports.document_schema import Block, Row, Section, Status
 from reports.numbers import significant
+from reports.sections.names import unit_words
 from reports.sections.validation import loop_name, quantity_name
 
 if TYPE_CHECKING:
@@ -58,10 +59,7 @@ def _table(loop: str, condition: str, keys: list[Key], tested: list[Compared]) -
     rows = []
     for key in keys:
         unit = units.get(key, "")
-        row: Row = {
-            "what": _title(names[key]),
-            "unit": "" if unit == "1" else unit,
-        }
+        row: Row = {"what": _title(names[key]), "unit": unit_words(unit)}
         rows.append(row | {f"d{k}": _cell(result.get(key)) for k, result in enumerate(known)})
     return doc.table(f"{loop_name(loop)}: {condition}", columns, rows)
 

@@ -37,8 +37,7 @@ def section(budgets: Mapping[str, DelayBudget]) -> Section:
     rows = [nothing | _row(name, budget) for name, budget in budgets.items()]
     note = (
         "The loop is built up cause by cause, so the parts add up to the phase of the exact sampled loop. "
-        "One more "
-        "sample: cost of one more period of computing delay, not included in the total."
+        "One more sample: cost of one more period of computing delay, not included in the total."
     )
     caption = "Lag at the gain crossover of each loop, by cause. The rest to 180° is phase margin."
     blocks = [
@@ -93,9 +92,8 @@ def _result(budgets: Mapping[str, DelayBudget]) -> str:
     lost = {name: -sum(budget.items[key] for key in digital) for name, budget in budgets.items()}
     name = max(lost, key=lambda key: lost[key])
     return (
-        f"Sampling, hold and computing delay cost the {name} loop {lost[name]:.1f} deg of phase margin, more "
-        "than "
-        f"any other loop; it has {180.0 + budgets[name].total_deg:.1f} deg left."
+        f"Sampling, hold and computing delay cost the {name} loop {lost[name]:.1f} deg of phase margin, "
+        f"more than any other loop; it has {180.0 + budgets[name].total_deg:.1f} deg left."
     )
 
 

@@ -63,8 +63,7 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
     change = to_minus(f"{row['phase_cost_deg']:+.1f}")
     return (
         f"Sampling and delay change the phase margin of the {row['loop'].lower()} by {change} deg, the "
-        "largest "
-        "change of all loops."
+        "largest change of all loops."
     )
 
 

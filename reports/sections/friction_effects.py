@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,14 +13,14 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section, Severity, Status, VerdictItem
-from reports.findings import Finding
-from reports.sections.large_signal import load_unit, output_unit
+from reports.sections.names import fine_unit, load_unit
 from reports.verdict_summary import tally
 
 if TYPE_CHECKING:
     from analyses.friction_effects import FrictionEffects
     from analyses.friction_effects.cycles import LimitCycles
     from analyses.friction_effects.result import FrictionPoint
+    from analyses.settling import Settling
 
 
 LEFT = 1e-3  # of a step: an error that is spoken of
@@ -31,8 +31,7 @@ def section(result: FrictionEffects) -> Section:
     title = "Dry friction at small signals"
     if not result.points:
         return doc.section("friction-effects", title, [], result=f"Not applicable: {result.reason}.")
-    scale, unit = output_unit(result.design)
-    fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
+    fine, small = fine_unit(result.design.axis)
     load = load_unit(result.design)
     items = [_cycle_verdict(point, fine, small, load) for point in result.points]
     blocks = [doc.verdicts(items, what="checks"), _threshold_table(result, fine, small, load)]
@@ -46,9 +45,8 @@ def section(result: FrictionEffects) -> Section:
     severity: Severity = "fail" if status == "fail" else "warn" if status == "warn" else "info"
     words = _summary(result, fine, small)
     return doc.section(
-        "friction-effects", title, blocks, result=words, intro=intro, status=status,
-        findings=[Finding(severity=severity, text=words, where="friction-effects")],
-    )  # fmt: skip
+        "friction-effects", title, blocks, result=words, intro=intro, status=status, told=severity
+    )
 
 
 def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> VerdictItem:
@@ -153,33 +151,27 @@ def _threshold_row(point: FrictionPoint, fine: float, torque_scale: float) -> Ro
 
 def _settling_table(result: FrictionEffects, fine: float, small: str, load: str) -> Block:
     """List the steady-state error after steps."""
+    size: dict[str, Any] = {"unit": small, "scale": fine}
     columns = [
-        doc.column("load", "Load", load, format="short:4"),
-        doc.column("step", "Step", small, format="sig:3"),
-        doc.column("wait", "Waited", "s", format="sig:2"),
-        doc.column("error", "Remaining error", small, format="sig:2"),
-        doc.column("end", "The drive"),
+        doc.of(lambda pair: pair[0], "load", "Load", load, format="short:4"),
+        doc.of(lambda pair: pair[1].amplitude_rad, "step", "Step", **size, format="sig:3"),
+        doc.of(lambda pair: pair[1].rest.after_s, "wait", "Waited", "s", format="sig:2"),
+        doc.of(lambda pair: _error(pair[1]), "error", "Remaining error", **size, format="sig:2"),
+        doc.of(lambda pair: end_words(pair[1].rest, fine, small), "end", "The drive"),
     ]
-    rows = []
-    for point in result.points:
-        for one in point.cycles.settlings:
-            error = fine * one.rest.error
-            rows.append(
-                {
-                    "load": point.load_Nm,
-                    "step": fine * one.amplitude_rad,
-                    "wait": one.rest.after_s,
-                    "error": error if abs(error) > 1e-6 * fine * one.amplitude_rad else 0.0,
-                    "end": end_words(one.rest, fine, small),
-                    "_status": "warn" if one.hunting else None,
-                }
-            )
+    ends = [(point.load_Nm, one) for point in result.points for one in point.cycles.settlings]
     note = (
         "The third step at each load is 0.3 of the threshold, the fourth that of a predicted cycle. Errors "
-        "below 10⁻⁶ "
-        "of the step are shown as 0."
+        "below 10⁻⁶ of the step are shown as 0."
     )
-    return doc.table("Steady-state error after a step", columns, rows, note)
+    return doc.listing(
+        "Steady-state error after a step", ends, columns, note,
+        lambda pair: "warn" if pair[1].hunting else None,
+    )  # fmt: skip
+
+
+def _error(one: Settling) -> float:
+    return one.rest.error if abs(one.rest.error) > 1e-6 * one.amplitude_rad else 0.0
 
 
 def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Block | None:

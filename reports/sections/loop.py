@@ -195,12 +195,7 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
 
 
 def step(
-    title: str,
-    loop_figures: LoopFigures,
-    locked: LoopFigures | None,
-    *,
-    name: str = "",
-    small: bool = False,
+    title: str, loop_figures: LoopFigures, locked: LoopFigures | None, *, name: str = "", small: bool = False
 ) -> Block:
     """Make the step figure."""
     figures = loop_figures.step

@@ -202,8 +202,7 @@ def margin_table(named: Mapping[str, LoopFigures]) -> Block:
     note = (
         "Of several crossings the table quotes the gain margin nearest to 0 dB and the phase margin nearest "
         "to 0°; all of them are listed below. A dash means that there is no such crossing, or that the loop "
-        "is not stable and has no margins. "
-        "Disk margin: α, balanced (S + T)."
+        "is not stable and has no margins. Disk margin: α, balanced (S + T)."
     )
     rows = [{"loop": name, **margin_row(loop_figures)} for name, loop_figures in named.items()]
     return doc.table("Stability margins", MARGIN_COLUMNS, rows, note)

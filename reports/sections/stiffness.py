@@ -11,7 +11,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section, Status
-from reports.sections.large_signal import load_unit, output_unit
+from reports.sections.names import load_unit, output_unit
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -47,12 +47,7 @@ def section(result: Stiffness) -> Section:
     )
     status: Status = "info" if not result.checks else "pass" if result.passed else "fail"
     return doc.section(
-        "stiffness",
-        "Stiffness",
-        blocks,
-        result=_result(result, unit),
-        intro=intro,
-        status=status,
+        "stiffness", "Stiffness", blocks, result=_result(result, unit), intro=intro, status=status
     )
 
 
@@ -95,12 +90,15 @@ def _table(result: Stiffness, unit: str) -> Block:
         "Stiffness by state",
         result.curves,
         [
-            (doc.column("state", "State"), lambda one: STATES[one.state]),
-            (doc.column("static", "Static", unit, format="sig:4", better=1), _static),
-            (doc.column("least", "Least", unit, format="sig:4", better=1), lambda one: one.least[0]),
-            (
-                doc.column("at", "at", "Hz", format="sig:4"),
+            doc.of(lambda one: STATES[one.state], "state", "State"),
+            doc.of(_static, "static", "Static", unit, format="sig:4", better=1),
+            doc.of(lambda one: one.least[0], "least", "Least", unit, format="sig:4", better=1),
+            doc.of(
                 lambda one: one.least[1] if math.isfinite(one.least[0]) else None,
+                "at",
+                "at",
+                "Hz",
+                format="sig:4",
             ),
         ],
         note,
@@ -112,7 +110,7 @@ def _static(curve: StiffnessCurve) -> float | str:
 
 
 def _lost_motion(result: Stiffness) -> Block:
-    scale, unit = output_unit(result.design)
+    scale, unit = output_unit(result.design.axis)
     lost = result.lost_motion
     assert lost is not None
     columns = [
@@ -141,12 +139,9 @@ def _at_rest(result: Stiffness, unit: str) -> Block:
         "At rest, by amplitude",
         result.at_rest,
         [
-            (
-                doc.column("moment", "Moment, peak", load_unit(result.design), format="sig:3"),
-                lambda one: one.moment_Nm,
-            ),
-            (doc.column("frequency_hz", "Frequency", "Hz", format="sig:3"), lambda one: one.frequency_hz),
-            (doc.column("seen", "Stiffness", unit, format="sig:4"), lambda one: abs(one.seen_Nm_rad)),
+            doc.of("moment_Nm", "moment", "Moment, peak", load_unit(result.design), format="sig:3"),
+            doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:3"),
+            doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Stiffness", unit, format="sig:4"),
         ],
         note,
     )
@@ -162,10 +157,10 @@ def _checks(result: Stiffness, unit: str) -> Block:
         "Injected moment",
         result.checks,
         [
-            (doc.column("frequency_hz", "Frequency", "Hz", format="sig:4"), lambda one: one.frequency_hz),
-            (doc.column("foreseen", "Predicted", unit, format="sig:6"), lambda one: abs(one.foreseen_Nm_rad)),
-            (doc.column("seen", "Simulated", unit, format="sig:6"), lambda one: abs(one.seen_Nm_rad)),
-            (doc.column("difference", "Relative difference", format="sig:2"), lambda one: one.difference),
+            doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:4"),
+            doc.of(lambda one: abs(one.foreseen_Nm_rad), "foreseen", "Predicted", unit, format="sig:6"),
+            doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Simulated", unit, format="sig:6"),
+            doc.of("difference", "difference", "Relative difference", format="sig:2"),
         ],
         note,
     )
