@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from operator import attrgetter
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -134,12 +134,24 @@ def of(
     """A column of `listing`: a field of the items by its dotted name, or what a function says of one.
 
     ``scale`` turns a number into ``unit``; what is not there stays nothing. ``look``: as of `column`.
+
+    Examples
+    --------
+    >>> _, read = of("real.imag", "y", "y", "mm", scale=1e3)
+    >>> read(2.0 + 3.0j), read(None)
+    (0.0, None)
     """
-    value = attrgetter(read) if isinstance(read, str) else read
+    value = partial(_field, read.split(".")) if isinstance(read, str) else read
     made = column(key, label, unit, **look)
     if scale == 1.0:
         return made, value
     return made, lambda item: None if (found := value(item)) is None else scale * found
+
+
+def _field(names: Sequence[str], item: Any) -> Any:
+    for name in names:
+        item = None if item is None else getattr(item, name)
+    return item
 
 
 def listing(

@@ -14,7 +14,7 @@ from analyses.requirements import tally
 from reports import document as doc
 from reports.as_json import as_json
 from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
-from reports.numbers import significant
+from reports.numbers import capital, significant
 from reports.sections import compare_best, compare_figures, compare_ledger, compare_many
 from reports.sections.compare_best import limit_words, number
 from reports.sections.names import LOOPS
@@ -187,13 +187,9 @@ def _group_table(
     rows = []
     for name in names:
         unit = "ms" if name.unit == "s" else name.unit.replace("^2", "²")
-        row: Row = {"figure": _title(name.label), "unit": unit}
+        row: Row = {"figure": capital(name.label), "unit": unit}
         rows.append(row | {f"d{k}": _cell(one, name, comparison) for k, one in enumerate(designs)})
     return doc.table(title, columns, rows)
-
-
-def _title(words: str) -> str:
-    return words[:1].upper() + words[1:]
 
 
 def _cell(one: Compared, name: FigureName, comparison: Comparison) -> str | None:

@@ -70,11 +70,9 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
     hertz = [response.frequency_hz for response, _ in made]
     style.frequency(bottom, (min(f[0] for f in hertz), max(f[-1] for f in hertz)))
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
-    return [doc.figure(
-        "overlay", chart,
-        caption=f"{title}, {which}: the base and its variants.",
-        alt=f"Bode diagram of the {which} of the {name} loop of {len(made)} designs.",
-    )]  # fmt: skip
+    caption = f"{title}, {which}: the base and its variants."
+    alt = f"Bode diagram of the {which} of the {name} loop of {len(made)} designs."
+    return [doc.figure("overlay", chart, caption=caption, alt=alt)]
 
 
 def _look(k: int) -> style.Style:
@@ -104,11 +102,9 @@ def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[Block]:
         panel.curve(np.asarray(step.time_s)[keep] * scale, response, label, **_look(k))
     panel.x.limits(0.0)
     panel.y.label = "response to a unit step"
-    return [doc.figure(
-        "overlay", chart,
-        caption=f"{title}, unit step: the base and its variants.",
-        alt=f"Step responses of the {name} loop of {len(shown)} designs.",
-    )]  # fmt: skip
+    caption = f"{title}, unit step: the base and its variants."
+    alt = f"Step responses of the {name} loop of {len(shown)} designs."
+    return [doc.figure("overlay", chart, caption=caption, alt=alt)]
 
 
 def tornadoes(comparison: Comparison) -> Section:
@@ -182,10 +178,9 @@ def _tornado(comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], li
     panel.y.limits(-0.6, max(len(bars), 1) - 0.4)
     panel.y.reversed, panel.y.grid = True, False
     panel.x.label = f"{words}, {name.unit}" if name and name.unit else words
-    return doc.figure(
-        "tornado", chart, caption=f"{words}: each parameter alone at both its ends.",
-        alt=f"Tornado chart of {words}; the strongest is {bars[0].path}.",
-    )  # fmt: skip
+    caption = f"{words}: each parameter alone at both its ends."
+    alt = f"Tornado chart of {words}; the strongest is {bars[0].path}."
+    return doc.figure("tornado", chart, caption=caption, alt=alt)
 
 
 def _bar_label(bar: Sensitivity) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from analyses.estimation.parameters import parameter
 from reports import document as doc
-from reports.document_schema import Block, Row, Section, Status
+from reports.document_schema import Block, Row, Section, Status, VerdictItem
 from reports.numbers import show
 
 if TYPE_CHECKING:
@@ -45,24 +45,18 @@ def verdict_words(items: Sequence[Item], result: str) -> str:
 
 def verdict_block(items: Sequence[Item]) -> Block:
     """The verdict, item by item; shares in per cent."""
-    made = []
-    for item in items:
-        value = None if item.value is None else 100.0 * item.value
-        limit = None if item.limit is None else 100.0 * item.limit
-        made.append(
-            doc.verdict(
-                item.id,
-                item.label,
-                value=value,
-                limit=limit,
-                unit="%" if value is not None else "",
-                distance=None if value is None or limit is None else limit - value,
-                passed=item.passed,
-                reason=item.reason,
-                comparison="<=" if limit is not None else "",
-            )
-        )
-    return doc.verdicts(made, "bench checks")
+    return doc.verdicts(map(_verdict, items), "bench checks")
+
+
+def _verdict(item: Item) -> VerdictItem:
+    value = None if item.value is None else 100.0 * item.value
+    limit = None if item.limit is None else 100.0 * item.limit
+    unit, comparison = "" if value is None else "%", "" if limit is None else "<="
+    return doc.verdict(
+        item.id, item.label, value=value, limit=limit, unit=unit, comparison=comparison,
+        distance=None if value is None or limit is None else limit - value,
+        passed=item.passed, reason=item.reason,
+    )  # fmt: skip
 
 
 def value_words(fit: Fit, name: str, axis: str = "rotary") -> str:

@@ -149,9 +149,5 @@ def _figure(model: JointModel, axis: str) -> Block:
     panel = chart.panel()
     panel.curve(np.arange(len(model.residual)), model.residual, "residual")
     panel.x.label, panel.y.label = "row after decimation", f"residual, {unit}"
-    return doc.figure(
-        "residual",
-        chart,
-        caption="Residual of the inverse dynamic model",
-        alt="Residual of the drive force over the record",
-    )
+    caption, alt = "Residual of the inverse dynamic model", "Residual of the drive force over the record"
+    return doc.figure("residual", chart, caption=caption, alt=alt)

@@ -200,12 +200,9 @@ def _figures(result: MonteCarloResult) -> list[Block]:
         for odds, column in part:
             _histogram(chart.panel(title=_words(column.name)), result, odds, column)
         names = ", ".join(_words(column.name) for _, column in part)
-        blocks.append(
-            doc.figure(
-                "distribution", chart, caption=f"Distribution within the tolerances: {names}.",
-                alt=f"Histograms of {names} with nominal design, worst case and limit.",
-            )
-        )  # fmt: skip
+        caption = f"Distribution within the tolerances: {names}."
+        alt = f"Histograms of {names} with nominal design, worst case and limit."
+        blocks.append(doc.figure("distribution", chart, caption=caption, alt=alt))
     return blocks
 
 

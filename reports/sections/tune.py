@@ -21,14 +21,13 @@ if TYPE_CHECKING:
 def section(result: TuningResult) -> Section:
     """Make the section."""
     verdicts = doc.verdicts(_verdict(r) for r in result.requirements)
-    blocks: list[Block] = [verdicts, gains(result), requirements(result)]
-    if result.confirmed:
-        blocks.append(confirmed(result))
-    if result.trade_off:
-        blocks.append(_curve(result))
-    if result.checks:
-        blocks.append(checks(result))
-    blocks += [doc.remark(note) for note in result.notes]
+    blocks: list[Block] = [
+        *(verdicts, gains(result), requirements(result)),
+        *([confirmed(result)] if result.confirmed else []),
+        *([_curve(result)] if result.trade_off else []),
+        *([checks(result)] if result.checks else []),
+        *(doc.remark(note) for note in result.notes),
+    ]
     blocks.append(doc.details("How the start gains were found", [doc.text(step) for step in result.steps]))
     title = "Tuning" if result.feasible else "Tuning: the requirements cannot be met"
     return doc.section(
@@ -172,11 +171,9 @@ def _curve(result: TuningResult) -> Block:
         panel.rule_y(max(margin), label="required", **required)
     panel.x.label = "bandwidth of the position loop, Hz"
     panel.y.label = "smallest phase margin of all loops, deg"
-    return doc.figure(
-        "trade_off", chart,
-        caption="Position bandwidth against the phase margin that every loop keeps at its worst corner.",
-        alt=f"Curve of {len(result.trade_off)} points, phase margin falling with bandwidth.",
-    )  # fmt: skip
+    caption = "Position bandwidth against the phase margin that every loop keeps at its worst corner."
+    alt = f"Curve of {len(result.trade_off)} points, phase margin falling with bandwidth."
+    return doc.figure("trade_off", chart, caption=caption, alt=alt)
 
 
 def checks(result: TuningResult) -> Block:

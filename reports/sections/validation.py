@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.verdict import Verdict
@@ -12,6 +13,7 @@ from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.document_schema import Block, Section, Severity, Status, VerdictItem
 from reports.findings import Finding
+from reports.numbers import capital
 from reports.sections.conditional import findings_of
 from reports.sections.names import LOOPS, POINTS, QUANTITIES, unit_words
 from reports.terminal import Brief
@@ -51,14 +53,12 @@ def _others(validation: Validation) -> list[Section]:
     """Make the sections of large signals, friction and specification, as far as they were asked for."""
     from reports.sections import friction_effects, large_signal, specification
 
-    made: list[Section] = []
-    if validation.large_signals is not None:
-        made.append(large_signal.section(validation.large_signals))
-    if validation.friction is not None:
-        made.append(friction_effects.section(validation.friction))
-    if validation.specification is not None:
-        made.append(specification.section(validation.specification))
-    return made
+    shown: list[tuple[Callable[[Any], Section], Any]] = [
+        (large_signal.section, validation.large_signals),
+        (friction_effects.section, validation.friction),
+        (specification.section, validation.specification),
+    ]
+    return [make(result) for make, result in shown if result is not None]
 
 
 def brief(validation: Validation) -> Brief:
@@ -100,7 +100,7 @@ def result(validation: Validation) -> str:
     """Say how many predictions are met, and what the drive does that it must not."""
     words = [validation.tally.words("predictions"), *validation.failures]
     words += [f"stability of the {name} loop not known" for name in validation.undecided]
-    return " ".join(f"{each[:1].upper()}{each[1:]}." for each in words)
+    return " ".join(f"{capital(each)}." for each in words)
 
 
 def findings(validation: Validation) -> list[Finding]:
@@ -130,8 +130,7 @@ def verdict_items(validation: Validation) -> list[VerdictItem]:
     if not items:
         items.append(_item("judged", "Predictions", 0.0, None, None, "; ".join(validation.notes)))
     for k, failure in enumerate(validation.failures):
-        label = f"{failure[:1].upper()}{failure[1:]}"
-        items.append(_item(f"drive-{k}", label, None, None, False, ""))
+        items.append(_item(f"drive-{k}", capital(failure), None, None, False, ""))
     items += [
         _item(f"stable-{name}", f"{loop_name(name)}: stable", None, None, None, "not known")
         for name in validation.undecided
