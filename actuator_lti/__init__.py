@@ -22,7 +22,7 @@ every loop is a python-control system: ``control.bode_plot(loops.position.open_l
 The public names are loaded on first use, so that ``import actuator_lti`` costs nothing.
 """
 
-from actuator_lti.on_first_use import on_first_use
+from actuator_lti.start.on_first_use import on_first_use
 
 _PUBLIC = {
     "InputError": "actuator_lti.errors",
@@ -37,14 +37,14 @@ _PUBLIC = {
     "plant": "actuator_lti.loops.bare_plant",
     "Loop": "actuator_lti.loops",
     "Loops": "actuator_lti.loops",
-    "DelaySystem": "actuator_lti.delay_system",
-    "onset": "actuator_lti.limiters",
-    "delay_budget": "actuator_lti.delay_budget",
+    "DelaySystem": "actuator_lti.systems.delay_system",
+    "onset": "actuator_lti.loops.limiters",
+    "delay_budget": "actuator_lti.loops.delay_budget",
     "stability_margins": "actuator_lti.margins",
     "StabilityMargins": "actuator_lti.margins",
     "closed_loop_bandwidth": "actuator_lti.bandwidth",
     "step_figures": "actuator_lti.step",
-    "unwrapped_phase_deg": "actuator_lti.phase",
+    "unwrapped_phase_deg": "actuator_lti.systems.phase",
 }
 
 __all__ = sorted(_PUBLIC)

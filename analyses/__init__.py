@@ -10,23 +10,23 @@ Examples
 True
 """
 
-from actuator_lti.on_first_use import on_first_use
+from actuator_lti.start.on_first_use import on_first_use
 
 _PUBLIC = {
-    "LoopFigures": "analyses.loop_figures",
-    "LoopSurvey": "analyses.loop_survey",
+    "LoopFigures": "analyses.linear.loop_figures",
+    "LoopSurvey": "analyses.linear.loop_survey",
     "amplitude_map": "analyses.large_signal.map",
-    "compare": "analyses.variants",
+    "compare": "analyses.comparison.variants",
     "correlate_record": "analyses.correlation",
-    "evaluate_requirements": "analyses.requirements",
+    "evaluate_requirements": "analyses.specification.requirements",
     "identify_campaign": "analyses.identification.campaign",
     "import_campaign": "analyses.records",
     "large_signals": "analyses.large_signal",
     "load_campaign": "analyses.records",
-    "load_study": "analyses.study",
+    "load_study": "analyses.studies.study",
     "open_record": "analyses.records",
     "sawtooth": "analyses.large_signal.sawtooth",
-    "survey_loops": "analyses.loop_survey",
+    "survey_loops": "analyses.linear.loop_survey",
     "tune": "analyses.tuning",
     "validate": "analyses.validation",
 }

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 if TYPE_CHECKING:
-    from analyses.engine import Engine
+    from analyses.studies.engine import Engine
 
 Kind = Literal["plain", "output", "load", "command"]
 UNITS = ("_rad_s", "_rad", "_hz", "_Nm", "_s", "_degC", "_V", "_A")
@@ -99,6 +99,6 @@ class OnMachines:
     @property
     def engine(self) -> Engine:
         """Where to compute."""
-        from analyses.engine import Engine
+        from analyses.studies.engine import Engine
 
         return Engine(self.workers, self.scheduler, tls=self.tls)

@@ -147,7 +147,7 @@ def _steps(count: int, share: float) -> Row:
     from actuator_lti.batch import Population
     from analyses.monte_carlo import StepCheck
     from analyses.monte_carlo.stepping import step_columns
-    from analyses.sampling import as_values, sampler_of
+    from analyses.studies.sampling import as_values, sampler_of
 
     design = load_design("ilr33-amber")
     sampler = sampler_of(design)
@@ -187,10 +187,10 @@ def _dask(quick: bool) -> Iterator[Row]:
     import distributed
 
     from actuator_lti import load_design
-    from analyses.engine import Engine
     from analyses.monte_carlo import SampleTask
     from analyses.monte_carlo.store import Store
-    from analyses.sampling import sampler_of
+    from analyses.studies.engine import Engine
+    from analyses.studies.sampling import sampler_of
 
     design = load_design("ilr33-amber")
     task = SampleTask(design, sampler_of(design))

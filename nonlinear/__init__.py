@@ -13,17 +13,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from actuator_lti.on_first_use import on_first_use
+from actuator_lti.start.on_first_use import on_first_use
 
 if TYPE_CHECKING:
     from nonlinear import commands, loads
-    from nonlinear.batch import Reducers, Run, simulate_many
-    from nonlinear.derivative import Tangent, tangent
+    from nonlinear.bench.derivative import Tangent, tangent
+    from nonlinear.bench.probe import Probe
     from nonlinear.drive import Drive
-    from nonlinear.probe import Probe
     from nonlinear.rows import LIMITERS, Rows
-    from nonlinear.simulation import simulate
-    from nonlinear.trajectory import State, Trajectory
+    from nonlinear.runs.batch import Reducers, Run, simulate_many
+    from nonlinear.runs.simulation import simulate
+    from nonlinear.runs.trajectory import State, Trajectory
 
 __all__ = [
     "LIMITERS",
@@ -45,16 +45,16 @@ __all__ = [
 _WHERE = {
     "Drive": "nonlinear.drive",
     "LIMITERS": "nonlinear.rows",
-    "Probe": "nonlinear.probe",
-    "Reducers": "nonlinear.batch",
+    "Probe": "nonlinear.bench.probe",
+    "Reducers": "nonlinear.runs.batch",
     "Rows": "nonlinear.rows",
-    "Run": "nonlinear.batch",
-    "State": "nonlinear.trajectory",
-    "Tangent": "nonlinear.derivative",
-    "Trajectory": "nonlinear.trajectory",
-    "simulate": "nonlinear.simulation",
-    "simulate_many": "nonlinear.batch",
-    "tangent": "nonlinear.derivative",
+    "Run": "nonlinear.runs.batch",
+    "State": "nonlinear.runs.trajectory",
+    "Tangent": "nonlinear.bench.derivative",
+    "Trajectory": "nonlinear.runs.trajectory",
+    "simulate": "nonlinear.runs.simulation",
+    "simulate_many": "nonlinear.runs.batch",
+    "tangent": "nonlinear.bench.derivative",
 }
 
 

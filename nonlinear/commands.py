@@ -413,7 +413,7 @@ def recorded(
 
     ``held``: a log of changes, each value held until the next (`events`).
     """
-    from nonlinear.records import read_columns
+    from nonlinear.runs.records import read_columns
 
     scale = {"deg": pi / 180.0, "rad": 1.0, "mm": 1e-3, "m": 1.0, "A": 1.0, "V": 1.0}.get(
         unit.removesuffix("/s") if unit not in ("A/s", "V/s") else unit

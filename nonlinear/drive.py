@@ -9,9 +9,9 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from nonlinear._kernels import layout as at
 from nonlinear.native import control_tick, parameters, tick
-from nonlinear.parameters import design_row
-from nonlinear.setup import put_state
-from nonlinear.trajectory import ADVICE, STATUS, State
+from nonlinear.row.parameters import design_row
+from nonlinear.runs.setup import put_state
+from nonlinear.runs.trajectory import ADVICE, STATUS, State
 
 Floats = npt.NDArray[np.float64]
 STATE_NAMES = {name[2:].lower(): place for name, place in vars(at).items() if name in at.STATE_NAMES}

@@ -25,14 +25,14 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
-from nonlinear.batch import Progress, run_rows
-from nonlinear.parameters import design_rows
-from nonlinear.probe import Probe, write_probe
-from nonlinear.reduced import COLUMNS, BatchResult
-from nonlinear.running import Running
-from nonlinear.setup import Tables
-from nonlinear.simulation import run_row
-from nonlinear.trajectory import Trajectory
+from nonlinear.bench.probe import Probe, write_probe
+from nonlinear.row.parameters import design_rows
+from nonlinear.runs.batch import Progress, run_rows
+from nonlinear.runs.reduced import COLUMNS, BatchResult
+from nonlinear.runs.setup import Tables
+from nonlinear.runs.simulation import run_row
+from nonlinear.runs.trajectory import Trajectory
+from nonlinear.settling.running import Running
 
 Floats = npt.NDArray[np.float64]
 LIMITERS = at.LIMITERS
@@ -153,7 +153,7 @@ class Rows:
             write_probe(probe, row)
 
     def window(self, ticks: npt.ArrayLike, cycles: npt.ArrayLike = 1, harmonics: int = 1) -> None:
-        """Reduce the last two windows (`nonlinear.reduced.whole_periods` finds ticks and cycles)."""
+        """Reduce the last two windows (`nonlinear.runs.reduced.whole_periods` finds ticks and cycles)."""
         self["window"], self["cycles"], self["harmonics"] = ticks, cycles, harmonics
 
     def step_figures(self, target_rad: npt.ArrayLike, band: float = 0.02) -> None:

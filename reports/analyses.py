@@ -12,7 +12,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from analyses.corners.asked import Asked as CornersAsked
 from analyses.correlation.asked import Asked as CorrelationAsked
 from analyses.duty.asked import Asked as DutyAsked
@@ -21,13 +21,13 @@ from analyses.identification.asked import Asked as IdentificationAsked
 from analyses.margins.asked import Asked as MarginsAsked
 from analyses.monte_carlo.asked import Asked as MonteCarloAsked
 from analyses.motion.asked import Asked as MotionAsked
-from analyses.study_asked import Asked as StudyAsked
+from analyses.studies.study_asked import Asked as StudyAsked
 from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.asked import Asked as ValidationAsked
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
-    from analyses.study import Study
+    from analyses.studies.study import Study
     from reports.document_schema import Section
     from reports.terminal import Brief
 
@@ -305,7 +305,7 @@ ANALYSES = (
         name="compare",
         group="Variants and history",
         request=StudyAsked,
-        function="analyses.study_asked.compared",
+        function="analyses.studies.study_asked.compared",
         doing="comparing",
         study=True,
         keeps=True,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.reading import shown_path
+from actuator_lti.files.reading import shown_path
 from reports.document import plain
 
 
@@ -45,7 +45,7 @@ def as_json(value: Any) -> Any:
 
 def _named(value: Any) -> Any:
     """A result by its names, but the fields that ``repr`` leaves out; of a loop the figures."""
-    from analyses.loop_figures import LoopFigures
+    from analyses.linear.loop_figures import LoopFigures
     from reports.loop_json import loop_json
 
     if isinstance(value, LoopFigures):

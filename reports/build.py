@@ -7,11 +7,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_lti.atomic import write_together
 from actuator_lti.design import design_hash, warnings_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.tree import Tree
+from actuator_lti.files.atomic import write_together
+from actuator_lti.files.tree import Tree
 from analyses.corners import corners
 from reports import document as doc
 from reports.analyses import BY_NAME, FURTHER, Analysis
@@ -19,10 +19,10 @@ from reports.document_schema import Document
 
 if TYPE_CHECKING:
     from analyses.isolation import Missing
-    from analyses.loop_figures import LoopFigures
-    from analyses.loop_survey import LoopSurvey
-    from analyses.requirements import RequirementVerdict
-    from analyses.weakest import Spread, WeakPoint
+    from analyses.linear.loop_figures import LoopFigures
+    from analyses.linear.loop_survey import LoopSurvey
+    from analyses.specification.requirements import RequirementVerdict
+    from analyses.specification.weakest import Spread, WeakPoint
 
 Progress = Callable[[int, int], None]
 
@@ -95,7 +95,7 @@ def design_report(
 
 
 def _held(figures: Mapping[str, LoopFigures]) -> list[str]:
-    """Name the loops that are judged held, see `analyses.held_loops`."""
+    """Name the loops that are judged held, see `analyses.linear.held_loops`."""
     return [name for name, one in figures.items() if one.held is not None]
 
 
@@ -104,7 +104,7 @@ def _views(
 ) -> tuple[WeakPoint | None, Mapping[str, Mapping[str, Spread]]]:
     """The weakest point of all views, and the spread over the operating points."""
     from analyses.isolation import attempt
-    from analyses.weakest import spread, weakest
+    from analyses.specification.weakest import spread, weakest
 
     if survey is None:
         return None, {}
@@ -118,8 +118,8 @@ def _loops(
 ) -> tuple[Mapping[str, LoopFigures], list[doc.Section], LoopSurvey | None]:
     """Compute the linear loops and make their sections; none where the loops themselves fail."""
     from analyses.isolation import attempt
-    from analyses.loop_survey import survey_loops
-    from analyses.requirements import evaluate_requirements
+    from analyses.linear.loop_survey import survey_loops
+    from analyses.specification.requirements import evaluate_requirements
 
     survey = attempt("linear loops", lambda: survey_loops(design, progress), None)
     if survey is None:

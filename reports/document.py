@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.errors import InputError
-from actuator_lti.reading import parse_json, read_json, shown, shown_path
-from actuator_lti.tree import Tree
-from actuator_lti.verdict import Verdict
+from actuator_lti.files.reading import parse_json, read_json, shown, shown_path
+from actuator_lti.files.tree import Tree
 from reports.certain import certain
 from reports.charts.data import chart_data
 from reports.document_schema import (

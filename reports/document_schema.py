@@ -21,8 +21,8 @@ from pydantic import (
 from typing_extensions import TypedDict
 
 from actuator_lti.errors import InputError
-from actuator_lti.reading import shown
-from actuator_lti.tree import Tree
+from actuator_lti.files.reading import shown
+from actuator_lti.files.tree import Tree
 from reports.live_schema import LiveData, Refused
 
 SCHEMA: Final = "actuator-lti/report"

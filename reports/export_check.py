@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from analyses.code_check import CodeCheck
+from analyses.linear.code_check import CodeCheck
 from analyses.validation.row import Row
 from reports.sections.validation import loop_name, quantity_name
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
-from analyses.code_check import CodeCheck
+from analyses.linear.code_check import CodeCheck
 
 
 def export_documents(design: Design, check: CodeCheck | None = None) -> dict[str, bytes]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from actuator_lti.quantities import QUANTITIES
+from actuator_lti.asked.quantities import QUANTITIES
 
 TERMS: dict[str, str] = {
     "Antiresonance": "frequency at which the load, on its spring, holds the motor still: sqrt(k/J_l)",
@@ -48,7 +48,7 @@ TERMS: dict[str, str] = {
     "Verdict": "met, not met or not proven",
     "Waiver": "leave to go on while a requirement is not proven, with reason and date",
 }
-"""Terms that are no figure; those are in `actuator_lti.quantities`."""
+"""Terms that are no figure; those are in `actuator_lti.asked.quantities`."""
 
 
 def glossary() -> dict[str, str]:

@@ -17,7 +17,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from reports.document import figures
 from reports.drawing import Progress, draw_all
 from reports.glossary import meaning

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from actuator_lti.tree import Tree
-from analyses.held_loops import HELD
-from analyses.loop_figures import LoopFigures
+from actuator_lti.files.tree import Tree
+from analyses.linear.held_loops import HELD
+from analyses.linear.loop_figures import LoopFigures
 
 
 def loop_json(figures: LoopFigures) -> Tree:

@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from actuator_lti.errors import InputError
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 
 LIBRARIES = ("control", "numpy", "scipy", "matplotlib", "jinja2")
 

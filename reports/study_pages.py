@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_lti.atomic import write_together
+from actuator_lti.files.atomic import write_together
 from reports import document as doc
 from reports.document_schema import Document
 

@@ -12,7 +12,7 @@ from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
-from actuator_lti.verdict import Verdict
+from actuator_lti.asked.verdict import Verdict
 from reports.cli.output import console
 from reports.html import show_signed
 from reports.numbers import show

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, cast
 
-from actuator_lti.verdict import Role, Tally, Verdict
+from actuator_lti.asked.verdict import Role, Tally, Verdict
 from reports.document_schema import Block, Counts, VerdictItem
 from reports.document_schema import Verdict as Overall
 

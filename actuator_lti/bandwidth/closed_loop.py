@@ -13,7 +13,6 @@ from actuator_lti.bandwidth.exact_gain import exact_gain
 from actuator_lti.bandwidth.measured import measured_bandwidth
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
 from actuator_lti.errors import InputError
-from actuator_lti.exact_fraction import Fraction, dc_noise, double, exact_fraction, shown
 from actuator_lti.margins.delay_distance import delayed_extreme
 from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, delay_form, from_rational
 from actuator_lti.margins.delay_setting import low_frequency
@@ -25,8 +24,9 @@ from actuator_lti.margins.given import Given, given_of
 from actuator_lti.margins.loop import Mask, RationalLoop, rational_loop
 from actuator_lti.margins.measured_data import is_measured
 from actuator_lti.margins.sweep import subdivided, variation
-from actuator_lti.plain_system import PlainSystem
-from actuator_lti.rest_mode import without_rest_mode
+from actuator_lti.systems.exact_fraction import Fraction, dc_noise, double, exact_fraction, shown
+from actuator_lti.systems.plain_system import PlainSystem
+from actuator_lti.systems.rest_mode import without_rest_mode
 
 _FLOOR = 1e-6  # of the gain at zero frequency: the phase is followed down to it
 _TAKEN = flint.fmpq(1, 1000)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import flint
 
-from actuator_lti.exact_fraction import Fraction, double
 from actuator_lti.margins.certified_roots import all_roots, even_and_odd, positive_roots
+from actuator_lti.systems.exact_fraction import Fraction, double
 
 _BITS = 128
 _V = flint.fmpq_poly([0, 1])

@@ -4,7 +4,7 @@
 sampled loops; `drive_figures` the static figures that requirements may ask for.
 """
 
-from actuator_lti.on_first_use import on_first_use
+from actuator_lti.start.on_first_use import on_first_use
 
 _PUBLIC = {
     "Crossovers": "actuator_lti.batch.figures",

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS, MOST_RESONANCE_DB
 from actuator_lti.batch.parameters import Population
 from actuator_lti.drive.angle import pushes_away
 from actuator_lti.drive.operating import Operating, OperatingPoint
@@ -19,7 +20,6 @@ from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram
-from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS, MOST_RESONANCE_DB
 
 _CHUNK = 1024
 _MOST_ORDER = 80
@@ -94,7 +94,7 @@ class LinearFigures:
         return self._list(loop, FIRST_PHASE, 2)
 
     def quantity(self, name: str, loop: str) -> np.ndarray:
-        """One figure of one loop, shape (count,), in its unit (`actuator_lti.quantities`).
+        """One figure of one loop, shape (count,), in its unit (`actuator_lti.asked.quantities`).
 
         Margins are the ones to quote; ``inf`` where there is none.
         """

@@ -12,7 +12,7 @@ import numpy as np
 from actuator_lti.design.access import located, paths_of, stacked
 from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
-from actuator_lti.sampling import split_delay
+from actuator_lti.systems.sampling import split_delay
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from actuator_lti.batch._figures import DC_GAIN, FINAL, FIRST_PHASE, LISTED, MODULUS, MODULUS_X
-from actuator_lti.rest_mode import without_rest_mode
+from actuator_lti.systems.rest_mode import without_rest_mode
 
 
 def at_rest(A: np.ndarray, B: np.ndarray, C: np.ndarray, rows: np.ndarray) -> None:

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from actuator_lti.asked.drive_figure import drive_figure
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES
 from actuator_lti.batch.parameters import Population
-from actuator_lti.drive_figure import drive_figure
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import DRIVE_QUANTITIES
 
 _CHUNK = 64  # designs at once: a stiffness takes a matrix for each of its frequencies
 
 
 def drive_figures(population: Population, quantity: str, load_Nm: float = 0.0) -> np.ndarray:
-    """One static figure of every design, shape (count,), in its unit (see `actuator_lti.drive_figure`).
+    """One static figure of every design, shape (count,), in its unit (see `actuator_lti.asked.drive_figure`).
 
     Raises
     ------

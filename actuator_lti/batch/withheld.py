@@ -25,7 +25,7 @@ from actuator_lti.batch._figures import (
     STABLE,
 )
 from actuator_lti.margins.trust import told_from_zero
-from actuator_lti.rest_mode import without_rest_mode
+from actuator_lti.systems.rest_mode import without_rest_mode
 
 AT_BORDER = 1e-10  # distance of the largest pole from the unit circle within which rounding decides
 _GROWTH = 10.0  # of an open-loop pole in one sample: below it the entries stay small

@@ -5,7 +5,7 @@ so that nothing is translated by guess. `kernel` marks such a function, `emit_c`
 calls, `Library` is the compiled form that a package calls.
 """
 
-from actuator_lti.on_first_use import on_first_use
+from actuator_lti.start.on_first_use import on_first_use
 
 _PUBLIC = {
     "EmitError": "actuator_lti.compiled.kinds",

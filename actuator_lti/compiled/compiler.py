@@ -59,15 +59,18 @@ def zig_command() -> list[str] | None:
 def compiler_for(target: str) -> list[str]:
     """Command and target flags of a compiler for ``linux64``, ``win64`` or ``wasm``.
 
+    ziglang's comes first, as its Linux binary runs with any glibc from 2.17 on; ``CC`` names another.
+
     Raises
     ------
     InputError
         Where this machine has none; says which package brings one.
     """
     compiler = system_compiler()
-    if target == "linux64" and HERE == "linux-x86_64" and compiler:
-        return [compiler]
     zig = zig_command()
+    native = target == "linux64" and HERE == "linux-x86_64"
+    if native and compiler and (zig is None or os.environ.get("CC")):
+        return [compiler]
     if zig is None:
         wanted = "gcc or clang, or " if target == "linux64" else ""
         raise InputError(f"no C compiler for {target}; allowed: {wanted}pip install 'actuator-lti[export]'")

@@ -174,7 +174,7 @@ class Library:
         InputError
             As `build`.
         """
-        from actuator_lti.atomic import write_bytes
+        from actuator_lti.files.atomic import write_bytes
 
         name = self.path(target or HERE).name
         data = compile_library(self.text(), name, target or HERE, portable=bool(target))

@@ -16,7 +16,7 @@ from actuator_lti.design.sections import part_at, parts_of, with_part
 from actuator_lti.design.tolerances import rescaled
 from actuator_lti.design.units import si_text
 from actuator_lti.errors import InputError
-from actuator_lti.reading import shown
+from actuator_lti.files.reading import shown
 
 
 def paths_of(design: Design) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Annotated, Literal
 
+from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.field import (
     BIG,
     Axis,
@@ -16,7 +17,6 @@ from actuator_lti.design.field import (
     quantity,
     text,
 )
-from actuator_lti.quantities import QUANTITIES
 
 # fmt: off
 Rotor = Literal["free", "locked"]

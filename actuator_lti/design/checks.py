@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from math import inf, isfinite, log
+from math import inf, log
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.quantities import QUANTITIES
 from actuator_lti.design.sections import parts_of
-from actuator_lti.reading import shown
+from actuator_lti.files.reading import shown
 
 CHECKS = "validation"  # what the ids of checks by simulation begin with
 _ELECTRICAL = {
@@ -43,21 +43,10 @@ def check_design(design: Design, where: str, lines: Mapping[str, int] | None = N
         All at once: line, key, value and what is allowed.
     """
     findings = Findings(where, lines)
-    for check in (check_place, _motor):  # the others ask for an inertia and for constants
-        findings.extend(check(design))
-    findings.refuse()
-    for check in (
-        _stages,
-        _most,
-        *CONTROL_CHECKS,
-        check_elastic,
-        _limits,
-        _requirements,
-        _waivers,
-        _correlations,
-    ):
-        findings.extend(check(design))
-    findings.refuse()
+    for checks in (FIRST_RELATIONS, (*RELATIONS, _requirements, _waivers, _correlations)):
+        for check in checks:
+            findings.extend(check(design))
+        findings.refuse()
 
 
 def _most(design: Design) -> Iterator[Refusal]:
@@ -128,13 +117,18 @@ def _stages(design: Design) -> Iterator[Refusal]:
 def _limits(design: Design) -> Iterator[Refusal]:
     limits, top = design.limits, no_load_speed(design)
     peak, continuous = limits.peak_current_A, limits.continuous_current_A
-    if isfinite(limits.speed_rad_s) and limits.speed_rad_s > top:
+    if top < limits.speed_rad_s < inf:
         unit = "m/s" if design.axis == "linear" else "rad/s"
         allowed = f"the supply cannot reach it; allowed: at most U/kE = {top:.4g} {unit}"
         yield "limits.speed", f"{limits.speed_rad_s:.4g} {unit}", allowed
-    if isfinite(continuous) and continuous > peak:
+    if peak < continuous < inf:
         allowed = f"allowed: at most limits.peak_current = {peak:g} A"
         yield "limits.continuous_current", f"{continuous:g} A", allowed
+
+
+FIRST_RELATIONS = (check_place, _motor)  # the others ask for an inertia and for constants
+RELATIONS = (_stages, _most, *CONTROL_CHECKS, check_elastic, _limits)
+"""Between the numbers of a drive; an exported one checks them again when they are changed."""
 
 
 def _requirements(design: Design) -> Iterator[Refusal]:

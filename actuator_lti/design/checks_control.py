@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import degrees, inf, isfinite, pi
+from math import inf, pi
 
 from actuator_lti.design.control import stable_pair
 from actuator_lti.design.fields import fields_in
@@ -12,6 +12,7 @@ from actuator_lti.design.model import FILTER_KEYS, Design, Filter
 
 MAX_FILTERS = 8  # of each place; the running drive has room for so many second-order sections
 MAX_MAP_POINTS = 16  # of each direction
+_BELOW_NYQUIST = ("frequency_rad_s", "zero_rad_s", "pole_rad_s")
 TRACKING_LIMIT = 0.828  # w0 T at which the tracking loop of model.md section 7 becomes unstable: 2 sqrt 2 - 2
 
 
@@ -39,7 +40,7 @@ def _filter(item: Filter, path: str, nyquist: float) -> Iterator[Refusal]:
             yield key, "nothing", f'missing; a "{item.kind}" needs it'
         elif name not in needed | optional and value != getattr(fresh, name):
             yield key, value, f'not allowed with kind = "{item.kind}"'
-        elif name in ("frequency_rad_s", "zero_rad_s", "pole_rad_s") and (value or 0.0) >= nyquist:
+        elif name in _BELOW_NYQUIST and value is not None and value >= nyquist:
             allowed = f"allowed: below the velocity loop's Nyquist frequency, {nyquist:.6g} rad/s"
             yield key, f"{value:.6g} rad/s", allowed
     if item.kind == "biquad":
@@ -96,8 +97,8 @@ def _overload(design: Design) -> Iterator[Refusal]:
         return
     needs = [
         ("needs a current loop, [control.current]", design.controller.current is not None),
-        ("needs limits.peak_current and limits.continuous_current", isfinite(peak) and isfinite(continuous)),
-        ("allowed: with peak_current above continuous_current", peak > continuous or continuous == inf),
+        ("needs limits.peak_current and limits.continuous_current", peak < inf and continuous < inf),
+        ("allowed: with peak_current above continuous_current", continuous < peak or continuous == inf),
     ]
     for words, met in needs:
         if not met:
@@ -140,7 +141,7 @@ def _command(design: Design) -> Iterator[Refusal]:
     given = {
         field.key: value
         for field in fields_in("command")
-        if field.key in _PROFILE and isfinite(value := getattr(design.command, field.attribute))
+        if field.key in _PROFILE and (value := getattr(design.command, field.attribute)) < inf
     }
     for key, value in given.items():
         power, outer, limiter = _PROFILE[key]
@@ -153,7 +154,7 @@ def _command(design: Design) -> Iterator[Refusal]:
         if value * ratio > limit * (1 + 1e-9):
             most = f"{limit / ratio:.6g} {_unit(design, key)}"
             if design.axis == "rotary":
-                most += f" ({degrees(limit / ratio):.6g} {_unit(design, key).replace('rad', 'deg')})"
+                most += f" ({limit / ratio * (180.0 / pi):.6g} {_unit(design, key).replace('rad', 'deg')})"
             yield path, text, f"faster than limits.{limiter}; allowed: at most {most} at the output"
 
 
@@ -190,13 +191,13 @@ def _friction_map(design: Design) -> Iterator[Refusal]:
     for name, direction in (("forward", 1), ("reverse", -1)):
         points = friction.map(direction)
         speeds, torques = [point.speed_rad_s for point in points], [point.torque_Nm for point in points]
-        if speeds[:1] != [0.0]:
+        if not speeds or speeds[0] != 0.0:
             yield "friction.point", name, "allowed: the first point at speed 0"
-        if len(set(speeds)) != len(speeds):
+        if any(speed in speeds[:k] for k, speed in enumerate(speeds)):
             yield "friction.point", name, "allowed: each speed once"
         if len(speeds) > MAX_MAP_POINTS:
             yield "friction.point", f"{len(speeds)} points", f"allowed: at most {MAX_MAP_POINTS}"
-        if torques[-1:] < torques[-2:-1]:
+        if len(torques) > 1 and torques[-1] < torques[-2]:
             yield "friction.point", name, "allowed: not falling at the end, as the last slope continues"
 
 

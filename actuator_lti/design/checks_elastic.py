@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from actuator_lti.design.mistakes import Refusal
 from actuator_lti.design.model import Design
-from actuator_lti.reading import shown
+from actuator_lti.files.reading import shown
 
 
 def check_place(design: Design) -> Iterator[Refusal]:

@@ -13,8 +13,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.design.reader import read_tree
 from actuator_lti.design.shipped import shipped_designs, shipped_path
 from actuator_lti.errors import InputError
-from actuator_lti.reading import decode, parse_toml, read_bytes, shown
-from actuator_lti.tree import Tree
+from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown
+from actuator_lti.files.tree import Tree
 
 
 def load_design(name_or_path: str | PathLike[str]) -> Design:

@@ -8,8 +8,8 @@ from difflib import get_close_matches
 from typing import Any
 
 from actuator_lti.errors import InputError, Mistakes
-from actuator_lti.reading import shown
-from actuator_lti.tree import Tree
+from actuator_lti.files.reading import shown
+from actuator_lti.files.tree import Tree
 
 MOST = 30  # told at once
 _KEY = r"(?:[\w-]+|\"[^\"]*\"|'[^']*')"
@@ -19,6 +19,13 @@ _PARTS = re.compile(_KEY)
 
 Refusal = tuple[str, object, str]
 """Key, value as it is to be shown ("" for none), and what is allowed."""
+
+
+def refusal_text(refusal: Refusal) -> str:
+    """``key = value: what is allowed``."""
+    path, given, reason = refusal
+    value = f"{given}"
+    return f"{shown(path, 200)[1:-1]}{f' = {value}' if value else ''}: {reason}"
 
 
 class Findings:
@@ -33,8 +40,7 @@ class Findings:
         """Keep a mistake."""
         line = self._line(path)
         at = f"line {line}: " if line else ""
-        value = f" = {given}" if given != "" else ""
-        text = f"{at}{shown(path, 200)[1:-1]}{value}: {reason}"
+        text = f"{at}{refusal_text((path, given, reason))}"
         self.found.append((line, InputError(text, where=self.where)))
 
     def extend(self, refusals: Iterable[Refusal]) -> None:

@@ -65,7 +65,7 @@ from actuator_lti.design.plant import (
     STANDARD_GRAVITY_m_s2,
     Temperature,
 )
-from actuator_lti.faces import draw
+from actuator_lti.drawing.faces import draw
 
 
 @dataclass(frozen=True, kw_only=True)

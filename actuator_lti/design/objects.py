@@ -11,7 +11,7 @@ from actuator_lti.design.model import ControllerObject, ControllerObjects, Desig
 from actuator_lti.design.object_dictionary import OBJECTS, PER_RPM, KnownObject, model_value, step_of
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
-from actuator_lti.reading import shown
+from actuator_lti.files.reading import shown
 
 __all__ = ["PER_RPM", "Exported", "Imported", "Rounding", "export_objects", "import_objects"]
 

@@ -1,10 +1,10 @@
-"""Limits of figures as text: the figures themselves stand in `actuator_lti.quantities`."""
+"""Limits of figures as text: the figures themselves stand in `actuator_lti.asked.quantities`."""
 
 from __future__ import annotations
 
+from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.units import convert, parse_quantity, parse_unit, split_quantity
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import QUANTITIES
 
 __all__ = ["QUANTITIES", "parse_limit"]
 

@@ -23,8 +23,8 @@ from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import parse_quantity, si_text
 from actuator_lti.errors import InputError
-from actuator_lti.reading import shown
-from actuator_lti.tree import Tree
+from actuator_lti.files.reading import shown
+from actuator_lti.files.tree import Tree
 
 MAX_GEARS = 20
 MAX_LIST = 200

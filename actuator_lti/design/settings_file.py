@@ -12,7 +12,7 @@ from actuator_lti.design.object_dictionary import OBJECTS
 from actuator_lti.design.objects import checked_objects
 from actuator_lti.design.settings_xml import read_settings_xml
 from actuator_lti.errors import InputError
-from actuator_lti.reading import decode, parse_toml, read_bytes, shown
+from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown
 
 _LABEL = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{4})(?:\.([0-9A-Fa-f]{2}))?\Z")
 

@@ -10,7 +10,7 @@ from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH
 from actuator_lti.design.model import ControllerObject, ControllerObjects
 from actuator_lti.design.objects import checked_objects
 from actuator_lti.errors import InputError
-from actuator_lti.reading import decode, read_bytes, shown
+from actuator_lti.files.reading import decode, read_bytes, shown
 
 _INTEGER = re.compile(r"(?:[+-]?[0-9]{1,20}|0[xX][0-9A-Fa-f]{1,16})\Z")
 _NAMESPACE = "http://www.canopen.org/xml/1.0"

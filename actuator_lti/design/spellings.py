@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from math import isfinite, nan
 
-from actuator_lti.reading import shown
+from actuator_lti.files.reading import shown
 
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9])")

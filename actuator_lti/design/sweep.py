@@ -10,7 +10,7 @@ from typing import Any
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.reading import shown
+from actuator_lti.files.reading import shown
 
 
 @dataclass(frozen=True)

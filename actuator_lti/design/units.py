@@ -18,7 +18,7 @@ from math import isfinite, pi
 
 from actuator_lti.design.spellings import LONGEST, split_quantity, tidy
 from actuator_lti.errors import InputError
-from actuator_lti.reading import shown
+from actuator_lti.files.reading import shown
 
 _PREFIXES = {
     "tera": 12, "T": 12, "giga": 9, "G": 9, "mega": 6, "M": 6, "kilo": 3, "k": 3, "centi": -2, "c": -2,

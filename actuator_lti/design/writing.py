@@ -28,8 +28,8 @@ from actuator_lti.design.sections import RECORDS, SECTIONS, at_place, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.design.units import si_text
 from actuator_lti.errors import InputError
-from actuator_lti.reading import shown
-from actuator_lti.tree import Tree
+from actuator_lti.files.reading import shown
+from actuator_lti.files.tree import Tree
 
 # what a design has that its file does not mention: a section absent here must be written even when empty
 _BARE = Design(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from actuator_lti.errors import InputError
-from actuator_lti.resolvent import states_at
+from actuator_lti.systems.resolvent import states_at
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Encoder, Filter

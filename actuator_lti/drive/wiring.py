@@ -14,7 +14,7 @@ from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.plant import Plant, motor_plant
 from actuator_lti.drive.signals import SIGNALS
 from actuator_lti.errors import InputError
-from actuator_lti.sampling import DelayedHold, delayed_hold
+from actuator_lti.systems.sampling import DelayedHold, delayed_hold
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Filter

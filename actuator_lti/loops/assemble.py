@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from actuator_lti.design.model import Design
     from actuator_lti.drive.operating import OperatingPoint, RotorState
-    from actuator_lti.limiters import LimiterPath
+    from actuator_lti.loops.limiters import LimiterPath
     from actuator_lti.loops.simulation import TickSystem
 
 

@@ -15,14 +15,14 @@ from actuator_lti.errors import InputError
 from actuator_lti.loops.flow import ALL, SOURCES, FlowProgram
 from actuator_lti.loops.result import Form
 from actuator_lti.loops.tick import TickProgram
-from actuator_lti.plain_delays import PlainDelaySystem
+from actuator_lti.systems.plain_delays import PlainDelaySystem
 
 if TYPE_CHECKING:
     import control
 
-    from actuator_lti.delay_system import DelaySystem
     from actuator_lti.design.model import Design
     from actuator_lti.drive.operating import OperatingPoint, RotorState
+    from actuator_lti.systems.delay_system import DelaySystem
 
 PlantInput = Literal["u", "i_ref"]
 OUTPUTS = {"current": "i", "speed": "w", "angle": "th", "output_angle": "output_angle", "twist": "twist"}
@@ -123,7 +123,7 @@ def _continuous(wired: Drive, command: str, form: Form) -> control.StateSpace | 
 
         parts = (flow.rates[:, x], flow.rates[:, u], rows[:, x], rows[:, u])
         return control.ss(*parts, remove_useless_states=False, states=list(states), **names)
-    from actuator_lti.delay_system import DelaySystem
+    from actuator_lti.systems.delay_system import DelaySystem
 
     plain = PlainDelaySystem(
         A=flow.rates[:, x], B1=flow.rates[:, u], B2=flow.rates[:, z],

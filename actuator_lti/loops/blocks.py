@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.loops.tick import Tick, TickProgram
-from actuator_lti.rest_mode import without_rest_mode
+from actuator_lti.systems.rest_mode import without_rest_mode
 
 
 def seen(depends: np.ndarray, start: np.ndarray) -> np.ndarray:

@@ -13,8 +13,8 @@ from actuator_lti.loops.blocks import seen
 from actuator_lti.loops.flow import SOURCES, Flow, FlowProgram
 from actuator_lti.loops.result import Loop
 from actuator_lti.loops.sampled import whole_path
-from actuator_lti.plain_delays import PlainDelaySystem, static
-from actuator_lti.rest_mode import without_rest_mode
+from actuator_lti.systems.plain_delays import PlainDelaySystem, static
+from actuator_lti.systems.rest_mode import without_rest_mode
 
 RATES = {"ref": ("ref", "ref_rate", "ref_rate_rate"), "cut": ("cut", "cut_rate")}
 """An input and its derivatives, as the ideal form has them."""

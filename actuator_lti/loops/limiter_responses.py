@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from actuator_lti.drive.wiring import Drive
-from actuator_lti.limiters import LimiterPath, limiter_paths
 from actuator_lti.loops.blocks import compose
 from actuator_lti.loops.flow import FlowProgram
+from actuator_lti.loops.limiters import LimiterPath, limiter_paths
 from actuator_lti.loops.tick import TickProgram
-from actuator_lti.resolvent import states_at
+from actuator_lti.systems.resolvent import states_at
 
 Response = Callable[[np.ndarray], np.ndarray]
 

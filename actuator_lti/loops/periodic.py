@@ -23,8 +23,8 @@ from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.blocks import Block, seen, siso
 from actuator_lti.loops.tick import TickProgram
-from actuator_lti.resolvent import balanced
-from actuator_lti.rest_mode import System, without_common_rest_mode
+from actuator_lti.systems.resolvent import balanced
+from actuator_lti.systems.rest_mode import System, without_common_rest_mode
 
 if TYPE_CHECKING:
     from actuator_lti.loops.result import Loops

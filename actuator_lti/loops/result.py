@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
-from actuator_lti.as_control import as_control
-from actuator_lti.faces import draw
+from actuator_lti.drawing.faces import draw
+from actuator_lti.systems.as_control import as_control
 
 Form = Literal["sampled", "continuous", "ideal"]
 InnerLoops = Literal["closed", "open"]
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from actuator_lti.design.model import Design
     from actuator_lti.drive.operating import Operating
-    from actuator_lti.limiters import LimiterPath
+    from actuator_lti.loops.limiters import LimiterPath
     from actuator_lti.loops.simulation import TickSystem
 
 
@@ -62,7 +62,7 @@ class Loop:
         """L as a python-control system.
 
         ``control.StateSpace`` (sampled with dt, ideal without) or
-        `actuator_lti.delay_system.DelaySystem` (continuous).
+        `actuator_lti.systems.delay_system.DelaySystem` (continuous).
         """
         return as_control(self.plain_open)
 
@@ -71,7 +71,7 @@ class Loop:
         """T = L/(1 + L) as a python-control system: the feedback loop alone, without the feed-forward.
 
         Its bandwidth is not that of the drive: see ``Loops.reference_to_output`` for the response to the
-        reference, and `actuator_lti.commanded` for that to the command, behind the mean of its profile.
+        reference, and `actuator_lti.loops.commanded` for that to the command, behind the mean of its profile.
         """
         return as_control(self.plain_closed)
 

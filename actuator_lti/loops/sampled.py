@@ -8,7 +8,7 @@ from actuator_lti.loops.periodic import cyclic, fundamental, phase_blocks, point
 from actuator_lti.loops.result import Loop
 from actuator_lti.loops.simulation import OUTPUTS, TickSystem
 from actuator_lti.loops.tick import TickProgram
-from actuator_lti.plain_system import PlainSystem
+from actuator_lti.systems.plain_system import PlainSystem
 
 
 def _system(block: Block, period_s: float, name: str, source: str, signal: str) -> PlainSystem:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from actuator_lti.faces import draw
+from actuator_lti.drawing.faces import draw
 from actuator_lti.margins.single import (
     Agreement,
     DelayMargin,

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
-from actuator_lti.exact_fraction import product
 from actuator_lti.margins.collocation import open_loop_matrix
 from actuator_lti.margins.delay_form import DelayForm, border_values, characteristic, delay_form
 from actuator_lti.margins.delay_setting import low_frequency
@@ -20,6 +19,7 @@ from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import Motion
 from actuator_lti.step.rational import NO_FINAL, UNSTABLE, free_motion
 from actuator_lti.step.stepped import Stepped
+from actuator_lti.systems.exact_fraction import product
 
 _FEWEST = 12  # steps to the shortest delay
 _FIRST = 10.0  # longest delays to step at first

@@ -12,7 +12,10 @@ import flint
 import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.exact_fraction import (
+from actuator_lti.margins.given import ULP
+from actuator_lti.margins.loop import RationalLoop
+from actuator_lti.step.motion import Motion, gain_of
+from actuator_lti.systems.exact_fraction import (
     Fraction,
     balls,
     dc_noise,
@@ -24,9 +27,6 @@ from actuator_lti.exact_fraction import (
     roots,
     shown,
 )
-from actuator_lti.margins.given import ULP
-from actuator_lti.margins.loop import RationalLoop
-from actuator_lti.step.motion import Motion, gain_of
 
 _EPS = float(np.finfo(float).eps)
 _FIRST_BITS = 192

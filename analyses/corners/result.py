@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from actuator_lti.design.model import Design
 from analyses.corners.asked import Asked
-from analyses.loop_figures import LoopFigures
-from analyses.verdicts import RequirementVerdict, tally
+from analyses.linear.loop_figures import LoopFigures
+from analyses.specification.verdicts import RequirementVerdict, tally
 
 
 @dataclass(frozen=True)

@@ -7,18 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, CORNERED, QUANTITIES
 from actuator_lti.batch import Population
 from actuator_lti.design.access import with_values
 from actuator_lti.design.model import Design, Temperature, Tolerance
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from actuator_lti.quantities import ANALYSIS_QUANTITIES, CORNERED, QUANTITIES
 from analyses.corners.result import Asked, Corner, Corners
-from analyses.loop_figures import all_loop_figures
-from analyses.sampling import Factor
-from analyses.sensitivity import population_figures
-from analyses.verdicts import judged
+from analyses.linear.loop_figures import all_loop_figures
+from analyses.specification.sensitivity import population_figures
+from analyses.specification.verdicts import judged
+from analyses.studies.sampling import Factor
 
 _TORQUE, _BACK_EMF = "motor.torque_constant", "motor.back_emf_constant"
 
@@ -27,7 +27,7 @@ def corners(design: Design, asked: Asked | None = None) -> Corners:
     """Figures and requirements of a drive when hot, cold, on a low supply, and at the worst tolerances.
 
     Each corner is a design of its own, put through the same loops as the nominal one. Requirements on what an
-    analysis finds (`actuator_lti.quantities.ANALYSIS_QUANTITIES`) are left out.
+    analysis finds (`actuator_lti.asked.quantities.ANALYSIS_QUANTITIES`) are left out.
 
     Examples
     --------

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.failures.asked import Asked
-from analyses.settling import Settling
+from analyses.motion.settling import Settling
 
 Floats = npt.NDArray[np.float64]
 

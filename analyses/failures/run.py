@@ -10,11 +10,11 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops.compliance import compliance
-from analyses.drive_figures import drive_figures
 from analyses.failures.cases import Case, cases_of
 from analyses.failures.result import Asked, FailureCase, Failures, Floats
 from analyses.failures.rig import Rig
-from analyses.settling import settle
+from analyses.motion.settling import settle
+from analyses.specification.drive_figures import drive_figures
 
 SETTLED = 1e-3
 LONGEST_S = 5.0  # of waiting before a failure

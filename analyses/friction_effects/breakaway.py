@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.design.model import Command, Design
-from analyses.static_threshold import StaticThreshold, static_threshold
+from analyses.linear.static_threshold import StaticThreshold, static_threshold
 from nonlinear import Rows
-from nonlinear.rest import first_motion_s
+from nonlinear.settling.rest import first_motion_s
 
 FRACTIONS = (0.2, 0.3, 0.5, 0.7, 0.9)
 WITHIN, COUNT = 0.05, 51

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.drive.operating import dry_torque
-from analyses.drive_figures import drive_figures
 from analyses.friction_effects.stick_slip import StickSlipCycle
 from analyses.limit_cycles.friction import cycles_of_friction
 from analyses.limit_cycles.result import Confirmation, Cycle
 from analyses.limit_cycles.run import confirm
-from analyses.settling import Settling, largest_swing, settle
+from analyses.motion.settling import Settling, largest_swing, settle
+from analyses.specification.drive_figures import drive_figures
 
 BELOW = 0.3
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import dry_torque
-from analyses.static_threshold import StaticThreshold
+from analyses.linear.static_threshold import StaticThreshold
 from nonlinear import commands, simulate
 
 SPAN = 25.0  # amplitude over the threshold

@@ -16,7 +16,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import breakaway_torque_Nm
 from actuator_lti.drive.steady import standing_gain, steady_input
-from analyses.linear_states import AT_REST, without_value
+from analyses.linear.linear_states import AT_REST, without_value
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops

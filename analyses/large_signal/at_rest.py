@@ -18,9 +18,9 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from analyses.large_signal.coherent import coherent
-from analyses.responses import response_at
+from analyses.linear.responses import response_at
 from nonlinear import LIMITERS, Rows
-from nonlinear.reduced import BatchResult
+from nonlinear.runs.reduced import BatchResult
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
@@ -138,7 +138,7 @@ def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: f
 
 def free_amplitude(design: Design, loops: Loops, frequency_hz: Floats, part: float) -> Floats:
     """Command amplitude: a part of full deflection, at most half of what reaches a limit."""
-    from actuator_lti.limiters import onset
+    from actuator_lti.loops.limiters import onset
 
     full = design.validation.full_deflection_rad
     border = onset(loops, 2.0 * np.pi * frequency_hz).amplitude_rad

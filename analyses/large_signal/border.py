@@ -10,17 +10,17 @@ import numpy as np
 from actuator_lti.design.model import Command, Design
 from actuator_lti.drive import signals
 from actuator_lti.drive.profile import command_mean
-from actuator_lti.limiters import onset
 from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.loops.assemble import loops_at
+from actuator_lti.loops.limiters import onset
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.grid import frequency_range_hz, tone
 from analyses.large_signal.nonlinear_parts import nonlinear_parts
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
-from analyses.responses import response_at
+from analyses.linear.responses import response_at
 from nonlinear import LIMITERS
-from nonlinear.on_the_bench import on_the_bench
+from nonlinear.bench.on_the_bench import on_the_bench
 
 FREQUENCIES, ROUNDS = 14, 9
 TIGHT, WIDE = (0.94, 1.06), (0.3, 3.0)

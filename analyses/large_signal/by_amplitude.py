@@ -19,8 +19,8 @@ from actuator_lti.design.model import Design
 from analyses.large_signal.settling_ticks import full_range, settling_ticks_of
 from analyses.validation.places import Bench
 from nonlinear import LIMITERS, Rows
-from nonlinear.operating_motion import OperatingMotion, full_torque_Nm
-from nonlinear.reduced import BatchResult
+from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm
+from nonlinear.runs.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
 SIZES = {"small": 0.02, "medium": 0.2, "large": 1.0}  # of full deflection, speed, current

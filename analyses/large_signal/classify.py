@@ -6,7 +6,7 @@ import numpy as np
 
 from analyses.large_signal.formulas import PARABOLA_THIRD, TRIANGLE_THIRD
 from nonlinear import LIMITERS
-from nonlinear.reduced import BatchResult
+from nonlinear.runs.reduced import BatchResult
 
 CAUSES = ("none", "friction", "stiction", "other", *LIMITERS)
 WAVEFORMS = ("sine", "triangle", "parabola", "stick-slip", "no motion", "distorted", "not steady")

@@ -26,13 +26,13 @@ from actuator_lti.design.model import Design, Instruments
 from actuator_lti.errors import TooManyTicks
 from analyses.large_signal.settling_ticks import full_range
 from nonlinear import LIMITERS, Rows
-from nonlinear.loop_setup import points_of
-from nonlinear.operating_motion import lasting_torque_Nm
+from nonlinear.bench.loop_setup import points_of
+from nonlinear.bench.operating_motion import lasting_torque_Nm
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins, Loops
     from actuator_lti.loops.periodic import PeriodicLoop
-    from nonlinear.reduced import BatchResult
+    from nonlinear.runs.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]
@@ -323,7 +323,8 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
 
     A controller without an integral comes to rest beside its target where the load has a slope; a drive that
     stands because a limit holds it has not settled.  What goes on moving without growing while no limit acts
-    is kept going by something else (`nonlinear.rest`).  A swing against a limit dies out by a constant amount
+    is kept going by something else (`nonlinear.settling.rest`).  A swing against a limit dies out by a
+    constant amount
     a period, not by a share of itself: only windows of many periods (``longer``) tell it from one that stays.
 
     Raises

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops
-from analyses.responses import response_at
+from analyses.linear.responses import response_at
 
 LEAST_UPDATES = 96  # updates of the position loop in a window: peaks are seen to 1 - cos(pi/96) = 0.05 %
 DECADES_BELOW, FACTOR_ABOVE = 1.6, 8.0
@@ -71,7 +71,7 @@ def amplitudes(design: Design, count: int, smallest_rad: float | None) -> np.nda
     Parameters
     ----------
     smallest_rad : float or None
-        Command that just overcomes dry friction at once (`analyses.static_threshold`); the range
+        Command that just overcomes dry friction at once (`analyses.linear.static_threshold`); the range
         begins at twice that, within 1/20000 to 1/200 of full deflection.
     """
     full = design.validation.full_deflection_rad

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.faces import draw
-from actuator_lti.limiters import onset
+from actuator_lti.drawing.faces import draw
 from actuator_lti.loops import Loops
+from actuator_lti.loops.limiters import onset
 from analyses.large_signal.border import slow_protection
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, not_linear, waveforms
 from analyses.large_signal.grid import amplitudes, tones
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
-from analyses.static_threshold import static_threshold
+from analyses.linear.static_threshold import static_threshold
 
 if TYPE_CHECKING:
     import pandas
@@ -96,7 +96,7 @@ class AmplitudeMap:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A data frame with one row a point: command, what acts, waveform, fundamental (pandas needed)."""
-        from actuator_lti.extras import need
+        from actuator_lti.start.extras import need
 
         frame = need("pandas", "tables", "to_pandas")
         amplitude, frequency = np.meshgrid(self.amplitude_rad, self.frequency_hz, indexing="ij")

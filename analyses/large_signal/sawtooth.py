@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
-from analyses.drive_figures import drive_figures
 from analyses.large_signal.formulas import FULL_TRIANGLE, RateLimited, rate_limited
 from analyses.large_signal.grid import tone
+from analyses.specification.drive_figures import drive_figures
 from nonlinear import State, commands, simulate
 
 OVERRUN = 3.0  # x = w A/R that is shown

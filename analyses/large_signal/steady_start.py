@@ -13,9 +13,9 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.steady import steady_input
 from actuator_lti.errors import NumericalError
 from actuator_lti.loops import Loops
-from actuator_lti.resolvent import states_at
+from actuator_lti.systems.resolvent import states_at
 from analyses.large_signal.formulas import FULL_TRIANGLE
-from analyses.linear_states import without_value
+from analyses.linear.linear_states import without_value
 from nonlinear import Rows
 
 PLACES = {

@@ -11,7 +11,7 @@ from analyses.large_signal.classify import STEADY
 from analyses.large_signal.grid import Tone
 from analyses.large_signal.steady_start import LinearSteadyState, triangle_start
 from nonlinear import Rows
-from nonlinear.reduced import BatchResult
+from nonlinear.runs.reduced import BatchResult
 
 Progress = Callable[[int, int], None]
 HARMONICS = 3

@@ -24,8 +24,8 @@ from actuator_lti.design.model import Design
 from analyses.large_signal.coherent import coherent
 from analyses.large_signal.conditional import step_rows
 from analyses.large_signal.settling_ticks import LONGEST_TICKS, full_range
-from analyses.loop_figures import loop_figures
-from analyses.responses import response_at
+from analyses.linear.loop_figures import loop_figures
+from analyses.linear.responses import response_at
 from nonlinear import Rows
 
 if TYPE_CHECKING:

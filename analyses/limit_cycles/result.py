@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from actuator_lti.design.model import Design
-from analyses.settling import Settling, largest_swing
+from analyses.motion.settling import Settling, largest_swing
 
 Cause = Literal["play", "quantisation", "motor-quantisation", "friction"]
 Verdict = Literal["confirmed", "refuted"]

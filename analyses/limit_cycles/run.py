@@ -16,7 +16,7 @@ from analyses.limit_cycles.describing import (
     without_nonlinearities,
 )
 from analyses.limit_cycles.result import Cause, Confirmation, Cycle, LimitCycles
-from analyses.settling import settle
+from analyses.motion.settling import settle
 from nonlinear import Rows
 
 SCALES = np.geomspace(0.4, 2.5, 41)

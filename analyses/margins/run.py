@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops, assemble_loops
-from actuator_lti.verdict import Tally, Verdict
-from analyses.loop_figures import LoopFigures, all_loop_figures, loop_figures
-from analyses.loop_survey import OperatingPointFigures, operating_points
+from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
+from analyses.linear.loop_survey import OperatingPointFigures, operating_points
 from analyses.margins.asked import Asked
-from analyses.requirements import RequirementVerdict, evaluate_requirements, tally
-from analyses.weakest import Spread, spread
+from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
+from analyses.specification.weakest import Spread, spread
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,8 +94,8 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
 
 def _around(loops: Loops, file: Path, *, step: bool) -> dict[str, LoopFigures]:
     """The figures of the loop of the file, by its name."""
-    from analyses.outer_loop import loop_around
-    from analyses.outer_loop_file import read_outer_loop
+    from analyses.linear.outer_loop import loop_around
+    from analyses.linear.outer_loop_file import read_outer_loop
 
     outer = read_outer_loop(file)
     return {outer.name: loop_figures(loop_around(loops, outer), step=step, certify=True)}

@@ -56,7 +56,7 @@ class Asked(OnMachines):
         from actuator_lti.batch import variable_paths
         from analyses.monte_carlo.run import MonteCarloSettings
         from analyses.monte_carlo.stepping import StepCheck
-        from analyses.sampling import read_table
+        from analyses.studies.sampling import read_table
 
         table = None if self.from_samples is None else read_table(self.from_samples, variable_paths(design))
         check = None if self.step is None else StepCheck(self.step, self.duration_s, self.load_Nm)
@@ -77,7 +77,7 @@ def study(
     """
     from analyses.monte_carlo.run import monte_carlo, sample_folder
     from analyses.monte_carlo.task import replay
-    from analyses.sampling import sampler_of
+    from analyses.studies.sampling import sampler_of
 
     settings = asked.settings(design)
     if asked.sample is not None:

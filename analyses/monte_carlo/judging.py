@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES, QUANTITIES, judged_loops
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import DRIVE_QUANTITIES, QUANTITIES, judged_loops
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement

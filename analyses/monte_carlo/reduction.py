@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analyses.engine import Chunk
 from analyses.monte_carlo.judging import in_populations, judge
 from analyses.monte_carlo.sketch import Sketch
+from analyses.studies.engine import Chunk
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement

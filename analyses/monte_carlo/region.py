@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri, ndtr, ndtri
 
-from analyses.sampling import BOX_SIGMA, Factor, Sampler
+from analyses.studies.sampling import BOX_SIGMA, Factor, Sampler
 
 _LEAST = 1e-9  # of an eigenvalue of a correlation matrix: below, the direction does not exist
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from actuator_lti.verdict import Tally, Verdict
+from actuator_lti.asked.verdict import Tally, Verdict
 from analyses.monte_carlo.statistics import ColumnStatistics
-from analyses.verdicts import RequirementVerdict, tally
+from analyses.specification.verdicts import RequirementVerdict, tally
 
 __all__ = ["ColumnStatistics", "MonteCarloResult", "Odds", "WorstCase"]
 

@@ -12,15 +12,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_lti.atomic import write_bytes
+from actuator_lti.asked.quantities import QUANTITIES
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
 from actuator_lti.errors import InputError
-from actuator_lti.extras import need
-from actuator_lti.quantities import QUANTITIES
-from actuator_lti.verdict import Verdict
-from analyses.engine import Chunk, Engine
+from actuator_lti.files.atomic import write_bytes
+from actuator_lti.start.extras import need
 from analyses.monte_carlo.judging import in_populations, judge, label, source_columns
 from analyses.monte_carlo.reduction import BLOCK, Reducing, Reduction, Tally, judged, reduced, unpacked
 from analyses.monte_carlo.result import MonteCarloResult, Odds, WorstCase
@@ -30,8 +29,9 @@ from analyses.monte_carlo.stepping import StepCheck
 from analyses.monte_carlo.store import CHUNK, Store
 from analyses.monte_carlo.task import SampleTask
 from analyses.monte_carlo.worst import worst_case
-from analyses.sampling import Table, sampler_of
-from analyses.verdicts import RequirementVerdict
+from analyses.specification.verdicts import RequirementVerdict
+from analyses.studies.engine import Chunk, Engine
+from analyses.studies.sampling import Table, sampler_of
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.batch import Population
 from actuator_lti.errors import InputError
-from analyses.engine import Arrays
+from analyses.studies.engine import Arrays
 
 if TYPE_CHECKING:
     from nonlinear import Rows

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError
-from actuator_lti.tree import Tree
-from analyses.engine import Arrays, Chunk
+from actuator_lti.files.atomic import write_bytes
+from actuator_lti.files.tree import Tree
+from analyses.studies.engine import Arrays, Chunk
 
 SCHEMA = "actuator-lti/samples"
 VERSION = 1

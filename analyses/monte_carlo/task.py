@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.batch import (
     Population,
     drive_figures,
@@ -18,13 +19,12 @@ from actuator_lti.batch import (
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.design import design_hash, with_values
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
-from actuator_lti.tree import Tree
-from analyses.engine import Arrays
+from actuator_lti.files.tree import Tree
 from analyses.monte_carlo.judging import drive_column, loops_of
 from analyses.monte_carlo.stepping import StepCheck, step_columns, step_units
-from analyses.proof import code_version
-from analyses.sampling import Sampler, as_values
+from analyses.studies.engine import Arrays
+from analyses.studies.proof import code_version
+from analyses.studies.sampling import Sampler, as_values
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -71,7 +71,7 @@ class SampleTask:
         return columns | self.figures(draws)
 
     def sample(self) -> bytes:
-        """The first sample, to be computed alike wherever the study is (`analyses.proof`)."""
+        """The first sample, to be computed alike wherever the study is (`analyses.studies.proof`)."""
         return b"".join(values.tobytes() for values in self.evaluate(0, 1).values())
 
     def figures(self, draws: np.ndarray) -> Arrays:
@@ -145,7 +145,7 @@ def replay(design: Design, sampler: Sampler, number: int) -> Design:
     Examples
     --------
     >>> from actuator_lti import load_design
-    >>> from analyses.sampling import sampler_of
+    >>> from analyses.studies.sampling import sampler_of
     >>> design = load_design("ilr33-amber")
     >>> replay(design, sampler_of(design, seed=3), 17).load.inertia_kgm2 == design.load.inertia_kgm2
     False

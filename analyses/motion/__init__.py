@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from actuator_lti.on_first_use import on_first_use
+from actuator_lti.start.on_first_use import on_first_use
 
 if TYPE_CHECKING:
     from analyses.motion.asked import Asked

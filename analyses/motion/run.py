@@ -15,8 +15,8 @@ from analyses.motion.asked import KINDS, USUAL_CYCLES, Asked
 from nonlinear import Trajectory, commands, loads, simulate
 from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment
-from nonlinear.records import read_columns
-from nonlinear.trajectory import COMMAND_UNITS
+from nonlinear.runs.records import read_columns
+from nonlinear.runs.trajectory import COMMAND_UNITS
 
 USUAL_S = 1.0
 

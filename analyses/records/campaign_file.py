@@ -44,7 +44,7 @@ from typing import Annotated, Literal
 
 from actuator_lti.bounds import CAMPAIGN_RUNS
 from actuator_lti.errors import InputError
-from actuator_lti.reading import shown_path
+from actuator_lti.files.reading import shown_path
 from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.records.toml_tables import Table, key_of, read_toml

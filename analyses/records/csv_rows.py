@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
-from actuator_lti.extras import need
+from actuator_lti.start.extras import need
 from analyses.records.record import FloatArray, RowCounts
 from analyses.records.spec import MISSING_TEXTS, CsvFormat, Policy
 

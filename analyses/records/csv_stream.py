@@ -9,7 +9,7 @@ from typing import BinaryIO
 
 from actuator_lti.bounds import CSV_LINE_BYTES, CSV_ROWS
 from actuator_lti.errors import InputError
-from actuator_lti.reading import open_regular
+from actuator_lti.files.reading import open_regular
 from analyses.records.bounded import BoundedRows
 from analyses.records.columns import find_columns, read_header
 from analyses.records.csv_rows import Account, Block, Columns, careful_rows, clean, fast_rows

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from actuator_lti.bounds import MAT_BYTES
 from actuator_lti.errors import InputError
-from actuator_lti.reading import read_bytes
+from actuator_lti.files.reading import read_bytes
 from analyses.records.mat5 import MatContent, read_mat5
 from analyses.records.record import FloatArray, Record
 from analyses.records.spec import CsvFormat, RecordSpec

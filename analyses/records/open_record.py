@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from actuator_lti.errors import InputError
-from actuator_lti.reading import open_regular, shown_path
+from actuator_lti.files.reading import open_regular, shown_path
 from analyses.records.campaign_file import record_spec
 from analyses.records.campaign_import import read_record
 from analyses.records.csv_stream import MAX_ROWS

@@ -11,8 +11,8 @@ import numpy as np
 
 from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError
-from actuator_lti.extras import need
-from actuator_lti.reading import read_bytes, shown_path
+from actuator_lti.files.reading import read_bytes, shown_path
+from actuator_lti.start.extras import need
 from analyses.records.record import FloatArray, Record
 from analyses.records.spec import RecordSpec
 from analyses.records.table_record import record_of_columns

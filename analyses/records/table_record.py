@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from actuator_lti.errors import InputError
-from actuator_lti.reading import shown_path
+from actuator_lti.files.reading import shown_path
 from analyses.records.csv_rows import Account, Block
 from analyses.records.gaps import filled, several_rates
 from analyses.records.inputs import inputs_of

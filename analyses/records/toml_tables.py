@@ -17,8 +17,8 @@ from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_t
 
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
-from actuator_lti.reading import read_campaign_toml
-from actuator_lti.tree import Tree
+from actuator_lti.files.reading import read_campaign_toml
+from actuator_lti.files.tree import Tree
 from analyses.request import UNITS
 
 T = TypeVar("T")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.design.model import Command, Design
-from analyses.drive_figures import DriveFigures, drive_figures
+from analyses.specification.drive_figures import DriveFigures, drive_figures
 from analyses.specification.manoeuvres import thermal_duty
 from nonlinear import commands, simulate
 

@@ -81,7 +81,7 @@ def manoeuvres(
     Parameters
     ----------
     rate_rad_s, acceleration_rad_s2 : float
-        Largest rate and acceleration of the output (`analyses.drive_figures`).
+        Largest rate and acceleration of the output (`analyses.specification.drive_figures`).
     settling_s : float
         How long the linear loop takes to settle.
     """

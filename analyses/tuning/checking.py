@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.batch import Population
 from actuator_lti.design import with_values
 from actuator_lti.loops import assemble_loops
-from actuator_lti.quantities import QUANTITIES
-from analyses.loop_figures import all_loop_figures
+from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.stepping import StepCheck, step_columns
+from analyses.specification.verdicts import judged
 from analyses.tuning.problem import Problem
 from analyses.tuning.result import NonlinearCheck
-from analyses.verdicts import judged
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
+    from analyses.specification.verdicts import RequirementVerdict
     from analyses.tuning.result import BindingRequirement
-    from analyses.verdicts import RequirementVerdict
 
 _SMALL = 0.05
 
@@ -63,7 +63,7 @@ def _nothing(name: str) -> tuple[float | None, str]:
 
 def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tuple[NonlinearCheck, ...]:
     """Steps of a twentieth of full deflection and of full deflection, with every limit and friction on."""
-    from analyses.variant_figures import LargeSignal
+    from analyses.comparison.variant_figures import LargeSignal
 
     worst = int(np.argmin(result.min(axis=1)))
     plan = LargeSignal.plan(tuned)

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, paths_of, tolerances
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES
 from analyses.monte_carlo.judging import in_populations, judge
-from analyses.sampling import Factor, correlation_of, semidefinite_root
+from analyses.studies.sampling import Factor, correlation_of, semidefinite_root
 from analyses.tuning.placing import Variable, change
 
 if TYPE_CHECKING:

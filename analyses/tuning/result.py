@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
+    from analyses.specification.verdicts import RequirementVerdict
     from analyses.tuning.asked import Aim
-    from analyses.verdicts import RequirementVerdict
 
 
 @dataclass(frozen=True)

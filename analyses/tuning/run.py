@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.asked.quantities import LOOP_QUANTITIES
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
-from actuator_lti.quantities import LOOP_QUANTITIES
 from analyses.monte_carlo.judging import in_populations, label
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.checking import confirm, nonlinear_checks
@@ -26,7 +26,7 @@ from analyses.tuning.trade_off import trade_off
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
-    from analyses.verdicts import RequirementVerdict
+    from analyses.specification.verdicts import RequirementVerdict
 
 Progress = Callable[[int, int], None]
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding

@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import Place
-from nonlinear.differences import RETURNED
-from nonlinear.loop_setup import LoopSetup
-from nonlinear.stepper import Stepper
+from nonlinear.bench.differences import RETURNED
+from nonlinear.bench.loop_setup import LoopSetup
+from nonlinear.bench.stepper import Stepper
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]

@@ -9,9 +9,9 @@ from math import ceil, inf, isfinite
 from analyses.validation.limit_values import FAR
 from analyses.validation.row import Row
 from analyses.validation.value_pair import Pair
-from nonlinear.loop_setup import every
+from nonlinear.bench.loop_setup import every
+from nonlinear.bench.stepper import Stepper
 from nonlinear.rows import Rows
-from nonlinear.stepper import Stepper
 
 
 def command_rows(pair: Pair) -> Iterator[Row]:

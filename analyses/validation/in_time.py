@@ -18,15 +18,15 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.plain_system import PlainSystem
-from actuator_lti.resolvent import balanced
+from actuator_lti.systems.plain_system import PlainSystem
+from actuator_lti.systems.resolvent import balanced
 from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
 from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, pole_near
 from nonlinear import tangent
-from nonlinear.differences import RETURNED
-from nonlinear.loop_setup import LoopSetup
-from nonlinear.stepper import Stepper
+from nonlinear.bench.differences import RETURNED
+from nonlinear.bench.loop_setup import LoopSetup
+from nonlinear.bench.stepper import Stepper
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]

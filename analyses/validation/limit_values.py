@@ -11,9 +11,9 @@ from math import isfinite
 from actuator_lti.design.model import CurrentLoop, Design, VelocityLoop
 from analyses.validation.row import Row, judged
 from analyses.validation.value_pair import WITHIN, Pair, only
-from nonlinear.loop_setup import every, producer, stages_of, target
+from nonlinear.bench.loop_setup import every, producer, stages_of, target
+from nonlinear.bench.stepper import Stepper
 from nonlinear.rows import Rows
-from nonlinear.stepper import Stepper
 
 FAR = 1e6  # times a limit: a command that nothing follows
 OVER = 3.0  # times a limit: what an integral is asked beyond it

@@ -1,6 +1,6 @@
 """The places of a drive that are judged: its loops, its break points, the command and the load.
 
-Loops stand on the operating motion that `nonlinear.operating_motion` chooses, without counts, noise and
+Loops stand on the operating motion that `nonlinear.bench.operating_motion` chooses, without counts, noise and
 supply, which are no part of a loop.  The linear writing may be that of another drive, the ``model``: a wrong
 one shows what a validation sees.
 """
@@ -18,12 +18,12 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.wiring import wire
-from analyses.loop_figures import LoopFigures, loop_figures
+from analyses.linear.loop_figures import LoopFigures, loop_figures
 from analyses.validation.small_signal import Place
 from nonlinear import tangent
-from nonlinear.loop_setup import PATHS, LoopSetup, loop_setup, points_of, stages_of
-from nonlinear.on_the_bench import on_the_bench
-from nonlinear.operating_motion import may_stand, on_its_stand, standing
+from nonlinear.bench.loop_setup import PATHS, LoopSetup, loop_setup, points_of, stages_of
+from nonlinear.bench.on_the_bench import on_the_bench
+from nonlinear.bench.operating_motion import may_stand, on_its_stand, standing
 
 if TYPE_CHECKING:
     from actuator_lti.drive.operating import Operating

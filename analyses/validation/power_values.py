@@ -9,7 +9,7 @@ from actuator_lti.design.model import Instruments
 from analyses.validation.row import Row
 from analyses.validation.torque_values import edge
 from analyses.validation.value_pair import Pair, only
-from nonlinear.stepper import Stepper
+from nonlinear.bench.stepper import Stepper
 
 
 def power_rows(pair: Pair) -> Iterator[Row]:

@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from math import degrees
 from typing import TYPE_CHECKING
 
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design
-from actuator_lti.verdict import Tally, Verdict
 from analyses.large_signal.at_rest import RestSweep
 from analyses.large_signal.by_amplitude import AmplitudeMargin
 from analyses.large_signal.conditional import Conditional
 from analyses.limit_cycles.counts import Counts
-from analyses.loop_figures import LoopFigures
-from analyses.settling import Settling, largest_swing, words
+from analyses.linear.loop_figures import LoopFigures
+from analyses.motion.settling import Settling, largest_swing, words
 from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.in_time import MarginShown, StepShown
 from analyses.validation.row import Row
@@ -102,8 +102,8 @@ class Validation:
     def hunting(self) -> Settling | None:
         """The largest motion that a step of the drive as it is ends in; None: it comes to rest.
 
-        By its one judge (`analyses.settling`), whatever keeps it going: counts, play, friction, load. A swing
-        of less than `NOTICED` of full deflection is listed, it fails nothing.
+        By its one judge (`analyses.motion.settling`), whatever keeps it going: counts, play, friction,
+        load. A swing of less than `NOTICED` of full deflection is listed, it fails nothing.
         """
         least = NOTICED * self.design.validation.full_deflection_rad
         return largest_swing(one for one in self.settlings if one.swing_rad >= least)

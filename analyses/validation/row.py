@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf, isfinite
 
-from actuator_lti.verdict import Verdict
+from actuator_lti.asked.verdict import Verdict
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,12 +24,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.resolvent import balanced
-from actuator_lti.verdict import Verdict
-from analyses.loop_figures import LoopFigures
+from actuator_lti.asked.verdict import Verdict
+from actuator_lti.systems.resolvent import balanced
+from analyses.linear.loop_figures import LoopFigures
 from analyses.validation.row import Row, judged
 from nonlinear import Tangent
-from nonlinear.lifted import GRID, relative
+from nonlinear.bench.lifted import GRID, relative
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins

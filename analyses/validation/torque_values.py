@@ -19,9 +19,9 @@ from actuator_lti.design.model import Command, Controller, Design, Instruments, 
 from actuator_lti.drive.operating import dry_torque
 from analyses.validation.row import Row, judged
 from analyses.validation.value_pair import WITHIN
-from nonlinear.operating_motion import OperatingMotion, full_torque_Nm, operating_motion_at
+from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm, operating_motion_at
+from nonlinear.bench.stepper import Stepper
 from nonlinear.rows import Rows
-from nonlinear.stepper import Stepper
 
 EXACT = 1e-9  # of an inertia; of the largest torque that takes part in a balance
 ULPS = 64.0  # of a speed, a twist: what the transition of a tick rounds to

@@ -9,12 +9,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
+from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
-from actuator_lti.verdict import Verdict
 from analyses.isolation import attempt
 from analyses.large_signal import large_signals
 from analyses.large_signal.at_rest import RestSweep, free_amplitude, sweep_from_rest
@@ -22,8 +23,8 @@ from analyses.large_signal.by_amplitude import margins_by_amplitude
 from analyses.large_signal.conditional import Conditional, conditional_stability
 from analyses.large_signal.settling_ticks import settling_ticks_of
 from analyses.limit_cycles.counts import Counts, counts_of
-from analyses.loop_figures import LoopFigures, loop_figures
-from analyses.settling import Settling, settle
+from analyses.linear.loop_figures import LoopFigures, loop_figures
+from analyses.motion.settling import Settling, settle
 from analyses.validation.bench_sweep import bench_sweep
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.in_time import margin_shown, step_shown
@@ -32,7 +33,7 @@ from analyses.validation.result import Validation
 from analyses.validation.row import Row
 from analyses.validation.settings import Settings
 from analyses.validation.small_signal import Place, small_signal
-from nonlinear.on_the_bench import on_the_bench
+from nonlinear.bench.on_the_bench import on_the_bench
 
 Progress = Callable[[int, int], None]
 T = TypeVar("T")
@@ -188,7 +189,6 @@ class _Work:
 
     def _held_by_friction(self) -> tuple[str, ...]:
         """Loops that are not stable as they are tested, but are with the friction that is left out there."""
-        from actuator_lti.loops import assemble_loops
 
         bench, model = self.bench, on_the_bench(self.bench.model)
         if bench.linear.friction == model.friction:

@@ -54,7 +54,7 @@ def keys_page() -> str:
 
 def quantities_page() -> str:
     """Every quantity that a requirement may limit."""
-    from actuator_lti.quantities import QUANTITIES
+    from actuator_lti.asked.quantities import QUANTITIES
 
     rows = [
         [
@@ -67,7 +67,7 @@ def quantities_page() -> str:
         for each in QUANTITIES.values()
     ]
     head = ["quantity", "unit", "of", "usual limit", "definition"]
-    intro = "What `quantity = ...` of a `[[requirement]]` may name; made from `actuator_lti.quantities`."
+    intro = "What `quantity = ...` of a `[[requirement]]` may name; from `actuator_lti.asked.quantities`."
     return "\n".join(["# Requirement quantities", "", intro, "", *table(head, rows)])
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from actuator_lti.atomic import write_bytes
+from actuator_lti.files.atomic import write_bytes
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from examples.virtual_bench.instruments import BenchInstruments, RunLogs

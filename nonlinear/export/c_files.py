@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.design.model import Design
+from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
-from nonlinear.elastic import is_elastic
-from nonlinear.export.program import header_text, single, source_hash, source_text, template
+from nonlinear.export.program import c_text, header_text, single, source_hash, source_text, template
 from nonlinear.export.rows import place_words
 from nonlinear.native import parameters
-from nonlinear.parameters import design_row
+from nonlinear.row.elastic import is_elastic
+from nonlinear.row.parameters import design_row
 
 Floats = npt.NDArray[np.float64]
 SPARE_LEVELS = 3  # halvings of the period beyond those of the design
@@ -113,6 +115,13 @@ def stage_words(design: Design) -> tuple[str, str]:
     return table[design.controller.outermost]
 
 
+def _version() -> str:
+    try:
+        return version("actuator-lti")
+    except PackageNotFoundError:
+        return "not installed"
+
+
 def _design_header(ours: ExportedDesign) -> str:
     return f"""/*
  * Parameters of the design {_plain(ours.design.name)}.
@@ -121,6 +130,12 @@ def _design_header(ours: ExportedDesign) -> str:
 #define DRIVE_DESIGN_H
 
 #include "drive.h"
+
+#define DRIVE_DESIGN_NAME {c_text(ours.design.name)}
+#define DRIVE_DESIGN_REVISION {c_text(ours.design.revision or "")}
+#define DRIVE_DESIGN_HASH "{design_hash(ours.design)}" /* SHA-256 of its values */
+#define DRIVE_SOURCE_HASH "{source_hash()}" /* SHA-256 of drive.h and drive.c in double precision */
+#define DRIVE_EXPORTER_VERSION "{_version()}"
 
 enum {{
     DRIVE_P_LENGTH = {ours.p_size}, /* of the row p of this design */

@@ -16,7 +16,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear.export.c_files import c_export, exported, spare_parameters
 from nonlinear.export.model_description import MODEL, build_description, description
-from nonlinear.export.program import template
+from nonlinear.export.program import c_text, template
+from nonlinear.export.relations import relation_functions
 from nonlinear.export.trace import KeyTrace, trace_keys
 from nonlinear.export.variables import (
     FIRST_CONSTANT,
@@ -38,7 +39,7 @@ _FOLDERS = {
 }
 _SUFFIX = {"linux64": "so", "win64": "dll"}
 _SHARED = {
-    "linux64": ("-shared", "-fPIC", "-fvisibility=hidden"),
+    "linux64": ("-shared", "-fPIC", "-fvisibility=hidden", "-s"),
     "win64": ("-shared", "-fvisibility=hidden"),
 }
 
@@ -140,6 +141,8 @@ def _design_header(design: Design, trace: KeyTrace, spare: int) -> str:
 #ifndef FMU_DESIGN_H
 #define FMU_DESIGN_H
 
+#include <stddef.h>
+
 #define FMU_TOKEN "@TOKEN@"
 #define FMU_SPARE_P {spare} /* room for a stiffer coupling than the design's */
 #define FMU_KEYS {len(trace.keys)}U
@@ -155,14 +158,23 @@ typedef struct {{
     double low; /* allowed, both inclusive */
     double high;
     int fixed; /* 1: only before the run */
+    int whole; /* 1: a count, an integer variable */
 }} fmu_key;
 
+typedef struct {{
+    double value;
+    int whole;
+}} fmu_constant;
+
 extern const fmu_key fmu_keys[FMU_KEYS + 1U];
-extern const double fmu_constants[FMU_CONSTANTS + 1U];
+extern const fmu_constant fmu_constants[FMU_CONSTANTS + 1U];
 extern const char *const fmu_texts[FMU_TEXTS + 1U];
 
 /* Works out the parameters p from the keys; 0 where they ask for another structure than the exported one. */
 int fmu_set_keys(const double *k, double *p);
+
+/* Whether the keys go together, as a design file has to have them; 0, and the reason, where they do not. */
+int fmu_related(const double *k, char *why, size_t size);
 
 #endif
 """
@@ -170,29 +182,34 @@ int fmu_set_keys(const double *k, double *p);
 
 def _design_source(design: Design, trace: KeyTrace) -> str:
     keys = "\n".join(
-        f"    {{{c_float(key.value)}, {c_float(key_low(key))}, {c_float(key.high)}, {int(key.fixed)}}},"
+        f"    {{{c_float(key.value)}, {c_float(key_low(key))}, {c_float(key.high)}, {int(key.fixed)}, "
+        f"{int(key.whole)}}},"
         f" /* {key.path} */"
         for key in trace.keys
     )
-    constants = "\n".join(f"    {c_float(_finite(key.value))}, /* {key.path} */" for key in trace.constants)
-    texts = "\n".join(f"    {_literal(value)}, /* {path} */" for path, value, _ in texts_of(design))
+    constants = "\n".join(
+        f"    {{{c_float(_finite(key.value))}, {int(key.whole)}}}, /* {key.path} */"
+        for key in trace.constants
+    )
+    texts = "\n".join(f"    {c_text(value)}, /* {path} */" for path, value, _ in texts_of(design))
     lines = "\n".join(f"    {line}" for line in trace.lines)
+    relations = relation_functions(design, trace.keys)
     return f"""/*
  * Keys of the design as parameters of the unit, and how the drive's parameters follow from them.
  */
 #include "fmu_design.h"
 
 #include <math.h>
-#include <stddef.h>
+#include <stdio.h>
 
 const fmu_key fmu_keys[FMU_KEYS + 1U] = {{
 {keys}
-    {{0.0, 0.0, 0.0, 0}}
+    {{0.0, 0.0, 0.0, 0, 0}}
 }};
 
-const double fmu_constants[FMU_CONSTANTS + 1U] = {{
+const fmu_constant fmu_constants[FMU_CONSTANTS + 1U] = {{
 {constants}
-    0.0
+    {{0.0, 0}}
 }};
 
 const char *const fmu_texts[FMU_TEXTS + 1U] = {{
@@ -205,19 +222,24 @@ int fmu_set_keys(const double *k, double *p)
 {lines}
     return 1;
 }}
-"""
+
+{_relations_text(relations)}"""
+
+
+def _relations_text(relations: Sequence[Sequence[str]]) -> str:
+    """One function a check, and one that calls them."""
+    arguments = "const double *k, char *why, size_t size"
+    texts = []
+    for number, lines in enumerate(relations):
+        body = "\n".join(f"    {line}" for line in lines)
+        texts.append(f"static int related_{number}({arguments})\n{{\n{body}\n}}\n")
+    calls = "".join(f" && (related_{number}(k, why, size) != 0)" for number in range(len(relations)))
+    texts.append(f"int fmu_related({arguments})\n{{\n    return ((size > 0U){calls}) ? 1 : 0;\n}}\n")
+    return "\n".join(texts)
 
 
 def _finite(value: float) -> float:
     return value if math.isfinite(value) else 0.0
-
-
-def _literal(text: str) -> str:
-    """A C string in ASCII; other characters as octal escapes of their UTF-8."""
-    plain = "".join(
-        chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode()
-    )
-    return f'"{plain}"'
 
 
 def _zipped(files: Mapping[str, bytes]) -> bytes:

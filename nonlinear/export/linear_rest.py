@@ -10,7 +10,6 @@ import math
 
 import numpy as np
 
-from actuator_lti import rest_mode as rest_mode_rule
 from actuator_lti.batch._figures import (
     DC_GAIN,
     FINAL,
@@ -21,7 +20,8 @@ from actuator_lti.batch._figures import (
     MODULUS_X,
 )
 from actuator_lti.compiled.kernel import kernel
-from actuator_lti.rest_mode import ROUNDED
+from actuator_lti.systems import rest_mode as rest_mode_rule
+from actuator_lti.systems.rest_mode import ROUNDED
 from nonlinear.export.linear_limiters import states_at
 
 LEAST = np.array(rest_mode_rule.LEAST)
@@ -191,7 +191,7 @@ def left_out(n, a, b, c, j, turned, v, a_less, b_less, c_less):
 
 @kernel
 def level_at_rest(n, a, b, c, work, state, sizes, v, a_less, b_less, c_less):
-    """L(0), without a mode at rest that the loop does not show (`actuator_lti.rest_mode`)."""
+    """L(0), without a mode at rest that the loop does not show (`actuator_lti.systems.rest_mode`)."""
     for turned in range(2):
         for fullness in range(1, n + 1):  # integrators that little else drives first
             for j in range(n):

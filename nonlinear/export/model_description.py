@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from actuator_lti.design.model import Design
 from actuator_lti.design.units import parse_unit
+from nonlinear.export.trace import LARGEST_INTEGER
 from nonlinear.export.variables import FIRST_FLAG, INITIAL_ANGLE, Variable
 
 TIME = 0  # value reference of the independent variable (FMI 3.0)
@@ -93,17 +94,27 @@ def _units(variables: Sequence[Variable], version: int) -> ET.Element:
         if "celsius" in str(result.dimension):
             powers["offset"] = "273.15"
         ET.SubElement(unit, "BaseUnit", powers)
+        for shown in sorted({item.shown for item in variables if item.unit == name} - {""}):
+            factor = parse_unit(name).factor / parse_unit(shown).factor
+            ET.SubElement(unit, "DisplayUnit", name=shown, factor=repr(factor))
     return definitions
 
 
 def _bounds(item: Variable) -> dict[str, str]:
+    """Unit, range and size of a number; an integer has a range alone."""
+    if item.kind == "integer":
+        return {"min": str(int(item.low)), "max": str(int(min(item.high, LARGEST_INTEGER)))}
     result = {}
     if item.unit != "1":
         result["unit"] = item.unit
+        if item.shown:
+            result["displayUnit"] = item.shown
     if item.low > -math.inf:
         result["min"] = repr(float(item.low))
     if item.high < math.inf:
         result["max"] = repr(float(item.high))
+    if item.nominal is not None:
+        result["nominal"] = repr(float(item.nominal))
     return result
 
 
@@ -116,7 +127,9 @@ def _initial(item: Variable) -> dict[str, str]:
 def _start(item: Variable) -> dict[str, str]:
     if item.start is None:
         return {}
-    return {"start": item.start if isinstance(item.start, str) else repr(float(item.start))}
+    if isinstance(item.start, str):
+        return {"start": item.start}
+    return {"start": str(int(item.start)) if item.kind == "integer" else repr(float(item.start))}
 
 
 def _common(item: Variable) -> dict[str, str]:
@@ -131,11 +144,11 @@ def _common(item: Variable) -> dict[str, str]:
 
 
 def _variables_2(root: ET.Element, variables: Sequence[Variable]) -> None:
-    types = {"real": "Real", "boolean": "Boolean", "string": "String"}
+    types = {"real": "Real", "integer": "Integer", "boolean": "Boolean", "string": "String"}
     listed = ET.SubElement(root, "ModelVariables")
     for item in variables:
         scalar = ET.SubElement(listed, "ScalarVariable", _common(item))
-        bounds = _bounds(item) if item.kind == "real" else {}
+        bounds = _bounds(item) if item.kind in ("real", "integer") else {}
         ET.SubElement(scalar, types[item.kind], {**bounds, **_start(item)})
     structure = ET.SubElement(root, "ModelStructure")
     index = {item.reference: n + 1 for n, item in enumerate(variables)}
@@ -154,7 +167,7 @@ def _known(item: Variable) -> list[int]:
 
 
 def _variables_3(root: ET.Element, variables: Sequence[Variable]) -> None:
-    types = {"real": "Float64", "boolean": "Boolean", "string": "String"}
+    types = {"real": "Float64", "integer": "Int32", "boolean": "Boolean", "string": "String"}
     listed = ET.SubElement(root, "ModelVariables")
     ET.SubElement(
         listed, "Float64", name="time", valueReference=str(TIME), causality="independent",
@@ -165,7 +178,7 @@ def _variables_3(root: ET.Element, variables: Sequence[Variable]) -> None:
             element = ET.SubElement(listed, "String", _common(item))
             ET.SubElement(element, "Start", value=str(item.start))
         else:
-            bounds = _bounds(item) if item.kind == "real" else {}
+            bounds = _bounds(item) if item.kind in ("real", "integer") else {}
             ET.SubElement(listed, types[item.kind], {**_common(item), **bounds, **_start(item)})
     structure = ET.SubElement(root, "ModelStructure")
     outputs = [item for item in variables if item.causality == "output"]

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.design.access import parameter_value, stacked
 from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import Limiter
 from actuator_lti.drive.wiring import wire
-from actuator_lti.drive_figure import drive_figure
-from actuator_lti.limiters import limiter_places
+from actuator_lti.loops.limiters import limiter_places
 from nonlinear._kernels import layout as at
 from nonlinear.export.linear_limiters import SIGNALS as SEEN
 from nonlinear.export.statement import Statement, used
 from nonlinear.export.trace import Tape, Traced, stored
-from nonlinear.parameters import design_row
+from nonlinear.row.parameters import design_row
 
 PLACES = {
     "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,

@@ -34,6 +34,11 @@ STATUS = {
     "NOT_FINITE": "the speed is not finite any more",
     "NO_ROOT": "no time was found for a zero crossing of the speed",
 }
+_FLAGS = {
+    **{(f"FLAG_{name.upper().replace('-', '_')}", bit): f"the {name} limit acted"
+       for name, bit in zip(at.LIMITERS, at.LIMITER_BITS, strict=True)},
+    ("FLAG_AT_REST", at.FLAG_STICK): "the rotor is held by friction",
+}  # fmt: skip
 _ABOUT = {
     "prepare_sizes": "Works out the lengths of p and s; call it first, and after every change of p.",
     "derive": "Derives all that does not change with time; call it after `prepare_sizes`.",
@@ -68,14 +73,14 @@ def header_text() -> str:
         ("Inputs of a tick, in io", names_of(0, at.IN_PROBE, "IN_")),
         ("Outputs of a tick, in io: what was at its beginning", _outputs()),
         ("Status", [(name, getattr(at, name)) for name in STATUS]),
+        ("Bits of io[DRIVE_IO_FLAGS]", list(_FLAGS)),
     )
     blocks = "\n".join(_enum(title, items) for title, items in groups)
-    flags = ", ".join(f"{bit} {name}" for name, bit in zip(at.LIMITERS, at.LIMITER_BITS, strict=True))
     heads = "\n".join(f"/* {_ABOUT[name]} */\n{text}" for name, text in program().declarations.items())
     sizes = f"enum {{\n    DRIVE_RUN_SIZE = {at.SIZE}, /* parameters of a run */\n"
     sizes += f"    DRIVE_IO_LENGTH = {at.IO_SIZE}\n}};"
     return template("drive.h").replace("@BLOCKS@", blocks).replace("@FUNCTIONS@", heads).replace(
-        "@SIZES@", sizes).replace("@FLAGS@", f"{flags}, {at.FLAG_STICK} at rest")  # fmt: skip
+        "@SIZES@", sizes)  # fmt: skip
 
 
 _DERIVED = ("DELAY_LINE", "RARE_LOAD", "STATE_SIZE", "PARAMETER_SIZE")
@@ -88,7 +93,7 @@ def _outputs() -> list[tuple[str, int]]:
 def _enum(title: str, items: list[tuple[str, int]]) -> str:
     lines = [f"/* {title} */", "enum {"]
     for name, value in items:
-        said = STATUS.get(name, words().get(name, ""))
+        said = STATUS.get(name) or _FLAGS.get((name, value)) or words().get(name, "")
         end = "," if (name, value) != items[-1] else ""
         lines.append(f"    DRIVE_{name} = {value}{end}" + (f" /* {_plain(said)} */" if said else ""))
     return "\n".join([*lines, "};", ""])
@@ -120,10 +125,18 @@ def source_hash() -> str:
     return hashlib.sha256((header_text() + source_text()).encode()).hexdigest()
 
 
+def c_text(text: str) -> str:
+    """A C string in ASCII; other characters as octal escapes of their UTF-8."""
+    plain = "".join(
+        chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode()
+    )
+    return f'"{plain}"'
+
+
 _NUMBER = re.compile(r"(?<![\w.])(\d+\.\d*(?:e[+-]?\d+)?|\d+e[+-]?\d+)(?![\w.])")
 _SAME = {"abs", "isfinite", "isnan", "isinf"}  # type-generic, or of whole numbers
 _CALLS = re.compile(rf"\b({'|'.join(sorted({*FUNCTIONS.split()} - _SAME, key=len, reverse=True))})\(")
-_COMMENT = re.compile(r"(/\*.*?\*/)", re.DOTALL)
+_KEPT = re.compile(r'(/\*.*?\*/|"[^"\n]*")', re.DOTALL)  # comments and texts
 
 
 _LARGEST, _SMALLEST = 3e38, 1e-37  # of single precision, rounded inwards
@@ -139,8 +152,8 @@ def _literal(result: re.Match[str]) -> str:
 
 def single(text: str) -> str:
     """The same source in single precision: types, literals and functions of the C library."""
-    parts = _COMMENT.split(text)
-    for k in range(0, len(parts), 2):  # comments stay
+    parts = _KEPT.split(text)
+    for k in range(0, len(parts), 2):  # these stay
         code = parts[k].replace("(double)", "(float)")
         code = re.sub(r"\bdouble\b", "float", code)
         parts[k] = _CALLS.sub(r"\1f(", _NUMBER.sub(_literal, code))

@@ -11,37 +11,48 @@ from actuator_lti.compiled.kinds import c_float
 
 Term = str | float  # a key "k[3]", an earlier value "v7", or a number
 SIGNS = frozenset({"+", "-", "*", "/", "<", "<=", ">", ">=", "==", "!=", "&&", "||"})
+_ENDS = {"end": "}", "allowed": "return 1;"}
 
 
 @dataclass(frozen=True)
 class Statement:
     """One step: a value of some terms, a condition on them, or a place of the row that gets one.
 
+    Where another outcome of a condition is followed too, a branch with its end stands for the condition;
+    each way ends with all being allowed, or a refusal.
+
     Attributes
     ----------
-    kind : {"value", "condition", "store"}
+    kind : {"value", "condition", "store", "branch", "end", "allowed", "refusal"}
     target : int
-        Number of the value, or place in the row; of a condition 1 where it has to hold, else 0.
+        Number of the value, or place in the row; of a condition or branch 1 where it has to hold, else 0.
     does : str
         A sign between two terms, the name of a function of the C library, ``where`` (condition, yes, no),
-        ``zero_below`` (value, least), or empty for the term itself.
+        ``zero_below`` (value, least), or empty for the term itself.  Of a refusal: the C string of its words,
+        the form of ``printf`` where a term is shown.
     terms : tuple of str or float
     """
 
-    kind: Literal["value", "condition", "store"]
-    target: int
-    does: str
-    terms: tuple[Term, ...]
+    kind: Literal["value", "condition", "store", "branch", "end", "allowed", "refusal"]
+    target: int = 0
+    does: str = ""
+    terms: tuple[Term, ...] = ()
 
     @property
     def c(self) -> str:
         """The statement in C, of the rows ``k`` (keys) and ``p`` (parameters)."""
+        if self.kind in _ENDS:
+            return _ENDS[self.kind]
+        if self.kind == "refusal":
+            shown = ", ".join((self.does, *map(str, self.terms)))
+            return f"(void)snprintf(why, size, {shown}); return 0;"
         text = self._expression()
         if self.kind == "value":
             return f"const double v{self.target} = {text};"
         if self.kind == "store":
             return f"p[{self.target}] = {text};"
-        return f"if ({'!' if self.target else ''}({text})) {{ return 0; }}"
+        then = "{" if self.kind == "branch" else "{ return 0; }"
+        return f"if ({'!' if self.target else ''}({text})) {then}"
 
     def _expression(self) -> str:
         words = [term if isinstance(term, str) else c_float(term) for term in self.terms]
@@ -64,8 +75,11 @@ def used(statements: Sequence[Statement]) -> tuple[Statement, ...]:
     kept: list[Statement] = []
     wanted: set[Term] = set()
     for statement in reversed(statements):
-        if statement.kind == "value" and f"v{statement.target}" not in wanted:
-            continue
+        if statement.kind == "value":
+            name = f"v{statement.target}"
+            if name not in wanted:
+                continue
+            wanted.remove(name)  # another branch may have another of this name
         wanted |= {*statement.terms}
         kept.append(statement)
     return tuple(reversed(kept))

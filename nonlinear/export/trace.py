@@ -19,7 +19,7 @@ from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout as at
 from nonlinear.export.statement import Statement, Term, used
-from nonlinear.parameters import design_row
+from nonlinear.row.parameters import design_row
 
 
 class NotTraceable(TypeError):
@@ -31,10 +31,12 @@ class Tape:
     """Statements in the order in which they were made.
 
     Where the statements are ``interpreted``, the whole number below a value and the outcome of a comparison
-    are values too; else they are conditions.
+    are values too; else they are conditions.  Where they are ``loose``, a message may show a value, a
+    remainder is a value, and every value is known to be finite.
     """
 
     interpreted: bool = False
+    loose: bool = False
     statements: list[Statement] = field(default_factory=list)
     count: int = 0
 
@@ -74,6 +76,8 @@ def _compared(sign: str, function: Callable[[Any, Any], bool]) -> Any:
     def compare(self: Traced, other: Any) -> Any:
         if not isinstance(other, int | float | Traced):
             return False
+        if self.tape.loose and isinstance(other, float) and math.isinf(other):
+            return function(self.number, other)
         made = self.tape.value if self.tape.interpreted else self.tape.condition
         return made(sign, (self, other), function(self.number, _number(other)))
 
@@ -146,7 +150,13 @@ class Traced:
         return self.tape.value("pow", (self, power), self.number ** _number(power))
 
     def __mod__(self, other: Any) -> Traced:
-        raise NotTraceable("a remainder")
+        if not self.tape.loose:
+            raise NotTraceable("a remainder")
+        return self.tape.value("fmod", (self, other), math.fmod(self.number, _number(other)))
+
+    def __format__(self, form: str) -> str:
+        """Stands in a message for the value that it will have."""
+        return f"\x01{form or 'g'}\x02{self.name}\x03"
 
     def __neg__(self) -> Traced:
         return self.tape.value("-", (self,), -self.number)
@@ -158,9 +168,12 @@ class Traced:
         return self.tape.condition("!=", (self, 0.0), self.number != 0.0)
 
     def __float__(self) -> float:
+        if self.tape.loose:
+            return self.number
         raise NotTraceable("a function of a floating-point number")
 
-    __int__ = __float__
+    def __int__(self) -> int:
+        raise NotTraceable("a whole number of a floating-point number")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,6 +188,8 @@ class Key:
         SI; ``low_open`` makes the lower bound exclusive.
     unit : str
         SI unit; ``"1"``: none.
+    whole : bool
+        A count.
     fixed : bool
         Only before the run begins, because the state's shape or clock depends on it.
     """
@@ -186,6 +201,7 @@ class Key:
     low: float
     high: float
     low_open: bool
+    whole: bool = False
     fixed: bool = False
 
 
@@ -204,7 +220,9 @@ _FIXED = {
     at.RATIO_TO_COUPLING, at.DIFFERENCE_SAMPLES, at.PROFILE_SAMPLES, at.COUNTS_PER_RAD,
     at.POSITION_COUNTS, at.SEED,
 }  # fmt: skip
-_INPUTS = ("limits.voltage",)  # an input of the drive
+LARGEST_INTEGER = 2**31 - 1  # of an integer variable
+# an input of the drive; what the units of a file were turned by when it was read
+_DECIDED = ("limits.voltage", "screw.lead")
 
 
 def trace_keys(design: Design) -> KeyTrace:
@@ -213,7 +231,7 @@ def trace_keys(design: Design) -> KeyTrace:
     constants: list[Key] = []
     for path in paths_of(design):
         key = _key(design, path)
-        reached = None if path in _INPUTS else _reached(design, path)
+        reached = None if path in _DECIDED else _reached(design, path)
         if reached:
             free.append(Key(**{**vars(key), "fixed": bool(reached & _FIXED)}))
         else:
@@ -243,12 +261,14 @@ def _reached(design: Design, path: str) -> set[int] | None:
 
 def _key(design: Design, path: str) -> Key:
     known, _ = located(design, path)
+    value = parameter_value(design, path)
     return Key(
         path=path,
-        value=parameter_value(design, path),
+        value=value,
         unit=known.unit(Structure.of(design)),
         description=known.description,
         low=known.low,
         high=known.high,
         low_open=known.low_open,
+        whole=known.kind == "integer" and value <= LARGEST_INTEGER,
     )

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from actuator_lti.design.field import BIG
 from actuator_lti.design.fields import fields_in
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.sections import parts_of
 from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import stage_words
@@ -19,20 +20,27 @@ COMMAND, MOMENT, SUPPLY = 1, 2, 3
 FIRST_OUTPUT, FIRST_FLAG, INITIAL_ANGLE = 10, 30, 90
 FIRST_KEY, FIRST_CONSTANT, FIRST_TEXT = 100, 1000, 2000
 
+SHOWN = {"rad": "deg", "rad/s": "deg/s", "m": "mm"}  # unit that a host shows a value in
+
 Causality = Literal["input", "output", "parameter", "local", "independent"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """One variable; ``start`` is None where it is calculated, ``unit`` ``"1"`` where there is none."""
+    """One variable; ``start`` is None where it is calculated, ``unit`` ``"1"`` where there is none.
+
+    ``shown`` is the unit that a host shows it in, ``nominal`` its size in use; ``""`` and None: not said.
+    """
 
     name: str
     reference: int
     causality: Causality
     variability: str
     description: str
-    kind: Literal["real", "boolean", "string"] = "real"
+    kind: Literal["real", "integer", "boolean", "string"] = "real"
     unit: str = "1"
+    shown: str = ""
+    nominal: float | None = None
     start: float | str | None = None
     low: float = -math.inf
     high: float = math.inf
@@ -52,23 +60,55 @@ def _units(design: Design) -> tuple[str, str]:
     return ("m", "N") if design.axis == "linear" else ("rad", "N*m")
 
 
+def sizes(design: Design) -> dict[str, float]:
+    """Size in use of each quantity, on the output shaft and on the motor."""
+    ratio, angle = design.total_ratio, design.validation.full_deflection_rad
+    speed = min(design.limits.speed_rad_s, no_load_speed(design), BIG)
+    voltage = supply_voltage(design)
+    current = min(design.limits.peak_current_A, design.limits.continuous_current_A, BIG)
+    kM, kV = design.motor.torque_constant_Nm_A, design.motor.source_gain_Nm_V
+    return {
+        "output.angle": angle,
+        "output.rate": speed / ratio,
+        "motor.current": current,
+        "motor.voltage": voltage,
+        "motor.torque": kM * current if kM else (kV or 0.0) * voltage,
+        "motor.angle": angle * ratio,
+        "motor.speed": speed,
+        "control.current_command": current,
+        "control.speed_command": speed,
+        "supply_voltage": voltage,
+        "command": {"position": angle, "velocity": speed / ratio, "current": current, "voltage": voltage}[
+            design.controller.outermost
+        ],
+        "hinge_moment": design.load.moment_max_Nm,
+    }
+
+
+def _signal(design: Design, number: int, text: tuple[str, str, str], **more: Any) -> Variable:
+    """An input or output: name, words and unit, with its size where that is known."""
+    name, words, unit = text
+    size = sizes(design)[name]
+    turns = unit == "rad/s" and name in ("motor.speed", "control.speed_command")
+    return Variable(
+        name=name, reference=number, variability="continuous", description=words, unit=unit,
+        shown="rpm" if turns else SHOWN.get(unit, ""),
+        nominal=size if 0.0 < size < BIG else None, **more,
+    )  # fmt: skip
+
+
 def _inputs(design: Design) -> tuple[Variable, ...]:
     words, unit = stage_words(design)
     _, torque = _units(design)
+    moment = "moment of the load on the output shaft, beside that of the design"
     texts = (
         ("command", words, unit, 0.0, -math.inf),
-        (
-            "hinge_moment",
-            "moment of the load on the output shaft, beside that of the design",
-            torque,
-            0.0,
-            -math.inf,
-        ),
+        ("hinge_moment", moment, torque, 0.0, -math.inf),
         ("supply_voltage", "limits.voltage of the design, from outside", "V", supply_voltage(design), 0.0),
     )
     return tuple(
-        Variable(name=name, reference=COMMAND + n, causality="input", variability="continuous",
-                 description=f"{text}; taken at the beginning of each tick", unit=unit, start=start, low=low)
+        _signal(design, COMMAND + n, (name, f"{text}; taken at the beginning of each tick", unit),
+                causality="input", start=start, low=low)
         for n, (name, text, unit, start, low) in enumerate(texts)
     )  # fmt: skip
 
@@ -86,11 +126,7 @@ def _outputs(design: Design) -> tuple[Variable, ...]:
         ("control.current_command", "current command of the last tick", "A"),
         ("control.speed_command", "speed command of the last tick", f"{angle}/s"),
     )
-    return tuple(
-        Variable(name=name, reference=FIRST_OUTPUT + n, causality="output", variability="continuous",
-                 description=text, unit=unit)
-        for n, (name, text, unit) in enumerate(texts)
-    )  # fmt: skip
+    return tuple(_signal(design, FIRST_OUTPUT + n, text, causality="output") for n, text in enumerate(texts))
 
 
 def _flags() -> tuple[Variable, ...]:
@@ -116,6 +152,7 @@ def _parameters(design: Design, trace: KeyTrace) -> tuple[Variable, ...]:
     start = Variable(
         name="initial.angle", reference=INITIAL_ANGLE, causality="parameter", variability="fixed",
         description="output angle at the start, everything at rest", unit=angle, start=0.0,
+        shown=SHOWN[angle],
     )  # fmt: skip
     ours = [
         _of_key(key, FIRST_KEY + n, "parameter", "fixed" if key.fixed else "tunable")
@@ -129,6 +166,7 @@ def _of_key(key: Key, reference: int, causality: Causality, variability: str) ->
     return Variable(
         name=structured(key.path), reference=reference, causality=causality, variability=variability,
         description=key.description, unit=key.unit, start=key.value, low=key_low(key), high=key.high,
+        kind="integer" if key.whole else "real", shown=SHOWN.get(key.unit, ""),
     )  # fmt: skip
 
 

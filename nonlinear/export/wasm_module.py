@@ -4,7 +4,8 @@ The module is a wasi reactor without imports: the tick of the drive, its loops f
 (`nonlinear.export.linear`, `linear_periodic`), and the figures of a loop by the kernels of
 `actuator_lti.batch`.  Rows lie in
 its memory; functions that end in ``_at`` say where.  A host writes the row of a run
-(`nonlinear.parameters.design_row`) at ``p_at()``.  Then ``start()`` and ``tick()`` run it, with inputs and
+(`nonlinear.row.parameters.design_row`) at ``p_at()``.  Then ``start()`` and ``tick()`` run it, with inputs
+and
 outputs at ``io_at()``, places as in ``nonlinear._kernels.layout``; ``loop(stage, timed)`` computes a loop,
 its figures at ``figures_at(stage)`` (`actuator_lti.batch._quoted`) and ``row_at(stage)``
 (`actuator_lti.batch._figures`), ``respond(stage, count)`` its response at the angles of ``x_at()``, and
@@ -25,7 +26,7 @@ from actuator_lti.batch import _figures, _quoted, _response, _run
 from actuator_lti.compiled import Program, emit_c
 from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.compiled.kinds import Kind
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from nonlinear.export import (
     linear,
     linear_figures,
@@ -144,7 +145,7 @@ def main() -> None:
     """Build the module into the package (``make wasm``)."""
     from importlib.metadata import version
 
-    from actuator_lti.atomic import write_together
+    from actuator_lti.files.atomic import write_together
 
     data = build_wasm()
     about = {

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, Discriminator, PlainValidator
 
-from actuator_lti.reading import shown
+from actuator_lti.files.reading import shown
 from reports.charts.axis import Axis
 from reports.charts.paint import COLOURS
 

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from actuator_lti.errors import InputError
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from reports.charts.chart import Chart, Column
 
 DIGITS = 6

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from actuator_lti.verdict import Verdict
+from actuator_lti.asked.verdict import Verdict
 from analyses.request import OnMachines, Option, flag, options
-from analyses.study_asked import study_with
+from analyses.studies.study_asked import study_with
 from reports.analyses import Analysis
 from reports.cli.drive import SetOption, load_drive, output_quantity, read_changes
 from reports.cli.options import (
@@ -29,7 +29,7 @@ from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
-    from analyses.study import Study
+    from analyses.studies.study import Study
     from reports.document_schema import Section
 
 DesignOption = Annotated[

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from reports.cli.options import JsonOption
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design

@@ -1,4 +1,4 @@
-"""`actuator-lti export`: the running drive as C99 or as an FMU."""
+"""`actuator-lti export`: the running drive as C99 or as an FMU, the linear one as state spaces."""
 
 from __future__ import annotations
 
@@ -7,16 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from reports.cli.drive import SetOption, load_drive
+from reports.cli.export_linear import linear
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
 from reports.cli.targets import folder_for_results, refuse_existing
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
-    from analyses.code_check import CodeCheck
+    from analyses.linear.code_check import CodeCheck
 
-app = typer.Typer(help="The running drive outside of Python: C99 or FMU.", no_args_is_help=True)
+app = typer.Typer(help="The drive outside of Python: C99, FMU, linear models.", no_args_is_help=True)
+app.command("linear")(linear)
 
 CheckOption = Annotated[
     bool,
@@ -43,7 +45,7 @@ def c(
     as_json: JsonOption = False,
 ) -> None:
     """Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README."""
-    from actuator_lti.atomic import write_together
+    from actuator_lti.files.atomic import write_together
     from nonlinear.export import c_export
     from reports.export_check import check_text
 
@@ -59,8 +61,8 @@ def c(
 
 
 def _checked(drive: Design) -> CodeCheck:
-    from analyses.code_check import check_code
-    from nonlinear.waiting import told_if_slow
+    from analyses.linear.code_check import check_code
+    from nonlinear.runs.waiting import told_if_slow
 
     with told_if_slow("measuring the margins of the compiled code (--no-check leaves it out)"):
         return check_code(drive)
@@ -99,7 +101,7 @@ def fmu(
     as_json: JsonOption = False,
 ) -> None:
     """Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a parameter."""
-    from actuator_lti.atomic import write_bytes
+    from actuator_lti.files.atomic import write_bytes
     from nonlinear.export import PLATFORMS, fmu_bytes, refuse_unknown
     from reports.export_documents import export_documents
     from reports.model_picture import model_png

@@ -32,8 +32,8 @@ def init(
     as_json: JsonOption = False,
 ) -> None:
     """Write a commented design file to start one's own drive from."""
-    from actuator_lti.atomic import write_text
     from actuator_lti.design import read_design_text
+    from actuator_lti.files.atomic import write_text
     from reports.cli.output import print_json, print_line
 
     refuse_existing(file, force)

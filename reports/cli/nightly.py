@@ -84,7 +84,7 @@ def nightly(
     result, or a figure is worse than the approved baseline. `nightly approve STUDY --site DIR --by NAME
     --reason TEXT` makes the last night the baseline.
     """
-    from actuator_lti.extras import need
+    from actuator_lti.start.extras import need
 
     need("filelock", "nightly", "a nightly build")
     need("ruptures", "nightly", "a nightly build")

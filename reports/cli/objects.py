@@ -97,7 +97,7 @@ def import_settings(
     from actuator_lti.design import load_design, write_design
     from actuator_lti.design.objects import calibration, import_objects
     from actuator_lti.design.settings_file import read_settings
-    from actuator_lti.reading import shown_path
+    from actuator_lti.files.reading import shown_path
     from reports.cli.output import print_json, print_line, print_note
 
     factor = None if per is None else calibration(per)

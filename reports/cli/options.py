@@ -12,7 +12,7 @@ from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
-    from analyses.engine import Engine
+    from analyses.studies.engine import Engine
 
 DEFAULT_DESIGN = "ilr33-amber"
 DEFAULT_OUT = Path("out")
@@ -83,7 +83,7 @@ def command_quantity(option: str, words: str | None, drive: Design) -> float | N
     """
     from actuator_lti.design.units import parse_quantity
     from actuator_lti.errors import InputError
-    from nonlinear.trajectory import COMMAND_UNITS
+    from nonlinear.runs.trajectory import COMMAND_UNITS
 
     if words is None:
         return None
@@ -115,7 +115,7 @@ QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress on stand
 
 def engine_of(workers: int | None, scheduler: str | None, tls: Path | None) -> Engine:
     """Where a study is computed; says what to know of the connection."""
-    from analyses.engine import Engine
+    from analyses.studies.engine import Engine
     from reports.cli.output import print_note
 
     engine = Engine(workers, scheduler, tls=tls)

@@ -56,7 +56,7 @@ def report(
     With --include the results of identify and correlate become sections of it; with --also
     failure cases, duty cycle, limit cycles and corners.
     """
-    from actuator_lti.verdict import Verdict
+    from actuator_lti.asked.verdict import Verdict
     from reports.build import design_report, further_sections, validation_sections, write_report
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line

@@ -24,7 +24,7 @@ def refuse_existing(path: Path, force: bool) -> None:
 
 def write_new(path: Path | None, text: str, force: bool) -> None:
     """Write a file that is not there yet, or with ``--force``; nothing without a path."""
-    from actuator_lti.atomic import write_text
+    from actuator_lti.files.atomic import write_text
 
     if path is not None:
         refuse_existing(path, force)

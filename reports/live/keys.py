@@ -2,7 +2,7 @@
 
 How the row of the simulator follows from the keys is found by `nonlinear.export.trace` on `design_row`, as
 for an export in C: the page interprets the same statements. Figures of the whole drive follow likewise, out
-of `actuator_lti.drive_figure`.
+of `actuator_lti.asked.drive_figure`.
 """
 
 from __future__ import annotations

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 
-from actuator_lti.design.model import Design, Requirement
-from actuator_lti.errors import InputError
-from actuator_lti.quantities import (
+from actuator_lti.asked.quantities import (
     DRIVE_QUANTITIES,
     LOOP_QUANTITIES,
     LOOPS,
@@ -15,6 +13,8 @@ from actuator_lti.quantities import (
     Quantity,
     judged_loops,
 )
+from actuator_lti.design.model import Design, Requirement
+from actuator_lti.errors import InputError
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.grid import LEAST_UPDATES
 from analyses.monte_carlo.judging import in_populations
@@ -46,8 +46,8 @@ POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": li
 def live_model(design: Design, held: Collection[str] = ()) -> LiveData | Refused:
     """Give the page's data, or why there is none under ``refused``.
 
-    Requirements on the loops of ``held``, which the report judges held (`analyses.held_loops`), are named
-    apart: the page has the loops as they are by themselves.
+    Requirements on the loops of ``held``, which the report judges held (`analyses.linear.held_loops`), are
+    named apart: the page has the loops as they are by themselves.
     """
     if not design.controller.stages:
         return {"refused": OPEN}

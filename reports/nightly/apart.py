@@ -1,4 +1,4 @@
-"""Jobs of a night, each in a process that can be ended; what runs at once says `analyses.engine.Engine`.
+"""Jobs of a night, each in a process that can be ended; how many at once says `analyses.studies.engine`.
 
 A process of its own can be ended when it takes too long or too much memory, and a job that kills it takes
 nobody along. Here the processes stay warm from job to job, on a Dask cluster each job has a fresh one. Its
@@ -21,7 +21,7 @@ from threading import Lock, Timer
 from typing import Any
 
 from actuator_lti.errors import InputError
-from analyses.engine import Engine
+from analyses.studies.engine import Engine
 from reports.arithmetic import ONE_THREAD  # the jobs themselves are what runs in parallel
 from reports.nightly import worker
 from reports.nightly.cache import Cache, CorruptEntry

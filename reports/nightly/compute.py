@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.errors import InputError
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from reports.document_schema import Document, Section
 from reports.nightly.figures import digest
 
@@ -75,8 +75,8 @@ def design_document(payload: Mapping[str, Any]) -> Document:
 
 def _tolerances(design: Design, plan: Mapping[str, int]) -> list[Section]:
     """Sample the tolerances of a design; nothing where none of its values has one."""
-    from analyses.engine import Engine
     from analyses.monte_carlo import MonteCarloSettings, monte_carlo
+    from analyses.studies.engine import Engine
     from reports.sections.monte_carlo import section
 
     if not any(p.tolerance is not None for p in design.parameters.values()):
@@ -88,9 +88,9 @@ def _tolerances(design: Design, plan: Mapping[str, int]) -> list[Section]:
 
 def comparison_document(payload: Mapping[str, Any]) -> Document:
     """Compare all designs of a study on one page."""
+    from analyses.comparison.variants import compare
     from analyses.slugs import slug
-    from analyses.study import Study, Variant
-    from analyses.variants import compare
+    from analyses.studies.study import Study, Variant
     from reports.sections.compare import section as sections
     from reports.study_pages import study_document
 

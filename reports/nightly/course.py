@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from markupsafe import Markup
 
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from reports.nightly.charts import Chart, line_chart
 from reports.nightly.figures import Figure, Verdict, first_number
 from reports.nightly.history import History

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from actuator_lti.quantities import reserve
-from actuator_lti.tree import Tree
+from actuator_lti.asked.quantities import reserve
+from actuator_lti.files.tree import Tree
 from reports.nightly.text import one_line
 from reports.verdict_summary import role, tally, verdict_words, why
 

@@ -19,8 +19,8 @@ from typing import Any, TypeVar
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError
+from actuator_lti.files.atomic import write_bytes
 from reports.nightly.figures import Figure
 from reports.nightly.memory import Memory
 from reports.nightly.records import Baseline, Content, Index, Named, Night, Result, Run, packed, unpacked

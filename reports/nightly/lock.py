@@ -11,8 +11,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError
+from actuator_lti.files.atomic import write_bytes
 from reports.nightly.text import now, one_line
 
 

@@ -6,7 +6,7 @@ import json
 from dataclasses import asdict
 from xml.etree import ElementTree as Xml
 
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from reports.nightly.changes import Cause, Change, Comparison
 from reports.nightly.text import markdown_cell, one_line
 from reports.nightly.view import DesignView, Overview

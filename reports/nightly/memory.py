@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from actuator_lti.errors import InputError
-from actuator_lti.reading import read_json
+from actuator_lti.files.reading import read_json
 
 
 class HistoryLost(Exception):

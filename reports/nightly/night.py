@@ -13,8 +13,8 @@ from typing import Any
 
 from actuator_lti.bounds import JOB_MEMORY
 from actuator_lti.errors import InputError
-from actuator_lti.reading import shown_path
-from analyses.engine import Engine
+from actuator_lti.files.reading import shown_path
+from analyses.studies.engine import Engine
 from reports.nightly import memory
 from reports.nightly import site as site_files
 from reports.nightly.apart import Done, Limits, Task, build_each

@@ -8,7 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from reports.html import environment, security_policy, show_signed
 from reports.nightly.course import Course, course_of
 from reports.nightly.headline import cause_words, change_words, headlines, main_changes

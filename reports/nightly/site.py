@@ -16,8 +16,8 @@ import stat
 from collections.abc import Mapping
 from pathlib import Path
 
-from actuator_lti.atomic import write_bytes, write_text
 from actuator_lti.errors import InputError
+from actuator_lti.files.atomic import write_bytes, write_text
 from reports.nightly import machines, pages
 from reports.nightly.batch import Batch
 from reports.nightly.cache import Cache, CorruptEntry, Entry

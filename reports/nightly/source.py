@@ -1,6 +1,6 @@
 """From a study file, or a single design, to the jobs of a night.
 
-A study file may hold a table for the nightly beside what `analyses.study` reads::
+A study file may hold a table for the nightly beside what `analyses.studies.study` reads::
 
     [nightly]
     pdf = true
@@ -14,16 +14,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.errors import InputError
-from actuator_lti.reading import read_toml, shown, shown_path
-from actuator_lti.tree import Tree
+from actuator_lti.files.reading import read_toml, shown, shown_path
+from actuator_lti.files.tree import Tree
 from reports.nightly.job import Job
 from reports.nightly.night import Study
 from reports.nightly.tolerance import Tolerances, read_tolerances
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
-    from analyses.study import Study as StudyFile
-    from analyses.study import Variant
+    from analyses.studies.study import Study as StudyFile
+    from analyses.studies.study import Variant
 
 _KEYS = ("pdf", "tolerance")
 
@@ -47,7 +47,7 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
     InputError
         From the file: one line with place, key and what is allowed.
     """
-    from analyses.study import is_study, study_of
+    from analyses.studies.study import is_study, study_of
 
     if not is_study(path):
         from actuator_lti.design import load_design
@@ -73,7 +73,7 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
 
 
 def _read_file(path: Path) -> tuple[StudyFile, Tree]:
-    from analyses.study import study_from_tree
+    from analyses.studies.study import study_from_tree
 
     where = shown_path(path)
     tree = read_toml(path, "study file")

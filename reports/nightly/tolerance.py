@@ -7,8 +7,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.errors import InputError
-from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES
 from reports.nightly.figures import Figure
 from reports.nightly.text import one_line
 

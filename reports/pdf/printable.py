@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from actuator_lti.tree import Tree
+from actuator_lti.files.tree import Tree
 from reports.document import figures, walk
 from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed

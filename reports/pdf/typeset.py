@@ -9,9 +9,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from actuator_lti.atomic import write_bytes
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.extras import need
+from actuator_lti.files.atomic import write_bytes
+from actuator_lti.start.extras import need
 from reports.pdf.printable import printable
 
 TEMPLATE = Path(__file__).resolve().parents[1] / "templates" / "pdf" / "report.typ"

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from actuator_lti.quantities import AT_A_GLANCE, QUANTITIES, reserve
-from analyses.held_loops import HELD
-from analyses.loop_figures import LoopFigures
-from analyses.responses import frequency_grid
-from analyses.weakest import Spread, WeakPoint
+from actuator_lti.asked.quantities import AT_A_GLANCE, QUANTITIES, reserve
+from analyses.linear.held_loops import HELD
+from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.responses import frequency_grid
+from analyses.specification.weakest import Spread, WeakPoint
 from reports import document as doc
 from reports.document_schema import (
     Block,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analyses.loop_figures import LoopFigures
-from analyses.loop_survey import BreakPoint
+from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_survey import BreakPoint
 from reports import document as doc
 from reports.document_schema import Row, Section
 from reports.sections.margins import MARGIN_COLUMNS, evidence_notes, margin_row, worst_status

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from actuator_lti.atomic import write_text
-from actuator_lti.tree import Tree
-from actuator_lti.verdict import Verdict
-from analyses.requirements import tally
+from actuator_lti.asked.verdict import Verdict
+from actuator_lti.files.atomic import write_text
+from actuator_lti.files.tree import Tree
+from analyses.specification.requirements import tally
 from reports import document as doc
 from reports.as_json import as_json
 from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
@@ -22,9 +22,9 @@ from reports.sections.requirements import item, label
 from reports.terminal import Brief
 
 if TYPE_CHECKING:
-    from analyses.requirements import RequirementVerdict
-    from analyses.variant_figures import FigureName
-    from analyses.variants import Compared, Comparison
+    from analyses.comparison.variant_figures import FigureName
+    from analyses.comparison.variants import Compared, Comparison
+    from analyses.specification.requirements import RequirementVerdict
 
 GROUPS = {**LOOPS, "drive": "Drive", "large": "Large signals"}
 COLUMNS = 4  # variants beside the base in one table: what reads on one screen

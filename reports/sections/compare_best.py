@@ -6,16 +6,16 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from actuator_lti.quantities import reserve
-from analyses.requirements import tally
+from actuator_lti.asked.quantities import reserve
+from analyses.specification.requirements import tally
 from reports import document as doc
 from reports.document_schema import Block, Section
 from reports.numbers import significant
 from reports.sections.requirements import label
 
 if TYPE_CHECKING:
-    from analyses.requirements import RequirementVerdict
-    from analyses.variants import Compared, Comparison
+    from analyses.comparison.variants import Compared, Comparison
+    from analyses.specification.requirements import RequirementVerdict
 
 _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 _MOST = 3

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.quantities import ANALYSIS_QUANTITIES, drive_cases
+from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, drive_cases
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -14,9 +14,9 @@ from reports.document_schema import Block, Section
 from reports.sections.names import LOOPS
 
 if TYPE_CHECKING:
-    from analyses.responses import Curve
-    from analyses.sensitivity import Sensitivity
-    from analyses.variants import Compared, Comparison
+    from analyses.comparison.variants import Compared, Comparison
+    from analyses.linear.responses import Curve
+    from analyses.specification.sensitivity import Sensitivity
 
 MOST_CURVES = 7
 MOST_BARS = 10
@@ -46,7 +46,7 @@ def overlays(comparison: Comparison) -> Section:
 
 
 def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[Block]:
-    from analyses.responses import answer_curve, curve, frequency_grid
+    from analyses.linear.responses import answer_curve, curve, frequency_grid
 
     which = "closed loop" if closed else "open loop"
     chart = Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")

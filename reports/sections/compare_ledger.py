@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from actuator_lti.verdict import Tally
+from actuator_lti.asked.verdict import Tally
 from reports import document as doc
 from reports.document_schema import Block, Row, Section
 from reports.numbers import capital, significant
@@ -13,8 +13,8 @@ from reports.sections.names import unit_words
 from reports.sections.validation import loop_name, quantity_name
 
 if TYPE_CHECKING:
+    from analyses.comparison.variants import Compared, Comparison
     from analyses.validation.row import Row as Check
-    from analyses.variants import Compared, Comparison
 
 Key = tuple[str, str, str]
 ROUNDING = 1e-9  # of a value

@@ -11,16 +11,16 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from actuator_lti.verdict import Verdict
-from analyses.requirements import tally
+from actuator_lti.asked.verdict import Verdict
+from analyses.specification.requirements import tally
 from reports import document as doc
 from reports.document_schema import Block, VerdictItem
 from reports.sections.compare_best import failed, nearness, weakest
 from reports.sections.requirements import item
 
 if TYPE_CHECKING:
-    from analyses.requirements import RequirementVerdict
-    from analyses.variants import Compared, Comparison
+    from analyses.comparison.variants import Compared, Comparison
+    from analyses.specification.requirements import RequirementVerdict
 
 MANY = 60  # designs beside the base that one page shows
 _MOST_ROOM = 5

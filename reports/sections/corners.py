@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from actuator_lti.quantities import CORNERED, QUANTITIES, Quantity
+from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
 from reports import document as doc
 from reports.document_schema import Block, Row, Section
 from reports.sections.margins import shown

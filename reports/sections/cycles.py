@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from analyses.settling import words
+from analyses.motion.settling import words
 from reports import document as doc
 from reports.document_schema import Block, Section
 from reports.sections.names import fine_unit, load_unit
 
 if TYPE_CHECKING:
     from analyses.limit_cycles import Confirmation, LimitCycles
-    from analyses.settling import Settling
+    from analyses.motion.settling import Settling
 
 CAUSES = {
     "play": "play",

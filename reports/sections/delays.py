@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from actuator_lti.delay_budget import DelayBudget
+from actuator_lti.loops.delay_budget import DelayBudget
 from reports import document as doc
 from reports.charts import style
 from reports.charts.paint import HATCHES

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analyses.settling import largest_swing, words
+from analyses.motion.settling import largest_swing, words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart

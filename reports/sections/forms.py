@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from analyses.loop_figures import LoopFigures
-from analyses.responses import curve, frequency_grid
+from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.responses import curve, frequency_grid
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.design.model import Command
-from analyses.settling import largest_swing
-from analyses.settling import words as end_words
+from analyses.motion.settling import largest_swing
+from analyses.motion.settling import words as end_words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -17,10 +17,11 @@ from reports.sections.names import fine_unit, load_unit
 from reports.verdict_summary import tally
 
 if TYPE_CHECKING:
+    from analyses.settling import Settling
+
     from analyses.friction_effects import FrictionEffects
     from analyses.friction_effects.cycles import LimitCycles
     from analyses.friction_effects.result import FrictionPoint
-    from analyses.settling import Settling
 
 
 LEFT = 1e-3  # of a step: an error that is spoken of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from actuator_lti.atomic import write_text
+from actuator_lti.files.atomic import write_text
 from analyses.identification.bench import BenchResult
 from analyses.identification.frequency_bench import FrequencyResult
 from reports.document_schema import Section

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from actuator_lti.verdict import Verdict
+from actuator_lti.asked.verdict import Verdict
 from analyses.validation import Validation
 from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.in_time import MarginShown, StepShown

@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import LIMITERS
-from actuator_lti.limiters import Onset
+from actuator_lti.loops.limiters import Onset
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart

@@ -6,11 +6,18 @@ import math
 
 import numpy as np
 
+from actuator_lti.asked.quantities import AT_A_GLANCE
 from actuator_lti.design.model import Design
-from actuator_lti.quantities import AT_A_GLANCE
-from analyses.command_limits import said_of
-from analyses.loop_figures import LoopFigures
-from analyses.responses import answer_curve, curve, frequency_grid, nyquist_curve, response_at, sampled_step
+from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.responses import (
+    answer_curve,
+    curve,
+    frequency_grid,
+    nyquist_curve,
+    response_at,
+    sampled_step,
+)
+from analyses.specification.command_limits import said_of
 from reports import document as doc
 from reports.document_schema import Block, Section
 from reports.numbers import capital, fixed, seconds, to_minus

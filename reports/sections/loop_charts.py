@@ -11,7 +11,7 @@ import numpy as np
 from actuator_lti.bandwidth import Bandwidth
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.step import StepFigures
-from analyses.responses import Curve
+from analyses.linear.responses import Curve
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.numbers import seconds

@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from actuator_lti.quantities import QUANTITIES, Quantity
-from actuator_lti.tree import Tree
-from actuator_lti.verdict import Verdict
-from analyses.held_loops import HELD, OPEN
-from analyses.loop_figures import LoopFigures
-from analyses.loop_survey import OperatingPointFigures
-from analyses.weakest import Spread, spread
+from actuator_lti.asked.quantities import QUANTITIES, Quantity
+from actuator_lti.asked.verdict import Verdict
+from actuator_lti.files.tree import Tree
+from analyses.linear.held_loops import HELD, OPEN
+from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_survey import OperatingPointFigures
+from analyses.specification.weakest import Spread, spread
 from reports import document as doc
 from reports.document_schema import Block, Row, Section, State, Status
 from reports.numbers import short, to_minus

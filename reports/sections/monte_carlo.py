@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
-from actuator_lti.verdict import Verdict
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -20,7 +20,7 @@ from reports.terminal import Brief
 
 if TYPE_CHECKING:
     from analyses.monte_carlo import ColumnStatistics, MonteCarloResult, Odds, WorstCase
-    from analyses.verdicts import RequirementVerdict
+    from analyses.specification.verdicts import RequirementVerdict
 
 _SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.asked.quantities import QUANTITIES as REGISTRY
 from actuator_lti.design.model import Design
-from actuator_lti.quantities import QUANTITIES as REGISTRY
 from reports import document as doc
 from reports.document_schema import Column
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from actuator_lti.design.model import Design
-from analyses.loop_survey import OperatingPointFigures
+from analyses.linear.loop_survey import OperatingPointFigures
 from reports import document as doc
 from reports.document_schema import Row, Section
 from reports.sections.margins import evidence_notes, margin_row, response_row

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from actuator_lti.verdict import Verdict
-from analyses.requirements import RequirementVerdict, tally
+from actuator_lti.asked.verdict import Verdict
+from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
 from reports.document_schema import Section, Status, VerdictItem
 from reports.sections.names import QUANTITIES, unit_words

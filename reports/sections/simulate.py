@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.atomic import write_text
 from actuator_lti.design.control import Stage
-from actuator_lti.tree import Tree
-from analyses.conduct import conduct
+from actuator_lti.files.atomic import write_text
+from actuator_lti.files.tree import Tree
 from analyses.motion import Motion
+from analyses.motion.conduct import conduct
 from nonlinear import Trajectory
-from nonlinear.trajectory import COMMAND_UNITS, LimitUse
+from nonlinear.runs.trajectory import COMMAND_UNITS, LimitUse
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
-from actuator_lti.verdict import Verdict
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc

@@ -11,7 +11,7 @@ from actuator_lti.design import parameter_value, read_design_text, warnings_of, 
 from actuator_lti.design.explained import explained
 from actuator_lti.drive.facts import capability
 from actuator_lti.errors import InputError
-from analyses.loop_survey import survey_loops
+from analyses.linear.loop_survey import survey_loops
 from reports.cli.main import main
 from reports.sections import forms
 

@@ -87,7 +87,7 @@ def test_a_cycle_would_be_seen() -> None:
 
 
 LAZY = {"actuator_lti", "nonlinear", "analyses"}
-"""Packages whose names are loaded on first use (`actuator_lti.on_first_use`)."""
+"""Packages whose names are loaded on first use (`actuator_lti.start.on_first_use`)."""
 
 
 def everything_loaded(module: str, direct: dict[str, set[str]]) -> set[str]:

@@ -22,7 +22,7 @@ PACKAGES = (
     "nonlinear.commands",
     "nonlinear.loads",
     "analyses",
-    "actuator_lti.plotting",
+    "actuator_lti.drawing.plotting",
 )
 
 

@@ -7,8 +7,8 @@ from types import ModuleType
 
 import pytest
 
+from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.fields import FIELDS
-from actuator_lti.quantities import QUANTITIES
 from reports.cli.app import PANELS
 
 ROOT = Path(__file__).parents[2]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import CFUNCTYPE, c_char_p, c_int, c_void_p, cast
 from dataclasses import dataclass, field
@@ -13,7 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from actuator_lti.compiled.compiler import system_compiler
+
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
+needs_compiler = pytest.mark.skipif(
+    system_compiler() is None or not sys.platform.startswith("linux") or os.uname().machine != "x86_64",
+    reason="no C compiler for this machine's FMU binaries",
+)
+Refused = pytest.importorskip("fmpy.fmi1").FMICallException
 fmi2, fmi3 = pytest.importorskip("fmpy.fmi2"), pytest.importorskip("fmpy.fmi3")
 
 
@@ -29,11 +38,15 @@ class Host:
         """Values of real variables."""
         return list(self._call("get", "Real", "Float64", names))
 
+    def integers(self, *names: str) -> list[int]:
+        """Values of integer variables."""
+        return list(self._call("get", "Integer", "Int32", names))
+
     def set(self, **values: float) -> None:
         """Set real variables, all in one call."""
         self.put(values)
 
-    def put(self, values: dict[str, float], kind: str = "Real") -> None:
+    def put(self, values: Mapping[str, float], kind: str = "Real") -> None:
         """Set variables of one type by their dotted names, all in one call."""
         new = {"Real": "Float64", "Integer": "Int32"}[kind]
         self._call("set", kind, new, list(values), list(values.values()))

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import compile_files, system_compiler
+from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.errors import InputError
 from nonlinear import commands, loads, simulate
@@ -24,6 +25,7 @@ from nonlinear._kernels.start import retune
 from nonlinear._kernels.tick import get, set_state
 from nonlinear.export import c_export
 from nonlinear.export.c_files import ExportedDesign, exported, spare_parameters
+from nonlinear.export.program import source_hash
 from nonlinear.native import LIBRARY, parameters, tick
 from reports.cli.app import build
 
@@ -198,6 +200,31 @@ def test_single_precision_keeps_its_stated_error(name: str, tmp_path: Path) -> N
         assert lib.drive_tick(pointer(p), pointer(s), pointer(io)) == tick(P, S, IO) == at.OK
         worst = max(worst, abs(float(io[at.IO_OUTPUT]) - IO[at.IO_OUTPUT]))
     assert 0.0 < worst < 1e-3 * full  # the README of the export says so
+
+
+SHOWS = """#include "drive_design.h"
+#include <stdio.h>
+int main(void)
+{
+    (void)printf("%s|%s|%s|%d|%d", DRIVE_DESIGN_NAME, DRIVE_DESIGN_HASH, DRIVE_SOURCE_HASH,
+                 DRIVE_FLAG_VOLTAGE, DRIVE_FLAG_AT_REST);
+    return 0;
+}
+"""
+
+
+@needs_compiler
+@pytest.mark.parametrize("single", [False, True])
+def test_the_headers_say_which_design_and_source_and_name_the_flags(single: bool, tmp_path: Path) -> None:
+    design = replace(load_design("emps"), name='a "b" 1.5')
+    texts = c_export(design, single_precision=single)
+    files = {name: text for name, text in texts.items() if name.endswith(".h")} | {"show.c": SHOWS}
+    program = tmp_path / "show"
+    program.write_bytes(compile_files(files, "show", "linux64", STRICT))
+    program.chmod(0o755)
+    said = subprocess.run([str(program)], capture_output=True, text=True, check=True).stdout
+    flags = f"{at.FLAG_VOLTAGE}|{at.FLAG_STICK}"
+    assert said == f"{design.name}|{design_hash(design)}|{source_hash()}|{flags}"
 
 
 @pytest.mark.skipif(shutil.which("cppcheck") is None, reason="no cppcheck on this machine")

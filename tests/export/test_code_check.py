@@ -11,11 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 import actuator_lti.compiled.compiler as build_module
-import analyses.code_check as code_check
+import analyses.linear.code_check as code_check
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import system_compiler
 from actuator_lti.compiled.library import Library
-from analyses.code_check import CodeCheck, check_code
+from analyses.linear.code_check import CodeCheck, check_code
 from nonlinear.export import c_export
 from nonlinear.native import LIBRARY
 from reports.cli.app import build

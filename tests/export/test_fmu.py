@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmu_host import fmpy, hosted
+from fmu_host import fmpy, hosted, needs_compiler
 from random_drives import random_drive
 from typer.testing import CliRunner
 
@@ -26,13 +26,9 @@ from nonlinear import commands, loads, simulate
 from nonlinear.export import fmu_bytes
 from nonlinear.export.trace import trace_keys
 from nonlinear.export.variables import structured
-from nonlinear.parameters import design_row
+from nonlinear.row.parameters import design_row
 from reports.cli.app import build
 
-needs_compiler = pytest.mark.skipif(
-    system_compiler() is None or not sys.platform.startswith("linux") or os.uname().machine != "x86_64",
-    reason="no C compiler for this machine's FMU binaries",
-)
 LINUX = ("linux64",)
 OUTPUTS = ["output.angle", "motor.speed", "motor.current", "motor.voltage"]
 

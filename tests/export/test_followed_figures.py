@@ -12,12 +12,12 @@ import pytest
 from random_drives import random_drive, random_elastic_drive
 
 from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design
+from actuator_lti.asked.drive_figure import drive_figure
+from actuator_lti.asked.quantities import LOOPS
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.batch._figures import DC_GAIN
 from actuator_lti.design.access import parameter_value, stacked
 from actuator_lti.design.model import Design, FrictionPoint, Supply
-from actuator_lti.drive_figure import drive_figure
-from actuator_lti.quantities import LOOPS
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
 from nonlinear.export.statement import Statement
 

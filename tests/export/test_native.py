@@ -19,7 +19,7 @@ from actuator_lti.compiled.library import Library
 from actuator_lti.errors import InputError
 from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native, simulate, simulate_many
 from nonlinear._kernels.forms import forms
-from nonlinear.parameters import design_row
+from nonlinear.row.parameters import design_row
 
 quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
 

@@ -8,7 +8,7 @@ import threading
 
 import pytest
 
-import nonlinear.waiting as waiting
+import nonlinear.runs.waiting as waiting
 
 
 class Terminal(io.StringIO):

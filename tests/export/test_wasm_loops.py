@@ -19,6 +19,7 @@ from random_drives import random_drive, random_elastic_drive
 from ulps import TIMES, moved_by_an_ulp
 
 from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.loader import shipped_designs
 from actuator_lti.design.model import Design, Instruments
@@ -28,7 +29,6 @@ from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import point_blocks
 from actuator_lti.loops.result import Loop
 from actuator_lti.loops.sampled import stage_blocks
-from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
 from nonlinear.export import linear, linear_limiters, linear_periodic
 from nonlinear.export.c_files import exported
 from nonlinear.export.page import line_of

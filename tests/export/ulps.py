@@ -10,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS
 from actuator_lti.batch import Population
 from actuator_lti.batch import figures as many
 from actuator_lti.batch._figures import COLUMNS
@@ -19,7 +20,6 @@ from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import stage_blocks
-from actuator_lti.quantities import LOOP_QUANTITIES, LOOPS
 
 COUNT = 64
 TIMES = ("rise_time", "settling_time")

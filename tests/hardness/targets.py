@@ -24,8 +24,8 @@ from actuator_lti.design.objects import import_objects
 from actuator_lti.design.settings_file import read_settings_toml
 from actuator_lti.design.settings_xml import read_settings_xml, write_settings_xml
 from actuator_lti.design.units import parse_quantity
-from actuator_lti.reading import decode
-from analyses.outer_loop_file import read_outer_loop
+from actuator_lti.files.reading import decode
+from analyses.linear.outer_loop_file import read_outer_loop
 from analyses.records import (
     CsvFormat,
     RecordSpec,
@@ -38,8 +38,8 @@ from analyses.records import (
     read_mat_record,
 )
 from analyses.records.parquet_reader import read_parquet_record
-from analyses.sampling import read_table
-from nonlinear.records import read_columns
+from analyses.studies.sampling import read_table
+from nonlinear.runs.records import read_columns
 from reports.nightly.cache import Cache, CorruptEntry, sealed
 from reports.nightly.history import FILE, NIGHTS, open_history
 from reports.nightly.memory import remembered

@@ -12,11 +12,11 @@ from actuator_lti import bounds
 from actuator_lti.design import load_design
 from actuator_lti.errors import InputError, NumericalError
 from analyses.monte_carlo import MonteCarloSettings
-from analyses.sampling import read_table
-from analyses.study import load_study
+from analyses.studies.sampling import read_table
+from analyses.studies.study import load_study
 from nonlinear import commands, loads, simulate
-from nonlinear.batch import run_rows
-from nonlinear.parameters import design_row
+from nonlinear.row.parameters import design_row
+from nonlinear.runs.batch import run_rows
 from reports.cli.main import main
 
 ROOT = Path(__file__).parents[2]
@@ -118,7 +118,7 @@ def test_a_recorded_command_of_many_rows(tmp_path, monkeypatch) -> None:
     path = tmp_path / "r.csv"
     path.write_text("t,x\n" + "0,1\n" * 200)
     small = bounds.Bound(what="rows", most=100, reason="", asked_by="--record")
-    monkeypatch.setattr("nonlinear.records.TABLE_ROWS", small)
+    monkeypatch.setattr("nonlinear.runs.records.TABLE_ROWS", small)
     refused(lambda: commands.recorded(path), "r.csv", "--record", "at most 100")
     with path.open("wb") as file:
         file.truncate(bounds.TABLE_BYTES.most + 1)  # a hole: takes no disk
@@ -161,8 +161,8 @@ def test_sweeps_stop_at_the_first_variant_too_many(tmp_path, monkeypatch) -> Non
     path.write_text('[study]\nbase = "ilr33-amber"\n' + f"[[sweep]]\n{sweep}\n" * 500)
     made: list[int] = []
     small = bounds.Bound(what="variants", most=25, reason="", asked_by="[[sweep]]")
-    monkeypatch.setattr("analyses.study.STUDY_VARIANTS", small)
-    from analyses.study import _Maker
+    monkeypatch.setattr("analyses.studies.study.STUDY_VARIANTS", small)
+    from analyses.studies.study import _Maker
 
     whole = _Maker._made
 

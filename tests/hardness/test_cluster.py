@@ -18,9 +18,9 @@ import pytest
 from nightly_fakes import BUILD, CODE, job, study
 
 from actuator_lti.errors import InputError, NumericalError
-from analyses import cluster as clusters
-from analyses import engine, proof
-from analyses.engine import Engine
+from analyses.studies import cluster as clusters
+from analyses.studies import engine, proof
+from analyses.studies.engine import Engine
 from reports.cli.main import main
 from reports.cli.options import engine_of
 from reports.nightly.cache import Cache
@@ -363,8 +363,8 @@ def test_a_lost_worker_s_designs_of_a_comparison_are_done_again(cluster, tmp_pat
     """One of two workers dies while designs are computed; what is found is what one process finds."""
     import distributed
 
-    from analyses.study import load_study
-    from analyses.variants import compare
+    from analyses.comparison.variants import compare
+    from analyses.studies.study import load_study
 
     running, remote = cluster
     (tmp_path / "study.toml").write_text(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from analyses import variants
-from analyses.engine import Engine
-from analyses.study import load_study
-from analyses.variants import compare
+from analyses.comparison import variants
+from analyses.comparison.variants import compare
+from analyses.studies.engine import Engine
+from analyses.studies.study import load_study
 
 STUDY = """
 [study]

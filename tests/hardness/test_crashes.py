@@ -18,14 +18,14 @@ REPORT = ("report", "ilr33-amber", "--quiet")
 
 # What is broken on purpose (module, function), and the sections that must be there all the same.
 BROKEN = {
-    "analyses.loop_survey:survey_loops": {"parameters", "provenance"},
-    "analyses.loop_survey:_other_form": {"margins", "loop-position", "parameters"},
-    "analyses.loop_figures:_locked": {"margins", "loop-current", "parameters"},
-    "analyses.loop_survey:_break_points": {"margins", "loop-position", "parameters"},
-    "analyses.loop_survey:operating_points": {"margins", "loop-position", "parameters"},
-    "analyses.loop_survey:_budgets": {"margins", "loop-position", "parameters"},
-    "analyses.loop_survey:_onset": {"margins", "loop-position", "parameters"},
-    "analyses.requirements:evaluate_requirements": {"margins", "loop-position", "parameters"},
+    "analyses.linear.loop_survey:survey_loops": {"parameters", "provenance"},
+    "analyses.linear.loop_survey:_other_form": {"margins", "loop-position", "parameters"},
+    "analyses.linear.loop_figures:_locked": {"margins", "loop-current", "parameters"},
+    "analyses.linear.loop_survey:_break_points": {"margins", "loop-position", "parameters"},
+    "analyses.linear.loop_survey:operating_points": {"margins", "loop-position", "parameters"},
+    "analyses.linear.loop_survey:_budgets": {"margins", "loop-position", "parameters"},
+    "analyses.linear.loop_survey:_onset": {"margins", "loop-position", "parameters"},
+    "analyses.specification.requirements:evaluate_requirements": {"margins", "loop-position", "parameters"},
     "reports.sections.answer:section": {"margins", "loop-position", "parameters"},
     "reports.sections.margins:section": {"loop-position", "parameters"},
     "reports.sections.loop:section": {"margins", "parameters"},

@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 from nightly_fakes import CODE, INLINE, job, study
 
-from actuator_lti import atomic
 from actuator_lti.errors import InputError
+from actuator_lti.files import atomic
 from reports.nightly.lock import hold
 from reports.nightly.memory import HistoryLost
 from reports.nightly.night import approve, run_night, state_of

@@ -6,7 +6,7 @@ import pytest
 
 from actuator_lti.bounds import JSON_DEPTH, KEY_PARTS, TEXT_CHARACTERS, TOML_BYTES, TOML_DEPTH, TOML_VALUES
 from actuator_lti.errors import InputError
-from actuator_lti.reading import parse_json, parse_toml
+from actuator_lti.files.reading import parse_json, parse_toml
 
 
 def refused(read, text: str) -> str:

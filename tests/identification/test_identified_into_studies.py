@@ -13,7 +13,7 @@ from actuator_lti.design.model import Tolerance
 from actuator_lti.design.parameters import FrozenMap
 from analyses.identification.inverse import fit_records
 from analyses.records import open_record
-from analyses.sampling import sampler_of
+from analyses.studies.sampling import sampler_of
 from analyses.tuning.problem import loop_requirements, problem_of
 from tests.identification.bench_records import Command, columns_of, motion, write
 

@@ -16,7 +16,7 @@ from analyses.identification.friction_map import fit_map
 from analyses.identification.inverse import fit_records
 from analyses.identification.to_design import design_with_fit, joint_values, with_structure
 from analyses.records.record import Record, RowCounts
-from analyses.sampling import sampler_of
+from analyses.studies.sampling import sampler_of
 
 PERIOD = 1e-3
 TIME = np.arange(0.0, 20.0, PERIOD)

@@ -18,8 +18,8 @@ import pytest
 from flint import arb, arb_poly, ctx, fmpq_poly
 
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.exact_fraction import exact_fraction
 from actuator_lti.margins import stability_margins
+from actuator_lti.systems.exact_fraction import exact_fraction
 
 _AGREE = 1e-6
 _LARGEST = 40

@@ -12,7 +12,7 @@ from loop_designs import amber
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.model import Command
 from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
-from analyses.loop_figures import all_loop_figures
+from analyses.linear.loop_figures import all_loop_figures
 
 
 def test_the_mean_is_what_the_running_drive_does_to_a_command() -> None:

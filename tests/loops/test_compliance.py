@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
 from actuator_lti.batch import drive_figures as many
 from actuator_lti.design import load_design
 from actuator_lti.design.model import Requirement
-from actuator_lti.drive_figure import drive_figure
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.compliance import compliance
 from actuator_lti.loops.stiffness import stiffness_figures
-from analyses.requirements import evaluate_requirements
+from analyses.specification.requirements import evaluate_requirements
 from tests.loops.two_mass import drive_e
 
 

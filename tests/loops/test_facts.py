@@ -33,7 +33,7 @@ from actuator_lti.drive.facts import (
     stall_torque_Nm,
     torque_gain_Nm_rad,
 )
-from analyses.drive_figures import drive_figures
+from analyses.specification.drive_figures import drive_figures
 
 
 def force_source(ratio: float = 2.0) -> Design:

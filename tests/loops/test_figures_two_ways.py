@@ -12,13 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_wide_identity import wide_designs
 
+from actuator_lti.asked.drive_figure import drive_figure
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.batch.static import drive_figures
 from actuator_lti.design.model import Design, FrictionPoint, Gravity
-from actuator_lti.drive_figure import drive_figure
 from actuator_lti.loops import assemble_loops
 from actuator_lti.margins import stability_margins
-from actuator_lti.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES
 
 
 @st.composite

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from actuator_lti.plain_system import PlainSystem
-from analyses.responses import LARGE, response_at
+from actuator_lti.systems.plain_system import PlainSystem
+from analyses.linear.responses import LARGE, response_at
 
 PERIOD_S = 1e-3
 

@@ -8,9 +8,9 @@ import pytest
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import with_values
 from actuator_lti.loops import PeriodicLoop, exact_margins, periodic_loop
-from actuator_lti.resolvent import responses
-from nonlinear.on_the_bench import on_the_bench
-from nonlinear.operating_motion import on_its_stand
+from actuator_lti.systems.resolvent import responses
+from nonlinear.bench.on_the_bench import on_the_bench
+from nonlinear.bench.operating_motion import on_its_stand
 from tests.validation.random_drives import full_drive
 
 SYSTEMS = [  # of one state, by turns

@@ -6,7 +6,7 @@ import control
 import numpy as np
 import pytest
 
-from analyses.responses import curve
+from analyses.linear.responses import curve
 
 OMEGA = np.geomspace(1e-2, 1e3, 60)
 PERIOD_S = 1e-3

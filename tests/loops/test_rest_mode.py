@@ -15,7 +15,7 @@ from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import exact_margins
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import stage_blocks
-from actuator_lti.rest_mode import without_rest_mode
+from actuator_lti.systems.rest_mode import without_rest_mode
 
 SLOPES = (-6000.0, -100.0, -0.1, 50.0)
 

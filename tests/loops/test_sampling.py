@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from actuator_lti import InputError
 from actuator_lti.drive.blocks import pi
-from actuator_lti.sampling import delayed_hold, held_step, split_delay
+from actuator_lti.systems.sampling import delayed_hold, held_step, split_delay
 
 
 @given(st.floats(0, 5), st.floats(1e-6, 10))

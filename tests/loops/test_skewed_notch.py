@@ -7,7 +7,7 @@ import pytest
 
 from actuator_lti.design.model import Filter
 from actuator_lti.drive.blocks import biquad
-from nonlinear.filters import section
+from nonlinear.row.filters import section
 
 RNG = np.random.default_rng(7)
 

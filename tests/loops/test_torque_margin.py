@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
 from actuator_lti.batch.static import drive_figures
 from actuator_lti.design import load_design
 from actuator_lti.design.model import Design
-from actuator_lti.drive_figure import drive_figure
 from nonlinear import commands, simulate
 
 AMBER = load_design("ilr33-amber").with_values({"friction.breakaway_ratio": 1.3})

@@ -29,7 +29,7 @@ from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.tick import TickProgram
 from nonlinear import State, commands, simulate
 from nonlinear._kernels import layout
-from nonlinear.operating_motion import operating_motion
+from nonlinear.bench.operating_motion import operating_motion
 
 J, N, Ts, A, PHASE = 2e-5, 8.0, 1e-4, 4e-3, 2.5
 

@@ -11,10 +11,11 @@ import pytest
 from test_stacked import FILTERS, everything
 from two_mass import drive_d, drive_e
 
-from actuator_lti import InputError, assemble_loops, delay_budget
+from actuator_lti import InputError, assemble_loops
 from actuator_lti.design.model import Design, Encoder, Filter, Limits, PositionLoop
 from actuator_lti.drive.blocks import biquad, lag, tracking
 from actuator_lti.drive.signals import LIMITERS
+from actuator_lti.loops import delay_budget
 
 
 def faster(design: Design, factor: float) -> Design:
@@ -215,7 +216,7 @@ def test_encoder_tracking_needs_its_bandwidth() -> None:
 
 
 def test_the_survey_and_its_budget_table_know_filters_and_the_gap() -> None:
-    from analyses.loop_survey import survey_loops
+    from analyses.linear.loop_survey import survey_loops
     from reports.sections.delays import section
 
     base = drive_d(*FILTERS[:2])

@@ -26,9 +26,9 @@ from flint import acb, arb, ctx, fmpz_poly
 sys.path.insert(0, str(Path(__file__).parent))
 from margin_families import FAMILIES, PERIOD_S, poly, roots_of, scaled, signs, uniform
 
-from actuator_lti.delay_system import DelaySystem
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins import StabilityMargins, stability_margins
+from actuator_lti.systems.delay_system import DelaySystem
 
 FARTHEST = 1e10
 RATIO, DEG = 1e-9, 1e-7

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from actuator_lti.bandwidth import closed_loop_bandwidth, peaks
-from actuator_lti.delay_system import DelaySystem
 from actuator_lti.errors import InputError
 from actuator_lti.margins import stability_margins
+from actuator_lti.systems.delay_system import DelaySystem
 
 s = control.tf("s")
 W = 2 * math.pi * 30

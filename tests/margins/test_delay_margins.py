@@ -8,12 +8,12 @@ import control
 import numpy as np
 import pytest
 
-from actuator_lti.delay_system import DelaySystem
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins import stability_margins
 from actuator_lti.margins.collocation import closed_loop_matrix
 from actuator_lti.margins.delay_form import border_values, delay_form, evaluate_intervals, from_rational
 from actuator_lti.margins.loop import rational_loop
+from actuator_lti.systems.delay_system import DelaySystem
 
 s = control.tf("s")
 

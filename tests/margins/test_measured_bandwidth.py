@@ -11,9 +11,9 @@ import pytest
 
 from actuator_lti import closed_loop_bandwidth, stability_margins, step_figures, unwrapped_phase_deg
 from actuator_lti.bandwidth import peaks
+from actuator_lti.drawing.plotting import plot_bode, plot_nyquist, plot_step
 from actuator_lti.errors import InputError
 from actuator_lti.margins import MeasuredResponse
-from actuator_lti.plotting import plot_bode, plot_nyquist, plot_step
 
 s = control.tf("s")
 W = 2 * math.pi * 30

@@ -8,9 +8,9 @@ import control
 import numpy as np
 import pytest
 
-from actuator_lti.delay_system import DelaySystem
 from actuator_lti.errors import InputError
 from actuator_lti.step import step_figures
+from actuator_lti.systems.delay_system import DelaySystem
 
 s = control.tf("s")
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuator_lti.delay_system import DelaySystem
 from actuator_lti.errors import InputError
-from actuator_lti.phase import unwrapped_phase_deg
+from actuator_lti.systems.delay_system import DelaySystem
+from actuator_lti.systems.phase import unwrapped_phase_deg
 
 s = control.tf("s")
 

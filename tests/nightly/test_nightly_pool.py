@@ -8,7 +8,7 @@ import pytest
 from nightly_fakes import BUILD, CODE, Calendar, job, study
 from site_checks import check_whole
 
-from analyses.engine import Engine
+from analyses.studies.engine import Engine
 from reports.nightly.apart import Done, Limits, Task, build_each
 from reports.nightly.cache import Cache
 from reports.nightly.night import Settings, run_night

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from actuator_lti.quantities import LOOP_QUANTITIES, QUANTITIES
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from reports.nightly.figures import Figure
 from reports.nightly.tolerance import Tolerances, read_tolerances
 from reports.sections.margins import MARGIN_COLUMNS, RESPONSE_COLUMNS

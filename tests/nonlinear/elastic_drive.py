@@ -26,7 +26,7 @@ from actuator_lti.design.model import (
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
 from nonlinear.native import parameters, tick
-from nonlinear.parameters import design_row
+from nonlinear.row.parameters import design_row
 
 MOTOR = Motor(
     rotor_inertia_kgm2=2e-5,

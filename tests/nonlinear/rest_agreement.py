@@ -11,9 +11,9 @@ from __future__ import annotations
 import sys
 
 from actuator_lti.design.model import Design
-from analyses.settling import settle
+from analyses.motion.settling import settle
 from nonlinear import commands, simulate
-from nonlinear.rest import judge
+from nonlinear.settling.rest import judge
 from tests.validation.random_drives import stable_drives
 
 LENGTHS = (1_000, 20_000)  # ticks of the runs

@@ -9,7 +9,7 @@ from actuator_lti import load_design
 from actuator_lti.errors import InputError
 from nonlinear import Probe, Reducers, Rows, Run, commands, loads, simulate, simulate_many
 from nonlinear._kernels import layout
-from nonlinear.reduced import whole_periods
+from nonlinear.runs.reduced import whole_periods
 
 
 def mixed_runs() -> list[Run]:

@@ -15,7 +15,7 @@ from actuator_lti.design.model import Design, Filter, Limits
 from actuator_lti.drive.facts import torque_gain_Nm_rad
 from actuator_lti.errors import InputError
 from nonlinear import Drive, commands, simulate
-from nonlinear.filters import section
+from nonlinear.row.filters import section
 
 IDENTITIES = [
     ((1.0, 0.5, 0.2), (0.5, 0.2)),

@@ -14,7 +14,7 @@ from actuator_lti import load_design
 from actuator_lti.errors import InputError, NumericalError
 from nonlinear import Drive, State, commands, loads, simulate
 from nonlinear.commands import Command
-from nonlinear.records import read_columns
+from nonlinear.runs.records import read_columns
 
 TS = 1e-3
 T = np.arange(2000) * TS

@@ -8,8 +8,8 @@ import pytest
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.errors import InputError
 from nonlinear import Probe, Reducers, Run, State, commands, simulate, simulate_many
-from nonlinear.probe import fractional_delay
-from nonlinear.reduced import whole_periods
+from nonlinear.bench.probe import fractional_delay
+from nonlinear.runs.reduced import whole_periods
 
 CRUISE = 300.0
 INJECTION = {"u": 0.02, "i_ref": 0.3, "w_ref": 10.0, "output": 1e-4}

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from actuator_lti import InputError, assemble_loops, load_design, onset, stability_margins
-from actuator_lti.plotting import COLOURS, plot_bode, plot_map, plot_onset, plot_step
+from actuator_lti.drawing.plotting import COLOURS, plot_bode, plot_map, plot_onset, plot_step
 from analyses.large_signal.classify import CAUSES
 from analyses.large_signal.map import amplitude_map
-from analyses.loop_survey import LoopSurvey
+from analyses.linear.loop_survey import LoopSurvey
 from nonlinear import commands, simulate
 from reports.charts import paint
 
@@ -111,7 +111,7 @@ def test_pages_and_notebooks_have_the_same_colours() -> None:
 
 def test_matplotlib_is_imported_only_when_something_is_drawn() -> None:
     code = (
-        "import sys, nonlinear, analyses.loop_survey, actuator_lti.plotting;"
+        "import sys, nonlinear, analyses.linear.loop_survey, actuator_lti.drawing.plotting;"
         "from actuator_lti import load_design; load_design('ilr33-amber'); print('matplotlib' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

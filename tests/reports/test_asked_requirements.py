@@ -7,17 +7,17 @@ from pathlib import Path
 
 import pytest
 
+from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES
 from actuator_lti.batch import variable_paths
 from actuator_lti.design import design_hash, load_design, read_design_text, with_overrides, write_design
 from actuator_lti.design.model import Design, Requirement
-from actuator_lti.quantities import ANALYSIS_QUANTITIES
 from analyses.corners import corners
 from analyses.duty import Asked as DutyAsked
 from analyses.duty import duty
 from analyses.failures import Asked, failures
 from analyses.limit_cycles import limit_cycles
 from analyses.monte_carlo import MonteCarloSettings, monte_carlo
-from analyses.requirements import evaluate_requirements
+from analyses.specification.requirements import evaluate_requirements
 
 TABLES = {
     "failure.stop": "15 deg",

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from actuator_lti import atomic
 from actuator_lti.errors import InputError
+from actuator_lti.files import atomic
 
 
 def test_a_file_replaces_the_old_one_and_leaves_nothing_beside_it(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ import pytest
 from actuator_lti.design import load_design
 from actuator_lti.loops import assemble_loops
 from actuator_lti.margins import stability_margins
-from analyses.loop_figures import LoopFigures, all_loop_figures, loop_figures
-from analyses.loop_survey import survey_loops
+from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
+from analyses.linear.loop_survey import survey_loops
 from reports.cli.main import main
 from reports.loop_json import loop_json
 from reports.sections import loop as loop_section

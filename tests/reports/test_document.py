@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.errors import InputError
-from actuator_lti.verdict import Verdict
 from reports import document as doc
 from reports.charts.chart import Chart
 from reports.numbers import fixed, show, significant

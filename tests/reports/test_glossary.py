@@ -3,7 +3,7 @@
 import re
 from html import unescape
 
-from actuator_lti.quantities import QUANTITIES
+from actuator_lti.asked.quantities import QUANTITIES
 from reports import document as doc
 from reports.glossary import TERMS, glossary, meaning
 from reports.html import environment

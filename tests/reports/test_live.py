@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from built_report import HOSTILE, SEEN
 
-from analyses.responses import Curve
+from analyses.linear.responses import Curve
 from reports import document as doc
 from reports.charts import style
 from reports.charts.chart import Chart

@@ -14,8 +14,8 @@ from actuator_lti import assemble_loops, load_design
 from actuator_lti.compiled.compiler import system_compiler
 from actuator_lti.design.access import with_values
 from actuator_lti.margins import stability_margins
-from analyses.outer_loop import loop_around
-from analyses.outer_loop_file import outer_loop
+from analyses.linear.outer_loop import loop_around
+from analyses.linear.outer_loop_file import outer_loop
 from reports.cli.main import main
 
 needs_compiler = pytest.mark.skipif(

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_lti import load_design
+from actuator_lti.asked.quantities import CORNERED, LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.loops import assemble_loops
-from actuator_lti.quantities import CORNERED, LOOP_QUANTITIES, QUANTITIES
 from analyses.corners import corners
-from analyses.loop_figures import all_loop_figures
+from analyses.linear.loop_figures import all_loop_figures
 from reports import document as doc
 from reports.html import script
 from reports.live import live_model

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-import analyses.loop_survey
+import analyses.linear.loop_survey
 from analyses.isolation import drain
 from reports import document as doc
 from reports.cli.app import build
@@ -65,7 +65,7 @@ def test_a_missing_part_is_in_headline_and_json(tmp_path: Path, monkeypatch: pyt
     def fails(*_: Any) -> None:
         raise ZeroDivisionError("made up")
 
-    monkeypatch.setattr(analyses.loop_survey, "_other_form", fails)
+    monkeypatch.setattr(analyses.linear.loop_survey, "_other_form", fails)
     code, output, document = run(tmp_path)
     drain()
     assert code != 0

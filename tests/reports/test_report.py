@@ -293,7 +293,7 @@ def test_a_linear_axis_is_told_in_its_own_units() -> None:
 
 
 def test_limits_are_those_of_the_linear_onset(built: Built) -> None:
-    from actuator_lti.limiters import onset
+    from actuator_lti.loops.limiters import onset
 
     design = load_design("ilr33-amber")
     loops = assemble_loops(design)

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import design_hash, load_design, read_design_text, write_design
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.errors import InputError
-from actuator_lti.verdict import Verdict
 from analyses.validation import CHECKS, validate
 from reports.cli.main import main
 from reports.sections.validation import section

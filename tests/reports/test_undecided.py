@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from analyses import loop_figures
+from analyses.linear import loop_figures
 from analyses.margins import run
 from reports.cli.main import main
 

@@ -12,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.asked.quantities import CUSTOMARY, distance_from_minus_one, reserve
 from actuator_lti.design.model import Design
-from actuator_lti.quantities import CUSTOMARY, distance_from_minus_one, reserve
 from analyses.corners import corners
-from analyses.loop_survey import LoopSurvey, operating_points, survey_loops
-from analyses.weakest import spread, views, weakest
+from analyses.linear.loop_survey import LoopSurvey, operating_points, survey_loops
+from analyses.specification.weakest import spread, views, weakest
 from reports.cli.main import main
 from reports.sections.answer import weakest as words_of
 

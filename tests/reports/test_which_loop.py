@@ -12,19 +12,19 @@ from hypothesis import strategies as st
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.bandwidth import closed_loop_bandwidth
-from actuator_lti.commanded import commanded_bandwidth, commanded_step
 from actuator_lti.design import design_hash, read_design_text, with_overrides, write_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.profile import CommandMean, command_mean
 from actuator_lti.errors import InputError
-from actuator_lti.limiters import onset
+from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
+from actuator_lti.loops.limiters import onset
 from actuator_lti.step import step_figures
 from analyses.isolation import isolated
 from analyses.large_signal.at_rest import free_amplitude, sweep_from_rest
 from analyses.large_signal.map import amplitude_map
-from analyses.loop_figures import all_loop_figures
-from analyses.requirements import evaluate_requirements
-from analyses.responses import answer_curve, response_at
+from analyses.linear.loop_figures import all_loop_figures
+from analyses.linear.responses import answer_curve, response_at
+from analyses.specification.requirements import evaluate_requirements
 from nonlinear import commands, simulate
 from reports.sections.requirements import label
 
@@ -181,7 +181,7 @@ def test_a_locked_loop_that_fails_is_never_judged_by_the_free_one(
     """Nor does it take the others with it where nobody requires anything of it."""
     keys = {"quantity": "phase_margin", "unit": "deg", "loop": "current"}
     loops = assemble_loops(asking(load_design("ilr33-amber"), **keys, rotor=rotor))
-    monkeypatch.setattr("analyses.loop_figures._locked", lambda *_a, **_k: 1 / 0)
+    monkeypatch.setattr("analyses.linear.loop_figures._locked", lambda *_a, **_k: 1 / 0)
     with isolated() as missing, nullcontext() if rotor == "free" else pytest.raises(ZeroDivisionError):
         assert all_loop_figures(loops, locked=True)["current"].locked is None
     assert [one.part for one in missing] == ["current loop with the rotor locked"] * (rotor == "free")

@@ -175,7 +175,7 @@ def test_what_cannot_vary_is_refused():
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "emps", "ctms-motor-position"])
 def test_drive_figures_are_those_of_the_report(name):
-    from analyses.drive_figures import drive_figures as scalar
+    from analyses.specification.drive_figures import drive_figures as scalar
 
     population = Population(load_design(name), {}, 1)
     truth = scalar(population.design, 3.0)

@@ -9,9 +9,9 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.engine import Engine
 from analyses.monte_carlo import SampleTask
-from analyses.sampling import sampler_of
+from analyses.studies.engine import Engine
+from analyses.studies.sampling import sampler_of
 
 
 def collected(engine, task, chunks, after=None):
@@ -60,7 +60,7 @@ def test_workers_of_its_own():
 
 
 def test_a_scheduler_that_is_not_there_is_a_clear_failure(monkeypatch):
-    monkeypatch.setattr("analyses.cluster.CONNECT_S", 0.5)
+    monkeypatch.setattr("analyses.studies.cluster.CONNECT_S", 0.5)
     with pytest.raises(NumericalError, match="127"):
         Engine(scheduler="tcp://127.0.0.1:9").run(None, [(0, 1)], lambda c, a: None)
 
@@ -78,7 +78,7 @@ def test_a_cluster_that_is_slow_to_close_takes_no_result_back(monkeypatch):
             sink(part, call(held, part))
 
     monkeypatch.setattr(Engine, "_client", slow_to_close)
-    monkeypatch.setattr("analyses.cluster.submit", in_place)
+    monkeypatch.setattr("analyses.studies.cluster.submit", in_place)
     sums = {}
     Engine(workers=1).map(sum, [(1, 2), (3, 4)], sums.__setitem__)
     assert sums == {(1, 2): 3, (3, 4): 7}

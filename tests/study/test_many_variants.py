@@ -10,11 +10,11 @@ from dataclasses import replace
 import pytest
 
 from actuator_lti import load_design
-from actuator_lti.verdict import Verdict
-from analyses.requirements import RequirementVerdict
+from actuator_lti.asked.verdict import Verdict
+from analyses.comparison.variants import Comparison, compare
 from analyses.slugs import slug
-from analyses.study import Variant, study_of
-from analyses.variants import Comparison, compare
+from analyses.specification.requirements import RequirementVerdict
+from analyses.studies.study import Variant, study_of
 from reports import document as doc
 from reports.sections.compare import overview
 from reports.sections.compare import section as sections

@@ -9,11 +9,11 @@ import tomli_w
 
 from actuator_lti import load_design, read_design_text, write_design
 from actuator_lti.errors import InputError
-from analyses.engine import Engine
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
 from analyses.monte_carlo.reduction import Reduction, reduced, unpacked
 from analyses.monte_carlo.sketch import MOST
-from analyses.sampling import sampler_of
+from analyses.studies.engine import Engine
+from analyses.studies.sampling import sampler_of
 
 
 def toleranced():

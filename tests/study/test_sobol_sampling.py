@@ -6,7 +6,7 @@ import pytest
 from actuator_lti import load_design, read_design_text, write_design
 from actuator_lti.design.model import Tolerance
 from actuator_lti.errors import InputError
-from analyses.sampling import Factor, Sampler, read_table, sampler_of
+from analyses.studies.sampling import Factor, Sampler, read_table, sampler_of
 
 R, L = "motor.resistance", "motor.inductance"
 

@@ -10,7 +10,7 @@ from scipy.stats import binom
 from actuator_lti.design.model import Tolerance
 from analyses.monte_carlo.sketch import MOST, Sketch, merged
 from analyses.monte_carlo.statistics import SHARES, clopper_pearson, column_statistics
-from analyses.sampling import Factor, Sampler
+from analyses.studies.sampling import Factor, Sampler
 
 
 def statistics_of(values, size):

@@ -8,7 +8,7 @@ from actuator_lti.batch import Population
 from actuator_lti.design import parameter_value, paths_of, with_values
 from analyses.monte_carlo.stepping import StepCheck, step_columns, step_rows, step_units
 from nonlinear import commands
-from nonlinear.batch import Reducers, Run, simulate_many
+from nonlinear.runs.batch import Reducers, Run, simulate_many
 
 FIXED = ("control.period", "limits.continuous_current", "load.moment_max", "load.moment_slope")
 STEP = StepCheck(0.01, 0.1, load_Nm=2.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from actuator_lti import assemble_loops
 from actuator_lti.design import load_design, with_values
-from analyses.loop_survey import MOST_STATES, survey_loops
+from analyses.linear.loop_survey import MOST_STATES, survey_loops
 
 
 def test_a_fundamental_of_very_many_states_has_exact_borders_and_a_reason() -> None:

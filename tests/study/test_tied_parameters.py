@@ -10,7 +10,7 @@ from actuator_lti.design.model import Correlation, Design, Tolerance
 from actuator_lti.errors import InputError
 from analyses.estimation.fit import Fit
 from analyses.identification.to_design import design_with_fit
-from analyses.sampling import correlation_of, sampler_of, semidefinite_root
+from analyses.studies.sampling import correlation_of, sampler_of, semidefinite_root
 from analyses.tuning.problem import loop_requirements, problem_of
 
 KM, KE = "motor.torque_constant", "motor.back_emf_constant"

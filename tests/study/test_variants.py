@@ -8,10 +8,10 @@ from typer.testing import CliRunner
 
 from actuator_lti import load_design
 from actuator_lti.errors import InputError
-from analyses.sensitivity import sensitivities
+from analyses.comparison.variants import compare
 from analyses.slugs import slug
-from analyses.study import is_study, load_study, study_of
-from analyses.variants import compare
+from analyses.specification.sensitivity import sensitivities
+from analyses.studies.study import is_study, load_study, study_of
 
 HEAD = '[study]\nname = "s"\nbase = "ilr33-amber"\n'
 

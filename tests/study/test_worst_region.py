@@ -10,7 +10,7 @@ from scipy.stats import chi2, norm
 
 from actuator_lti.design.model import Tolerance
 from analyses.monte_carlo.region import Region
-from analyses.sampling import Factor, Sampler, Table
+from analyses.studies.sampling import Factor, Sampler, Table
 
 
 def _normal(path: str, nominal: float = 0.0, std: float = 1.0) -> Factor:
@@ -95,7 +95,7 @@ def test_a_worst_case_of_correlated_parameters_is_one_that_occurs(tmp_path: Path
     from actuator_lti.design import load_design
     from actuator_lti.design.model import Correlation
     from analyses.monte_carlo import MonteCarloSettings, monte_carlo
-    from analyses.sampling import sampler_of
+    from analyses.studies.sampling import sampler_of
 
     base = load_design("ilr33-amber")
     names = sampler_of(base).paths[:2]

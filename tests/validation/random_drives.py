@@ -596,7 +596,7 @@ def validate_one(design: Design, settings: Settings, tried: Tried) -> None:
     import time
     import traceback
 
-    from actuator_lti.verdict import Verdict
+    from actuator_lti.asked.verdict import Verdict
     from analyses.isolation import isolated
     from analyses.validation import validate
 

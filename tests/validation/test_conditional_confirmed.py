@@ -30,7 +30,7 @@ from analyses.large_signal.conditional import (
     step_threshold,
 )
 from analyses.large_signal.settling_ticks import settling_ticks_of
-from analyses.settling import settle
+from analyses.motion.settling import settle
 from tests.validation.random_drives import full_drive
 
 

@@ -12,10 +12,10 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.design import with_values
-from analyses.conduct import conduct
 from analyses.motion import Asked, Motion
+from analyses.motion.conduct import conduct
 from nonlinear import commands, simulate
-from nonlinear.rest import PERIODS
+from nonlinear.settling.rest import PERIODS
 from reports.cli.main import main
 from reports.sections.simulate import section
 

@@ -15,7 +15,7 @@ from actuator_lti.design.model import Requirement
 from actuator_lti.errors import InputError
 from analyses.corners import Asked, corners
 from analyses.corners.run import worst_ends
-from analyses.sensitivity import population_figures
+from analyses.specification.sensitivity import population_figures
 from reports.cli.main import main
 from reports.sections.corners import section
 

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 from actuator_lti import load_design
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.model import Design, FrictionPoint, Instruments, Supply
 from actuator_lti.design.shipped import shipped_designs
 from actuator_lti.errors import InputError
-from actuator_lti.verdict import Verdict
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.row import Row
 from analyses.validation.torque_values import edge, mechanics
-from nonlinear.operating_motion import operating_motion_at
+from nonlinear.bench.operating_motion import operating_motion_at
 from tests.validation.mutation_table import DRIVES, PAGE, keys_of, seen
 from tests.validation.random_drives import full_drive
 

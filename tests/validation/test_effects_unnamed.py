@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from actuator_lti import load_design
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
-from actuator_lti.verdict import Verdict
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import small_signal
 

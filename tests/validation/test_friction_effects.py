@@ -13,8 +13,8 @@ from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from analyses.friction_effects import friction_effects
 from analyses.friction_effects.cycles import limit_cycles
-from analyses.settling import settle
-from analyses.static_threshold import static_threshold
+from analyses.linear.static_threshold import static_threshold
+from analyses.motion.settling import settle
 from reports.sections.friction_effects import section
 
 

@@ -14,7 +14,7 @@ from actuator_lti.design.model import Filter
 from actuator_lti.errors import NumericalError
 from analyses.friction_effects.stick_slip import _slip
 from analyses.large_signal.steady_start import LEFT_AT_REST, PLACES, linear_steady_state
-from analyses.linear_states import without_value
+from analyses.linear.linear_states import without_value
 
 
 @pytest.mark.parametrize("name", shipped_designs())

@@ -17,8 +17,8 @@ from analyses.large_signal.grid import LEAST_UPDATES, amplitudes, tone
 from analyses.large_signal.map import AmplitudeMap, amplitude_map
 from analyses.large_signal.steady_start import PLACES, linear_steady_state
 from analyses.large_signal.tones_run import run_tones
-from analyses.static_threshold import static_threshold
-from nonlinear.on_the_bench import on_the_bench
+from analyses.linear.static_threshold import static_threshold
+from nonlinear.bench.on_the_bench import on_the_bench
 from tests.validation.random_drives import full_drive
 
 SHIPPED = ("ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position")

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from actuator_lti import load_design
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import with_overrides, with_values
 from actuator_lti.drive.steady import motor_torque_Nm
-from actuator_lti.verdict import Verdict
-from analyses.drive_figures import drive_figures
 from analyses.friction_effects import friction_effects
 from analyses.large_signal import large_signals
 from analyses.specification import Specification, specification
+from analyses.specification.drive_figures import drive_figures
 from analyses.specification.manoeuvres import thermal_duty
 from analyses.specification.plane import torque_speed_plane
 from nonlinear import commands, simulate
-from nonlinear.on_the_bench import on_the_bench
+from nonlinear.bench.on_the_bench import on_the_bench
 from reports import document as doc
 from reports.drawing import draw_svg
 from reports.sections import friction_effects as friction_section

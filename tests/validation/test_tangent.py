@@ -14,11 +14,11 @@ from actuator_lti.errors import InputError
 from actuator_lti.loops import Loops, periodic_loop
 from analyses.validation import CHECKS, validate
 from nonlinear import tangent
-from nonlinear.derivative import Tangent
-from nonlinear.lifted import GRID, relative
-from nonlinear.loop_setup import points_of, stages_of
-from nonlinear.on_the_bench import on_the_bench
-from nonlinear.operating_motion import on_its_stand, operating_motion
+from nonlinear.bench.derivative import Tangent
+from nonlinear.bench.lifted import GRID, relative
+from nonlinear.bench.loop_setup import points_of, stages_of
+from nonlinear.bench.on_the_bench import on_the_bench
+from nonlinear.bench.operating_motion import on_its_stand, operating_motion
 from tests.validation.random_drives import full_drive, is_stable
 
 Z = np.exp(1j * GRID)

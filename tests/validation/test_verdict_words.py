@@ -11,12 +11,12 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.design.model import Design
 from analyses.large_signal.at_rest import RestSweep
-from analyses.settling import Settling
+from analyses.motion.settling import Settling
 from analyses.validation import CHECKS, Validation, validate
 from analyses.validation.places import Bench
 from analyses.validation.row import judged
 from nonlinear import tangent
-from nonlinear.rest import Rest
+from nonlinear.settling.rest import Rest
 from reports.sections.from_rest import described
 from reports.sections.validation import summary
 

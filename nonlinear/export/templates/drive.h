@@ -20,8 +20,6 @@ extern "C" {
 @SIZES@
 
 @BLOCKS@
-/* Bits of io[DRIVE_IO_FLAGS]: @FLAGS@ */
-
 @FUNCTIONS@
 
 #ifdef __cplusplus

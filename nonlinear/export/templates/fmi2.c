@@ -33,11 +33,12 @@ typedef struct {
     fmi2CallbackLogger logger;
     fmi2ComponentEnvironment environment;
     char *name;
+    int quiet; /* 1: the host does not want to be told */
 } unit;
 
 static fmi2Status say(const unit *m, fmi2Status status, const char *text)
 {
-    if (m->logger != NULL) {
+    if ((m->logger != NULL) && (m->quiet == 0)) {
         m->logger(m->environment, m->name, status, "logStatusError", "%s", text);
     }
     return status;
@@ -54,10 +55,13 @@ UNIT_EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
 
 UNIT_EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String names[])
 {
-    (void)c;
-    (void)on;
-    (void)n;
-    (void)names;
+    unit *m = (unit *)c;
+    for (size_t j = 0U; j < n; j += 1U) {
+        if (strcmp(names[j], "logStatusError") != 0) {
+            return say(m, fmi2Error, "there is no such category; allowed: logStatusError");
+        }
+    }
+    m->quiet = (on != 0) ? 0 : 1;
     return fmi2OK;
 }
 
@@ -157,9 +161,8 @@ UNIT_EXPORT fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference 
 
 UNIT_EXPORT fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer value[])
 {
-    (void)vr;
-    (void)value;
-    return (n == 0U) ? fmi2OK : say((unit *)c, fmi2Error, "there are no integer variables");
+    unit *m = (unit *)c;
+    return told(m, unit_get_integers(&m->core, vr, n, value));
 }
 
 UNIT_EXPORT fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String value[])
@@ -175,9 +178,8 @@ UNIT_EXPORT fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[
 
 UNIT_EXPORT fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer value[])
 {
-    (void)vr;
-    (void)value;
-    return (n == 0U) ? fmi2OK : say((unit *)c, fmi2Error, "there are no integer variables");
+    unit *m = (unit *)c;
+    return told(m, unit_set_integers(&m->core, vr, n, value));
 }
 
 UNIT_EXPORT fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean value[])

@@ -22,11 +22,12 @@ typedef struct {
     unit_core core;
     fmi3LogMessageCallback logger;
     fmi3InstanceEnvironment environment;
+    int quiet; /* 1: the host does not want to be told */
 } unit;
 
 static fmi3Status say(const unit *m, fmi3Status status, const char *text)
 {
-    if (m->logger != NULL) {
+    if ((m->logger != NULL) && (m->quiet == 0)) {
         m->logger(m->environment, status, "logStatusError", text);
     }
     return status;
@@ -42,10 +43,13 @@ UNIT_EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
 
 UNIT_EXPORT fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t n, const fmi3String names[])
 {
-    (void)c;
-    (void)on;
-    (void)n;
-    (void)names;
+    unit *m = (unit *)c;
+    for (size_t j = 0U; j < n; j += 1U) {
+        if (strcmp(names[j], "logStatusError") != 0) {
+            return say(m, fmi3Error, "there is no such category; allowed: logStatusError");
+        }
+    }
+    m->quiet = (on != 0) ? 0 : 1;
     return fmi3OK;
 }
 
@@ -156,6 +160,20 @@ UNIT_EXPORT fmi3Status fmi3SetFloat64(
     return told(m, (count < n) ? "fewer values than variables" : unit_set_reals(&m->core, vr, n, value));
 }
 
+UNIT_EXPORT fmi3Status fmi3GetInt32(
+    fmi3Instance c, const fmi3ValueReference vr[], size_t n, int32_t value[], size_t count)
+{
+    unit *m = (unit *)c;
+    return told(m, (count < n) ? "fewer values than variables" : unit_get_integers(&m->core, vr, n, value));
+}
+
+UNIT_EXPORT fmi3Status fmi3SetInt32(
+    fmi3Instance c, const fmi3ValueReference vr[], size_t n, const int32_t value[], size_t count)
+{
+    unit *m = (unit *)c;
+    return told(m, (count < n) ? "fewer values than variables" : unit_set_integers(&m->core, vr, n, value));
+}
+
 UNIT_EXPORT fmi3Status fmi3GetBoolean(
     fmi3Instance c, const fmi3ValueReference vr[], size_t n, fmi3Boolean value[], size_t count)
 {
@@ -241,7 +259,6 @@ ABSENT(fmi3GetInt8)
 ABSENT(fmi3GetUInt8)
 ABSENT(fmi3GetInt16)
 ABSENT(fmi3GetUInt16)
-ABSENT(fmi3GetInt32)
 ABSENT(fmi3GetUInt32)
 ABSENT(fmi3GetInt64)
 ABSENT(fmi3GetUInt64)
@@ -252,7 +269,6 @@ ABSENT(fmi3SetInt8)
 ABSENT(fmi3SetUInt8)
 ABSENT(fmi3SetInt16)
 ABSENT(fmi3SetUInt16)
-ABSENT(fmi3SetInt32)
 ABSENT(fmi3SetUInt32)
 ABSENT(fmi3SetInt64)
 ABSENT(fmi3SetUInt64)

@@ -43,9 +43,12 @@ const char *unit_in(const unit_core *m, int phases)
 }
 
 /* Parameters p that follow from the keys, with their lengths; not yet what is derived from them. */
-static const char *follow(const unit_state *m, const double *keys, double *p)
+static const char *follow(unit_core *m, const double *keys, double *p)
 {
-    if ((m->touched != 0) && (fmu_set_keys(keys, p) == 0)) {
+    if ((m->state.touched != 0) && (fmu_related(keys, m->why, sizeof(m->why)) == 0)) {
+        return m->why;
+    }
+    if ((m->state.touched != 0) && (fmu_set_keys(keys, p) == 0)) {
         return STRUCTURE;
     }
     drive_prepare_sizes(p);
@@ -76,33 +79,44 @@ static void show(unit_state *m, const double *s, const double *io)
 }
 
 /* The state at the start time. */
-static const char *begin(unit_state *m)
+static const char *begin(unit_core *m)
 {
+    unit_state *o = &m->state;
     const char *failed;
 
-    m->p[DRIVE_SPEED_START] = 0.0;
-    failed = follow(m, m->keys, m->p);
+    o->p[DRIVE_SPEED_START] = 0.0;
+    failed = follow(m, o->keys, o->p);
     if (failed == NULL) {
-        drive_derive(m->p, m->s);
-        m->p[DRIVE_ANGLE_START] = m->initial_angle * m->p[DRIVE_RATIO];
-        drive_init(m->p, m->s);
-        m->changed = 0;
-        show(m, m->s, m->io);
+        drive_derive(o->p, o->s);
+        o->p[DRIVE_ANGLE_START] = o->initial_angle * o->p[DRIVE_RATIO];
+        drive_init(o->p, o->s);
+        o->changed = 0;
+        show(o, o->s, o->io);
     }
     return failed;
 }
 
-/* The next tick, with the keys and the inputs that hold now. */
-static void begin_tick(unit_state *m)
+/* The keys that were set since the last tick; they have been found to be allowed then. */
+static void retune(unit_core *m)
 {
-    if (m->changed != 0) { /* they have been found to be allowed when they were set */
-        (void)follow(m, m->keys, m->p);
-        drive_derive(m->p, m->s);
-        drive_retune(m->p, m->s);
-        if (m->p[DRIVE_OVERLOAD] <= 0.0) {
-            m->s[DRIVE_S_CURRENT_LIMIT] = m->p[DRIVE_CURRENT_LIMIT];
-        }
-        m->changed = 0;
+    unit_state *o = &m->state;
+
+    (void)follow(m, o->keys, o->p);
+    drive_derive(o->p, o->s);
+    drive_retune(o->p, o->s);
+    if (o->p[DRIVE_OVERLOAD] <= 0.0) {
+        o->s[DRIVE_S_CURRENT_LIMIT] = o->p[DRIVE_CURRENT_LIMIT];
+    }
+    o->changed = 0;
+}
+
+/* The next tick, with the keys and the inputs that hold now. */
+static void begin_tick(unit_core *c)
+{
+    unit_state *m = &c->state;
+
+    if (m->changed != 0) {
+        retune(c);
     }
     m->io[DRIVE_IN_COMMAND] = m->inputs[INPUT_COMMAND];
     m->io[DRIVE_IN_LOAD] = m->inputs[INPUT_MOMENT];
@@ -136,7 +150,7 @@ static int advance(unit_core *m, double until, int64_t target, double tau)
 
     while ((o->ticks < target) && (status == DRIVE_OK)) {
         if (o->under_way == 0) {
-            begin_tick(o);
+            begin_tick(m);
         }
         status = drive_tick(o->p, o->s, o->io);
         o->under_way = 0;
@@ -144,7 +158,7 @@ static int advance(unit_core *m, double until, int64_t target, double tau)
     }
     if ((status == DRIVE_OK) && (tau > 0.0)) {
         if (o->under_way == 0) {
-            begin_tick(o);
+            begin_tick(m);
         }
         status = look(m, tau);
     } else {
@@ -154,14 +168,26 @@ static int advance(unit_core *m, double until, int64_t target, double tau)
     return status;
 }
 
-static int get_real(const unit_state *m, unsigned int reference, double *value)
+/* A key or a constant of the design, where it is of this type. */
+static int get_key(const unit_state *m, unsigned int reference, int whole, double *value)
 {
-    if ((reference >= FMU_FIRST_KEY) && (reference < FMU_FIRST_KEY + FMU_KEYS)) {
-        *value = m->keys[reference - FMU_FIRST_KEY];
+    const unsigned int key = reference - FMU_FIRST_KEY;
+    const unsigned int constant = reference - FMU_FIRST_CONSTANT;
+
+    if ((reference >= FMU_FIRST_KEY) && (key < FMU_KEYS) && (fmu_keys[key].whole == whole)) {
+        *value = m->keys[key];
         return 1;
     }
-    if ((reference >= FMU_FIRST_CONSTANT) && (reference < FMU_FIRST_CONSTANT + FMU_CONSTANTS)) {
-        *value = fmu_constants[reference - FMU_FIRST_CONSTANT];
+    if ((reference >= FMU_FIRST_CONSTANT) && (constant < FMU_CONSTANTS) && (fmu_constants[constant].whole == whole)) {
+        *value = fmu_constants[constant].value;
+        return 1;
+    }
+    return 0;
+}
+
+static int get_real(const unit_state *m, unsigned int reference, double *value)
+{
+    if (get_key(m, reference, 0, value) != 0) {
         return 1;
     }
     if ((reference >= FIRST_OUTPUT) && (reference < FIRST_OUTPUT + UNIT_OUTPUTS)) {
@@ -208,7 +234,7 @@ const char *unit_exit_initialization(unit_core *m)
     const char *failed = unit_in(m, UNIT_INITIALIZING);
 
     if (failed == NULL) {
-        failed = begin(&m->state);
+        failed = begin(m);
     }
     if (failed == NULL) {
         m->state.phase = UNIT_STEPPING;
@@ -251,17 +277,39 @@ const char *unit_step(unit_core *m, double now, double step)
     return NULL;
 }
 
-const char *unit_get_reals(unit_core *m, const unsigned int *references, size_t n, double *values)
+/* Whether values may be read; in the initialization mode they are worked out. */
+static const char *readable(unit_core *m)
 {
     const char *failed = unit_in(m, ~UNIT_INSTANTIATED);
 
     if ((failed == NULL) && (m->state.phase == UNIT_INITIALIZING)) {
-        failed = begin(&m->state);
+        failed = begin(m);
     }
+    return failed;
+}
+
+const char *unit_get_reals(unit_core *m, const unsigned int *references, size_t n, double *values)
+{
+    const char *failed = readable(m);
+
     for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
         if (get_real(&m->state, references[j], &values[j]) == 0) {
             failed = "there is no such real variable";
         }
+    }
+    return failed;
+}
+
+const char *unit_get_integers(unit_core *m, const unsigned int *references, size_t n, int32_t *values)
+{
+    const char *failed = readable(m);
+
+    for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
+        double value = 0.0;
+        if (get_key(&m->state, references[j], 1, &value) == 0) {
+            failed = "there is no such integer variable";
+        }
+        values[j] = (int32_t)value;
     }
     return failed;
 }
@@ -304,7 +352,7 @@ static const char *tried(unit_core *m, const unsigned int *references, size_t n,
             o->touched = 1;
         }
     }
-    failed = follow(o, m->keys, m->q);
+    failed = follow(m, m->keys, m->q);
     o->touched = touched;
     return failed;
 }
@@ -322,16 +370,19 @@ static void set_real(unit_state *m, unsigned int reference, double value)
     }
 }
 
-const char *unit_set_reals(unit_core *m, const unsigned int *references, size_t n, const double *values)
+/* Values of one type; all of them are set, or none. */
+static const char *set(unit_core *m, const unsigned int *references, size_t n, const double *values, int whole)
 {
     const char *failed = unit_in(m, UNIT_INSTANTIATED | UNIT_INITIALIZING | UNIT_STEPPING);
     int keys = 0;
 
     for (size_t j = 0U; (j < n) && (failed == NULL); j += 1U) {
-        if (allowed(&m->state, references[j], values[j]) == 0) {
-            failed = "no such input or parameter, not now, or a value that is not allowed";
+        const int key = is_key(references[j]);
+        const int type = (key != 0) ? fmu_keys[references[j] - FMU_FIRST_KEY].whole : 0;
+        if ((type != whole) || (allowed(&m->state, references[j], values[j]) == 0)) {
+            failed = "no such input or parameter of this type, not now, or a value that is not allowed";
         }
-        keys |= is_key(references[j]);
+        keys |= key;
     }
     if ((failed == NULL) && (keys != 0) && (m->state.phase == UNIT_STEPPING)) {
         failed = tried(m, references, n, values);
@@ -342,11 +393,26 @@ const char *unit_set_reals(unit_core *m, const unsigned int *references, size_t 
     return failed;
 }
 
+const char *unit_set_reals(unit_core *m, const unsigned int *references, size_t n, const double *values)
+{
+    return set(m, references, n, values, 0);
+}
+
+const char *unit_set_integers(unit_core *m, const unsigned int *references, size_t n, const int32_t *values)
+{
+    double numbers[FMU_KEYS + 1U];
+
+    for (size_t j = 0U; (j < n) && (n <= FMU_KEYS); j += 1U) {
+        numbers[j] = (double)values[j];
+    }
+    return (n <= FMU_KEYS) ? set(m, references, n, numbers, 1) : "more values than there are integer variables";
+}
+
 const char *unit_get_boolean(unit_core *m, unsigned int reference, int *value)
 {
     static const int bits[] = {@BITS@};
     const unsigned int count = (unsigned int)(sizeof(bits) / sizeof(bits[0]));
-    const char *failed = unit_in(m, ~UNIT_INSTANTIATED);
+    const char *failed = readable(m);
 
     if ((failed == NULL) && ((reference < 30U) || (reference >= 30U + count))) {
         failed = "there is no such Boolean variable";

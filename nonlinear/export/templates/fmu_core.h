@@ -50,6 +50,7 @@ typedef struct {
     double q[DRIVE_P_LENGTH + FMU_SPARE_P];
     double view[DRIVE_S_LENGTH + UNIT_SPARE];
     double keys[FMU_KEYS + 1];
+    char why[256]; /* the last refusal of keys that do not go together */
 } unit_core;
 
 #ifdef _WIN32
@@ -75,6 +76,8 @@ const char *unit_step(unit_core *m, double now, double step);
 /* By value reference. */
 const char *unit_get_reals(unit_core *m, const unsigned int *references, size_t n, double *values);
 const char *unit_set_reals(unit_core *m, const unsigned int *references, size_t n, const double *values);
+const char *unit_get_integers(unit_core *m, const unsigned int *references, size_t n, int32_t *values);
+const char *unit_set_integers(unit_core *m, const unsigned int *references, size_t n, const int32_t *values);
 const char *unit_get_boolean(unit_core *m, unsigned int reference, int *value);
 const char *unit_get_strings(const unit_core *m, const unsigned int *references, size_t n, const char **values);
 

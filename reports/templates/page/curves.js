@@ -14,7 +14,7 @@ const unwrapped = (re, im, hertz) => {
   const slope = Math.round(Math.log(Math.hypot(re[1], im[1]) / Math.hypot(re[0], im[0])) / Math.log(hertz[1] / hertz[0])) || 0;
   for (let k = 0; k < re.length; k++) {
     let angle = Math.atan2(im[k], re[k]) * 180 / Math.PI;
-    if (last === null) turn = -360 * Math.ceil((angle - 90 * slope - 90) / 360); // as actuator_lti.phase's branch
+    if (last === null) turn = -360 * Math.ceil((angle - 90 * slope - 90) / 360); // as actuator_lti.systems.phase's branch
     if (last !== null) turn -= 360 * Math.round((angle + turn - last) / 360);
     angle += turn;
     phase.push(angle);

@@ -1,0 +1,1 @@
+"""What can be required of a drive, where each figure is read, and the three words for it."""

@@ -1,0 +1,1 @@
+"""How results are drawn with matplotlib and shown in a notebook."""

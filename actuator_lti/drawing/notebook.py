@@ -1,0 +1,117 @@
+"""Designs, loops, margins and runs as small HTML tables: what a notebook shows for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+from math import isinf
+from typing import TYPE_CHECKING, Any
+
+from actuator_lti.drawing.faces import face
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from actuator_lti.loops.result import Loops
+    from actuator_lti.margins.results import StabilityMargins
+
+
+def html_table(head: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table with a caption; every text is escaped.
+
+    Examples
+    --------
+    >>> html_table("a < b", [], [["1"]])
+    '<table><caption>a &lt; b</caption><thead><tr></tr></thead><tbody><tr><td>1</td></tr></tbody></table>'
+    """
+    top = "".join(f"<th>{escape(word)}</th>" for word in columns)
+    body = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    caption = f"<caption>{escape(head)}</caption>"
+    return f"<table>{caption}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+
+
+@face
+def design_html(design: Design) -> str:
+    """Every value of a design as it was written, with source, grade and tolerance."""
+    rows = [
+        (
+            known.path,
+            known.symbol,
+            known.text,
+            "" if known.tolerance is None else known.tolerance.text,
+            known.grade or "",
+            known.source,
+        )
+        for known in design.parameters.values()
+    ]
+    title = f"{design.name}: {design.title}" if design.title else design.name
+    return html_table(title, ("key", "symbol", "value", "tolerance", "grade", "source"), rows)
+
+
+@face
+def loops_html(loops: Loops) -> str:
+    """The loops that there are: where each is cut, its unit and its period."""
+    rows = [
+        (
+            name,
+            loop.break_point,
+            loop.unit_in,
+            "continuous" if loop.period_s is None else f"{1e3 * loop.period_s:g} ms",
+        )
+        for name, loop in loops.present.items()
+    ]
+    head = f"{loops.design.name}: {loops.form}, {loops.operating_point}, load {loops.load_Nm:g}"
+    return html_table(head, ("loop", "cut at", "unit", "period"), rows)
+
+
+@face
+def run_html(run: Any) -> str:
+    """What came of a run (`nonlinear.Trajectory`): how far it went, which limits acted, how it ended."""
+    linear = run.axis == "linear"
+    factor, angle, speed = (1e3, "mm", "m/s") if linear else (57.29577951308232, "deg", "rad/s")
+    rows = [
+        ("rows", f"{run.time_s.size} of {1e3 * run.period_s * _every(run):g} ms"),
+        ("output, from", f"{_least(factor * run.output_angle_rad, min):.5g} {angle}"),
+        ("output, to", f"{_least(factor * run.output_angle_rad, max):.5g} {angle}"),
+        ("motor speed, up to", f"{_least(abs(run.motor_speed_rad_s), max):.5g} {speed}"),
+        ("current, up to", f"{_least(abs(run.current_A), max):.5g} A"),
+        ("at rest", f"{100.0 * run.stick_fraction:.3g} % of the ticks"),
+        *(
+            (f"{name} limit", f"{100.0 * use.fraction:.3g} % of the ticks, first at {use.first_time_s:.4g} s")
+            for name, use in run.limits.items()
+            if use.active
+        ),
+        ("stick, slip, reversal", f"{run.events} events"),
+        ("status", run.status if not run.advice else f"{run.status}: {run.advice}"),
+    ]
+    return html_table(f"{run.design_name}: {run.time_s.size} rows", ("figure", "value"), rows)
+
+
+def _least(values: Any, which: Any) -> float:
+    """Smallest or largest of some values; NaN of none."""
+    return float(which(values)) if len(values) else float("nan")
+
+
+def _every(run: Any) -> float:
+    """Ticks between two rows."""
+    return float(round((run.time_s[1] - run.time_s[0]) / run.period_s)) if run.time_s.size > 1 else 1.0
+
+
+@face
+def margins_html(margins: StabilityMargins) -> str:
+    """The figures to quote, and how they are known."""
+    result = [
+        ("gain margin", _figure(margins.gain_margin_db, 1.0, "dB")),
+        ("phase margin", _figure(margins.phase_margin_deg, 1.0, "deg")),
+        ("delay margin", _figure(margins.delay_margin_s, 1e3, "ms")),
+        ("modulus margin", _figure(margins.modulus_margin, 1.0, "")),
+        ("peak of S", _figure(margins.sensitivity_peak_db, 1.0, "dB")),
+        ("evidence", margins.evidence),
+        *(("note", note) for note in margins.notes),
+    ]
+    return html_table(f"closed loop: {margins.verdict}", ("figure", "value"), result)
+
+
+def _figure(value: float | None, factor: float, unit: str) -> str:
+    if value is None:
+        return "not known"
+    return "none" if isinf(value) else f"{factor * value:.4g} {unit}".rstrip()

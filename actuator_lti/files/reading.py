@@ -1,0 +1,288 @@
+"""The one reader of files: from a path to bytes, text and a tree of plain values; nothing physical.
+
+Size, kind of file, encoding, depth, number of values, length of texts, integers and control characters are
+checked here for every file that a user or somebody else wrote: designs, studies, settings, campaigns, record
+descriptions, report.json. What comes out may be printed and written to other files as it is.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import stat
+import tomllib
+import unicodedata
+from os import PathLike
+from typing import Any, BinaryIO
+
+from actuator_lti.bounds import (
+    CAMPAIGN_BYTES,
+    CAMPAIGN_VALUES,
+    JSON_DEPTH,
+    KEY_PARTS,
+    REPORT_BYTES,
+    TEXT_CHARACTERS,
+    TOML_BYTES,
+    TOML_DEPTH,
+    TOML_VALUES,
+    Bound,
+)
+from actuator_lti.errors import InputError
+from actuator_lti.files.tree import Tree
+
+INTEGERS = range(-(1 << 63), 1 << 63)
+"""What TOML promises to hold; longer ones would become infinite as floats, or take long to print."""
+
+_PIECE = 1 << 20
+_HARMLESS = (float, bool, type(None))  # need no look where values are not counted
+_CONTROL = ("Cc", "Cs")
+_CONTROL_OF_KEYS = ("Cc", "Cf", "Cs")
+
+
+def shown(value: object, longest: int = 60) -> str:
+    """A value as it may be printed: short, one line, no control characters."""
+    if isinstance(value, dict | list):
+        return "a table" if isinstance(value, dict) else "a list"
+    text = value if isinstance(value, str) else _written(value)
+    text = "".join(c if unicodedata.category(c)[0] != "C" else "?" for c in text[: longest + 1])
+    text = text if len(text) <= longest else text[: longest - 3] + "..."
+    return f'"{text}"' if isinstance(value, str) else text
+
+
+def _written(value: object) -> str:
+    """``repr``, also of an integer with more digits than Python agrees to print."""
+    if isinstance(value, int) and value not in INTEGERS:
+        return f"an integer of {value.bit_length()} bits"
+    return repr(value)
+
+
+def shown_path(path: str | PathLike[str]) -> str:
+    """A path as it may be printed."""
+    return shown(os.fspath(path), 200)[1:-1]
+
+
+def open_regular(path: str | PathLike[str], what: str = "file") -> BinaryIO:
+    """Open a regular file for reading; a directory, a device or a pipe is refused without waiting for it.
+
+    Raises
+    ------
+    InputError
+        Naming the file and what is allowed.
+    """
+    where = shown_path(path)
+    try:
+        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except FileNotFoundError:
+        raise InputError(f"cannot be read: no such file; allowed: a {what}", where=where) from None
+    except IsADirectoryError:
+        raise InputError(f"is a directory; allowed: a {what}", where=where) from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read: {_reason(error)}", where=where) from None
+    mode = os.fstat(handle).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(handle)
+        kind = "is a directory" if stat.S_ISDIR(mode) else "is no regular file"
+        raise InputError(f"{kind}; allowed: a {what}", where=where)
+    return os.fdopen(handle, "rb")
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+
+
+def read_bytes(path: str | PathLike[str], what: str = "design file", most: Bound = TOML_BYTES) -> bytes:
+    """The bytes of a regular file of bounded size.
+
+    Raises
+    ------
+    InputError
+        Naming the file and what is allowed.
+    """
+    where = shown_path(path)
+    data = bytearray()
+    with open_regular(path, what) as stream:
+        try:
+            while len(data) <= most.most and (piece := stream.read(_PIECE)):
+                data += piece
+        except OSError as error:
+            raise InputError(f"cannot be read: {_reason(error)}", where=where) from None
+    if len(data) > most.most:
+        raise InputError(f"is larger than allowed: {most.allowed}", where=where)
+    return bytes(data)
+
+
+def decode(data: bytes, where: str) -> str:
+    """UTF-8 text, with or without a byte-order mark."""
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise InputError("is UTF-16; allowed: UTF-8 text", where=where)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"byte {error.start} is not UTF-8; allowed: UTF-8 text", where=where) from None
+
+
+def read_toml(path: str | PathLike[str], what: str = "design file") -> Tree:
+    """The tree of a TOML file: size, encoding, syntax, depth, texts and integers checked.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the place and what is allowed.
+    """
+    return parse_toml(decode(read_bytes(path, what), shown_path(path)), shown_path(path))
+
+
+def read_campaign_toml(path: str | PathLike[str], what: str = "campaign file") -> Tree:
+    """As `read_toml`, for files that list thousands of runs."""
+    where = shown_path(path)
+    text = decode(read_bytes(path, what, CAMPAIGN_BYTES), where)
+    return parse_toml(text, where, size=CAMPAIGN_BYTES, values=CAMPAIGN_VALUES)
+
+
+def read_json(path: str | PathLike[str], what: str = "report.json") -> Any:
+    """The value of a JSON file, checked like a TOML file; NaN and Infinity are refused."""
+    where = shown_path(path)
+    return parse_json(decode(read_bytes(path, what, REPORT_BYTES), where), where)
+
+
+def parse_toml(text: str, where: str, *, size: Bound = TOML_BYTES, values: Bound = TOML_VALUES) -> Tree:
+    """The tree of a TOML text, refused with line and column where the syntax is wrong."""
+    if len(text) > size.most:
+        raise InputError(f"is larger than allowed: {size.allowed}", where=where)
+    _refuse_long_keys(text, where)
+    try:
+        tree = tomllib.loads(text)
+    except RecursionError:
+        raise InputError(_too_deep("", TOML_DEPTH), where=where) from None
+    except (ValueError, OverflowError) as error:
+        said = f"{shown(str(error), 200)[1:-1]}{_hint(text, error)}"
+        raise InputError(f"not TOML: {said}", where=where) from None
+    _walk(tree, where, TOML_DEPTH, values, TEXT_CHARACTERS)
+    return tree
+
+
+_UNQUOTED = re.compile(
+    r"\s*([A-Za-z_][\w.]*)\s*=\s*([+-]?[0-9][0-9.,eE+-]*\s*[A-Za-zµΩ%/°][^#\"\n]*?)\s*(#.*)?$"
+)
+_COMMA = re.compile(r"\s*([A-Za-z_][\w.]*)\s*=\s*([+-]?[0-9]+,[0-9]+)\s*(#.*)?$")
+_HINT_CHARACTERS = 300  # the expressions take the square of the length of a line
+
+
+def _hint(text: str, error: Exception) -> str:
+    """What the line at fault most likely wants: quotes around a quantity, a decimal point."""
+    place = re.search(r"line ([0-9]+)", str(error))
+    lines = text.splitlines()
+    if place is None or not 0 < int(place[1]) <= len(lines):
+        return ""
+    line = lines[int(place[1]) - 1]
+    if len(line) > _HINT_CHARACTERS:
+        return ""
+    if "\u201c" in line or "\u201d" in line or "\u201e" in line:
+        return '; use straight quotes: "'
+    if re.search(r";\s*(#.*)?$", line):
+        return "; no semicolon at the end of a line"
+    if text.lstrip()[:1] in "{[" and text.lstrip()[:2] not in ("[[",) and ":" in line:
+        return "; this looks like JSON, TOML is wanted"
+    if re.match(r"[^=\[#]*[,;\t][^=\[#]*$", lines[0]):
+        return "; this looks like a table of numbers, TOML is wanted"
+    if result := _COMMA.match(line):
+        return f"; use a decimal point: {result[1]} = {result[2].replace(',', '.')}"
+    if result := _UNQUOTED.match(line):
+        return f'; put a quantity in quotes: {result[1]} = "{shown(result[2].replace(",", "."))[1:-1]}"'
+    return ""
+
+
+def parse_json(text: str, where: str) -> Any:
+    """The value of a JSON text: no NaN, no key twice, bounded depth, no control characters."""
+    try:
+        value = json.loads(
+            text, parse_constant=_refuse_constant, parse_float=_finite, object_pairs_hook=_no_key_twice
+        )
+    except RecursionError:
+        raise InputError(_too_deep("", JSON_DEPTH), where=where) from None
+    except (ValueError, OverflowError) as error:
+        raise InputError(f"not JSON: {shown(str(error), 200)[1:-1]}", where=where) from None
+    _walk(value, where, JSON_DEPTH, None, None)
+    return value
+
+
+def _refuse_constant(name: str) -> None:
+    raise ValueError(f"{name} is not allowed")
+
+
+def _finite(digits: str) -> float:
+    value = float(digits)
+    if value - value != 0.0:
+        raise ValueError(f"{digits[:20]} is beyond the range of floats")
+    return value
+
+
+def _no_key_twice(pairs: list[tuple[str, Any]]) -> Tree:
+    made = dict(pairs)
+    if len(made) != len(pairs):
+        keys = [key for key, _ in pairs]
+        raise ValueError(
+            f"the key {shown(next(k for k in keys if keys.count(k) > 1))} stands twice in one table"
+        )
+    return made
+
+
+def _refuse_long_keys(text: str, where: str) -> None:
+    for number, line in enumerate(text.splitlines(), 1):
+        head = line.partition("=")[0]
+        if head.count(".") > KEY_PARTS.most and not head.lstrip().startswith("#"):
+            raise InputError(
+                f"line {number}: a key nested too deeply; allowed: {TOML_DEPTH.most} levels", where=where
+            )
+
+
+def _too_deep(path: str, depth: Bound) -> str:
+    at = f"{shown(path)[1:-1]}: " if path else ""
+    return f"{at}nested too deeply; allowed: {depth.most} levels"
+
+
+def _walk(tree: Any, where: str, depths: Bound, values: Bound | None, length: Bound | None) -> None:
+    """Refuse deep nesting, too many values, long texts, huge integers and control characters."""
+    stack: list[tuple[str, Any, int]] = [("", tree, 0)]
+    count = 0
+    while stack:
+        path, value, depth = stack.pop()
+        count += 1
+        if depth > depths.most:
+            raise InputError(_too_deep(path, depths), where=where)
+        if values is not None and count > values.most:
+            raise InputError(f"more values than allowed: {values.allowed}", where=where)
+        if isinstance(value, dict):
+            for key, item in value.items():
+                _check_text(key, f"a key of {path or 'the file'}", where, _CONTROL_OF_KEYS, length)
+                stack.append((f"{path}.{key}" if path else key, item, depth + 1))
+        elif isinstance(value, list):
+            stack.extend(
+                (f"{path}[{i + 1}]", item, depth + 1)
+                for i, item in enumerate(value)
+                if values is not None or type(item) not in _HARMLESS
+            )
+        elif isinstance(value, str):
+            _check_text(value, path, where, _CONTROL, length)
+        elif isinstance(value, int) and value not in INTEGERS:
+            raise InputError(
+                f"{shown(path)[1:-1]} = {shown(value)}: allowed: whole numbers of 64 bits", where=where
+            )
+
+
+def _check_text(text: str, path: str, where: str, refused: tuple[str, ...], length: Bound | None) -> None:
+    """Refuse a long text, and characters of some Unicode categories; line break and tab may stand."""
+    if length is not None and len(text) > length.most:
+        raise InputError(
+            f"{shown(path)[1:-1]}: {len(text)} characters; allowed: {length.allowed}", where=where
+        )
+    if text.isprintable():
+        return
+    for character in text:
+        if unicodedata.category(character) in refused and character not in "\n\t":
+            raise InputError(
+                f"{shown(path)[1:-1]} = {shown(text)}: holds the control character U+{ord(character):04X}; "
+                "allowed: printable text",
+                where=where,
+            )

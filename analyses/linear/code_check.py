@@ -1,0 +1,81 @@
+"""Predictions held against the compiled code: its own derivative, its steps and runs beside the margins.
+
+The C of an export is compiled with the options of its README and put in the simulator's place; then every
+prediction is judged on it as `analyses.validation` judges it.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from actuator_lti.asked.verdict import Verdict
+from actuator_lti.compiled import compiler
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
+from analyses.validation import CHECKS, validate
+from analyses.validation.row import Row
+from nonlinear.native import LIBRARY
+
+
+@dataclass(frozen=True)
+class CodeCheck:
+    """What the compiled code shows of the predictions.
+
+    Attributes
+    ----------
+    entries : tuple of Row
+        Predictions that are judged, with what the compiled code shows.
+    compiler : str
+        Command and options; empty where nothing was run.
+    reason : str
+        Why nothing was measured; empty where it was.
+    """
+
+    entries: tuple[Row, ...] = ()
+    compiler: str = ""
+    reason: str = ""
+
+    @property
+    def failed(self) -> tuple[Row, ...]:
+        """Predictions that the compiled code does not meet."""
+        return tuple(entry for entry in self.entries if entry.verdict is Verdict.NOT_MET)
+
+    def largest(self, *quantities: str) -> Row | None:
+        """The entry of these quantities with the largest difference; ``None`` where none is measured."""
+        known = [e for e in self.entries if e.name in quantities]
+        return max(known, key=lambda e: e.error, default=None)
+
+
+def check_code(design: Design) -> CodeCheck:
+    """Measure the small-signal predictions of a design on the emitted C.
+
+    Parameters
+    ----------
+    design : Design
+
+    Returns
+    -------
+    CodeCheck
+        With a reason in place of entries where there is no C compiler, or the design cannot be tested.
+    """
+    command = compiler.system_compiler()
+    if command is None or not sys.platform.startswith(("linux", "darwin")):
+        return CodeCheck(reason="no C compiler on the machine of the export")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run.so"
+        try:
+            flags = ("-shared", "-fPIC")
+            texts = {"run.c": LIBRARY.text()}
+            path.write_bytes(
+                compiler.compile_files(texts, path.name, "this machine", flags, command=[command])
+            )
+            with LIBRARY.borrowed(path):
+                validation = validate(design, CHECKS)
+        except (InputError, NumericalError) as error:
+            return CodeCheck(reason=str(error))
+    if not validation.rows:
+        return CodeCheck(reason="; ".join(validation.notes) or "nothing is judged of this design")
+    return CodeCheck(validation.rows, " ".join([Path(command).name, *compiler.FLAGS]))

@@ -1,0 +1,273 @@
+"""Everything that is said of a loop in one place: margins, bandwidth, peaks, step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from actuator_lti.asked.quantities import MOST_RESONANCE_DB
+from actuator_lti.drive.profile import command_mean, profile_note
+from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.systems.as_control import as_control
+from analyses.isolation import attempt
+
+if TYPE_CHECKING:
+    from actuator_lti.bandwidth import Bandwidth, Peaks
+    from actuator_lti.design.model import Requirement
+    from actuator_lti.drive.profile import CommandMean
+    from actuator_lti.loops import Loop, Loops
+    from actuator_lti.margins import StabilityMargins
+    from actuator_lti.step import StepFigures
+
+Figure = TypeVar("Figure")
+
+
+@dataclass(frozen=True)
+class LoopFigures:
+    """The figures of one loop.
+
+    Attributes
+    ----------
+    loop : Loop
+        The loop itself.
+    plain_response : PlainSystem or python-control system
+        What bandwidth and step are taken of, behind `mean`: the closed loop; for the position loop the
+        command to the output, feed-forward and filter of the command included.
+    margins : StabilityMargins
+        Of the open loop.
+    bandwidth, peaks, step : Bandwidth, Peaks, StepFigures or None
+        ``None`` where the closed loop is not stable, or has no such figure (then ``notes`` say why).
+    notes : tuple of str
+        Why a figure of a stable loop is missing.
+    held : LoopFigures or None
+        Of an inner loop that is unstable only by itself, in a drive that is stable as a whole: the same loop
+        as `analyses.linear.held_loops` holds it, which is stable.
+    locked : LoopFigures or None
+        Of a current loop with a free rotor: the same with the rotor locked, where it was asked for.
+    mean : CommandMean or None
+        What comes before ``plain_response`` on the way from the user's command: the mean of a limited jerk.
+    reference : LoopFigures or None
+        Of a position loop with a mean or a filter of the command: the same with bandwidth and step of the
+        response to the reference behind them.
+    """
+
+    loop: Loop
+    plain_response: Any
+    margins: StabilityMargins
+    bandwidth: Bandwidth | None
+    peaks: Peaks | None
+    step: StepFigures | None
+    notes: tuple[str, ...] = ()
+    held: LoopFigures | None = None
+    locked: LoopFigures | None = None
+    mean: CommandMean | None = None
+    reference: LoopFigures | None = None
+
+    def asked(self, requirement: Requirement) -> LoopFigures:
+        """The figures that a requirement means: of which current loop, of which response."""
+        if requirement.rotor == "locked" and self.locked is not None:
+            return self.locked
+        if requirement.to == "reference" and self.reference is not None:
+            return self.reference
+        return self.judged
+
+    @property
+    def rotor(self) -> str:
+        """How the rotor stands, of a current loop as it is judged: ``"free"`` or ``"locked"``; else empty."""
+        return "" if self.loop.name != "current" else "free" if self.held is None else "locked"
+
+    @property
+    def judged(self) -> LoopFigures:
+        """The figures that the drive is judged by: those of `held` where there are some."""
+        return self if self.held is None else self.held
+
+    @property
+    def sound(self) -> bool | None:
+        """Whether the loop, as it is judged, is stable; ``None`` where that is not known."""
+        return self.judged.margins.stable
+
+    @cached_property
+    def response(self) -> Any:
+        """What bandwidth and step are taken of, as a python-control system."""
+        return as_control(self.plain_response)
+
+    @property
+    def stable(self) -> bool:
+        """Whether the closed loop is known to be stable."""
+        return self.margins.stable is True
+
+
+def loop_figures(
+    loop: Loop,
+    response: Any = None,
+    *,
+    bandwidth: bool = True,
+    step: bool = True,
+    certify: bool = False,
+    mean: CommandMean | None = None,
+) -> LoopFigures:
+    """Compute all figures of a loop.
+
+    Parameters
+    ----------
+    loop : Loop
+    response : PlainSystem or python-control system, optional
+        Taken instead of the closed loop for bandwidth and step.
+    bandwidth, step : bool
+        Whether these are wanted; the step of a continuous loop with delays takes its time.
+    certify : bool
+        Whether the margins are to be known by exact arithmetic, see `stability_margins`.
+    mean : CommandMean, optional
+        Of the command, before the response.
+
+    Raises
+    ------
+    InputError, NumericalError
+        If the margins cannot be found; another figure that cannot becomes a note.
+    """
+    from actuator_lti.bandwidth import peaks
+    from actuator_lti.margins import stability_margins
+
+    response = loop.plain_closed if response is None else response
+    margins = stability_margins(loop.plain_open, certify=certify)
+    if margins.stable is not True:
+        return LoopFigures(loop, response, margins, None, None, None)
+    bare = LoopFigures(loop, response, margins, None, peaks(loop.plain_open), None)
+    return _answering(bare, response, mean, bandwidth=bandwidth, step=step)
+
+
+def _answering(
+    figures: LoopFigures, response: Any, mean: CommandMean | None, *, bandwidth: bool, step: bool
+) -> LoopFigures:
+    """The same with bandwidth and step of a response, behind the mean of the command where there is one."""
+    from actuator_lti.bandwidth import closed_loop_bandwidth
+    from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
+    from actuator_lti.step import step_figures
+
+    notes: list[str] = []
+
+    def band() -> Bandwidth:
+        own = _measured(closed_loop_bandwidth(response))
+        return own if mean is None else commanded_bandwidth(response, mean)
+
+    def steps() -> StepFigures:
+        own = step_figures(response)
+        return own if mean is None else commanded_step(response, own, mean)
+
+    return replace(
+        figures,
+        plain_response=response,
+        bandwidth=_if_there_is(band, notes) if bandwidth else None,
+        step=_if_there_is(steps, notes) if step else None,
+        notes=tuple(dict.fromkeys(notes)),
+        mean=mean,
+    )
+
+
+def _measured(band: Bandwidth) -> Bandwidth:
+    """The bandwidths, refused where a drive's gain at zero frequency is what rounding leaves of zero."""
+    if band.resonance_peak_db > MOST_RESONANCE_DB:
+        raise InputError(
+            "the response at zero frequency is less than 1e-5 of its largest value: there is nothing to "
+            "measure the fall and the resonance from"
+        )
+    return band
+
+
+def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:
+    """Give a figure; where there is none (no gain at DC, say) or none is found, note the reason instead."""
+    try:
+        return call()
+    except (InputError, NumericalError) as error:
+        notes.append(str(error))
+        return None
+
+
+def all_loop_figures(
+    loops: Loops,
+    *,
+    step: bool = True,
+    refused: list[str] | None = None,
+    certify: bool = False,
+    locked: bool | None = None,
+) -> dict[str, LoopFigures]:
+    """Compute the figures of every loop that the design has, innermost first, by name.
+
+    Parameters
+    ----------
+    loops : Loops
+    step : bool
+        Whether step figures are wanted.
+    refused : list of str, optional
+        Where given, a loop whose margins cannot be found is left out and the reason added here.
+    certify : bool
+        Whether the margins are to be known by exact arithmetic.
+    locked : bool, optional
+        Whether the current loop is wanted with the rotor locked as well; where left out, if a requirement
+        is on it. Without such a requirement it may fail alone, inside `analyses.isolation.isolated`.
+
+    Raises
+    ------
+    InputError, NumericalError
+        If the margins of a loop cannot be found, and ``refused`` is not given.
+    """
+    result = {}
+    needed = any(r.rotor == "locked" for r in loops.design.requirements)
+    for name, loop in loops.present.items():
+        try:
+            if name == "position":
+                result[name] = _position(loops, loop, step=step, certify=certify)
+            else:
+                result[name] = loop_figures(loop, step=step, certify=certify)
+            if name == "current" and (needed if locked is None else locked):
+                own = partial(_locked, loops, step=step, certify=certify)
+                with_it = own() if needed else attempt("current loop with the rotor locked", own, None)
+                result[name] = replace(result[name], locked=with_it)
+        except (InputError, NumericalError) as error:
+            if refused is None:
+                raise
+            refused.append(f"{name} loop, {loops.form}, {loops.operating_point}: {error}")
+    if result and (whole := result.get(loops.design.controller.outermost)) and whole.stable:
+        return {name: _with_held(one, loops, name, step, certify) for name, one in result.items()}
+    return result
+
+
+def _locked(loops: Loops, *, step: bool, certify: bool) -> LoopFigures | None:
+    """The current loop with the rotor locked; ``None`` where it is the one that stands there already."""
+    from analyses.linear.held_loops import other_loops
+
+    if loops.operating.rotor == "locked":
+        return None
+    fixed = other_loops(loops, loops.design, rotor="locked").current
+    assert fixed is not None
+    return loop_figures(fixed, step=step, certify=certify)
+
+
+def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFigures:
+    """The position loop, its response to the command, and to the reference where that is another."""
+    from analyses.linear.held_loops import other_loops
+
+    design, mean = loops.design, command_mean(loops.design)
+    figures = loop_figures(loop, loops.plain_response, step=step, certify=certify, mean=mean)
+    filtered = design.command.filter_time_s > 0.0
+    if not figures.stable or not (filtered or mean):
+        return figures
+    response = loops.plain_response
+    if filtered:
+        bare = replace(design, command=replace(design.command, filter_time_s=0.0))
+        response = other_loops(loops, bare).plain_response
+    reference = _answering(figures, response, None, bandwidth=True, step=step)
+    said = (profile_note(design),) if mean else ()
+    return replace(figures, reference=reference, notes=(*figures.notes, *said))
+
+
+def _with_held(figures: LoopFigures, loops: Loops, name: str, step: bool, certify: bool) -> LoopFigures:
+    """The same, with the figures of the loop held where it is unstable only by itself."""
+    from analyses.linear.held_loops import held_loop
+
+    if figures.margins.stable is not False or (loop := held_loop(loops, name)) is None:
+        return figures
+    held = figures.locked or _if_there_is(lambda: loop_figures(loop, step=step, certify=certify), [])
+    return replace(figures, held=held) if held is not None and held.stable else figures

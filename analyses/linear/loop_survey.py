@@ -1,0 +1,324 @@
+"""All that is said of a design's linear loops: forms, break points, operating points, delays, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypedDict
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from actuator_lti.drawing.faces import draw
+from actuator_lti.errors import InputError, NumericalError
+from analyses.isolation import attempt
+from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
+
+    from actuator_lti.drive.operating import OperatingPoint
+    from actuator_lti.loops import ExactMargins, Loops
+    from actuator_lti.loops.delay_budget import DelayBudget
+    from actuator_lti.loops.limiters import Onset
+    from actuator_lti.loops.result import Form
+
+Progress = Callable[[int, int], None]
+FORMS: tuple[Form, ...] = ("sampled", "continuous", "ideal")
+DESCRIBED_FRACTIONS = (0.01, 0.1)
+MOST_STATES = 160  # of a periodic loop's fundamental: its certificate takes the fifth power of their number
+
+
+@dataclass(frozen=True)
+class BreakPoint:
+    """A loop seen at one point with all others closed.
+
+    Attributes
+    ----------
+    figures : LoopFigures or None
+        ``None`` where they cannot be found; ``reason`` says why.
+    exact : ExactMargins or None
+        Where the loop is periodically time-varying.
+    reason : str
+    """
+
+    figures: LoopFigures | None
+    exact: ExactMargins | None
+    reason: str = ""
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the closed loop is stable; ``None`` where that is not known."""
+        if self.exact is not None:
+            return self.exact.stable
+        return None if self.figures is None else self.figures.margins.stable
+
+
+@dataclass(frozen=True)
+class OperatingPointFigures:
+    """The loops at one slope of the friction.
+
+    Attributes
+    ----------
+    kind : str
+        As `actuator_lti.assemble_loops` names it.
+    label : str
+    load_Nm : float or None
+        ``None`` where it makes no difference.
+    slope_Nms_rad : float
+        Slope of the friction torque over the motor speed.
+    figures : mapping of str to LoopFigures
+    """
+
+    kind: OperatingPoint
+    label: str
+    load_Nm: float | None
+    slope_Nms_rad: float
+    figures: Mapping[str, LoopFigures]
+    load_unit: str = "N m"
+
+    @property
+    def place(self) -> str:
+        """Label and load in words; empty where the dry part slides, as the loops are judged."""
+        if self.kind == "sliding":
+            return ""
+        return self.label if self.load_Nm is None else f"{self.label}, load {self.load_Nm:g} {self.load_unit}"
+
+
+@dataclass(frozen=True)
+class LoopSurvey:
+    """The loops of a design from every side.
+
+    Attributes
+    ----------
+    loops : Loops
+        Sampled, sliding, no load.
+    forms : mapping of str to mapping of str to LoopFigures
+        By form, then by loop; step figures of the sampled form only.
+    break_points : mapping of str to BreakPoint
+    operating_points : tuple of OperatingPointFigures
+    budgets : mapping of str to DelayBudget
+        At the lowest gain crossover of each loop that has one.
+    onset : Onset or None
+        The border of linear validity; ``None`` where nothing limits.
+    refused : tuple of str
+        Loops of the other forms and operating points whose margins were not found, and why.
+    """
+
+    design: Design
+    loops: Loops
+    forms: Mapping[str, Mapping[str, LoopFigures]]
+    break_points: Mapping[str, BreakPoint]
+    operating_points: tuple[OperatingPointFigures, ...]
+    budgets: Mapping[str, DelayBudget]
+    onset: Onset | None
+    refused: tuple[str, ...] = ()
+
+    @property
+    def figures(self) -> Mapping[str, LoopFigures]:
+        """The sampled, sliding loops: those that requirements are judged by."""
+        return self.forms["sampled"]
+
+    def plot_map(self, axes: Any = None) -> Axes:
+        """Draw over frequency the command amplitude at which each limiter sets in; gives the axes."""
+        if self.onset is None:
+            raise InputError(f"{self.design.name}: nothing limits, so there is no map")
+        return draw("plot_onset", self.onset, linear_axis=self.design.axis == "linear", axes=axes)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A data frame with one row for each form and loop: margins, bandwidth, peaks (pandas needed)."""
+        from actuator_lti.start.extras import need
+
+        rows = [
+            {"form": form, "loop": name, **_row(result)}
+            for form, loops in self.forms.items()
+            for name, result in loops.items()
+        ]
+        frame = need("pandas", "tables", "to_pandas").DataFrame(rows).set_index(["form", "loop"])
+        frame.attrs = {"design": self.design.name}
+        return frame
+
+
+class SurveyRow(TypedDict):
+    """A row of `LoopSurvey.to_pandas`."""
+
+    stable: bool | None
+    gain_margin_db: float | None
+    phase_margin_deg: float | None
+    delay_margin_s: float | None
+    modulus_margin: float | None
+    bandwidth_rad_s: float | None
+    evidence: str
+
+
+def _row(figures: LoopFigures) -> SurveyRow:
+    """The figures of one loop, by name with unit."""
+    margins, bandwidth = figures.margins, figures.bandwidth
+    return {
+        "stable": margins.stable,
+        "gain_margin_db": margins.gain_margin_db,
+        "phase_margin_deg": margins.phase_margin_deg,
+        "delay_margin_s": margins.delay_margin_s,
+        "modulus_margin": margins.modulus_margin,
+        "bandwidth_rad_s": None if bandwidth is None else bandwidth.minus3db_rad_s,
+        "evidence": margins.evidence,
+    }
+
+
+def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey:
+    """Assemble and measure the loops of a design in every form and at every operating point.
+
+    All margins are certified, see `stability_margins`.
+
+    Parameters
+    ----------
+    design : Design
+    progress : callable, optional
+        Called with (steps done, steps in all).
+
+    Raises
+    ------
+    InputError, NumericalError
+        As `assemble_loops` and `loop_figures`; inside `analyses.isolation.isolated` only of the sampled
+        loops: what else fails is left out and noted.
+    """
+    from actuator_lti.loops import assemble_loops
+
+    def step(done: int) -> None:
+        if progress is not None:
+            progress(done, 6)
+
+    loops = assemble_loops(design)
+    refused: list[str] = []
+    forms: dict[str, Mapping[str, LoopFigures]] = {
+        "sampled": all_loop_figures(loops, certify=True, locked=True)
+    }
+    for form in FORMS[1:]:
+        other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
+        forms |= {} if other is None else {form: other}
+    step(1)
+    step(2)
+    break_points = attempt("loops at the break points", lambda: _break_points(loops), {})
+    step(3)
+    points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
+    step(4)
+    budgets = attempt("delay budgets", lambda: _budgets(design, forms["sampled"]), {})
+    step(5)
+    border = attempt("border of linear validity", lambda: _onset(loops, forms["sampled"]), None)
+    step(6)
+    return LoopSurvey(
+        design, loops, forms, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
+    )
+
+
+def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
+    """Measure the loops in a form other than the sampled one."""
+    from actuator_lti.loops import assemble_loops
+
+    return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
+
+
+def _break_points(loops: Loops) -> dict[str, BreakPoint]:
+    """Measure the loop at every break point."""
+    return {name: _break_point(loops, name) for name in loops.break_points}
+
+
+def _break_point(loops: Loops, name: str) -> BreakPoint:
+    """Measure the loop at one break point."""
+    from actuator_lti.loops import exact_margins
+
+    loop = loops.break_points[name]
+    exact = exact_margins(loops, name) if loop.periodic else None
+    states = len(loop.plain_open.A)
+    if exact is not None and states > MOST_STATES:
+        why = f"the fundamental has {states} states; up to {MOST_STATES} are certified in a report"
+        return BreakPoint(None, exact, f"{why}; the exact borders of stability are below")
+    try:
+        return BreakPoint(loop_figures(loop, bandwidth=False, step=False, certify=True), exact)
+    except (InputError, NumericalError) as error:
+        return BreakPoint(None, exact, str(error))
+
+
+def operating_points(
+    design: Design, refused: list[str], *, described: bool = True, certify: bool = True
+) -> tuple[OperatingPointFigures, ...]:
+    """Measure the loops at each operating point that the drive has: sliding, driving, driven, gap, rest.
+
+    Parameters
+    ----------
+    refused : list of str
+        Gets the loops whose margins are not found, and why.
+    described : bool
+        Whether friction described at small speeds is wanted as well.
+    certify : bool
+        Whether the margins are to be known by exact arithmetic.
+    """
+    from actuator_lti.drive.operating import friction_slope
+    from actuator_lti.loops import assemble_loops
+
+    def point(
+        label: str, load: float | None, kind: OperatingPoint, speed: float | None = None
+    ) -> OperatingPointFigures:
+        moment = load or 0.0
+        slope = friction_slope(design, kind, moment, speed, 1)
+        loops = assemble_loops(design, operating_point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
+        figures = all_loop_figures(loops, step=False, refused=refused, certify=certify, locked=False)
+        unit = "N" if design.axis == "linear" else "N m"
+        return OperatingPointFigures(kind, label, load, slope, figures, unit)
+
+    points = [point("sliding", None, "sliding")]
+    if design.coupling is not None and design.friction.load_coefficient:
+        points += [
+            point("load driven by the motor", None, "driving"),
+            point("motor driven by the load", None, "driven"),
+        ]
+    if design.coupling is not None and design.coupling.play_rad:
+        points.append(point("in the gap of the play", None, "gap"))
+    for load in dict.fromkeys(design.validation.loads_Nm):
+        points.append(point("at rest", load, "rest"))
+        for speed in _described_speeds(design) if described else ():
+            unit = "rad/s" if design.axis == "rotary" else "m/s"
+            label = f"speed amplitude {speed:.3g} {unit}"
+            points.append(point(label, load, "describing-function", speed))
+    return tuple(points)
+
+
+def _described_speeds(design: Design) -> tuple[float, ...]:
+    """Give the speed amplitudes for the describing function: small fractions of the top speed."""
+    from analyses.specification.drive_figures import drive_figures
+
+    top = drive_figures(design).output_rate_rad_s * design.total_ratio
+    if not np.isfinite(top) or top <= 0.0:
+        return ()
+    return tuple(fraction * top for fraction in DESCRIBED_FRACTIONS)
+
+
+def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, DelayBudget]:
+    """Give the delay budget at the lowest gain crossover of each loop."""
+    from actuator_lti.loops.delay_budget import delay_budget
+
+    budgets = {}
+    for name, result in figures.items():
+        crossovers = [m.frequency_rad_s for m in result.margins.phase_margins if m.frequency_rad_s > 0.0]
+        if crossovers:
+            quoted = result.margins.phase_margin
+            at = quoted.frequency_rad_s if quoted and quoted.frequency_rad_s > 0 else min(crossovers)
+            budgets[name] = delay_budget(design, name, at)
+    return budgets
+
+
+def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
+    """Give the border of linear validity around the bandwidth of the outermost loop."""
+    from actuator_lti.loops.limiters import onset
+
+    outermost = loops.design.controller.outermost
+    if not loops.limiters or outermost not in figures:
+        return None
+    result = figures[outermost]
+    crossover = min((m.frequency_rad_s for m in result.margins.phase_margins), default=100.0)
+    nyquist = min(path.nyquist_rad_s for path in loops.limiters.values())
+    high = min(crossover * 30.0, nyquist * (1.0 - 1e-9))
+    border = onset(loops, np.geomspace(crossover / 100.0, high, 160))
+    return border if np.isfinite(border.amplitude_rad).any() else None

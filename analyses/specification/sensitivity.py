@@ -1,0 +1,160 @@
+"""How much each parameter moves each figure: exact loops, stated finite differences.
+
+The slope is a central difference over the exact sampled loops with a step of 0.1 % of the parameter; the
+swing is the figure computed anew with the parameter at both ends of its tolerance, or 10 % off without one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, drive_cases
+from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
+from actuator_lti.design import parameter_value
+from actuator_lti.drive.profile import command_mean
+from analyses.studies.sampling import Factor
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+STEP = 1e-3
+SWING = 0.1
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """One parameter and one figure.
+
+    Attributes
+    ----------
+    path, figure : str
+        Dotted key; column such as ``"position.phase_margin"``.
+    per_percent : float
+        Change of the figure per +1 % of the parameter (central difference of 0.1 %).
+    low_value, high_value : float
+        Ends of the parameter, SI.
+    low, high : float
+        The figure there; NaN where it does not exist.
+    """
+
+    path: str
+    figure: str
+    per_percent: float
+    low_value: float
+    high_value: float
+    low: float
+    high: float
+
+    @property
+    def swing(self) -> float:
+        """Distance between the figures at both ends."""
+        return abs(_rise(self.low, self.high))
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Every figure against every parameter.
+
+    Attributes
+    ----------
+    base : mapping of str to float
+        Figures of the nominal design.
+    entries : tuple of Sensitivity
+    """
+
+    base: Mapping[str, float]
+    entries: tuple[Sensitivity, ...]
+
+    def tornado(self, figure: str) -> tuple[Sensitivity, ...]:
+        """The parameters that move a figure, the strongest first."""
+        chosen = [
+            e
+            for e in self.entries
+            if e.figure == figure and e.swing > 1e-9 * max(abs(self.base[figure]), 1e-9)
+        ]
+        return tuple(sorted(chosen, key=lambda e: (-e.swing, e.path)))
+
+
+def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensitivities:
+    """Sensitivities of margins, bandwidths and static figures to the parameters of a design.
+
+    Parameters
+    ----------
+    design : Design
+    paths : sequence of str, optional
+        Dotted keys; by default every number of the plant and the controller that is not zero.
+
+    Examples
+    --------
+    The position loop's crossover, and so its bandwidth, follows its gain:
+
+    >>> from actuator_lti import load_design
+    >>> result = sensitivities(load_design("ilr33-amber"), ["control.position.gain"])
+    >>> round(result.tornado("position.bandwidth")[0].per_percent, 2)
+    0.38
+    """
+
+    chosen = tuple(p for p in (paths or variable_paths(design)) if _moves(design, p))
+    nominal = {path: parameter_value(design, path) for path in chosen}
+    ends = {path: _ends(design, path, nominal[path]) for path in chosen}
+    count = 1 + 4 * len(chosen)
+    values = {path: np.full(count, nominal[path]) for path in chosen}
+    for k, path in enumerate(chosen):
+        low, high = ends[path]
+        row = 1 + 4 * k
+        values[path][row : row + 4] = (nominal[path] * (1 - STEP), nominal[path] * (1 + STEP), low, high)
+    figures = population_figures(Population(design, values, count), design)
+    entries = [
+        Sensitivity(
+            path, name, _rise(column[1 + 4 * k], column[2 + 4 * k]) / (200.0 * STEP), *ends[path],
+            float(column[3 + 4 * k]), float(column[4 + 4 * k]),
+        )
+        for k, path in enumerate(chosen)
+        for name, column in figures.items()
+    ]  # fmt: skip
+    return Sensitivities({name: float(column[0]) for name, column in figures.items()}, tuple(entries))
+
+
+def _rise(low: float, high: float) -> float:
+    """High less low; 0 where both are the same infinity (a stiffness that no moment overcomes)."""
+    return 0.0 if low == high else float(high - low)
+
+
+def _moves(design: Design, path: str) -> bool:
+    """Whether a parameter is a finite number that is not zero."""
+
+    value = parameter_value(design, path)
+    return value != 0.0 and bool(np.isfinite(value)) and not path.startswith("friction.breakaway")
+
+
+def _ends(design: Design, path: str, nominal: float) -> tuple[float, float]:
+    parameter = design.parameters.get(path)
+    if parameter is not None and parameter.tolerance is not None:
+        low, high = Factor(path, nominal, parameter.tolerance).box
+        return low, high
+    return nominal * (1 - SWING), nominal * (1 + SWING)
+
+
+def population_figures(
+    population: Population, design: Design, *, time_figures: bool = False
+) -> dict[str, np.ndarray]:
+    """Figures of many designs by column, as `Sensitivity` names them; static ones at the design's loads.
+
+    Behind the mean of a limited jerk the response to the command is not among them.
+    """
+    linear = linear_figures(population, time_figures=time_figures, held=True)
+    columns = {}
+    for loop in linear.loops:
+        for name, quantity in LOOP_QUANTITIES.items():
+            unlike = loop == "position" and quantity.of_response and command_mean(design)
+            if (time_figures or not quantity.timed) and not unlike:  # stairs of samples have no slope
+                values = linear.quantity(name, loop)
+                columns[f"{loop}.{name}"] = np.abs(values) if quantity.absolute else values
+    for name, load in drive_cases(design.validation.loads_Nm):
+        if name != "motor_current" or design.motor.has_electrical_dynamics:
+            columns[f"drive.{name}@{load:g}"] = drive_figures(population, name, load)
+    return columns

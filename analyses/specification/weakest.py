@@ -1,0 +1,178 @@
+"""The weakest point of a drive: its least margin over all views, against what is required or customary.
+
+Views are the loops with the outer ones open, the loop cut at each break point with all others closed, the
+operating points, and the corners of temperature, supply and tolerances. Margins of different kinds are ranked
+by how near they let L come to -1 (`actuator_lti.asked.quantities.reserve`), not by shares of decibels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, isinf, log10
+from typing import TYPE_CHECKING
+
+from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, reserve
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from actuator_lti.margins import StabilityMargins
+    from analyses.corners import Corners
+    from analyses.linear.loop_figures import LoopFigures
+    from analyses.linear.loop_survey import BreakPoint, LoopSurvey, OperatingPointFigures
+
+
+@dataclass(frozen=True)
+class View:
+    """The margins of a loop from one side.
+
+    Attributes
+    ----------
+    place : str
+        Which operating point or corner, or that all loops are closed; empty for the loop as it is judged.
+    loop : str
+        Its name; empty at a break point.
+    rotor : str
+        Of a current loop: ``"free"`` or ``"locked"``.
+    stable : bool or None
+    figures : mapping of str to float
+        By the names of `CUSTOMARY`; ``inf`` where nothing limits.
+    cut : str
+        The break point, with all other loops closed.
+    """
+
+    place: str
+    loop: str
+    rotor: str
+    stable: bool | None
+    figures: Mapping[str, float]
+    cut: str = ""
+
+
+@dataclass(frozen=True)
+class WeakPoint:
+    """One margin in one view.
+
+    Attributes
+    ----------
+    view : View
+    quantity : str
+        Empty where the loop is not stable.
+    value, limit : float
+    required : bool
+        Whether the limit is a requirement's; else it is the customary one.
+    reserve : float
+        Share of the limit, as distance of L from -1, that is left; negative beyond it.
+    """
+
+    view: View
+    quantity: str
+    value: float
+    limit: float
+    required: bool
+    reserve: float
+
+
+def weakest(survey: LoopSurvey, corners: Corners | None = None) -> WeakPoint | None:
+    """The weakest point of a drive; ``None`` where no margin is known.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> from analyses.linear.loop_survey import survey_loops
+    >>> point = weakest(survey_loops(load_design("ilr33-amber")))
+    >>> point.view.loop, point.quantity
+    ('position', 'phase_margin')
+    """
+    points = [point for view in views(survey, corners) for point in _points(view, survey.design)]
+    return min(points, key=lambda point: point.reserve, default=None)
+
+
+def views(survey: LoopSurvey, corners: Corners | None = None) -> Iterator[View]:
+    """Every view of a drive, the loops as they are judged first."""
+    yield from _loops("", survey.figures)
+    for name, point in survey.break_points.items():
+        yield _at_break_point(name, point)
+    for one in survey.operating_points:
+        if one.kind != "describing-function":
+            yield from _loops(one.place, one.figures)
+    for corner in corners.corners[1:] if corners else ():
+        place = corner.name.replace("worst ", "tolerances of the worst ", 1)
+        yield from _loops(place, corner.figures)
+
+
+def _loops(place: str, loops: Mapping[str, LoopFigures]) -> Iterator[View]:
+    for name, one in loops.items():
+        judged = one.judged
+        yield View(place, name, one.rotor, judged.margins.stable, figures_of(judged.margins))
+        if one.locked is not None and one.held is None:
+            yield View(place, name, "locked", one.locked.stable, figures_of(one.locked.margins))
+
+
+def _at_break_point(name: str, point: BreakPoint) -> View:
+    figures = {} if point.figures is None else dict(figures_of(point.figures.margins))
+    if point.exact is not None and point.exact.stable:  # periodic: the fundamental alone is not all of it
+        up, down = point.exact.gain_upper, point.exact.gain_lower
+        figures["gain_margin"] = 20.0 * log10(min(up, 1.0 / down if down else inf))
+    return View("all loops closed", "", "", point.stable, figures, name)
+
+
+def figures_of(margins: StabilityMargins) -> dict[str, float]:
+    """The margins that custom limits, by name; those that there are."""
+    found = {name: getattr(margins, QUANTITIES[name].reader.partition(".")[2]) for name in CUSTOMARY}
+    return {name: abs(float(value)) for name, value in found.items() if value is not None}
+
+
+def _points(view: View, design: Design) -> Iterator[WeakPoint]:
+    if view.stable is False:
+        yield WeakPoint(view, "", 0.0, 0.0, False, -inf)
+    if view.stable is not True:
+        return
+    for name, value in view.figures.items():
+        required = _required(design, name, view)
+        limit = CUSTOMARY[name] if required is None else required
+        if not isinf(value):
+            yield WeakPoint(
+                view, name, value, limit, required is not None, reserve(name, value, limit, value - limit)
+            )
+
+
+def _required(design: Design, quantity: str, view: View) -> float | None:
+    """The limit that a requirement sets on a loop as it is judged; elsewhere custom holds."""
+    limits = [
+        item.minimum
+        for item in design.requirements
+        if item.quantity == quantity and item.loop in ("every", view.loop) and item.minimum
+        if view.rotor in ("", item.rotor or "free")
+    ]
+    return max(limits) if limits and not view.place else None
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A margin of a loop over the operating points of a drive: least and most, and where it is least."""
+
+    least: float
+    most: float
+    where: str
+
+
+def spread(
+    points: Sequence[OperatingPointFigures], names: Iterable[str] = ("gain_margin", "phase_margin")
+) -> dict[str, dict[str, Spread]]:
+    """By loop and figure; of a loop that is stable at every operating point."""
+    stable = {
+        loop: [point for point in points if loop in point.figures and point.kind != "describing-function"]
+        for loop in dict.fromkeys(name for point in points for name in point.figures)
+    }
+    made: dict[str, dict[str, Spread]] = {}
+    for loop, seen in stable.items():
+        if not all(point.figures[loop].judged.stable for point in seen):
+            continue
+        rows = [(point.place or "sliding", figures_of(point.figures[loop].judged.margins)) for point in seen]
+        for name in names:
+            values = [(figures[name], place) for place, figures in rows if name in figures]
+            if values:
+                least, most = min(values, key=lambda v: v[0]), max(values, key=lambda v: v[0])
+                made.setdefault(loop, {})[name] = Spread(least[0], most[0], least[1])
+    return made

@@ -1,0 +1,1 @@
+"""Work that falls into parts: study files, samples, and where they are computed."""

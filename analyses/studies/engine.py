@@ -1,0 +1,219 @@
+"""Work that falls into parts, computed here, on a local Dask cluster, or on one that is already there.
+
+Parts are chunks of a numbered study (`Engine.run`) or any items (`Engine.map`). What comes of a part must not
+depend on where it is computed; results come in any order and are given to a sink one by one, so that memory
+holds only a few, whatever their number.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+import numpy as np
+
+from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.start.extras import need
+from analyses.studies import cluster
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+Chunk = tuple[int, int]
+Arrays = dict[str, np.ndarray]
+Progress = Callable[[int, int], None]
+Item = TypeVar("Item")
+Part = TypeVar("Part", covariant=True)
+Result = TypeVar("Result")
+
+
+class Task(Protocol[Part]):
+    """What is evaluated for numbers first to first + count - 1."""
+
+    def evaluate(self, first: int, count: int) -> Part:
+        """What they come to: columns by name, each of shape (count,), say."""
+
+
+@dataclass(frozen=True)
+class Engine:
+    """Where parts are computed.
+
+    Attributes
+    ----------
+    workers : int or None
+        Processes of a local Dask cluster; ``None`` for none.
+    scheduler : str or None
+        Address of a running Dask scheduler, such as ``tls://host:8786``.
+    tls : Path or None
+        Folder with ca.pem, cert.pem and key.pem for that scheduler.
+    threads : int or None
+        Threads in this process when neither is given; all processors by default.
+    """
+
+    workers: int | None = None
+    scheduler: str | None = None
+    threads: int | None = None
+    tls: Path | None = None
+
+    @property
+    def caution(self) -> str:
+        """What to know of the connection before it is used; empty where nothing."""
+        if self.scheduler is None or not cluster.is_open(self.scheduler):
+            return ""
+        return (
+            f"--scheduler {self.scheduler}: not encrypted, and whoever reaches it can run code on its workers"
+            " and here; use tls:// with --tls"
+        )
+
+    def __post_init__(self) -> None:
+        if self.workers is not None and self.scheduler is not None:
+            raise InputError("--workers and --scheduler: one of them")
+        if self.workers is not None and self.workers < 1:
+            raise InputError(f"--workers {self.workers}: at least 1")
+        if self.tls is not None and not (self.scheduler or "").startswith("tls://"):
+            raise InputError("--tls: goes with --scheduler tls://HOST:PORT")
+        if self.tls is None and (self.scheduler or "").startswith("tls://"):
+            raise InputError(
+                f"--scheduler {self.scheduler}: needs --tls DIR with {', '.join(cluster.TLS_FILES.values())}"
+            )
+
+    @property
+    def distributed(self) -> bool:
+        """Whether parts go to other processes."""
+        return self.workers is not None or self.scheduler is not None
+
+    def run(
+        self,
+        task: Task[Result],
+        chunks: Iterable[Chunk],
+        sink: Callable[[Chunk, Result], None],
+        progress: Progress | None = None,
+    ) -> None:
+        """Evaluate every chunk once and give each result to the sink, in any order.
+
+        Raises
+        ------
+        NumericalError
+            If workers keep dying, or the scheduler cannot be reached or is lost.
+        InputError
+            If a worker computes otherwise than this process (`analyses.studies.proof`).
+        """
+        todo = list(chunks)
+        counted = _Counted(progress, sum(count for _, count in todo))
+
+        def take(chunk: Chunk, part: Result) -> None:
+            sink(chunk, part)
+            counted.add(chunk[1])
+
+        self._each(_evaluate, task, todo, take)
+
+    def map(
+        self,
+        work: Callable[[Item], Result],
+        items: Sequence[Item],
+        sink: Callable[[Item, Result], None],
+        progress: Progress | None = None,
+    ) -> None:
+        """Apply a function of a module to every item once, each result to the sink, in any order.
+
+        Raises
+        ------
+        NumericalError
+            As `run`; whatever the work raises goes its way.
+        """
+        counted = _Counted(progress, len(items))
+
+        def take(item: Item, result: Result) -> None:
+            sink(item, result)
+            counted.add(1)
+
+        self._each(_applied, work, list(items), take)
+
+    def _each(
+        self, call: Callable[[Any, Any], Any], held: Any, todo: list[Any], sink: Callable[[Any, Any], None]
+    ) -> None:
+        """Give ``call(held, part)`` of every part to the sink."""
+        if not todo:
+            return
+        if not self.distributed:
+            _threads(partial(call, held), todo, sink, self.threads or os.cpu_count() or 1)
+            return
+        finished = False
+        try:
+            with self._client() as client:
+                cluster.submit(client, call, held, todo, sink)
+                finished = True
+        except (OSError, TimeoutError, CancelledError) as error:
+            if isinstance(error, InputError):
+                raise
+            if not finished:  # a cluster too slow to close takes no result back
+                said = " ".join(str(error).split()) or "no answer in time"
+                if isinstance(error, CancelledError):
+                    said = "the connection is lost"
+                raise NumericalError(
+                    f"Dask scheduler {self.scheduler or 'here'}: {said}; what is done is kept: the same"
+                    " command goes on with it, on this scheduler or another"
+                ) from error
+
+    @contextmanager
+    def _client(self) -> Iterator[Client]:
+        need("distributed", "cluster", "a cluster of workers")
+        import distributed
+
+        if self.scheduler is not None:
+            with cluster.quiet(), cluster.connected(self.scheduler, self.tls) as client:
+                yield client
+            return
+        with (
+            cluster.quiet(),
+            cluster.local_cluster(self.workers or 1) as here,
+            distributed.Client(here) as client,
+        ):
+            yield client
+
+
+@dataclass
+class _Counted:
+    """Reports how much is done."""
+
+    progress: Progress | None
+    total: int
+    done: int = 0
+
+    def add(self, count: int) -> None:
+        self.done += count
+        if self.progress is not None:
+            self.progress(self.done, self.total)
+
+
+def _threads(
+    call: Callable[[Any], Any], todo: list[Any], sink: Callable[[Any, Any], None], threads: int
+) -> None:
+    """Compute in threads of this process (the compiled parts run without the interpreter's lock)."""
+    waiting = iter(todo)
+    pool = ThreadPoolExecutor(threads)
+    try:
+        running = {pool.submit(call, part): part for part in islice(waiting, threads * cluster.IN_FLIGHT)}
+        while running:
+            finished, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in sorted(finished, key=lambda one: one.exception() is not None):  # keep the good
+                sink(running.pop(future), future.result())
+                for part in islice(waiting, 1):
+                    running[pool.submit(call, part)] = part
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)  # who holds a part that never ends can end it now
+
+
+def _evaluate(task: Task[Result], chunk: Chunk) -> Result:
+    return task.evaluate(*chunk)
+
+
+def _applied(work: Callable[[Any], Any], item: Any) -> Any:
+    return work(item)

@@ -1,0 +1,68 @@
+"""What is asked of a comparison of variants, and the study that it is asked of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from actuator_lti.errors import InputError
+from actuator_lti.files.tree import Tree
+from analyses.request import OnMachines, Option
+
+if TYPE_CHECKING:
+    from analyses.comparison.variants import Comparison
+    from analyses.studies.study import Study
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked(OnMachines):
+    """A comparison."""
+
+    validate: Annotated[
+        bool | None,
+        Option(
+            words="The nonlinear check of every design; as the study says.", flag="validate/--no-validate"
+        ),
+    ] = None
+    example: Annotated[bool, Option(words="Print a study file to start from, and stop.")] = False
+
+
+def compared(
+    study: Study | None, asked: Asked, *, out: Path, progress: Callable[[int, int], None] | None = None
+) -> Comparison | str:
+    """Compare the variants of a study; what is found of each design is kept under ``out``.
+
+    Raises
+    ------
+    InputError
+        Without a study, unless the example of one is asked for.
+    """
+    if asked.example:
+        import textwrap
+
+        import analyses.studies.study
+
+        return textwrap.dedent((analyses.studies.study.__doc__ or "").split("::", 1)[1]).strip()
+    if study is None:
+        raise InputError("compare: give a study file or a design; --example prints a study file")
+    from analyses.comparison.variants import compare
+
+    engine = asked.engine if asked.workers or asked.scheduler else None  # else one after the other
+    return compare(study, validation=asked.validate, progress=progress, engine=engine, folder=out / "designs")
+
+
+def study_with(path: str, variants: dict[str, Tree]) -> Study:
+    """A study file, or a study of a design; with more variants, by name."""
+    from actuator_lti.design import load_design, with_overrides
+    from analyses.slugs import slug
+    from analyses.studies.study import Variant, is_study, load_study, study_of
+
+    plan = load_study(path) if is_study(path) else study_of(load_design(path))
+    assert plan.base.design is not None
+    extra = [
+        Variant(words, slug(words), with_overrides(plan.base.design, overrides), overrides)
+        for words, overrides in variants.items()
+    ]
+    return replace(plan, variants=(*plan.variants, *extra))

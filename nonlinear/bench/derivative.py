@@ -1,0 +1,169 @@
+"""The simulator's own derivative: a complete linear model of the running drive, from its compiled tick.
+
+On an operating motion one base period of the drive, H ticks (the least common multiple of its stages'
+updates), is a map of its state s and of a signal v added at one place and held there over its own period,
+
+    s' = F(s, v),   y = G(s, v).
+
+It is affine where no event changes (a limit, a reversal, a parting of the coupling) and smooth under a load
+that bends with the angle.  Its derivative
+
+    A = dF/ds,   B = dF/dv,   C = dG/ds,   D = dG/dv
+
+says everything that a linear loop says: response, poles, margins, at any rate, of any slow mode, stable or
+not.  It shares no code with the linear loops, so the two may be held against each other.
+
+`nonlinear.bench.differences` takes it; what two sizes of its steps differ in is the stated error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.loader import as_design
+from actuator_lti.systems.resolvent import balanced
+from nonlinear.bench.differences import Differences
+from nonlinear.bench.lifted import Complexes, Floats, response
+from nonlinear.bench.loop_setup import LoopSetup, loop_setup
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """Linear model of the running drive from an injection at a place to what comes back there.
+
+    Attributes
+    ----------
+    place : str
+        A stage (outer loops open), a break point (all loops closed), ``"command"`` or ``"load"``.
+    A, B, C, D : ndarray, shapes (n, n), (n, M), (M, n), (M, M)
+        Over one base period. The M inputs are the values held one after the other at the place, the M outputs
+        what comes back at its updates, negated: the closed loop T = L/(1 + L). To command and load:
+        the output's answer.
+    period_s, hold_s : float
+        Base period, and time between two updates at the place.
+    states : tuple of str
+        Names of the numbers of the state that the injection moves, as the layout has them.
+    stated_error : float
+        Largest error of the response, relative, by what two step sizes differ in.
+    places : ndarray of int, shape (n,)
+        Where the states lie in the row of the state.
+    """
+
+    place: str
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+    period_s: float
+    hold_s: float
+    states: tuple[str, ...]
+    stated_error: float
+    places: npt.NDArray[np.intp] = field(repr=False, default_factory=lambda: np.empty(0, np.intp))
+
+    @cached_property
+    def system(self) -> Any:
+        """The same as a `control.StateSpace` with named signals."""
+        import control
+
+        updates = range(self.B.shape[1])
+        names = {"inputs": [f"{self.place}_in[{k}]" for k in updates]}
+        names["outputs"] = [f"{self.place}_back[{k}]" for k in updates]
+        parts = (self.A, self.B, self.C, self.D, self.period_s)
+        return control.ss(*parts, remove_useless_states=False, name=f"tangent_{self.place}", **names)
+
+    def closed(self, points: npt.ArrayLike) -> Complexes:
+        """T at points z = exp(j w hold_s), of their shape; of a periodic loop the fundamental.
+
+        That is what a sinusoid injected at the place brings back at its own frequency.
+        """
+        return response(self.A, self.B, self.C, self.D, np.asarray(points, complex))
+
+    def open(self, points: npt.ArrayLike) -> Complexes:
+        """L = T/(1 - T) at points z."""
+        closed = self.closed(points)
+        return np.asarray(closed / (1.0 - closed))
+
+    def lifted(self, point: complex) -> Complexes:
+        """The transfer matrix over a base period, shape (M, M), at a point z = exp(j w period_s)."""
+        A, scale = balanced(self.A)
+        inside = np.linalg.solve(point * np.eye(len(A)) - A, (self.B / scale[:, None]).astype(complex))
+        return np.asarray(self.C * scale @ inside + self.D)
+
+    def at_gain(self, gain: float) -> Floats:
+        """A with the loop gain at the place multiplied: v = (gain - 1) times what comes back."""
+        more = gain - 1.0
+        back = np.linalg.solve(np.eye(len(self.D)) + more * self.D, self.C)
+        return np.asarray(self.A - more * self.B @ back)
+
+    def __str__(self) -> str:
+        return (
+            f"tangent at {self.place}: {len(self.A)} states over {self.period_s:g} s, "
+            f"stated error {self.stated_error:.1e}"
+        )
+
+
+def tangent(
+    design: Design | str | PathLike[str], place: str, *, setup: LoopSetup | None = None, hold: bool = True
+) -> Tangent:
+    """Measure the derivative of the running drive.
+
+    Parameters
+    ----------
+    design : Design, str or path
+    place : str
+        ``"current"``, ``"velocity"``, ``"position"``: the loop of a stage, outer loops open.  ``"u"``,
+        ``"i_ref"``, ``"w_ref"``, ``"output"``: the loop seen there, all loops closed.  ``"command"`` and
+        ``"load"``: from the command, from the moment on the output shaft, to the output.
+    setup : LoopSetup, optional
+        Operating motion and test set-up; by default `nonlinear.bench.loop_setup.loop_setup` chooses one.
+    hold : bool
+        Whether the rotor is locked for the current loop, as on a bench.
+
+    Returns
+    -------
+    Tangent
+
+    Raises
+    ------
+    InputError
+        If the design has no such place or no operating motion.
+    NumericalError
+        If no step is free of events.
+
+    Notes
+    -----
+    Limits, counts, noise and supply are out of the test set-up; friction acts as the operating motion has it.
+
+    Examples
+    --------
+    >>> t = tangent("ilr33-amber", "position")
+    >>> t.stated_error < 1e-7, t.period_s
+    (True, 0.0001)
+    >>> import numpy as np
+    >>> from actuator_lti import assemble_loops
+    >>> z = np.exp(1j * 130.0 * t.hold_s)
+    >>> bool(abs(t.open(z) / assemble_loops("ilr33-amber").position.open_loop(z) - 1.0) < 1e-9)
+    True
+    """
+    if setup is None:
+        setup = loop_setup(as_design(design), place, limits_on=False, held=hold and place == "current")
+    measured, tick_s = Differences(setup, place), setup.design.controller.period_s
+    parts, stated_error = measured.parts()
+    return Tangent(
+        place,
+        *parts,
+        period_s=setup.base_ticks * tick_s,
+        hold_s=measured.hold * tick_s,
+        states=measured.names,
+        stated_error=stated_error,
+        places=measured.moved,
+    )

@@ -1,0 +1,251 @@
+"""Central differences of the compiled tick over one base period, all numbers of the state at once.
+
+Which numbers take part, a kick at the place shows: those that it moves.  A first estimate, by steps as large
+as no event forbids, says how far a large sine at the place moves each number.  From ten times that motion on
+steps fall by tens.  Each column is taken where successive steps agree best, by what their difference does
+to the response: larger steps bend, smaller ones are lost in rounding.  The sum of these differences is the
+stated error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isfinite
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.errors import NumericalError
+from nonlinear._kernels import layout as at
+from nonlinear._kernels.state_kinds import CONTINUOUS, COUNTER, FLAG, names_of, places_of
+from nonlinear.bench.lifted import GRID, Floats, response, sensitivities, sized
+from nonlinear.bench.loop_setup import LoopSetup, every
+from nonlinear.bench.stepper import Stepper
+
+Parts = tuple[Floats, Floats, Floats, Floats]
+RETURNED = {
+    "u": at.S_VOLTAGE_BEFORE, "i_ref": at.S_CURRENT_BEFORE, "w_ref": at.S_SPEED_COMMAND,
+    "output": at.S_OUTPUT_BEFORE,
+}  # fmt: skip
+DECADES, MOST_DECADES = 11, 40  # of steps; where events forbid the larger ones
+SWAY = 10.0  # times the motion that a large sine makes: the largest step
+LEAST = float(np.sqrt(np.finfo(float).eps))  # of the number itself: the largest step is no smaller
+FAR = 1e8  # times a kick's first motion: the largest step of the first estimate
+FRESH = 4  # periods from when a number is first moved, in which its motion gives its scale
+
+
+class Differences:
+    """One place of a drive that runs by hand.
+
+    A row is a state, and behind it what is injected at each update at the place.
+
+    Attributes
+    ----------
+    hold, updates : int
+        Ticks between two updates at the place; updates in a base period.
+    moved : ndarray of int
+        Places of the numbers of the state that take part.
+    """
+
+    def __init__(self, setup: LoopSetup, place: str) -> None:
+        self.where = f"{setup.design.name}: {place}"
+        self.injected = _Injection(setup, place)
+        self.drive = Stepper(self.injected.rows)
+        self.injected.prepare(self.drive.p)
+        self.base, self.hold = setup.base_ticks, self.injected.hold_ticks
+        self.updates, self.size = self.base // self.hold, self.drive.start.size
+        self.watched = places_of(self.drive.p, FLAG, COUNTER)
+        self.start = np.concatenate([self.drive.start, np.full(self.updates, self.injected.steady)])
+        after, _, self.calm = self._runs(self.start[None])
+        if after[0, at.S_EVENTS] != self.start[at.S_EVENTS]:
+            raise NumericalError(f"{self.where}: an event happens on the operating motion itself")
+        self.moved, scale, self.kick = self._reached()
+        self.places = np.concatenate([self.moved, self.size + np.arange(self.updates)])
+        self.scale = np.concatenate([scale, np.full(self.updates, self.kick)])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the numbers of the state that take part."""
+        return names_of(self.moved)
+
+    def parts(self) -> tuple[Parts, float]:
+        """A, B, C and D, and the stated error: the largest of the response, relative."""
+        left, right = self._felt(self._estimate())
+        sway = SWAY * self.kick * np.max(right, axis=0)
+        tried = self._tried(np.maximum(sway, LEAST * np.abs(self.start[self.places])))
+        for _ in range(2):  # what is felt of an error is known once the response is
+            whole, off = tried.best(left, right)
+            left, right = self._felt(whole)
+        return self._split(whole), float(np.max(np.einsum("zi,ik,zk->z", left, off, right)))
+
+    def _split(self, whole: Floats) -> Parts:
+        n = self.moved.size
+        return whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]
+
+    def _felt(self, whole: Floats) -> tuple[Floats, Floats]:
+        """What errors of the entries do to the response, over its size, see `sensitivities`."""
+        z, parts = np.exp(1j * GRID), self._split(whole)
+        left, right = (np.abs(each) for each in sensitivities(*parts, z))
+        return left / sized(response(*parts, z))[:, None], right
+
+    def _runs(self, rows: Floats) -> tuple[Floats, Floats, Floats]:
+        """States behind one base period, what came back at each update, and flags on the way."""
+        states, injected = rows[:, : self.size].copy(), rows[:, self.size :]
+        back, flags = np.empty(injected.shape), np.empty((*injected.shape, self.watched.size))
+        for k in range(self.updates):
+            early = self.injected.read(states, self.drive.p)
+            self.drive.each(states, self.hold, self.injected.at, injected[:, k])
+            back[:, k] = early if self.injected.at_start else self.injected.read(states, self.drive.p)
+            flags[:, k] = states[:, self.watched]
+        return states, back, flags
+
+    def _reached(self) -> tuple[npt.NDArray[np.intp], Floats, float]:
+        """Which numbers a kick moves, how far each, and the kick: the largest without an event."""
+        kick, continuous = self.injected.size, places_of(self.drive.p, CONTINUOUS)
+        for _ in range(16):
+            moved = self._kicked(kick)
+            if moved is not None:
+                places = continuous[moved[continuous] > 0.0]
+                return places, moved[places], kick
+            kick /= 10.0
+        raise NumericalError(
+            f"{self.where}: every kick at it ends in an event; no operating motion without one"
+        )
+
+    @property
+    def _memory(self) -> int:
+        """Ticks that a change may take through delay line, stored angles and moving average."""
+        p = self.drive.p
+        stored = p[at.DIFFERENCE_SAMPLES] * p[at.EVERY_VELOCITY] + p[at.PROFILE_SAMPLES] * p[at.OUTER_EVERY]
+        return int(p[at.DELAY_LINE] + stored)
+
+    def _kicked(self, kick: float) -> Floats | None:
+        """How far a kick moves each number soon after it reaches it; None where it ends in an event."""
+        rows = np.stack([self.start, self.start])
+        rows[0, self.size] += kick
+        moved, since = np.zeros(self.size), np.full(self.size, -1)
+        quiet, period = 0, 0
+        while quiet <= self._memory // self.base + FRESH:
+            rows[:, : self.size], _, flags = self._runs(rows)
+            rows[0, self.size] = self.injected.steady
+            if not np.array_equal(*flags):
+                return None
+            kicked, calm = rows[:, : self.size]
+            off = np.abs(np.where(kicked == calm, 0.0, kicked) - np.where(kicked == calm, 0.0, calm))
+            new = (off > 0.0) & (since < 0)  # a limit that is lifted is infinite in both
+            since[new] = period
+            young = (since >= 0) & (period - since < FRESH)
+            moved[young] = np.maximum(moved[young], off[young])
+            quiet, period = (0 if new.any() else quiet + 1), period + 1
+        return moved
+
+    def _estimate(self) -> Floats:
+        """Columns by the largest step each, far beyond the kick's own motion, that ends in no event."""
+        steps, columns = FAR * self.scale, np.zeros((self.scale.size, self.scale.size))
+        free = np.zeros(steps.size, bool)
+        for _ in range(MOST_DECADES):
+            found = self._differences(steps)[0]
+            new = ~free & np.isfinite(found).all(axis=1)
+            columns[new], free = found[new], free | new
+            if free.all():
+                return columns.T
+            steps = np.where(free, 0.0, 0.1 * steps)
+        raise self._refused(free)
+
+    def _tried(self, largest: Floats) -> _Columns:
+        """Columns by steps that fall by tens, until each has three successive ones without an event."""
+        tried: list[tuple[Floats, Floats]] = []
+        for decade in range(MOST_DECADES):
+            tried.append(self._differences(largest * 10.0**-decade))
+            if decade + 1 < DECADES:
+                continue
+            columns = _Columns(*zip(*tried, strict=True))
+            if columns.free.all():
+                return columns
+        raise self._refused(columns.free)
+
+    def _refused(self, free: npt.NDArray[np.bool_]) -> NumericalError:
+        """No step without an event."""
+        name = (*self.names, *["the injection"] * self.updates)[int(np.argmin(free))]
+        return NumericalError(f"{self.where}: every step of {name} ends in an event")
+
+    def _differences(self, steps: Floats) -> tuple[Floats, Floats]:
+        """Central differences over all numbers, one a row, and what rounding may make of them.
+
+        NaN where an event took place, or where the step is lost in the number.
+        """
+        K, both = steps.size, np.arange(2 * steps.size)
+        rows, places = np.tile(self.start, (2 * K, 1)), np.concatenate([self.places, self.places])
+        rows[both, places] += np.concatenate([steps, -steps])
+        ends = rows[both, places]
+        after, back, flags = self._runs(rows)
+        found = np.concatenate([after[:, self.moved], back], axis=1)
+        calm = (flags == self.calm).all(axis=(1, 2)) & np.isfinite(found).all(axis=1)
+        width = ends[:K] - ends[K:]
+        width = np.where(calm[:K] & calm[K:] & (width > 0.0), width, np.nan)[:, None]
+        size = np.maximum(np.abs(found[:K]), np.abs(found[K:]))
+        return (found[:K] - found[K:]) / width, np.spacing(size) / width
+
+
+class _Columns:
+    """All columns by steps that fall by tens, and what each differs in from that of the next smaller step."""
+
+    def __init__(self, values: Sequence[Floats], rounding: Sequence[Floats]) -> None:
+        self.values = np.stack(values[:-1])
+        self.off = np.maximum(np.abs(np.diff(np.stack(values), axis=0)), np.stack(rounding[:-1]))
+
+    @property
+    def free(self) -> npt.NDArray[np.bool_]:
+        """Which have three successive steps without an event."""
+        there = np.asarray(np.isfinite(self.off).all(axis=2))
+        return np.asarray((there[:-1] & there[1:]).any(axis=0))
+
+    def best(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:
+        """Each column by the step whose error does least to the response; and that error.
+
+        Of a step counts what its neighbours are off by as well: a step that is lost in rounding changes
+        nothing, and agrees with the next smaller one by that.
+        """
+        felt = np.max((self.off @ left.T) * right.T, axis=2)
+        larger = np.nan_to_num(np.vstack([0.0 * felt[:1], felt[:-1]]), nan=0.0)
+        smaller = np.vstack([felt[1:], np.full_like(felt[:1], np.inf)])
+        felt = np.maximum(np.maximum(felt, smaller), larger)
+        chosen = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
+        columns = np.arange(chosen.size)
+        return self.values[chosen, columns].T, self.off[chosen, columns].T
+
+
+class _Injection:
+    """Where the signal is added, how much would be large there, and what is read."""
+
+    def __init__(self, setup: LoopSetup, place: str) -> None:
+        design = setup.design
+        self.place, self.rows, self.ratio = place, setup.row(), design.total_ratio
+        self.at_start = place in ("command", "load")
+        self.outermost = design.controller.outermost
+        if place == "load":
+            self.hold_ticks, self.at = 1, at.LOAD
+        elif place == "command":
+            self.rows.step("command", 0.0, -1.0)
+            self.hold_ticks, self.at = every(design, self.outermost), at.COMMAND + 1
+        else:
+            point = setup.point
+            self.rows.step(point, 0.0, -1.0)
+            probe = at.PROBES + at.POINTS.index(point) * at.PROBE_SIZE
+            self.hold_ticks, self.at = setup.hold_ticks, probe + at.PROBE_SIGNAL + 1
+            self.read_at = RETURNED[point]
+        self.size = setup.range if isfinite(setup.range) and setup.range > 0.0 else 1.0
+        self.steady = float(self.rows.values[0, self.at])
+
+    def prepare(self, p: Floats) -> None:
+        """Let the load be looked at in every tick where it is what is moved."""
+        if self.place == "load":
+            p[at.RARE_LOAD] = 1.0
+
+    def read(self, s: Floats, p: Floats) -> Floats:
+        """What comes back, negated; the output itself for command and load."""
+        if not self.at_start:
+            return -s[:, self.read_at]
+        if self.place == "command" and self.outermost != "position":
+            return s[:, at.S_CURRENT if self.outermost == "current" else at.S_SPEED].copy()
+        return s[:, at.S_OUTPUT].copy() if p[at.ELASTIC_DRIVE] > 0.0 else s[:, at.S_ANGLE] / self.ratio

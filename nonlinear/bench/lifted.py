@@ -1,0 +1,49 @@
+"""The response of a system over one base period, of M updates at a place, to a sine there; and its errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.systems.resolvent import balanced
+
+Floats = npt.NDArray[np.float64]
+Complexes = npt.NDArray[np.complex128]
+GRID = np.geomspace(1e-4, 0.98, 60) * np.pi  # rad a sample: where responses are compared
+FAINT = 1e-6  # of the dominant part of a response: below that it is judged by that part
+
+
+def response(A: Floats, B: Floats, C: Floats, D: Floats, z: Complexes) -> Complexes:
+    """The fundamental of a lifted system at points of the faster rate, shape of z."""
+    A, scale = balanced(A)
+    B, C = B / scale[:, None], C * scale
+    M, n = B.shape[1], len(A)
+    points = z.reshape(-1, 1, 1)
+    inside = np.linalg.solve(points**M * np.eye(n) - A, np.broadcast_to(B.astype(complex), (z.size, n, M)))
+    turn = z.reshape(-1, 1) ** np.arange(M)
+    whole = C @ inside + D
+    return np.asarray(np.einsum("kj,kjm,km->k", 1.0 / turn, whole, turn) / M).reshape(z.shape)
+
+
+def sensitivities(A: Floats, B: Floats, C: Floats, D: Floats, z: Complexes) -> tuple[Complexes, Complexes]:
+    """What an entry (i, k) of A over C beside B over D does to the fundamental at z: left_i right_k."""
+    A, scale = balanced(A)
+    B, C = B / scale[:, None], C * scale
+    M, n = B.shape[1], len(A)
+    turned = z.reshape(-1, 1, 1) ** M * np.eye(n) - A
+    turn = z.reshape(-1, 1) ** np.arange(M)
+    back = 1.0 / (turn * M)
+    right = np.linalg.solve(turned, (turn @ B.T)[:, :, None])[:, :, 0]
+    left = np.linalg.solve(turned.transpose(0, 2, 1), (back @ C)[:, :, None])[:, :, 0]
+    return np.concatenate([left / scale, back], axis=1), np.concatenate([right * scale, turn], axis=1)
+
+
+def relative(found: npt.ArrayLike, wanted: npt.ArrayLike) -> Floats:
+    """Difference over size, see `sized`."""
+    return np.asarray(np.abs(np.asarray(found) - wanted) / sized(wanted))
+
+
+def sized(response: npt.ArrayLike) -> Floats:
+    """Size of a response, of a faint part of it that of its dominant part in part."""
+    size = np.abs(response)
+    return np.asarray(size + FAINT * np.max(size, initial=1e-300))

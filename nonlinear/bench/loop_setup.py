@@ -1,0 +1,305 @@
+"""One loop of a drive on the bench: which loops run, where the instrument sits, and the state it starts in.
+
+The loop definition of model.md section 3 (inner loops closed, outer ones open) is made as a drive does it:
+for the velocity loop the position controller is out of action and the speed command is a constant (speed
+mode); for the current loop the current command is (torque mode).  The rotor may then be held at its speed, as
+a bench does it: a free one runs away under a constant torque, and what is measured is the back-EMF.  For a
+break point all loops run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf, lcm
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from nonlinear.bench.operating_motion import (
+    OperatingMotion,
+    current_state,
+    full_torque_Nm,
+    may_stand,
+    operating_motion,
+    standing,
+    velocity_state,
+)
+from nonlinear.bench.probe import Probe, write_probe
+from nonlinear.rows import Rows
+
+Floats = npt.NDArray[np.float64]
+Value = float | npt.NDArray[np.float64]
+STAGES = ("current", "velocity", "position")
+HELD = 1e12  # so many times its inertia holds the rotor at its speed
+
+
+@dataclass(frozen=True)
+class LoopSetup:
+    """A drive set up to test one loop.
+
+    Attributes
+    ----------
+    design : Design
+    loop : str
+        ``"current"``, ``"velocity"``, ``"position"`` (outer loops open), or a break point ``"u"``,
+        ``"i_ref"``, ``"w_ref"``, ``"output"`` (all other loops closed).
+    bias : OperatingMotion
+        The motion underneath.
+    limits_on : bool
+    held : bool
+        Whether the rotor is held at its speed.
+    gain : float
+        Factor on the loop gain at the place.
+    """
+
+    design: Design
+    loop: str
+    bias: OperatingMotion
+    limits_on: bool = True
+    held: bool = False
+    gain: float = 1.0
+
+    @cached_property
+    def stages(self) -> tuple[str, ...]:
+        """Stages that the design has, innermost first."""
+        return stages_of(self.design)
+
+    @cached_property
+    def outer(self) -> str:
+        """Outermost stage that runs."""
+        return self.loop if self.loop in STAGES or not self.stages else self.stages[-1]
+
+    @cached_property
+    def point(self) -> str:
+        """Where the instrument sits."""
+        if self.loop in PATHS:
+            return target(self.design, self.outer) if self.stages else "u"
+        return target(self.design, self.loop) if self.loop in STAGES else self.loop
+
+    @property
+    def before(self) -> str:
+        """Name of the signal in front of the instrument."""
+        return f"probe_{self.point}_before"
+
+    @cached_property
+    def hold_ticks(self) -> int:
+        """Ticks between two updates at the point."""
+        return every(self.design, producer(self.design, self.point))
+
+    @cached_property
+    def base_ticks(self) -> int:
+        """Ticks after which everything repeats."""
+        current = self.design.controller.current
+        fed = current is not None and current.back_emf_feedforward != 0.0 and not self.held
+        stages = self._running + (("velocity",) if fed and "velocity" in self.stages else ())
+        return lcm(*(every(self.design, stage) for stage in stages))
+
+    @property
+    def period_s(self) -> float:
+        """Sampling period of the loop at the point."""
+        return self.hold_ticks * self.design.controller.period_s
+
+    @property
+    def _running(self) -> tuple[str, ...]:
+        return self.stages[: self.stages.index(self.outer) + 1] if self.stages else ()
+
+    @property
+    def condition(self) -> str:
+        """On which motion it is tested, in words."""
+        if self.held:
+            return "rotor held" + (" at a constant speed" if self.bias.speed_rad_s else "")
+        if self.bias.speed_rad_s:
+            pressed = ", coupling pressed by a constant moment" if self.bias.coupling_Nm else ""
+            return f"on a constant speed{pressed}"
+        return "standing, without dry friction"
+
+    def row(self) -> Rows:
+        """Parameters of a run that starts in the steady state of the operating motion; see `rows`."""
+        return self.rows(self.gain)
+
+    def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
+        """Parameters of runs that start in the steady state of the operating motion, one a value.
+
+        Parameters
+        ----------
+        gain : array_like
+            Factor on all parts of the controller in front of the point: the loop gain.
+        delay_samples : array_like
+            Extra delay at the point, in its own samples.
+        """
+        gains, delays = np.broadcast_arrays(np.atleast_1d(gain), np.atleast_1d(delay_samples))
+        rows = self._base.repeat(gains.size)
+        for values, delay in zip(rows.values, delays, strict=True):
+            write_probe(Probe(point=self.point, delay_samples=float(delay)), values)  # type: ignore[arg-type]
+        for place in GAINS[producer(self.design, self.point)]:
+            rows[place] *= gains
+        self._start(rows)
+        return rows
+
+    @cached_property
+    def _base(self) -> Rows:
+        """The row without instrument and state."""
+        row = Rows.of(self.design, friction_on=self.bias.friction_on, limits_on=self.limits_on)
+        dropped = ("friction_feedforward",) if self.loop in PATHS else FEED_FORWARD
+        for name in dropped:
+            row[name] = 0.0
+        if self.outer != "position":
+            for name in GAINS["position"]:
+                row[name] = 0.0
+        if self.outer == "current":
+            row["velocity_gain"] = row["velocity_integral"] = 0.0
+        if self.held:
+            for name in ("inertia", "motor_inertia"):
+                row[name] *= HELD
+        return row
+
+    def _start(self, row: Rows) -> None:
+        """Write the steady state, from the motor outwards."""
+        self.bias.load(row)
+        row["speed_start"], row["current_start"] = self.bias.speed_rad_s, self.bias.current_A
+        row["twist_start"] = self.bias.twist_rad
+        row["load_speed_start"] = self.bias.speed_rad_s / self.design.ratio_to_coupling
+        wanted: Value = self.bias.voltage_V
+        point = "u"
+        row["voltage_start"] = wanted
+        for stage in self._running:
+            if stage == "position":
+                self._position(row, wanted)
+                if point == "w_ref":
+                    row["speed_command_start"] = wanted
+                return
+            wanted = self._current(row) if stage == "current" else self._velocity(row, wanted)
+            point = "i_ref" if stage == "current" else "w_ref"
+            if point == "i_ref":
+                row["current_command_start"] = wanted
+        if self.outer == "current":
+            row["current_command_start"] = 0.0  # filters of a velocity controller that is out of action
+        self._constant(row, point, wanted)
+
+    def _current(self, row: Rows) -> Value:
+        """The current controller in its steady state; returns the current command."""
+        steady = current_state(
+            self.bias,
+            row["current_gain"],
+            row.value("current_integral") != 0.0,
+            row["back_emf_feedforward"],
+            row["resistance_feedforward"],
+        )
+        row["current_integrator_start"] = steady.integrator
+        return steady.command
+
+    def _velocity(self, row: Rows, wanted: Value) -> Value:
+        """The velocity controller in its steady state; returns the speed command."""
+        integral = row.value("velocity_integral") != 0.0
+        steady = velocity_state(self.design, self.bias, wanted, row["velocity_gain"], integral)
+        row["velocity_integrator_start"] = steady.integrator
+        row["current_command_start"] = steady.output  # what the torque filters begin with
+        return steady.command
+
+    def _position(self, row: Rows, wanted: Value) -> None:
+        """Let the command run with the drive, the motor behind it by what the controller needs."""
+        row["angle_start"] = -wanted / row["position_gain"]
+        at_output = self.design.controller.position_loop.sensor == "output"
+        seen = self.design.total_ratio * self.bias.output_rad(self.design) if at_output else 0.0
+        if self.bias.speed_rad_s == 0.0:
+            row.step("bias", seen / self.design.total_ratio, -1.0)
+            return
+        row["angle_start"] -= seen
+        row.ramp("bias", self.bias.speed_rad_s / self.design.total_ratio)
+
+    @property
+    def steady_start(self) -> bool:
+        """Whether the steady state is known that a run begins in; a ramp sets what a PI of position holds."""
+        return not (self.outer == "position" and remembers(self.design) and self.bias.speed_rad_s != 0.0)
+
+    @staticmethod
+    def _constant(row: Rows, point: str, value: Value) -> None:
+        """Replace the outer controllers, which are out of action, by a constant command."""
+        row.step(point, value, -1.0)
+
+    @cached_property
+    def range(self) -> float:
+        """What would be a large signal at the place, in its unit."""
+        design, limits = self.design, self.design.limits
+        full = design.validation.full_deflection_rad
+        speed = min(limits.speed_rad_s, self.bias.speed_rad_s or inf)
+        ranges = {"u": limits.voltage_V, "i_ref": limits.peak_current_A, "w_ref": speed, "output": full}
+        if self.loop == "load":
+            return full_torque_Nm(design) * design.total_ratio
+        if self.loop == "command":
+            outermost = design.controller.outermost
+            ranges |= {"position": full, "velocity": speed / design.total_ratio}
+            ranges |= {"current": limits.peak_current_A, "voltage": limits.voltage_V}
+            return ranges[outermost]
+        return ranges[self.point]
+
+
+FEED_FORWARD = ("feedforward", "acceleration_feedforward", "friction_feedforward")
+PATHS = ("command", "load")  # of the whole drive, to its output
+GAINS = {
+    "current": ("current_gain", "current_integral", "back_emf_feedforward", "resistance_feedforward"),
+    "velocity": ("velocity_gain", "velocity_integral"),
+    "position": ("position_gain", "position_integral", "derivative"),
+}
+
+
+def loop_setup(design: Design, loop: str, *, limits_on: bool = True, held: bool = False) -> LoopSetup:
+    """Set a drive up for one loop, on an operating motion that the code chooses.
+
+    A position controller with an integral or a derivative part cannot be started in the steady state of a
+    ramp: then the drive stands, where it has no slope of its own about rest.
+
+    Raises
+    ------
+    InputError
+        If the design has no such loop or break point, or has no operating motion.
+    """
+    known = (*stages_of(design), *points_of(design), *PATHS)
+    if loop not in known:
+        raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
+    result = LoopSetup(design, loop, operating_motion(design), limits_on, held)
+    if result.outer == "position" and remembers(design) and may_stand(design):
+        return LoopSetup(design, loop, standing(design), limits_on, held)
+    return result
+
+
+def remembers(design: Design) -> bool:
+    """Whether the position controller has a state that a ramp sets."""
+    place = design.controller.position
+    return place is not None and (place.integral_time_s is not None or place.derivative_time_s > 0.0)
+
+
+def stages_of(design: Design) -> tuple[str, ...]:
+    """Stages of the cascade, innermost first."""
+    control = design.controller
+    there = {"current": control.current, "velocity": control.velocity, "position": control.position}
+    return tuple(stage for stage in STAGES if there[stage] is not None)
+
+
+def target(design: Design, stage: str) -> str:
+    """The signal that a stage drives: ``u``, ``i_ref`` or ``w_ref``."""
+    stages = stages_of(design)
+    inside = stages[: stages.index(stage)]
+    return {"current": "i_ref", "velocity": "w_ref"}[inside[-1]] if inside else "u"
+
+
+def points_of(design: Design) -> tuple[str, ...]:
+    """Break points that exist, from the motor outwards."""
+    output = () if design.controller.position is None else ("output",)
+    return (*(target(design, stage) for stage in stages_of(design)), *output)
+
+
+def producer(design: Design, point: str) -> str:
+    """The stage that updates a break point; the position stage reads the output."""
+    return next((stage for stage in stages_of(design) if target(design, stage) == point), "position")
+
+
+def every(design: Design, stage: str) -> int:
+    """Ticks between two updates of a stage."""
+    control = design.controller
+    if stage == "velocity" and control.velocity is not None:
+        return control.velocity.every
+    return control.position_loop.every if stage == "position" else 1

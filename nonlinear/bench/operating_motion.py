@@ -1,0 +1,345 @@
+"""Constant speed under a test: the motion on which dry friction is a constant torque (model.md section 4).
+
+Where the friction depends on the torque of an elastic coupling, or the coupling has play, a constant moment
+at the output keeps the coupling pressed, so that the drive stays on one side of it.  A drive that
+feels a torque that changes with the angle has no such motion: it stands, without dry friction, and constant
+moments hold it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import copysign, cosh, inf, isfinite
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.design.model import Design, FilterPlace, Friction, LoadFriction
+from actuator_lti.drive.angle import follows_angle, holding_moment_Nm, holding_torque_Nm
+from actuator_lti.drive.operating import Operating, segments
+from actuator_lti.errors import InputError
+from nonlinear.row.filters import section
+from nonlinear.rows import Rows
+
+Value = float | npt.NDArray[np.float64]
+SHARE = 0.4  # of each limit that the operating motion may take
+MOST = 0.8  # where friction leaves no less
+FASTEST_RAD_S = 1e6
+SLOWEST = 1e-9  # of that
+COMMANDED = 0.7  # of a limit that a command may take
+ROOM = 0.7  # of the way to standstill, or to the next bend of a friction map, that a test may use
+PRESSED = (0.15, 0.05, 0.015, 0.005)  # of the full torque: what presses the coupling
+FLAT = 1e-12  # of Tc/w_s: a smaller slope of the tanh law is none
+
+
+@dataclass(frozen=True)
+class OperatingMotion:
+    """A drive at constant speed: every signal of the cascade, motor side.
+
+    Attributes
+    ----------
+    speed_rad_s : float
+        0: the drive stands, and dry friction has to be left out of the test.
+    current_A, voltage_V : float
+        What the motor takes (zero current for an ideal torque source).
+    friction_on : bool
+        Whether dry friction and offset torque take part.
+    load_Nm : float
+        Constant moment at the output.
+    twist_rad, coupling_Nm : float
+        Of the coupling, at its own shaft; 0 where the drive train is rigid.
+    extra_Nm : float
+        Constant torque at the motor shaft of a drive that stands, against what presses it and its own.
+    room_rad_s : float
+        How far the motor speed may move before the friction is another.
+    """
+
+    speed_rad_s: float
+    current_A: float
+    voltage_V: float
+    friction_on: bool
+    load_Nm: float = 0.0
+    twist_rad: float = 0.0
+    coupling_Nm: float = 0.0
+    room_rad_s: float = inf
+    extra_Nm: float = 0.0
+
+    def load(self, rows: Rows) -> None:
+        """Write the constant moment and torque of the operating motion into rows."""
+        rows["load"] = self.load_Nm
+        if self.extra_Nm:
+            rows["torque_table"], rows["torque_table_length"] = rows.tables.add(np.array([self.extra_Nm]))
+
+    @property
+    def delicate(self) -> bool:
+        """Whether a reversal or a parting of the coupling would change what is tested."""
+        return self.friction_on or self.coupling_Nm != 0.0
+
+    def output_rad(self, design: Design) -> float:
+        """Output angle where the motor is at zero, which is where a drive stands."""
+        return -self.twist_rad / design.ratio_behind_coupling
+
+    def operating(self, design: Design) -> Operating:
+        """Where the linear loops have to be taken to be those of this motion."""
+        if design.coupling is not None and self.friction_on:
+            return Operating(point="driving", speed_rad_s=self.speed_rad_s)
+        angle = self.output_rad(design)
+        return Operating(speed_rad_s=self.speed_rad_s, angle_rad=angle, twist_rad=self.twist_rad)
+
+
+def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
+    """Choose a constant speed that leaves room to every limit and stays far from reversal.
+
+    The speed takes at most `SHARE` of the speed limit, the voltage, the peak and the continuous current.
+    Where friction alone takes more than that, the drive stands, without it.
+
+    Raises
+    ------
+    InputError
+        If friction holds the drive whatever it does, or takes too much of a drive that cannot stand.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> result = operating_motion(load_design("ilr33-amber"))
+    >>> result.speed_rad_s > 100.0, result.voltage_V < 0.5 * 12.0
+    (True, True)
+    """
+    if follows_angle(design):
+        return standing(design)
+    loads = [load_Nm]
+    if needs_press(design):
+        whole = full_torque_Nm(design) * design.total_ratio / _felt(design)
+        loads = [load_Nm - part * whole for part in PRESSED]
+    for share in (SHARE, MOST):
+        for moment in loads:
+            motion = _fastest(design, moment, share)
+            if motion is not None:
+                return motion
+    least, limits = operating_motion_at(design, SLOWEST * FASTEST_RAD_S, loads[-1]), design.limits
+    stuck = least.voltage_V > limits.voltage_V or least.current_A > limits.peak_current_A
+    if stuck or bent_about_rest(design):
+        message = f"friction takes more than {1.0 if stuck else MOST:.0%} of the current or voltage limit"
+        raise InputError(f"{message}: no steady motion to test on", where=design.name)
+    return standing(design)
+
+
+def needs_press(design: Design) -> bool:
+    """Whether a coupling has to be kept on one side: it has play, or its torque makes friction."""
+    coupling = design.coupling
+    return coupling is not None and (coupling.play_rad > 0.0 or design.friction.load_coefficient > 0.0)
+
+
+def bent_about_rest(design: Design) -> bool:
+    """Whether play or friction gives a drive at rest another slope than a moving one has."""
+    friction = design.friction
+    uneven = bool(friction.points) or friction.viscous(1) != friction.viscous(-1)
+    return uneven or needs_press(design)
+
+
+def may_stand(design: Design) -> bool:
+    """Whether the drive has one slope about rest once its dry friction is left out."""
+    return follows_angle(design) or not bent_about_rest(design)
+
+
+def on_its_stand(design: Design, like: Design | None = None) -> Design:
+    """A drive without friction that would give it two slopes where it is tested; others as they are.
+
+    One that has to stand knows no friction by direction; a rigid one whose load is damped none by load, which
+    grows with the speed and is no part of its loops.  ``like`` is the drive that is tested, if another.
+    """
+    tested, friction = like or design, design.friction
+    if follows_angle(tested):
+        friction = replace(friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
+    elif tested.coupling is None and tested.load.moment_damping_Nms_rad:
+        friction = replace(friction, load_coefficient=0.0)
+    return design if friction == design.friction else replace(design, friction=friction)
+
+
+def standing(design: Design) -> OperatingMotion:
+    """At rest, motor at zero, no dry friction; constant moments hold it and press a coupling with play.
+
+    The drive is one that `may_stand`, `on_its_stand`.
+    """
+    load, coupling, torque = design.load, design.coupling, holding_torque_Nm(design)
+    if coupling is None or coupling.play_rad == 0.0:
+        return OperatingMotion(0.0, 0.0, 0.0, False, holding_moment_Nm(design), extra_Nm=torque)
+    press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
+    coupling_Nm = press / design.ratio_behind_coupling
+    twist = coupling_Nm / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad
+    passed = 1.0 if load.path == "back-drivable" else 0.0
+    torque += passed * coupling_Nm / design.ratio_to_coupling
+    moment = holding_moment_Nm(design, -twist / design.ratio_behind_coupling) - press
+    return OperatingMotion(0.0, 0.0, 0.0, False, moment, twist, coupling_Nm, extra_Nm=torque)
+
+
+def full_torque_Nm(design: Design) -> float:
+    """Torque that the motor reaches at its limits, at standstill."""
+    return _torque_Nm(design, design.limits.peak_current_A)
+
+
+def lasting_torque_Nm(design: Design) -> float:
+    """The same that an overload protection leaves for long."""
+    limits = design.limits
+    lasting = inf if limits.peak_time_s is None else limits.continuous_current_A
+    return _torque_Nm(design, min(limits.peak_current_A, lasting))
+
+
+def _torque_Nm(design: Design, current_A: float) -> float:
+    motor, limits = design.effective_motor, design.limits
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V * limits.voltage_V
+    short = limits.voltage_V / (motor.resistance_ohm or 1.0)
+    return (motor.torque_constant_Nm_A or 0.0) * min(current_A, short)
+
+
+def _felt(design: Design) -> float:
+    """Motor torque that a moment at the output costs, times N."""
+    passed = 1.0 if design.load.path == "back-drivable" else 0.0
+    return max(passed + design.friction.load_coefficient * design.total_ratio, 1e-12)
+
+
+def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | None:
+    """The fastest motion within the limits; None where there is none."""
+    limits = design.limits
+    speed = SHARE * limits.speed_rad_s if isfinite(limits.speed_rad_s) else FASTEST_RAD_S
+    current = share * min(limits.peak_current_A, limits.continuous_current_A)
+    while speed > SLOWEST * FASTEST_RAD_S:
+        motion = operating_motion_at(design, speed, load_Nm)
+        fits = motion.voltage_V <= share * limits.voltage_V and abs(motion.current_A) <= current
+        if fits and _commands_fit(design, motion) and motion.room_rad_s > 0.0:
+            return motion
+        speed *= 0.8
+    return None
+
+
+def _commands_fit(design: Design, motion: OperatingMotion) -> bool:
+    """Whether commands leave room to the limits: a controller without an integral needs an error."""
+    control, limits = design.controller, design.limits
+    wanted = motion.voltage_V
+    if control.current is not None:
+        loop = control.current
+        state = current_state(
+            motion,
+            loop.gain_V_A,
+            loop.integral_time_s is not None,
+            loop.back_emf_feedforward * (design.effective_motor.back_emf_constant_Vs_rad or 0.0),
+            loop.resistance_feedforward * (design.effective_motor.resistance_ohm or 0.0),
+        )
+        wanted = float(state.command)
+        if abs(wanted) > COMMANDED * limits.peak_current_A:
+            return False
+    if control.velocity is not None:
+        velocity = control.velocity
+        integral = velocity.integral_time_s is not None
+        wanted = float(velocity_state(design, motion, wanted, velocity.gain, integral).command)
+        return abs(wanted) <= COMMANDED * limits.speed_rad_s
+    return True
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A controller in its steady state: its command, its integrator, and its output before filters."""
+
+    command: Value
+    integrator: Value
+    output: Value
+
+
+def current_state(
+    bias: OperatingMotion, gain: Value, integral: bool, back_emf: Value, resistance: Value
+) -> Steady:
+    """The current controller on an operating motion; the last two are feed-forward in V s/rad and ohm."""
+    i, left = bias.current_A, bias.voltage_V - back_emf * bias.speed_rad_s
+    if integral:
+        return Steady(i, left - resistance * i, bias.voltage_V)
+    return Steady((left + gain * i) / (gain + resistance), 0.0, bias.voltage_V)
+
+
+def velocity_state(
+    design: Design, bias: OperatingMotion, wanted: Value, gain: Value, integral: bool
+) -> Steady:
+    """The velocity controller on an operating motion whose output behind the filters is ``wanted``."""
+    before = wanted / steady_gain(design, "torque")
+    seen = bias.speed_rad_s * steady_gain(design, "speed")
+    return Steady(seen, before, before) if integral else Steady(seen + before / gain, 0.0, before)
+
+
+def steady_gain(design: Design, place: FilterPlace) -> float:
+    """Gain at zero frequency of the filters of the velocity loop on the torque or the speed."""
+    velocity = design.controller.velocity
+    if velocity is None:
+        return 1.0
+    result, period_s = 1.0, velocity.every * design.controller.period_s
+    for item in velocity.filters_on(place):
+        b0, b1, b2, a1, a2 = section(item, period_s)
+        result *= (b0 + b1 + b2) / (1.0 + a1 + a2)
+    return result
+
+
+def operating_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> OperatingMotion:
+    """The steady state at a motor speed (rad/s, either direction) under a moment at the output."""
+    friction, moment, sense = design.friction, load_Nm, copysign(1.0, speed_rad_s)
+    moment -= design.load.moment_damping_Nms_rad * speed_rad_s / design.total_ratio
+    passed = 1.0 if design.load.path == "back-drivable" else 0.0
+    twist = coupling_Nm = 0.0
+    if design.coupling is None:
+        torque = sense * friction.load_coefficient * abs(moment) - passed * moment / design.total_ratio
+    else:
+        coupling_Nm = _behind(design.load.friction, speed_rad_s / design.ratio_to_coupling)
+        coupling_Nm -= moment / design.ratio_behind_coupling
+        half = 0.5 * design.coupling.play_rad * (1.0 if coupling_Nm > 0.0 else -1.0)
+        twist = coupling_Nm / design.coupling.stiffness_Nm_rad + half
+        torque = passed * coupling_Nm / design.ratio_to_coupling
+        torque += sense * friction.load_coefficient * design.ratio_behind_coupling * abs(coupling_Nm)
+    torque += sense * _own(friction, abs(speed_rad_s), int(sense)) + friction.offset_torque_Nm
+    room = _room(friction, abs(speed_rad_s), int(sense))
+    current, voltage = _driven(design, torque, speed_rad_s)
+    return OperatingMotion(speed_rad_s, current, voltage, True, load_Nm, twist, coupling_Nm, room)
+
+
+def _driven(design: Design, torque_Nm: float, speed_rad_s: float) -> tuple[float, float]:
+    """Current and voltage of a torque at a speed."""
+    motor = design.effective_motor
+    if motor.source_gain_Nm_V is not None:
+        return 0.0, torque_Nm / motor.source_gain_Nm_V
+    assert motor.torque_constant_Nm_A is not None
+    assert motor.resistance_ohm is not None
+    assert motor.back_emf_constant_Vs_rad is not None
+    current = torque_Nm / motor.torque_constant_Nm_A
+    return current, motor.resistance_ohm * current + motor.back_emf_constant_Vs_rad * speed_rad_s
+
+
+def _behind(friction: LoadFriction | None, speed_rad_s: float) -> float:
+    """Friction of the load at its own shaft."""
+    if friction is None:
+        return 0.0
+    dry = copysign(friction.dry_torque_Nm, speed_rad_s)
+    return dry + friction.viscous_Nms_rad * speed_rad_s + friction.offset_torque_Nm
+
+
+def _own(friction: Friction, speed_rad_s: float, sense: int) -> float:
+    """Dry and viscous friction of the motor, or its map, against a motion forward (1) or backward (-1)."""
+    points = friction.map(sense)
+    if not points:
+        return friction.dry_Nm(0.0, sense) + friction.viscous(sense) * speed_rad_s
+    torque = points[0].torque_Nm
+    pieces = segments(points)
+    ends = [start for start, _ in pieces[1:]] + [inf]
+    for (start, slope), end in zip(pieces, ends, strict=True):
+        torque += slope * max(min(speed_rad_s, end) - start, 0.0)
+    return torque
+
+
+def _room(friction: Friction, speed_rad_s: float, sense: int) -> float:
+    """How far the speed may move: part of the way to rest, to a bend of the map, to the slope of a tanh."""
+    if friction.law == "tanh" and friction.dry_Nm(0.0, sense) > 0.0:
+        least = friction.smoothing_speed_rad_s * 14.0  # there the slope of tanh is below FLAT
+        return min(ROOM * speed_rad_s, speed_rad_s - least) if _flat(friction, speed_rad_s) else 0.0
+    bends = [0.0, *(start for start, _ in segments(friction.map(sense)))] if friction.points else [0.0]
+    return ROOM * min(abs(speed_rad_s - bend) for bend in bends)
+
+
+def _flat(friction: Friction, speed_rad_s: float) -> bool:
+    x = speed_rad_s / friction.smoothing_speed_rad_s
+    return x > 300.0 or cosh(x) ** -2 < FLAT

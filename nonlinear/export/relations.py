@@ -1,0 +1,99 @@
+"""The relations between the keys of a design as C, found by running the checks of a design on traced values.
+
+Each comparison that a check makes is turned over: where the check then refuses, that is a relation, in the
+check's own words; where it does not, the check is followed from there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from actuator_lti.design.access import stacked
+from actuator_lti.design.checks import FIRST_RELATIONS, RELATIONS
+from actuator_lti.design.mistakes import refusal_text
+from actuator_lti.design.model import Design
+from actuator_lti.design.parameters import FrozenMap
+from nonlinear.export.program import c_text
+from nonlinear.export.statement import Statement, used
+from nonlinear.export.trace import Key, Tape, Traced
+
+MOST_TURNS = 2  # branches beside the design's own that are followed; beyond: another structure
+BEYOND = "these parameters ask for another structure: export the changed design again"
+_SHOWN = re.compile(r"\x01([^\x02]*)\x02([^\x03]*)\x03")
+
+
+@dataclass
+class _Way(Tape):
+    """One way through a check: the first outcomes of comparisons are told, the rest those of the values."""
+
+    told: Sequence[bool] = ()
+    outcomes: list[bool] = field(default_factory=list)
+
+    def condition(self, does: str, terms: tuple[Any, ...], outcome: bool) -> bool:
+        """Note a comparison among the statements."""
+        number = len(self.outcomes)
+        self.outcomes.append(self.told[number] if number < len(self.told) else outcome)
+        return super().condition(does, terms, self.outcomes[-1])
+
+
+def relation_functions(design: Design, keys: Sequence[Key]) -> list[list[str]]:
+    """Statements of C functions of ``(k, why, size)``: 0 where keys contradict each other, and why."""
+    bare = replace(design, parameters=FrozenMap({}))  # values are shown as they are then, not as written
+    ways = [_followed(bare, keys, check, (), 0) for check in (*FIRST_RELATIONS, *RELATIONS)]
+    return [_indented(used(way)) for way in ways if _refuses(way)]
+
+
+def _followed(
+    design: Design, keys: Sequence[Key], check: Any, told: tuple[bool, ...], turns: int
+) -> list[Statement]:
+    """What a check does behind the outcomes that are told, up to what it refuses first."""
+    way = _Way(loose=True, told=told)
+    values = {key.path: Traced(way, f"k[{n}]", key.value) for n, key in enumerate(keys)}
+    end = Statement("allowed")
+    try:
+        for refusal in check(stacked(design, values)):
+            end = _refusal(refusal_text(refusal))
+            break
+    except ArithmeticError:  # a turn that no values take: those of the keys' ranges never come here
+        end = _refusal(BEYOND)
+    found: list[Statement] = []
+    number = 0  # of comparisons so far; what lies before those that are told is there already
+    for statement in way.statements:
+        if statement.kind != "condition":
+            found += [statement] if number >= len(told) else []
+            continue
+        if number >= len(told):
+            turned = (*way.outcomes[:number], not way.outcomes[number])
+            body = (
+                [_refusal(BEYOND)]
+                if turns > MOST_TURNS
+                else _followed(design, keys, check, turned, turns + 1)
+            )
+            if _refuses(body):
+                found += [replace(statement, kind="branch"), *body, Statement("end")]
+        number += 1
+    return [*found, end]
+
+
+def _refuses(statements: Sequence[Statement]) -> bool:
+    return any(statement.kind == "refusal" for statement in statements)
+
+
+def _refusal(text: str) -> Statement:
+    """A message that shows the values of then."""
+    parts = _SHOWN.split(text.replace("%", "%%"))  # words, form, name, words, ...
+    words = "".join(part if n % 3 == 0 else f"%{part}" for n, part in enumerate(parts) if n % 3 < 2)
+    return Statement("refusal", does=c_text(words), terms=tuple(parts[2::3]))
+
+
+def _indented(statements: Sequence[Statement]) -> list[str]:
+    lines: list[str] = []
+    depth = 0
+    for statement in statements:
+        depth -= statement.kind == "end"
+        lines.append("    " * depth + statement.c)
+        depth += statement.kind == "branch"
+    return lines

@@ -1,0 +1,1 @@
+"""A design as the row of numbers that the compiled kernels read."""

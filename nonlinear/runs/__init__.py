@@ -1,0 +1,1 @@
+"""One run, or many at once: checked, called, wrapped, reduced."""

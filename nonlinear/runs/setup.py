@@ -1,0 +1,163 @@
+"""Commands, loads, probes and the initial state written into a run's row and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.bounds import RUN_TICKS
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from nonlinear._kernels import layout as at
+from nonlinear.bench.probe import Probe, write_probe
+from nonlinear.commands import Command, write
+from nonlinear.loads import LoadMoment
+from nonlinear.runs.trajectory import State
+
+Floats = npt.NDArray[np.float64]
+
+
+CONTENT = 0.02  # of a command's range: so large a line above the Nyquist frequency is refused
+
+
+@dataclass
+class Tables:
+    """All time series of one or many runs, end to end; a run knows offsets and lengths."""
+
+    parts: list[Floats] = field(default_factory=list)
+    size: int = 0
+    known: dict[int, tuple[int, int]] = field(default_factory=dict)
+
+    def add(self, values: Floats, key: object = None) -> tuple[int, int]:
+        """Append a series; returns its offset and length.  The same ``key`` object is stored only once."""
+        if key is not None and id(key) in self.known:
+            return self.known[id(key)]
+        place = (self.size, values.size)
+        self.parts.append(np.ascontiguousarray(values, dtype=float))
+        self.size += values.size
+        if key is not None:
+            self.known[id(key)] = place
+        return place
+
+    def append(self, other: Tables) -> int:
+        """Append all series of another set; returns where they begin."""
+        base = self.size
+        self.parts.extend(other.parts)
+        self.size += other.size
+        return base
+
+    def joined(self) -> Floats:
+        """One array for the kernel."""
+        return np.concatenate(self.parts) if self.parts else np.zeros(1)
+
+
+def ticks_of(duration_s: float, period_s: float) -> int:
+    """Number of ticks in a duration, rounded; refuses a duration without any."""
+    if not isfinite(duration_s):
+        raise InputError(f"duration_s = {duration_s}: must be a finite number of seconds")
+    ticks = round(min(duration_s / period_s, 1e18))
+    RUN_TICKS.check(ticks, name=f"duration_s = {duration_s:g}")
+    if ticks < 1:
+        raise InputError(f"duration_s = {duration_s:g}: must hold at least one tick of {period_s:g} s")
+    return ticks
+
+
+def put_signal(row: Floats, place: int, command: Command, tables: Tables) -> None:
+    """Write a command at a place of the row, its table beside the others."""
+    table = command.table(float(row[at.PERIOD]), int(row[at.TICKS]))
+    offset, length = (0, 0) if table is None else tables.add(table)
+    write(command, row, place, offset, length)
+
+
+def check_frequency(design: Design, command: Command) -> None:
+    """Refuse a command that the outermost loop, sampled every so many ticks, cannot follow in principle."""
+    control = design.controller
+    loop = {"position": control.position, "velocity": control.velocity}.get(control.outermost)
+    nyquist = 0.5 / (control.period_s * (1 if loop is None else loop.every))
+    if command.highest_hz >= nyquist:
+        message = f"command {command.kind}: {command.highest_hz:g} Hz: must be below the Nyquist frequency"
+        stage = "the drive" if loop is None else f"the {control.outermost} loop"
+        raise InputError(f"{message} of {stage}, {nyquist:g} Hz", where=design.name)
+    content = 0.0 if command.held else command.highest_content(nyquist)
+    if content > CONTENT:
+        stage = "the drive" if loop is None else f"the {control.outermost} loop"
+        words = f"a line of {100.0 * content:.2g} % of its range lies above the Nyquist frequency of {stage}"
+        message = f"command {command.kind}: {words}, {nyquist:g} Hz"
+        raise InputError(f"{message}: it would come back at a lower one; filter it first", where=design.name)
+
+
+def put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
+    """Write the load torque."""
+    row[at.LOAD] = load.constant_Nm
+    row[at.LOAD_SLOPE] += load.slope_Nm_rad
+    if load.series is not None:
+        table = load.series.table(float(row[at.PERIOD]), int(row[at.TICKS]))
+        if table is not None:
+            row[at.LOAD_TABLE], row[at.LOAD_TABLE_LENGTH] = tables.add(table)
+
+
+def put_torque(row: Floats, torque_Nm: npt.ArrayLike, tables: Tables) -> None:
+    """Write an extra torque at the motor shaft: a number, or one value a tick."""
+    values = np.atleast_1d(np.asarray(torque_Nm, dtype=float))
+    if not np.isfinite(values).all():
+        raise InputError("disturbance_Nm holds values that are not finite")
+    row[at.TORQUE_TABLE], row[at.TORQUE_TABLE_LENGTH] = tables.add(values)
+
+
+def put_supply(row: Floats, design: Design, supply: Command, scales: bool, tables: Tables) -> None:
+    """Write a bus voltage over time; see `nonlinear.simulate`."""
+    nominal = design.limits.voltage_V
+    if scales and (design.controller.current is not None or not isfinite(nominal)):
+        message = "supply_scales: needs a drive without a current loop, and a finite limits.voltage"
+        raise InputError(message, where=design.name)
+    table = supply.table(float(row[at.PERIOD]), int(row[at.TICKS]))
+    if table is None or (table < 0.0).any():
+        raise InputError("supply: voltages of 0 or more at times are needed", where=design.name)
+    row[at.SUPPLY_TABLE], row[at.SUPPLY_TABLE_LENGTH] = tables.add(table)
+    row[at.SUPPLY], row[at.SUPPLY_VOLTAGE] = at.SUPPLY_SCALES if scales else at.SUPPLY_LIMITS, nominal
+
+
+def put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
+    """Write the probes, at most one a point."""
+    seen = set()
+    for probe in probes:
+        if probe.point in seen:
+            raise InputError(f"two probes at {probe.point}: one a point is allowed")
+        seen.add(probe.point)
+        _check_point(row, probe.point)
+        place = write_probe(probe, row)
+        if isinstance(probe.injection, Command):
+            put_signal(row, place, probe.injection, tables)
+        elif probe.injection is not None:
+            offset, length = tables.add(np.asarray(probe.injection, dtype=float))
+            row[place], row[place + 1] = at.TABLE, 1.0
+            row[place + 3], row[place + 4] = offset, length
+
+
+def _check_point(row: Floats, point: str) -> None:
+    stages = {"w_ref": at.HAS_VELOCITY, "i_ref": at.HAS_CURRENT, "output": at.HAS_POSITION}
+    if point in stages and not row[stages[point]]:
+        raise InputError(f"probe point = {point!r}: this design has no such stage")
+
+
+def put_state(row: Floats, state: State) -> None:
+    """Write the initial state."""
+    row[at.ANGLE_START], row[at.SPEED_START] = state.motor_angle_rad, state.motor_speed_rad_s
+    if row[at.ELASTIC_DRIVE]:
+        angle, speed = state.motor_angle_rad / row[at.RATIO], state.motor_speed_rad_s / row[at.RATIO]
+        behind = row[at.RATIO] / row[at.RATIO_TO_COUPLING]
+        if state.output_angle_rad is not None:
+            row[at.TWIST_START] = behind * (angle - state.output_angle_rad)
+        row[at.LOAD_SPEED_START] = behind * (
+            speed if state.output_speed_rad_s is None else state.output_speed_rad_s
+        )
+    row[at.CURRENT_START] = 0.0 if row[at.SOURCE] else state.current_A
+    row[at.CURRENT_INTEGRATOR_START] = state.current_integral_V
+    row[at.VELOCITY_INTEGRATOR_START] = state.velocity_integral
+    row[at.SPEED_COMMAND_START] = state.speed_command_rad_s
+    row[at.CURRENT_COMMAND_START] = state.current_command_A
+    row[at.VOLTAGE_START] = state.voltage_V

@@ -1,0 +1,232 @@
+"""Simulate one run: check, convert, call the kernel, wrap."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+from threading import Thread
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.bounds import HISTORY_BYTES
+from actuator_lti.design.loader import as_design
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
+from nonlinear._kernels import layout as at
+from nonlinear.bench.probe import Probe
+from nonlinear.commands import Command
+from nonlinear.loads import LoadMoment, as_load
+from nonlinear.row.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE, design_row
+from nonlinear.runs.setup import (
+    Tables,
+    check_frequency,
+    put_load,
+    put_probes,
+    put_signal,
+    put_state,
+    put_supply,
+    put_torque,
+    ticks_of,
+)
+from nonlinear.runs.trajectory import STATUS, LimitUse, State, Trajectory
+from nonlinear.runs.watch import watch
+from nonlinear.runs.wrap import wrap
+from nonlinear.settling.running import Running
+
+Floats = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+
+def simulate(
+    design: Design | str | PathLike[str],
+    command: Command,
+    duration_s: float,
+    load_Nm: float | LoadMoment = 0.0,
+    *,
+    bias: Command | None = None,
+    probes: Sequence[Probe] = (),
+    initial: State | None = None,
+    disturbance_Nm: npt.ArrayLike | None = None,
+    supply: Command | None = None,
+    supply_scales: bool = False,
+    friction_on: bool = True,
+    limits_on: bool = True,
+    energy: bool = False,
+    record_every: int = 1,
+    tanh_tolerance: float = TANH_TOLERANCE,
+    max_events: int = MAX_EVENTS_PER_TICK,
+    raise_on_failure: bool = True,
+    progress: Progress | None = None,
+) -> Trajectory:
+    """Run the sampled cascade on the nonlinear drive (model.md sections 1 and 2).
+
+    Between events the slipping plant is propagated exactly; zero crossings of the speed, stick and breakaway
+    are located inside the tick in closed form, so there is no integration error (the tanh law: see
+    ``tanh_tolerance``).
+
+    Parameters
+    ----------
+    design : Design, str or path
+        A design, a shipped name, or the path of a design file.
+    command : Command
+        Output angle against time, from `nonlinear.commands`.
+    duration_s : float
+        Rounded to whole ticks; row k is sampled at ``t_k = k Ts``, k = 0 .. n - 1.
+    load_Nm : float or LoadMoment
+        Load torque at the output shaft, held over each tick; slope and gravity of the design add to it.
+    bias : Command, optional
+        Motion added under the command, in the same unit.
+    probes : sequence of Probe
+        Instruments at break points.
+    initial : State, optional
+        Default: everything at rest at zero.
+    disturbance_Nm : array_like, optional
+        Extra torque at the motor shaft, one value a tick (the last is held).
+    supply : Command, optional
+        Bus voltage against time (`nonlinear.commands.sampled`), at the ticks; it takes the place of
+        ``limits.voltage`` and of the design's own supply.
+    supply_scales : bool
+        The controller's output is a duty ratio of the bus, as in a servo without a current loop: the motor
+        has ``u U(t) / limits.voltage``, with u the controller's voltage, limited by ``limits.voltage``.
+    friction_on, limits_on : bool
+        ``friction_on=False`` leaves out dry friction and offset; ``limits_on=False`` all four limits.
+    energy : bool
+        Integrate the energies (at most some twice as slow).
+    record_every : int
+        Keep every so many rows.
+    tanh_tolerance : float
+        Error of the speed that one tick may add under the tanh law, in smoothing speeds w_s; sets its
+        sub-steps.
+    max_events : int
+        Most events in one tick before the run is given up.
+    raise_on_failure : bool
+        ``False`` returns a failed run with its status instead; rows not reached are NaN.
+    progress : callable, optional
+        Called as ``progress(done, total)`` in ticks from time to time, and once at the end.
+
+    Returns
+    -------
+    Trajectory
+
+    Raises
+    ------
+    InputError
+        For a command faster than the Nyquist frequency of the position loop, a duration of no tick, values
+        that are not finite, a probe at a stage that the design does not have.
+    NumericalError
+        If the run ends early (state not finite, too many events in a tick).
+
+    Notes
+    -----
+    At a zero crossing the rotor rests while ``|drive torque| <= Tc * breakaway_ratio``, as model.md says of
+    stick; it passes through otherwise.  Counts are the floor of angle times counts per rad; they enter the
+    speed estimate by difference only, the position controller sees the angle itself.  The reference before
+    the first tick is the initial angle (feed-forward by backward difference).
+
+    Examples
+    --------
+    >>> from nonlinear import commands, simulate
+    >>> run = simulate("ilr33-amber", commands.step(0.01), duration_s=0.1)
+    >>> run.time_s.size, bool(abs(run.output_angle_rad[-1] - 0.01) < 1e-3)
+    (1000, True)
+    """
+    design = as_design(design)
+    row = design_row(design, friction_on=friction_on, limits_on=limits_on)
+    row[at.TICKS] = ticks_of(duration_s, design.controller.period_s)
+    row[at.WITH_ENERGY] = energy
+    row[at.TANH_TOLERANCE], row[at.MAX_EVENTS] = tanh_tolerance, max_events
+    if record_every < 1:
+        raise InputError(f"record_every = {record_every}: must be at least 1")
+    row[at.RECORD_EVERY] = record_every
+    tables = Tables()
+    for place, signal in ((at.COMMAND, command), (at.BIAS, bias)):
+        if signal is not None:
+            check_frequency(design, signal)
+            put_signal(row, place, signal, tables)
+    put_load(row, as_load(load_Nm), tables)
+    if disturbance_Nm is not None:
+        put_torque(row, disturbance_Nm, tables)
+    if supply is not None:
+        put_supply(row, design, supply, supply_scales, tables)
+    put_probes(row, probes, tables)
+    put_state(row, initial or State())
+    trajectory = run_row(design, row, tables.joined(), progress)
+    if raise_on_failure and trajectory.status != "ok":
+        reached = trajectory.period_s * float(np.isfinite(trajectory.output_angle_rad).sum()) * record_every
+        raise NumericalError(f"run stopped at {reached:.6g} s ({trajectory.status}): {trajectory.advice}")
+    return trajectory
+
+
+def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | None = None) -> Trajectory:
+    """Run one row of parameters with its history."""
+    from nonlinear.native import parameters
+
+    ticks, every = int(row[at.TICKS]), int(row[at.RECORD_EVERY])
+    probing = [p for k, p in enumerate(at.POINTS) if row[at.PROBES + k * at.PROBE_SIZE] > 0.0]
+    rows, columns = (ticks + every - 1) // every, at.HISTORY_PROBES + 2 * len(probing)
+    columns += at.ELASTIC_COLUMNS * int(row[at.ELASTIC_DRIVE]) + int(row[at.VARYING_LOAD].any())
+    if 8 * rows * columns > HISTORY_BYTES.most:
+        message = f"{ticks} ticks: a history of {rows} rows does not fit into memory"
+        raise InputError(f"{message}; use record_every, or simulate_many with reducers")
+    history, flags = np.empty((columns, rows)), np.zeros(rows, np.uint16)
+    out = np.zeros(at.OUT_SIZE)
+    p, s = parameters(row)
+    begun = Running(p.copy(), s.copy(), tables)
+    status = _call(p, s, tables, history, flags, out, progress)
+    done = (int(out[at.OUT_TICKS]) + every - 1) // every
+    history[:, done:] = np.nan
+    digest = hashlib.sha256(row.tobytes() + tables.tobytes()).hexdigest()
+    run = wrap(design, row, history, flags, out, STATUS[status], probing, digest)
+    left = Running(p, s, tables) if begun.held() is None else begun
+    return replace(run, load_Nm=_load(row, history), limits=_named_limits(run), running=left)
+
+
+def _named_limits(run: Trajectory) -> Mapping[str, LimitUse]:
+    """The uses of the limits; the clamp at the continuous current is the overload protection's alone."""
+    if "overload" not in run.limits or not run.limits["overload"].active or not run.limits["current"].active:
+        return run.limits
+    rows = np.flatnonzero(run.limit_active("current"))
+    first = float(run.time_s[rows[0]]) if rows.size else None
+    own = replace(run.limits["current"], fraction=rows.size / run.time_s.size, first_time_s=first)
+    return {**run.limits, "current": own}
+
+
+def _load(row: Floats, history: Floats) -> Floats | None:
+    """The moment on the output shaft at the recorded ticks; ``None`` where there is none in the whole run."""
+    if not row[at.LOAD : at.TORQUE_TABLE].any():
+        return None
+    return history[-1] if row[at.VARYING_LOAD].any() else np.broadcast_to(row[at.LOAD], history.shape[1])
+
+
+def _call(
+    p: Floats, s: Floats, tables: Floats, history: Floats, flags: np.ndarray, out: Floats,
+    progress: Progress | None,
+) -> int:  # fmt: skip
+    """Call the kernel; with ``progress``, in a thread that is watched and can be interrupted."""
+    from nonlinear.native import resume
+
+    shared = np.zeros(2)
+    look = watch()
+    if progress is None and look is None:
+        return resume(p, s, tables, history, flags, out, shared)
+    result: list[int] = []
+    thread = Thread(target=lambda: result.append(resume(p, s, tables, history, flags, out, shared)))
+    thread.start()
+    total = int(p[at.TICKS])
+    try:
+        while thread.is_alive():
+            thread.join(0.1)
+            if look is not None:
+                look()
+            if progress is not None and thread.is_alive():
+                progress(int(shared[0]), total)
+    except BaseException:
+        shared[1] = 1.0
+        thread.join()
+        raise
+    if progress is not None:
+        progress(int(shared[0]), total)  # a run may end before it was looked at once
+    return result[0]

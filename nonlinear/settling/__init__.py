@@ -1,0 +1,1 @@
+"""Whether a drive comes to rest, and waiting that costs no work."""

@@ -1,0 +1,111 @@
+"""Waiting that costs no work: a drive whose state changes evenly is set forward to what happens next.
+
+Under constant inputs every period of the outermost stage applies one map to the state.  The map is affine
+as long as no event happens; where it is so at two states it is so on the line between them, as every guard is
+linear there.  So where two windows of `DRIFT` periods add the same to the state, as an integral that grows
+while friction holds the drive does, the last state before an event is found by bisection.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from nonlinear._kernels import elastic_layout as ES
+from nonlinear._kernels import layout as at
+from nonlinear.settling.running import Piece, Running
+
+Floats = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
+DRIFT, CHECKED, EVEN = 64, 16, 1e-4  # periods of a window, of a look ahead; how alike two changes are
+STILL, ROUNDING = 2.0**-30, 2.0**-42  # of the largest value: a change in a window that counts; rounding
+MOST_LEAPS = int(1.0 / STILL)  # windows until what changes by `STILL` in each has changed by its own size
+_MODES = (at.S_DIRECTION, ES.ES_SEGMENT, ES.ES_LOAD, ES.ES_CONTACT)  # they follow from the rest
+_ANGLES = (at.S_ANGLE, at.S_OUTPUT)
+
+
+def matter(drive: Running) -> Places:
+    """Places of the state that what comes depends on; overload and bus only near the level where they act."""
+    p, s, left = drive.p, drive.s, list(_MODES)
+    if abs(s[at.S_CURRENT]) < p[at.CONTINUOUS_CURRENT] and not s[at.S_OVERLOADED]:
+        left.append(at.S_OVERLOAD)
+    if abs(s[at.S_VOLTAGE]) < 0.5 * s[at.S_VOLTAGE_LIMIT]:
+        left.append(at.S_VOLTAGE_LIMIT)
+    return drive.matter[~np.isin(drive.matter, left)]
+
+
+def eventless(piece: Piece) -> bool:
+    """Whether nothing happened that moves anything."""
+    columns = piece.columns[[1, at.HISTORY_ANGLE]]
+    return piece.status == "ok" and (piece.events == 0 or bool((np.ptp(columns, axis=1) == 0.0).all()))
+
+
+def change(state: Floats, before: Floats) -> Floats:
+    """The difference of two states; limits that are infinite in both have none."""
+    return np.subtract(state, before, out=np.zeros_like(state), where=state != before)
+
+
+def small(step: Floats, scale: Floats) -> npt.NDArray[np.bool_]:
+    """Numbers that change by next to nothing in a window."""
+    return np.abs(step) <= STILL * np.where(np.isfinite(scale), scale, 0.0)
+
+
+def even(step: Floats, other: Floats, scale: Floats) -> bool:
+    """Whether two changes of a state are one, number by number, or both next to nothing."""
+    rounding = ROUNDING * np.where(np.isfinite(scale), scale, 0.0)
+    same = np.abs(step - other) <= EVEN * np.abs(step) + rounding
+    return bool((same | (small(step, scale) & small(other, scale))).all())
+
+
+def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Floats) -> tuple[int, int]:
+    """Set a drive forward by windows of one change each, as many as have no event.
+
+    Parameters
+    ----------
+    step, before : ndarray
+        Change of the state at ``places`` in the last window, and in the one before it; next to nothing that
+        differs between them is rounding, which does not add up.
+
+    Returns
+    -------
+    windows, ticks : int
+        How far, 0 where the drive moves; and the ticks of work.
+    """
+    moves = np.isin(places, _ANGLES) & ~small(step, scale)
+    if moves.any():
+        return 0, 0
+    stay, start, looks = drive.s.copy(), drive.s[places], 0
+    step = np.where(small(step, scale) & (np.abs(step - before) > EVEN * np.abs(step)), 0.0, step)
+
+    def holds(windows: int) -> bool:
+        nonlocal looks
+        looks += 1
+        drive.s[:] = stay
+        drive.s[places] = ahead = start + windows * step
+        piece = drive.advance(CHECKED * drive.base_ticks)
+        after = change(drive.s[places], ahead)
+        return eventless(piece) and even(after, CHECKED / DRIFT * step, np.maximum(scale, np.abs(ahead)))
+
+    low, high = 0, 1
+    while high <= MOST_LEAPS and holds(high):
+        low, high = high, 2 * high
+    while 0 < low < MOST_LEAPS and high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    drive.s[:] = stay
+    drive.s[places] = start + low * step
+    if drive.p[at.OVERLOAD] > 0.0:
+        ticks = low * DRIFT * drive.base_ticks
+        drive.s[at.S_OVERLOAD] = overload(drive.p, stay, drive.s[at.S_CURRENT], ticks)
+    return low, looks * CHECKED * drive.base_ticks
+
+
+def overload(p: Floats, s: Floats, current_A: float, ticks: int) -> float:
+    """The overload memory ``x += a ((i/i_cont)^2 - x)`` after ticks in which the current grows evenly."""
+    if ticks == 0:
+        return float(s[at.S_OVERLOAD])
+    a, size = p[at.OVERLOAD_RATE], p[at.CONTINUOUS_CURRENT]
+    start, slope = s[at.S_CURRENT] / size, (current_A - s[at.S_CURRENT]) / (ticks * size)
+    C, B = slope**2, 2.0 * slope * (start - slope / a)
+    A = start**2 - (B + C) / a
+    return float(A + B * ticks + C * ticks**2 + (1.0 - a) ** ticks * (s[at.S_OVERLOAD] - A))

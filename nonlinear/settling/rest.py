@@ -1,0 +1,352 @@
+"""Whether a drive comes to rest under a command and a load that stay: the one judge of it.
+
+With constant inputs a run is one map applied again and again, once a period of the outermost stage.  So the
+question is asked of the whole state, and the drive is followed until it is answered:
+
+- *at rest*: over `DRIFT` periods nothing changes by more than `STILL` of the largest value that it had;
+- held by friction while an integral grows is not rest.  Then every period adds the same to the state; the
+  state is set forward to just before breakaway (`nonlinear.settling.drift`), and the drive is followed
+  from there;
+- *limit cycle*: held by friction it stands a third time where it stood before, after equal times and swings
+  (to `ALIKE`): what follows from standing there is known, so it does so for ever.  Or of `PERIODS` swings or
+  more the later half is as large as the earlier, and an event, a limit or a sensor's counts are in it, as a
+  linear drive has none.  Which one a drive ends in may depend on the step;
+- *diverging*: no finite state, or a motion that still grows at the end of the work;
+- *still moving*: none of these within `MOST_TICKS` ticks of work.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import inf
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.errors import InputError
+from nonlinear._kernels import layout as at
+from nonlinear.settling.drift import DRIFT, MOST_LEAPS, STILL, change, even, eventless, leap, matter, small
+from nonlinear.settling.running import Piece, Running
+from nonlinear.settling.scales import Scales
+
+Floats = npt.NDArray[np.float64]
+Verdict = Literal["at rest", "limit cycle", "still moving", "diverging"]
+
+PERIODS, ALIKE = 8, 0.01
+MOST_TICKS = 4_000_000
+PIECE_TICKS = 4096
+_RANGED = [1, at.HISTORY_ANGLE, 3, 4, 5, 6]  # both angles, currents, voltage, commands
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rest:
+    """What a motion ends in; angles at the output, in the unit of the outermost stage's command.
+
+    Attributes
+    ----------
+    verdict : {"at rest", "limit cycle", "still moving", "diverging"}
+    error : float
+        Command less what follows it, at the end; of a limit cycle the mean between its ends.
+    amplitude, motor_amplitude : float
+        Half the span of what follows the command, and of the motor's own angle over the reduction (speed, for
+        a speed drive), over the cycle that returned, else in the last half of the work; 0 at rest.
+    frequency_hz : float or None
+        Of a limit cycle.
+    periods : int
+        Whole swings seen.
+    limited : tuple of str
+        Limiters that act in the last half of the work.
+    after_s : float
+        From the start of the judgement to its end, waits that were leapt over included.
+    ticks : int
+        Ticks of work.
+    """
+
+    verdict: Verdict
+    error: float
+    amplitude: float
+    motor_amplitude: float
+    frequency_hz: float | None
+    periods: int
+    limited: tuple[str, ...]
+    after_s: float
+    ticks: int
+
+    @property
+    def comes_to_rest(self) -> bool:
+        """Whether it does."""
+        return self.verdict == "at rest"
+
+
+def judge(running: Running, most_ticks: int = MOST_TICKS) -> Rest | None:
+    """Follow a drive from its present state until it is known what it ends in.
+
+    Parameters
+    ----------
+    running : Running
+        Of a run (``run.running``) or of `nonlinear.Rows.running`; it is not changed.
+    most_ticks : int
+        Bound on the work.
+
+    Returns
+    -------
+    Rest or None
+        ``None`` where command, load or supply still change of themselves. Noise is left out: it is no cycle.
+
+    Examples
+    --------
+    >>> from nonlinear import commands, simulate
+    >>> judge(simulate("ilr33-amber", commands.step(0.01), 0.05).running).verdict
+    'at rest'
+    """
+    drive = running.held()
+    return None if drive is None else _Watch(drive, most_ticks).judged()
+
+
+def first_motion_s(running: Running, most_ticks: int = MOST_TICKS) -> float:
+    """Time after which the motor first moves from where it is; inf: never, as far as the work goes.
+
+    Raises
+    ------
+    InputError
+        Where command, load or supply still change of themselves.
+    """
+    drive = running.held()
+    if drive is None:
+        raise InputError("first motion: command, load and supply must stay as they are")
+    watch, start = _Watch(drive, most_ticks), drive.s[at.S_ANGLE]
+    while watch.ticks < most_ticks and not watch.quiet():
+        moved = np.concatenate([seen[2] for seen in watch.seen[-2:]]) != start / drive.p[at.RATIO]
+        if moved.any():
+            return float(np.concatenate(watch.times[-2:])[np.argmax(moved)])
+    return inf
+
+
+@dataclass
+class _Watch:
+    """The drive and what was seen of it."""
+
+    drive: Running
+    most_ticks: int
+    ticks: int = 0  # of work
+    periods: int = 0  # gone by, leaps included
+    times: list[Floats] = field(default_factory=list)
+    seen: list[Floats] = field(default_factory=list)  # per piece: reference, followed, motor
+    ranges: list[tuple[Floats, Floats]] = field(default_factory=list)  # per piece, of _RANGED
+    acted: list[tuple[int, int, int]] = field(default_factory=list)  # entries, flags, events
+    stood: list[_Stand] = field(default_factory=list)  # before it broke away
+    scales: Scales = field(init=False)
+    period_s: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Begin with the state that is there."""
+        self.period_s = self.drive.base_ticks * float(self.drive.p[at.PERIOD])
+        self.scales = Scales(self.drive, DRIFT * self.period_s)
+
+    def judged(self) -> Rest:
+        """Go on until the verdict is known."""
+        due, periods = 8, max(PIECE_TICKS // self.drive.base_ticks, 2)
+        while self.ticks < self.most_ticks:
+            piece = self._advance(periods)
+            if piece.status != "ok":
+                return self._rest("diverging")
+            stood = len(self.stood)
+            if self.quiet():
+                return self._rest("at rest")
+            if len(self.stood) > stood and (cycle := self._returns()) is not None:
+                return self._rest("limit cycle", *cycle)
+            if len(self.seen) >= due:
+                due += due // 2
+                swing = self._swing()
+                if swing.alike and self._bent():
+                    return self._rest("limit cycle", swing)
+                if self._idle():
+                    return self._rest("at rest")
+        return self._rest("diverging" if self._grows() else "still moving", self._swing())
+
+    def _advance(self, periods: int) -> Piece:
+        """Go on and keep one entry a period."""
+        base = self.drive.base_ticks
+        piece = self.drive.advance(periods * base, base)
+        self.times.append(self.period_s * np.arange(self.periods, self.periods + periods, dtype=float))
+        self.ticks, self.periods = self.ticks + periods * base, self.periods + periods
+        self.seen.append(self._signals(piece.columns))
+        flags = int(np.bitwise_or.reduce(piece.flags))
+        self.acted.append((periods, flags, piece.events))
+        ranged = piece.columns[_RANGED]
+        self.ranges.append((ranged.min(axis=1), ranged.max(axis=1)))
+        self.scales.take(self.drive, piece)
+        return piece
+
+    def _signals(self, columns: Floats) -> Floats:
+        """Command, what follows it, and the motor's part of that, all in the command's unit."""
+        p, w = self.drive.p, columns[2] / self.drive.p[at.RATIO]
+        if p[at.HAS_POSITION] > 0.0:
+            return np.stack([columns[0], columns[1], columns[at.HISTORY_ANGLE] / p[at.RATIO]])
+        if p[at.HAS_CURRENT] > 0.0 and p[at.HAS_VELOCITY] <= 0.0:
+            return np.stack([columns[0], columns[3], columns[3]])
+        if p[at.ELASTIC_DRIVE] > 0.0:
+            place = columns.shape[0] - at.ELASTIC_COLUMNS - int(p[at.RARE_LOAD] > 0.0)
+            return np.stack([columns[0], columns[place], w])
+        return np.stack([columns[0], w, w])
+
+    def quiet(self) -> bool:
+        """Whether nothing changes any more; an even drift is leapt over, up to what happens next."""
+        drive, places = self.drive, matter(self.drive)
+        states, pieces = [drive.s[places]], []
+        for _ in range(2):
+            pieces.append(self._advance(DRIFT))
+            states.append(drive.s[places])
+        scale = self.scales.states[places]
+        before, step = change(states[1], states[0]), change(states[2], states[1])
+        nothing = bool((small(before, scale) & small(step, scale)).all())
+        if all(self._still(piece) for piece in pieces) and (nothing or self._turning):
+            return True
+        if not all(eventless(piece) for piece in pieces) or not even(step, before, scale):
+            return False
+        windows, ticks = leap(drive, places, step, before, scale)
+        self.periods, self.ticks = self.periods + windows * DRIFT, self.ticks + ticks
+        if windows:
+            followed, motor = (float(values[-1]) for values in self.seen[-1][1:])
+            self.stood.append(_Stand(self.period_s * self.periods, len(self.seen), followed, motor))
+        return windows >= MOST_LEAPS
+
+    def _returns(self) -> tuple[_Swing, int] | None:
+        """The swing between two returns to where the drive stands, and its first piece; None: not yet known.
+
+        As near as a count of the sensors, or `STILL` of the largest angle, is the same place.
+        """
+        last, p = self.stood[-1], self.drive.p
+        counts = p[at.COUNTS_PER_RAD] * p[at.RATIO], p[at.POSITION_COUNTS]
+        far = max([STILL * float(self.scales.signals[1]), *(1.0 / each for each in counts if each > 0.0)])
+        away, visits = True, list[_Stand]()
+        for one in reversed(self.stood):
+            near = max(abs(one.followed - last.followed), abs(one.motor - last.motor)) <= far
+            if near and away:
+                visits.append(one)
+            away = not near
+        for turns in range(1, (len(visits) - 1) // 2 + 1):
+            now, before, first = (visits[k * turns] for k in range(3))
+            if not _alike(now.time_s - before.time_s, before.time_s - first.time_s):
+                continue
+            span = self._span(before.piece, now.piece)
+            if span > far and _alike(span, self._span(first.piece, before.piece)):
+                return _Swing(2, 1.0 / (now.time_s - before.time_s), alike=True), before.piece
+        return None
+
+    def _span(self, start: int, end: int) -> float:
+        """Of what moves most between two pieces."""
+        return float(np.ptp(np.concatenate(self.seen[start:end], axis=1)[1:], axis=1).max())
+
+    def _still(self, piece: Piece) -> bool:
+        """Whether all signals keep their values; of a speed drive, all but the angles."""
+        names = [2, 3, 4, 5, 6] if self._turning else [1, 2, 3, 4, 5, 6, at.HISTORY_ANGLE]
+        return bool((np.ptp(piece.columns[names], axis=1) <= STILL * self.scales.signals[names]).all())
+
+    @property
+    def _turning(self) -> bool:
+        """Whether a steady motion is what the command orders."""
+        return bool(self.drive.p[at.HAS_POSITION] <= 0.0)
+
+    def _grows(self) -> bool:
+        """Whether the command was never missed by more than in the last quarter of the entries."""
+        command, followed, _ = np.concatenate(self.seen, axis=1)
+        missed = [float(part.max()) for part in np.array_split(np.abs(command - followed), 4)]
+        return missed[3] > (1.0 + ALIKE) * max(missed[:3])
+
+    def _idle(self) -> bool:
+        """Whether nothing moved in the later half of the pieces, and what goes on in it keeps its range."""
+        ranges = np.array(self.ranges[len(self.ranges) // 2 :])
+        early, late = ((part[:, 0].min(axis=0), part[:, 1].max(axis=0)) for part in np.array_split(ranges, 2))
+        kept = bool((late[0] >= early[0]).all() and (late[1] <= early[1]).all())
+        return kept and not self._turning and bool((early[0][:2] == early[1][:2]).all())
+
+    def _bent(self) -> bool:
+        """Whether anything but a linear drive is in the last half: events, limits, counts."""
+        p, limits = self.drive.p, ~at.FLAG_STICK
+        counted = max(p[at.COUNTS_PER_RAD], p[at.POSITION_COUNTS], p[at.CURRENT_RESOLUTION]) > 0.0
+        return bool(counted or p[at.LAW] > 0.0 or any(flags & limits or n for _, flags, n in self._late()))
+
+    def _late(self) -> list[tuple[int, int, int]]:
+        """What acted in the last half of the entries."""
+        left, result = sum(one[0] for one in self.acted) // 2, []
+        for one in reversed(self.acted):
+            if left <= 0:
+                break
+            result.append(one)
+            left -= one[0]
+        return result
+
+    def _swing(self) -> _Swing:
+        """The swings of the last half of the entries, of whatever moves most."""
+        times, seen = np.concatenate(self.times), np.concatenate(self.seen, axis=1)
+        half = slice(times.size // 2, None)
+        spans = np.ptp(seen[1:, half], axis=1)
+        return _swing_of(times[half], seen[1 + int(np.argmax(spans)), half])
+
+    def _rest(self, verdict: Verdict, swing: _Swing | None = None, since: int | None = None) -> Rest:
+        """What is known by now; of the last half of the entries, or of the pieces ``since`` one."""
+        seen = np.concatenate(self.seen[since:], axis=1)
+        command, followed, motor = seen[:, seen.shape[1] // 2 if since is None else 0 :]
+        still, p = verdict == "at rest", self.drive.p
+        acted = self._late()[: 1 if still else None]
+        end = followed[-1] if still else 0.5 * (followed.max() + followed.min())
+        ordered = (
+            max(p[at.HAS_POSITION], p[at.HAS_VELOCITY], p[at.HAS_CURRENT]) > 0.0
+        )  # a voltage orders nothing
+        return Rest(
+            verdict=verdict,
+            error=float(command[-1] - end) if ordered else 0.0,
+            amplitude=0.0 if still else 0.5 * float(np.ptp(followed)),
+            motor_amplitude=0.0 if still else 0.5 * float(np.ptp(motor)),
+            frequency_hz=swing.frequency_hz if swing is not None and verdict == "limit cycle" else None,
+            periods=0 if swing is None else swing.periods,
+            limited=tuple(
+                name
+                for name, bit in zip(at.LIMITERS, at.LIMITER_BITS, strict=True)
+                if any(flags & bit for _, flags, _ in acted)
+            ),
+            after_s=self.periods * self.period_s,
+            ticks=self.ticks,
+        )
+
+
+@dataclass(frozen=True)
+class _Stand:
+    """Where a drive stands that friction holds: when, after how many pieces, what follows, the motor."""
+
+    time_s: float
+    piece: int
+    followed: float
+    motor: float
+
+
+@dataclass(frozen=True)
+class _Swing:
+    """Swings of a signal."""
+
+    periods: int
+    frequency_hz: float | None
+    alike: bool
+
+
+def _swing_of(times: Floats, values: Floats) -> _Swing:
+    """Swings between passages from below to above the middle, each by a quarter of the span."""
+    middle, quarter = 0.5 * (values.max() + values.min()), 0.25 * float(np.ptp(values))
+    side = np.where(values > middle + quarter, 1, np.where(values < middle - quarter, -1, 0))
+    places = np.flatnonzero(side)
+    up = places[1:][(side[places][1:] > 0) & (side[places][:-1] < 0)]
+    n = max(up.size - 1, 0)
+    if n < 2:
+        return _Swing(n, None, alike=False)
+    sizes = np.array([np.ptp(values[a:b]) for a, b in pairwise(up)])
+    first, second = (float(half.mean()) for half in np.array_split(sizes, 2))
+    alike = n >= PERIODS and _alike(first, second)
+    return _Swing(n, float(n / (times[up[-1]] - times[up[0]])), alike)
+
+
+def _alike(first: float, second: float) -> bool:
+    """Whether two swings, or their times, are as large as each other."""
+    return abs(second - first) <= ALIKE * first

@@ -1,0 +1,243 @@
+"""`actuator-lti export linear`: every loop and response of a design as state space, for other programs.
+
+The sampled form is exact; the continuous one carries its delays apart
+(`actuator_lti.systems.delay_system`). What is
+written is one tree of names, units, matrices and margins; `read_models` gives it back from any of the files,
+and `system_of` one of its systems as margins, bandwidths and step figures take it.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import json
+from dataclasses import asdict
+from math import isfinite, isqrt
+from pathlib import Path
+from pprint import pformat
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from actuator_lti.files.tree import Tree
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from actuator_lti.loops import Form, Loop, Loops
+
+SCHEMA = "actuator-lti/linear"
+SUFFIXES = {"json": ".json", "mat": ".mat", "python": ".py"}
+FORMS: tuple[Form, ...] = ("sampled", "continuous")
+_MATRICES = ("A", "B", "C", "D")
+_DELAYED = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays_s")
+
+_PYTHON = '''"""Linear models of the design {name}, hash {hash}; written by actuator-lti.
+
+    system(MODELS["sampled"]["loops"]["position"]["open_loop"])      a python-control system
+"""
+
+# fmt: off
+MODELS = {tree}
+# fmt: on
+
+
+def system(entry):
+    """The python-control system of an entry of matrices; one with delays is actuator-lti's DelaySystem."""
+    names = {{"inputs": [entry["input"]], "outputs": [entry["output"]], "name": entry["name"]}}
+    if "delays_s" in entry:
+        from actuator_lti.systems.delay_system import DelaySystem
+
+        parts = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays_s")
+        return DelaySystem(*(entry[part] for part in parts), **names)
+    import control
+
+    return control.ss(entry["A"], entry["B"], entry["C"], entry["D"], entry["dt"], **names)
+'''
+
+
+def linear_models(design: Design) -> Tree:
+    """The tree of a design at its usual operating point: per form its loops, break points and responses."""
+    from actuator_lti import assemble_loops
+    from actuator_lti.design import design_hash
+
+    about = {"name": design.name, "revision": design.revision or "", "hash": design_hash(design)}
+    tree: Tree = {"schema": SCHEMA, "version": 1, "design": about}
+    for form in FORMS:
+        tree[form] = _form(assemble_loops(design, form))
+    return tree
+
+
+def _form(loops: Loops) -> Tree:
+    from nonlinear.export.c_files import stage_words
+
+    design = loops.design
+    length, force = ("m", "N") if design.axis == "linear" else ("rad", "N*m")
+    _, asked = stage_words(design)
+    answer = {"position": length, "velocity": f"{length}/s", "current": "A"}
+    responses: Tree = {}
+    if loops.plain_response is not None:
+        unit = answer.get(design.controller.outermost, f"{length}/s")
+        responses["command"] = _system(loops.plain_response, asked, unit)
+    if loops.moment_system is not None:
+        responses["load"] = _system(loops.moment_system(), force, length)
+    return {
+        "operating_point": loops.operating_point,
+        "load": loops.load_Nm,
+        "loops": {name: _loop(loop, loops) for name, loop in loops.present.items()},
+        "break_points": {name: _loop(loop, loops) for name, loop in loops.break_points.items()},
+        "responses": responses,
+    }
+
+
+def _loop(loop: Loop, loops: Loops) -> Tree:
+    """Open loop, closed loop, sensitivity, and margins: of a periodic loop those of its whole period."""
+    from actuator_lti.loops import exact_margins
+
+    systems = {
+        "open_loop": loop.plain_open,
+        "closed_loop": loop.plain_closed,
+        "sensitivity": loop.plain_sensitivity,
+    }
+    result: Tree = {name: _system(one, loop.unit_in, loop.unit_out) for name, one in systems.items()}
+    result["periodic"] = loop.periodic
+    if loop.periodic:  # the open loop of the fundamental is not all of it
+        exact = asdict(exact_margins(loops, loop.break_point))
+        result["margins"] = {
+            name: value for name, value in exact.items() if value is not None and isfinite(value)
+        }
+    else:
+        result["margins"] = margins_tree(loop.plain_open)
+    return result
+
+
+def margins_tree(system: Any) -> Tree:
+    """Verdict, evidence and every margin of an open loop; why there are none, where it is refused."""
+    from actuator_lti.margins import stability_margins
+
+    try:
+        found = stability_margins(system)
+    except InputError as refusal:
+        return {"verdict": "undecided", "evidence": "withheld", "evidence_reason": refusal.message}
+    return {
+        "verdict": found.verdict,
+        "evidence": found.evidence,
+        "evidence_reason": found.evidence_reason,
+        "gain_margins": [one.ratio for one in found.gain_margins],
+        "gain_margins_rad_s": [one.frequency_rad_s for one in found.gain_margins],
+        "phase_margins_deg": [one.deg for one in found.phase_margins],
+        "phase_margins_rad_s": [one.frequency_rad_s for one in found.phase_margins],
+        "delay_margins_s": [one.seconds for one in found.delay_margins],
+        "delay_margins_rad_s": [one.frequency_rad_s for one in found.delay_margins],
+        "modulus_margin": [] if found.modulus_margin is None else [found.modulus_margin],
+    }
+
+
+def _system(system: Any, unit_in: str, unit_out: str) -> Tree:
+    """Matrices and names."""
+    parts = _DELAYED if hasattr(system, "delays_s") else _MATRICES
+    return {
+        "name": system.name,
+        "input": system.source,
+        "input_unit": unit_in,
+        "output": system.signal,
+        "output_unit": unit_out,
+        "states": list(system.states),
+        "dt": float(system.dt),
+        **{part: np.asarray(getattr(system, part), dtype=float).tolist() for part in parts},
+    }
+
+
+def system_of(entry: Tree) -> Any:
+    """A system of a tree, written by any of the formats."""
+    from actuator_lti.systems.plain_delays import PlainDelaySystem
+    from actuator_lti.systems.plain_system import PlainSystem
+
+    n = isqrt(np.size(entry["A"]))
+    names: dict[str, Any] = {
+        "name": str(entry["name"]),
+        "source": str(entry["input"]),
+        "signal": str(entry["output"]),
+    }
+    names["states"] = tuple(str(state) for state in np.atleast_1d(entry["states"]))
+    k = np.size(entry["delays_s"]) if "delays_s" in entry else 0
+    sizes = {
+        "A": (n, n), "B": (n, 1), "C": (1, n), "D": (1, 1), "B1": (n, 1), "B2": (n, k), "C1": (1, n),
+        "C2": (k, n), "D11": (1, 1), "D12": (1, k), "D21": (k, 1), "D22": (k, k), "delays_s": (k,),
+    }  # fmt: skip
+    known = _DELAYED if "delays_s" in entry else _MATRICES
+    parts: dict[str, Any] = {
+        part: np.asarray(entry[part], dtype=float).reshape(sizes[part]) for part in known
+    }
+    if "delays_s" in entry:
+        return PlainDelaySystem(**parts, **names)
+    return PlainSystem(**parts, dt=float(entry["dt"]), **names)
+
+
+def written_models(tree: Tree, to: str) -> bytes:
+    """The file of a tree.
+
+    Raises
+    ------
+    InputError
+        For an unknown format.
+    """
+    if to == "json":
+        return (json.dumps(tree, indent=1, allow_nan=False) + "\n").encode()
+    if to == "python":
+        about = tree["design"]
+        text = pformat(tree, width=110, compact=True, sort_dicts=False)
+        return _PYTHON.format(name=about["name"].replace('"', "'"), hash=about["hash"], tree=text).encode()
+    if to == "mat":
+        from scipy.io import savemat
+
+        held = io.BytesIO()
+        savemat(held, _for_matlab(tree), long_field_names=True, oned_as="column")
+        return held.getvalue()
+    raise InputError(f"to = {to}: allowed: {', '.join(SUFFIXES)}")
+
+
+def _for_matlab(value: Any) -> Any:
+    """Lists of texts as cells; empty lists and texts as MATLAB has them."""
+    if isinstance(value, dict):
+        return {name: _for_matlab(item) for name, item in value.items()}
+    if isinstance(value, list):
+        texts = any(isinstance(item, str) for item in value)
+        return np.array(value, dtype=object if texts else float)
+    return value
+
+
+def _from_mat(path: Path) -> Any:
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        return loadmat(path, simplify_cells=True)
+    except (MatReadError, NotImplementedError) as error:
+        raise ValueError(error) from None
+
+
+def read_models(path: str | Path) -> Tree:
+    """The tree of a file that `written_models` made; its ending says how.
+
+    Raises
+    ------
+    InputError
+        For a file that is none.
+    """
+    path = Path(path)
+    try:
+        if path.suffix == ".mat":
+            tree: Any = _from_mat(path)
+        elif path.suffix == ".py":
+            body = ast.parse(path.read_text(encoding="utf-8")).body
+            tree = next(ast.literal_eval(one.value) for one in body if isinstance(one, ast.Assign))
+        else:
+            tree = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, SyntaxError, StopIteration) as error:
+        raise InputError(f"cannot be read: {error}", where=str(path)) from None
+    if not isinstance(tree, dict) or tree.get("schema") != SCHEMA:
+        raise InputError(
+            f"no linear models; allowed: a file of actuator-lti export linear ({SCHEMA})", where=str(path)
+        )
+    return tree

@@ -1,0 +1,69 @@
+"""What fused multiply-add does to a run: the sentence of the exported README, measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from random_drives import random_drive
+
+from actuator_lti import load_design
+from actuator_lti.compiled.compiler import compile_files, system_compiler
+from actuator_lti.design.model import Design
+from nonlinear.native import LIBRARY
+from nonlinear.rows import Rows
+
+SHIPPED = (
+    "emps", "ilr33-amber", "ilr33-amber-multirate", "ilr33-amber-tanh", "ilr33-amber-compliant", "fin",
+    "joint", "ballscrew", "ctms-motor-position",
+)  # fmt: skip
+CPU = Path("/proc/cpuinfo")
+pytestmark = pytest.mark.skipif(
+    system_compiler() is None or not CPU.is_file() or " fma " not in CPU.read_text(encoding="utf-8"),
+    reason="no C compiler, or no fused multiply-add on this machine",
+)
+
+
+@pytest.fixture(scope="module")
+def libraries(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The simulator compiled plainly, and with products and sums in one rounding."""
+    folder, command = tmp_path_factory.mktemp("fma"), [str(system_compiler())]
+    texts = {"run.c": LIBRARY.text()}
+    for name, more in (("plain.so", ()), ("fused.so", ("-mfma", "-ffp-contract=fast"))):
+        flags = ("-O3", "-shared", "-fPIC", *more)
+        (folder / name).write_bytes(compile_files(texts, "run.so", "x", flags, command=command))
+    return folder / "plain.so", folder / "fused.so"
+
+
+def apart(design: Design, libraries: tuple[Path, Path], ticks: int = 3000) -> float:
+    """Largest difference of angle, speed, current and voltage, each of its own size."""
+    found = []
+    for path in libraries:
+        rows = Rows.of(design)
+        rows["ticks"], rows["load"] = ticks, 0.1
+        turns = np.sin(2.0 * np.pi * 3.0 * np.arange(ticks) / ticks)
+        rows.series("command", 0.3 * design.validation.full_deflection_rad * turns)
+        with LIBRARY.borrowed(path):
+            run = rows.trajectory()
+        found.append(
+            np.column_stack([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])
+        )
+    plain, fused = found
+    there = plain.any(axis=0)  # a force source has no current
+    return float((np.abs(plain - fused).max(axis=0)[there] / np.abs(plain).max(axis=0)[there]).max())
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_designs_stay_within_rounding(name: str, libraries: tuple[Path, Path]) -> None:
+    assert apart(load_design(name), libraries) < 1e-11
+
+
+def test_a_count_on_the_other_side_is_seen(libraries: tuple[Path, Path]) -> None:
+    """Drives with counts, noise, friction: most agree to rounding, and some differ far beyond it."""
+    sizes = [
+        apart(random_drive(np.random.default_rng(seed)), libraries)
+        for seed in (*range(10, 20), 37, 63, 64, 65)
+    ]
+    assert np.median(sizes) < 1e-9
+    assert max(sizes) > 1e-5

@@ -1,0 +1,89 @@
+"""The linear models of a file give the margins and responses of the loops that they were written of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from actuator_lti import assemble_loops
+from actuator_lti.errors import InputError
+from actuator_lti.loops import exact_margins
+from reports.cli.app import build
+from reports.linear_models import margins_tree, read_models, system_of
+
+NAMES = ("ilr33-amber", "ilr33-amber-multirate", "ballscrew", "ctms-motor-position", "emps")
+OTHERS = [("ilr33-amber-multirate", "json"), ("ctms-motor-position", "python"), ("emps", "json")]
+
+
+def written(name: str, to: str, folder: Path) -> Path:
+    path = folder / f"models.{'py' if to == 'python' else to}"
+    done = CliRunner().invoke(build(), ["export", "linear", name, "--to", to, "--out", str(path)])
+    assert done.exit_code == 0, done.exception
+    return path
+
+
+def same(found: Any, known: Any) -> bool:
+    return bool(np.allclose(np.ravel(found), np.ravel(known), rtol=1e-12, atol=0.0)) and (
+        np.size(found) == np.size(known)
+    )
+
+
+@pytest.mark.parametrize(("name", "to"), [*((name, "mat") for name in NAMES), *OTHERS])
+def test_read_back_they_have_the_same_margins_and_responses(name: str, to: str, tmp_path: Path) -> None:
+    tree = read_models(written(name, to, tmp_path))
+    for form in ("sampled", "continuous"):
+        loops, kept = assemble_loops(name, form), tree[form]
+        for place, ours in (("loops", loops.present), ("break_points", loops.break_points)):
+            assert set(kept[place]) == set(ours)
+            for each, loop in ours.items():
+                entry = kept[place][each]
+                assert entry["open_loop"]["output_unit"] == loop.unit_out
+                assert responds_alike(system_of(entry["closed_loop"]), loop.plain_closed)
+                assert responds_alike(system_of(entry["sensitivity"]), loop.plain_sensitivity)
+                if loop.periodic:
+                    exact = exact_margins(loops, loop.break_point)
+                    assert same(entry["margins"]["gain_upper"], exact.gain_upper)
+                    continue
+                again = margins_tree(system_of(entry["open_loop"]))
+                for key, value in margins_tree(loop.plain_open).items():
+                    for found in (again[key], entry["margins"][key]):
+                        assert found == value if isinstance(value, str) else same(found, value), (each, key)
+        assert responds_alike(system_of(kept["responses"]["command"]), loops.plain_response)
+        assert loops.moment_system is not None
+        assert responds_alike(system_of(kept["responses"]["load"]), loops.moment_system())
+
+
+def responds_alike(found: Any, known: Any) -> bool:
+    w = np.geomspace(0.1, 3000.0, 40)
+    points = np.exp(1j * w * known.dt) if known.dt else 1j * w
+    return same(found(points), known(points)) and tuple(found.states) == tuple(known.states)
+
+
+def test_the_python_file_makes_python_control_systems(tmp_path: Path) -> None:
+    """A program that knows nothing but the file, numpy and python-control."""
+    scope: dict[str, Any] = {}
+    exec(written("emps", "python", tmp_path).read_text(encoding="utf-8"), scope)
+    ours = scope["system"](scope["MODELS"]["sampled"]["loops"]["position"]["open_loop"])
+    known = assemble_loops("emps").position
+    assert known is not None
+    z = np.exp(1j * 100.0 * ours.dt)
+    assert ours(z) == pytest.approx(known.open_loop(z), rel=1e-12)
+    delayed = scope["system"](scope["MODELS"]["continuous"]["loops"]["position"]["open_loop"])
+    continuous = assemble_loops("emps", "continuous").position
+    assert continuous is not None
+    assert delayed(100j) == pytest.approx(continuous.open_loop(100j), rel=1e-12)
+
+
+def test_files_that_are_none_and_files_that_are_there(tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text("{}")
+    (tmp_path / "a.mat").write_text("{}")
+    (tmp_path / "a.py").write_text("MODELS =")
+    for name in ("a.json", "a.mat", "a.py", "absent.json"):
+        with pytest.raises(InputError, match=r"no linear models|cannot be read"):
+            read_models(tmp_path / name)
+    call = ["export", "linear", "emps", "--out", str(tmp_path / "a.json")]
+    assert "exists already" in str(CliRunner().invoke(build(), call).exception)
