@@ -56,17 +56,14 @@ def sentence(one: Counts, axis: str) -> str:
 def _facts(one: Counts, axis: str) -> list[FactItem]:
     scale, unit, speed = _units(axis)
     name = NAMES[one.sensor]
+    linear = f"Linear within {WITHIN:.0%} from this amplitude at the sensor on, by describing function"
     items = [
         doc.fact(f"{name}: one count", one.quantum_rad * scale, unit),
         doc.fact("Ripple of the motor's speed, largest", one.ripple_rad_s, speed),
         doc.fact("at a motor speed of", one.ripple_at_rad_s, speed),
         doc.fact("Standing error, one count", one.standing_rad * scale, unit, better=-1),
         doc.fact("Standing error after a step, simulated", one.standing_seen_rad * scale, unit, better=-1),
-        doc.fact(
-            f"Linear within {WITHIN:.0%} from this amplitude at the sensor on, by describing function",
-            one.linear_rad * scale,
-            unit,
-        ),
+        doc.fact(linear, one.linear_rad * scale, unit),
     ]
     if one.linear_seen_rad is not None:
         label = "Linear from this amplitude on, simulated at the bandwidth"

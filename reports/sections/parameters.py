@@ -64,14 +64,10 @@ def section(design: Design, warnings: Sequence[str] = ()) -> Section:
 
 def _derived(design: Design) -> Block:
     """Give what follows from the values."""
-    rotary = design.axis == "rotary"
+    mass, unit = ("Inertia at the motor", "kg m²") if design.axis == "rotary" else ("Moving mass", "kg")
     items = [
         doc.fact("Total reduction N", float(f"{design.total_ratio:.6g}")),
-        doc.fact(
-            "Inertia at the motor" if rotary else "Moving mass",
-            design.inertia_kgm2,
-            "kg m²" if rotary else "kg",
-        ),
+        doc.fact(mass, design.inertia_kgm2, unit),
         doc.fact("Tick of the controller", design.controller.period_s * 1e6, "µs"),
         doc.fact("Computing delay", design.controller.computing_delay_s * 1e6, "µs"),
         doc.fact("Friction law", design.friction.law),

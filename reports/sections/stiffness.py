@@ -86,23 +86,19 @@ def _figure(result: Stiffness, unit: str) -> list[Block]:
 
 def _table(result: Stiffness, unit: str) -> Block:
     note = "Infinite: the output comes back to its place, or does not move at all."
-    return doc.listing(
-        "Stiffness by state",
-        result.curves,
-        [
-            doc.of(lambda one: STATES[one.state], "state", "State"),
-            doc.of(_static, "static", "Static", unit, format="sig:4", better=1),
-            doc.of(lambda one: one.least[0], "least", "Least", unit, format="sig:4", better=1),
-            doc.of(
-                lambda one: one.least[1] if math.isfinite(one.least[0]) else None,
-                "at",
-                "at",
-                "Hz",
-                format="sig:4",
-            ),
-        ],
-        note,
-    )
+    columns = [
+        doc.of(lambda one: STATES[one.state], "state", "State"),
+        doc.of(_static, "static", "Static", unit, format="sig:4", better=1),
+        doc.of(lambda one: one.least[0], "least", "Least", unit, format="sig:4", better=1),
+        doc.of(
+            lambda one: one.least[1] if math.isfinite(one.least[0]) else None,
+            "at",
+            "at",
+            "Hz",
+            format="sig:4",
+        ),
+    ]
+    return doc.listing("Stiffness by state", result.curves, columns, note)
 
 
 def _static(curve: StiffnessCurve) -> float | str:
@@ -135,16 +131,12 @@ def _at_rest(result: Stiffness, unit: str) -> Block:
         "Fundamental of the simulated drive as it is, with its dry friction, play and quantisation, the "
         "command held. No value: the output does not move."
     )
-    return doc.listing(
-        "At rest, by amplitude",
-        result.at_rest,
-        [
-            doc.of("moment_Nm", "moment", "Moment, peak", load_unit(result.design), format="sig:3"),
-            doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:3"),
-            doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Stiffness", unit, format="sig:4"),
-        ],
-        note,
-    )
+    columns = [
+        doc.of("moment_Nm", "moment", "Moment, peak", load_unit(result.design), format="sig:3"),
+        doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:3"),
+        doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Stiffness", unit, format="sig:4"),
+    ]
+    return doc.listing("At rest, by amplitude", result.at_rest, columns, note)
 
 
 def _checks(result: Stiffness, unit: str) -> Block:
@@ -153,14 +145,10 @@ def _checks(result: Stiffness, unit: str) -> Block:
         "load: predicted here is the linear stiffness of that drive, without the friction by load "
         "that the curves have."
     )
-    return doc.listing(
-        "Injected moment",
-        result.checks,
-        [
-            doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:4"),
-            doc.of(lambda one: abs(one.foreseen_Nm_rad), "foreseen", "Predicted", unit, format="sig:6"),
-            doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Simulated", unit, format="sig:6"),
-            doc.of("difference", "difference", "Relative difference", format="sig:2"),
-        ],
-        note,
-    )
+    columns = [
+        doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:4"),
+        doc.of(lambda one: abs(one.foreseen_Nm_rad), "foreseen", "Predicted", unit, format="sig:6"),
+        doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Simulated", unit, format="sig:6"),
+        doc.of("difference", "difference", "Relative difference", format="sig:2"),
+    ]
+    return doc.listing("Injected moment", result.checks, columns, note)
