@@ -59,23 +59,21 @@ def _followed(
             break
     except ArithmeticError:  # a turn that no values take: those of the keys' ranges never come here
         end = _refusal(BEYOND)
-    found: list[Statement] = []
-    number = 0  # of comparisons so far; what lies before those that are told is there already
-    for statement in way.statements:
+    rest = [end]
+    number = len(way.outcomes)
+    for statement in reversed(way.statements):
         if statement.kind != "condition":
-            found += [statement] if number >= len(told) else []
+            rest.insert(0, statement)
             continue
-        if number >= len(told):
-            turned = (*way.outcomes[:number], not way.outcomes[number])
-            body = (
-                [_refusal(BEYOND)]
-                if turns > MOST_TURNS
-                else _followed(design, keys, check, turned, turns + 1)
-            )
-            if _refuses(body):
-                found += [replace(statement, kind="branch"), *body, Statement("end")]
-        number += 1
-    return [*found, end]
+        number -= 1
+        if number < len(told):  # that, and what lies before it, is there already
+            break
+        turned = (*way.outcomes[:number], not way.outcomes[number])
+        deep = turns > MOST_TURNS
+        body = [_refusal(BEYOND)] if deep else _followed(design, keys, check, turned, turns + 1)
+        if _refuses(body) or _refuses(rest):  # else the outcome makes no difference
+            rest = [replace(statement, kind="branch"), *body, Statement("end"), *rest]
+    return rest
 
 
 def _refuses(statements: Sequence[Statement]) -> bool:

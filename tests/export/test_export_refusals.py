@@ -116,12 +116,13 @@ def test_unknown_versions_and_platforms(
 
 
 def test_no_name_ends_a_comment_or_turns_the_code_round() -> None:
-    hostile = "*/ int evil; /* \\ \u202e\u2066 \x85 two\nlines"
+    hostile = '*/ int evil; /* " int evil; \\ \u202e\u2066 \x85 two\nlines'
     texts = c_export(replace(load_design("ctms-motor-position"), name=hostile, title=hostile))
     for name in ("drive_design.h", "drive_design.c", "README.md"):
         assert all(c.isprintable() or c == "\n" for c in texts[name]), name
     for name in ("drive_design.h", "drive_design.c"):
-        code = re.sub(r"/\*.*?\*/", "", texts[name], flags=re.DOTALL)
+        comment_or_text = r'/\*.*?\*/|"(?:[^"\\\n]|\\.)*"'
+        code = re.sub(comment_or_text, "", texts[name], flags=re.DOTALL)
         assert "evil" in texts[name]
         assert "evil" not in code
         assert "*/" not in code

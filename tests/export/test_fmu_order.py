@@ -139,6 +139,18 @@ def test_keys_that_contradict_each_other_are_refused_as_in_a_design_file(unit: P
         host.step(2.5 * PERIOD, PERIOD)
 
 
+def test_what_no_longer_applies_is_not_refused(tmp_path: Path) -> None:
+    """Only a gear error bounds its order: without one, any order is a design and is taken."""
+    design = with_values(load_design("ballscrew"), {"load.gear_error": 0.01})
+    path = tmp_path / "u.fmu"
+    path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
+    none = {"load.gear_error": 0.0, "load.gear_error_periods": 1e6}
+    with_values(design, none)
+    with hosted(path) as (host,):
+        host.start(**{structured(key): value for key, value in none.items()})
+        refused(host, "load.gear_error_periods = .*at most", host.put, {"load.gear_error": 0.01})
+
+
 NUMBER = re.compile(r"-?\d+(\.\d*)?(e[+-]?\d+)?")
 
 
