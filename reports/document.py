@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -32,6 +33,7 @@ from reports.document_schema import (
     Layout,
     Row,
     Section,
+    Severity,
     Status,
     VerdictItem,
     validate,
@@ -46,12 +48,13 @@ if TYPE_CHECKING:
     from reports.charts.chart import Chart
 
 T = TypeVar("T")
+Shown = tuple[Column, Callable[[Any], Any]]
 
 __all__ = [
     "Block", "Cell", "Column", "Document", "Row", "Section", "VerdictItem", "abscissa", "certain", "check",
     "column", "details", "document", "dumps", "fact", "facts", "figure", "figures", "listing", "load",
-    "loads", "plain", "rounded", "section", "table", "text", "validate", "verdict", "verdicts", "waived",
-    "walk", "with_columns",
+    "loads", "of", "plain", "rounded", "section", "table", "text", "validate", "verdict", "verdicts",
+    "waived", "walk", "with_columns",
 ]  # fmt: skip
 
 
@@ -125,10 +128,36 @@ def table(
     }
 
 
+def of(
+    read: str | Callable[[Any], Any], key: str, label: str, unit: str = "", *, scale: float = 1.0, **look: Any
+) -> Shown:
+    """A column of `listing`: a field of the items by its dotted name, or what a function says of one.
+
+    ``scale`` turns a number into ``unit``; what is not there stays nothing. ``look``: as of `column`.
+
+    Examples
+    --------
+    >>> _, read = of("real.imag", "y", "y", "mm", scale=1e3)
+    >>> read(2.0 + 3.0j), read(None)
+    (0.0, None)
+    """
+    value = partial(_field, read.split(".")) if isinstance(read, str) else read
+    made = column(key, label, unit, **look)
+    if scale == 1.0:
+        return made, value
+    return made, lambda item: None if (found := value(item)) is None else scale * found
+
+
+def _field(names: Sequence[str], item: Any) -> Any:
+    for name in names:
+        item = None if item is None else getattr(item, name)
+    return item
+
+
 def listing(
     caption: str,
     items: Iterable[T],
-    columns: Sequence[tuple[Column, Callable[[T], Any]]],
+    columns: Sequence[Shown],
     note: str = "",
     status: Callable[[T], Status | None] | None = None,
 ) -> Block:
@@ -136,8 +165,8 @@ def listing(
 
     Examples
     --------
-    >>> listing("Squares", [2, 3], [(column("n", "n", format="int"), lambda n: n * n)])["rows"]
-    [{'n': 4}, {'n': 9}]
+    >>> listing("Parts", [2 + 3j], [of("imag", "y", "y", "mm", scale=1e3)])["rows"]
+    [{'y': 3000.0}]
     """
     rows = [
         {one["key"]: read(item) for one, read in columns} | ({"_status": status(item)} if status else {})
@@ -259,6 +288,11 @@ def verdicts(items: Iterable[VerdictItem], what: str = "requirements") -> Block:
     return {"kind": "verdicts", "items": [plain(item) for item in items], "what": what}
 
 
+def judged(blocks: Iterable[Block]) -> list[VerdictItem]:
+    """Every verdict of some blocks."""
+    return [item for block in blocks if block["kind"] == "verdicts" for item in block["items"]]
+
+
 def details(title: str, blocks: Sequence[Block]) -> Block:
     """Make a part that opens on demand."""
     return {"kind": "details", "title": title, "blocks": list(blocks)}
@@ -272,6 +306,7 @@ def section(
     result: str = "",
     intro: str = "",
     status: Status = "info",
+    told: Severity | None = None,
     findings: Iterable[Finding] = (),
     verdict: Verdict | None = None,
 ) -> Section:
@@ -285,11 +320,14 @@ def section(
         One sentence that says what was found; it comes first.
     intro : str
         How it was found.
+    told : Severity, optional
+        How grave the result is, where the first screen says it.
     findings : iterable of Finding
-        What the first screen has to say of it.
+        What else the first screen has to say of it.
     verdict : Verdict, optional
         Not proven: a report is not proven by this section, whatever its verdicts.
     """
+    first = [Finding(severity=told, text=result, where=id)] if told and result else []
     made: Section = {
         "id": id,
         "title": title,
@@ -297,7 +335,7 @@ def section(
         "intro": intro,
         "status": status,
         "blocks": list(blocks),
-        "findings": plain_findings(findings),
+        "findings": plain_findings([*first, *findings]),
     }
     return made if verdict is None else {**made, "verdict": verdict.value}
 

@@ -105,6 +105,11 @@ def hertz(value: float) -> str:
     return f"{short(value / 1e3, 3)} kHz" if value >= 1e3 else f"{short(value, 3)} Hz"
 
 
+def capital(words: str) -> str:
+    """Begin with a capital; the rest stays."""
+    return words[:1].upper() + words[1:]
+
+
 def to_minus(text: str) -> str:
     """Use the minus sign of typography."""
     return text.replace("-", "−")

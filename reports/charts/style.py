@@ -1,10 +1,9 @@
-"""What figures share: limits of an axis, ticks of phase, powers of ten."""
+"""What figures share: limits of an axis, ticks of phase."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -22,42 +21,15 @@ from reports.charts.paint import (
     SKY,
     Style,
     series,
-)
+)  # fmt: skip
 from reports.numbers import hertz, time_unit, to_minus
 
 SMALL, HALF, WIDE = 340.0, 430.0, 900.0
 __all__ = [
-    "BLUE",
-    "BROWN",
-    "GREEN",
-    "HALF",
-    "INK",
-    "MUTED",
-    "ORANGE",
-    "PURPLE",
-    "RED",
-    "SERIES",
-    "SKY",
-    "SMALL",
-    "WIDE",
-    "Chart",
-    "Panel",
-    "Style",
-    "Values",
-    "bound",
-    "differences",
-    "frequency",
-    "hertz",
-    "known",
-    "phase_axis",
-    "powers",
-    "series",
-    "time_axis",
-    "time_unit",
-    "to_minus",
+    "BLUE", "BROWN", "GREEN", "HALF", "INK", "MUTED", "ORANGE", "PURPLE", "RED", "SERIES", "SKY", "SMALL",
+    "WIDE", "Chart", "Panel", "Style", "bound", "frequency", "hertz", "known", "phase_axis", "series",
+    "time_axis", "time_unit", "to_minus",
 ]  # fmt: skip
-
-Values = Sequence[float | None]  # of a curve; null is a gap
 
 
 def known(values: Iterable[float | None]) -> list[float]:
@@ -100,20 +72,3 @@ def time_axis(panel: Panel, last_s: float) -> float:
     scale, unit = time_unit(last_s)
     panel.x.label = f"time, {unit}"
     return scale
-
-
-def powers(exponents: Iterable[int]) -> list[tuple[float, str]]:
-    """Give ticks at powers of ten.
-
-    Examples
-    --------
-    >>> powers((-6, 0, 3))
-    [(1e-06, '10⁻⁶'), (1.0, '1'), (1000.0, '10³')]
-    """
-    raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-    return [(10.0**k, "1" if k == 0 else "10" + str(k).translate(raised)) for k in exponents]
-
-
-def differences(a: Any, b: Any) -> np.ndarray:
-    """Give a less b; None is a gap."""
-    return np.asarray(np.asarray(a, dtype=float) - np.asarray(b, dtype=float))

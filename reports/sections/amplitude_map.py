@@ -111,9 +111,8 @@ def _lines(panel: Panel, result: LargeSignals, scale: float) -> None:
     there = [(words, one) for words, one in found if one is not None and np.isfinite(one.simulated_rad).any()]
     for k, (words, one) in enumerate(there):
         look = {"colour": style.INK, "marker": "Dv"[k % 2], "size": 7.0, "hollow": True}
-        panel.points(
-            one.frequency_hz, scale * one.simulated_rad / one.command_gain, f"simulated, {words}", **look
-        )
+        sizes = scale * one.simulated_rad / one.command_gain
+        panel.points(one.frequency_hz, sizes, f"simulated, {words}", **look)
 
 
 def _names(panel: Panel, names: Sequence[str], cause: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:

@@ -22,7 +22,7 @@ from reports.document_schema import (
     Weakest,
 )
 from reports.findings import Finding, gathered, plain
-from reports.numbers import short
+from reports.numbers import capital, short
 from reports.sections import loop as loop_section
 from reports.sections.margins import margin_row, range_words, shown, worst_status
 from reports.sections.names import LOOPS, POINTS, loop_words
@@ -93,7 +93,7 @@ def weakest(point: WeakPoint) -> Weakest:
     loop = loop_words(view.loop, view.rotor) if view.loop else ""
     cut = f"cut at the {POINTS.get(view.cut, view.cut)}" if view.cut else ""
     label = ", ".join(filter(None, (loop, view.place, cut)))
-    label = label[0].upper() + label[1:]
+    label = capital(label)
     if not point.quantity:
         return {"label": label, "words": "not stable", "status": "warn" if view.place else "fail"}
     quantity = QUANTITIES[point.quantity]

@@ -9,14 +9,7 @@ from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.loop_survey import BreakPoint
 from reports import document as doc
 from reports.document_schema import Row, Section
-from reports.sections.margins import (
-    MARGIN_COLUMNS,
-    evidence_notes,
-    finite,
-    margin_row,
-    times,
-    worst_status,
-)
+from reports.sections.margins import MARGIN_COLUMNS, evidence_notes, margin_row, worst_status
 from reports.sections.names import POINTS
 
 COLUMNS = [
@@ -25,10 +18,10 @@ COLUMNS = [
     *(c for c in MARGIN_COLUMNS if c["key"] not in ("loop", "delay_margin_samples", "disk_margin")),
 ]
 EXACT_COLUMNS = [
-    doc.column("point", "Cut at"),
-    doc.column("gain_upper", "Gain may grow by", "×", format="sig:4"),
-    doc.column("gain_lower", "and fall to", "×", format="sig:3"),
-    doc.column("delay_ms", "Delay may grow by", "ms", format="sig:3"),
+    doc.of(lambda pair: POINTS.get(pair[0], pair[0]), "point", "Cut at"),
+    doc.of(lambda pair: pair[1].gain_upper, "gain_upper", "Gain may grow by", "×", format="sig:4"),
+    doc.of(lambda pair: pair[1].gain_lower or None, "gain_lower", "and fall to", "×", format="sig:3"),
+    doc.of(lambda pair: pair[1].delay_s, "delay_ms", "Delay may grow by", "ms", scale=1e3, format="sig:3"),
 ]
 
 
@@ -43,25 +36,19 @@ def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures])
         reasons += [f"{POINTS.get(name, name)}: {point.reason}."] if point.reason else []
     note = "The outermost loop has no other loop outside it, so its two lines agree."
     blocks = [doc.table("Break-point matrix", COLUMNS, rows, note)]
-    reasons += [
-        line
-        for name, point in points.items()
-        if point.figures is not None
-        for line in evidence_notes({POINTS.get(name, name): point.figures})
-    ]
+    there = {POINTS.get(name, name): one.figures for name, one in points.items() if one.figures is not None}
+    reasons += evidence_notes(there)
     blocks += [doc.text(reason) for reason in reasons]
-    exact = [_exact_row(name, point) for name, point in points.items() if point.exact is not None]
+    exact = [(name, point.exact) for name, point in points.items() if point.exact is not None]
     if exact:
         words = (
             "A fast loop cut inside slower ones is periodically time-varying; the rows above describe its "
-            "fundamental. "
-            "The exact borders of stability follow from the eigenvalues over one period."
+            "fundamental. The exact borders of stability follow from the eigenvalues over one period."
         )
-        blocks += [doc.text(words), doc.table("Exact borders of periodic loops", EXACT_COLUMNS, exact)]
+        blocks += [doc.text(words), doc.listing("Exact borders of periodic loops", exact, EXACT_COLUMNS)]
     intro = (
         "In the finished drive a gain error or a delay occurs at one point, with every other loop closed. "
-        "The matrix "
-        "shows what the drive tolerates at each point."
+        "The matrix shows what the drive tolerates at each point."
     )
     status = worst_status([point.stable for point in points.values()])
     return doc.section(
@@ -85,14 +72,3 @@ def _row(name: str, others: str, figures: LoopFigures | None) -> Row:
     if figures is None:
         return {"point": POINTS.get(name, name), "others": others, "stable": "see below"}
     return {"point": POINTS.get(name, name), "others": others, **margin_row(figures)}
-
-
-def _exact_row(name: str, point: BreakPoint) -> Row:
-    exact = point.exact
-    assert exact is not None
-    return {
-        "point": POINTS.get(name, name),
-        "gain_upper": finite(exact.gain_upper),
-        "gain_lower": finite(exact.gain_lower) or None,
-        "delay_ms": times(exact.delay_s, 1e3),
-    }

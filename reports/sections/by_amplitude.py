@@ -9,7 +9,7 @@ from analyses.large_signal.by_amplitude import AmplitudeMargin
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Row
+from reports.document_schema import Block
 
 KINDS = {"gain": "loop gain, up", "delay": "delay at the loop"}
 NEXT_TO_NOTHING = 0.01  # of the linear margin
@@ -92,47 +92,36 @@ def _figure(items: Sequence[AmplitudeMargin]) -> Block:
 
 def _table(items: Sequence[AmplitudeMargin]) -> Block:
     columns = [
-        doc.column("loop", "Loop"),
-        doc.column("kind", "Varied"),
-        doc.column("size", "Released from"),
-        doc.column("friction", "Dry friction"),
-        doc.column("linear", "Linear margin", format="sig:4"),
-        doc.column("value", "Oscillation lasts from", format="sig:3"),
-        doc.column("unit", "Unit"),
-        doc.column("limiter", "Limit acting"),
-        doc.column("remark", ""),
+        doc.of("loop", "loop", "Loop"),
+        doc.of(lambda item: KINDS[item.kind], "kind", "Varied"),
+        doc.of(lambda item: f"{100.0 * item.part:.0f} % of full range", "size", "Released from"),
+        doc.of(lambda item: "on" if item.friction_on else "off", "friction", "Dry friction"),
+        doc.of(lambda item: _shown(item.linear, item), "linear", "Linear margin", format="sig:4"),
+        doc.of(lambda item: _shown(item.value, item), "value", "Oscillation lasts from", format="sig:3"),
+        doc.of(_unit, "unit", "Unit"),
+        doc.of("limiter", "limiter", "Limit acting"),
+        doc.of(_remark, "remark", ""),
     ]
-    rows = [_row(item) for item in items]
-    return doc.details(
-        "Margins from small, medium and large deviations",
-        [doc.table("Margins by amplitude", columns, rows)],
-    )
+    made = doc.listing("Margins by amplitude", items, columns)
+    return doc.details("Margins from small, medium and large deviations", [made])
 
 
-def _row(item: AmplitudeMargin) -> Row:
-    delay = item.kind == "delay"
-    unit = "ms" if delay else "dB"
-    remark = ""
+def _remark(item: AmplitudeMargin) -> str:
     if item.value is None:
-        remark = f"no oscillation lasts up to {_shown(item.furthest, item):.3g} {unit}"
-    elif item.value == (0.0 if delay else 1.0):
-        remark = "the nominal drive oscillates"
-    return {
-        "loop": item.loop,
-        "kind": KINDS[item.kind],
-        "size": f"{100.0 * item.part:.0f} % of full range",
-        "friction": "on" if item.friction_on else "off",
-        "linear": _shown(item.linear, item),
-        "value": None if item.value is None else _shown(item.value, item),
-        "unit": unit,
-        "limiter": item.limiter,
-        "remark": remark,
-    }
+        return f"no oscillation lasts up to {_text(item.furthest, item)}"
+    nominal = 0.0 if item.kind == "delay" else 1.0
+    return "the nominal drive oscillates" if item.value == nominal else ""
 
 
-def _shown(value: float, item: AmplitudeMargin) -> float:
+def _unit(item: AmplitudeMargin) -> str:
+    return "ms" if item.kind == "delay" else "dB"
+
+
+def _shown(value: float | None, item: AmplitudeMargin) -> float | None:
+    if value is None:
+        return None
     return 1e3 * value * item.period_s if item.kind == "delay" else 20.0 * math.log10(value)
 
 
 def _text(value: float, item: AmplitudeMargin) -> str:
-    return f"{_shown(value, item):.3g} {'ms' if item.kind == 'delay' else 'dB'}"
+    return f"{_shown(value, item):.3g} {_unit(item)}"

@@ -41,12 +41,9 @@ def surface_figure(fit: SurfaceFit) -> Block:
             _ring(panel, (point.speed_rad_s, 1e3 * point.torque_Nm), point.run, 14.0)
     panel.x.label, panel.y.label = "motor speed, rad/s", "friction torque at the motor, mN m"
     panel.y.limits(low=0.0)
-    return doc.figure(
-        "identification_surface",
-        chart,
-        caption="Friction torque of every run and the fitted surface, a line for each load",
-        alt="Measured friction torque against motor speed at several loads, with straight fitted lines",
-    )
+    caption = "Friction torque of every run and the fitted surface, a line for each load"
+    alt = "Measured friction torque against motor speed at several loads, with straight fitted lines"
+    return doc.figure("identification_surface", chart, caption=caption, alt=alt)
 
 
 def _place(points: Sequence[Any]) -> tuple[list[float], list[float]]:
@@ -86,12 +83,9 @@ def residual_figure(fit: SurfaceFit) -> Block:
             if point.run in named:
                 _ring(panel, (at, float(value)), point.run, 13.0)
         panel.x.label, panel.y.label = label, "residual, µN m"
-    return doc.figure(
-        "identification_residuals",
-        chart,
-        caption="Residuals of the runs less the most likely shared errors, with two standard deviations",
-        alt="Residual torque of every run against speed and against load",
-    )
+    caption = "Residuals of the runs less the most likely shared errors, with two standard deviations"
+    alt = "Residual torque of every run against speed and against load"
+    return doc.figure("identification_residuals", chart, caption=caption, alt=alt)
 
 
 def region_figure(fit: SurfaceFit) -> Block:
@@ -115,12 +109,9 @@ def region_figure(fit: SurfaceFit) -> Block:
             panel.rule_y(sign * y, dash=2)
         panel.points([0.0], [0.0], marker="+", size=10.0, colour=style.INK, read=False)
         panel.x.label, panel.y.label = f"{NAMES[i]}, % from its value", f"{NAMES[j]}, %"
-    return doc.figure(
-        "identification_region",
-        chart,
-        caption="Joint 95 % regions of pairs of coefficients; dotted: the 95 % interval of each alone",
-        alt="Ellipses of the uncertainty of pairs of friction coefficients, with and without shared errors",
-    )
+    caption = "Joint 95 % regions of pairs of coefficients; dotted: the 95 % interval of each alone"
+    alt = "Ellipses of the uncertainty of pairs of friction coefficients, with and without shared errors"
+    return doc.figure("identification_region", chart, caption=caption, alt=alt)
 
 
 def _ellipse(

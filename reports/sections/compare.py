@@ -14,7 +14,7 @@ from analyses.specification.requirements import tally
 from reports import document as doc
 from reports.as_json import as_json
 from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
-from reports.numbers import significant
+from reports.numbers import capital, significant
 from reports.sections import compare_best, compare_figures, compare_ledger, compare_many
 from reports.sections.compare_best import limit_words, number
 from reports.sections.names import LOOPS
@@ -130,20 +130,19 @@ def design_columns(designs: Sequence[Compared]) -> list[Column]:
 def overview(comparison: Comparison) -> Block:
     """One line a design that the page shows: how many requirements it meets, and which it misses."""
     comparison = compare_many.choice(comparison)
-    columns = [doc.column("design", "Design"), doc.column("met", "Met")]
-    columns += [doc.column("missed", "Not met"), doc.column("unproven", "Not proven")]
-    rows = []
-    for one in comparison.all:
-        missed = [v.id for v in one.verdicts if v.verdict == "not met"]
-        count = tally(one.verdicts)
-        rows.append({
-            "design": one.variant.name, "met": f"{count.met} of {count.total}", "missed": ", ".join(missed),
-            "unproven": ", ".join(v.id for v in one.verdicts if v.verdict == "not proven"),
-            "_status": count.role,
-        })  # fmt: skip
-    left_out = len(comparison.everything.all) - len(rows)
+    columns = [
+        doc.of("variant.name", "design", "Design"),
+        doc.of(lambda one: compare_best.met_words(one), "met", "Met"),
+        doc.of(lambda one: _those(one, Verdict.NOT_MET), "missed", "Not met"),
+        doc.of(lambda one: _those(one, Verdict.NOT_PROVEN), "unproven", "Not proven"),
+    ]
+    left_out = len(comparison.everything.all) - len(comparison.all)
     note = f"{left_out} more designs are in {compare_many.TABLE}." if left_out else ""
-    return doc.table("Requirements", columns, rows, note)
+    return doc.listing("Requirements", comparison.all, columns, note, lambda one: tally(one.verdicts).role)
+
+
+def _those(one: Compared, word: Verdict) -> str:
+    return ", ".join(v.id for v in one.verdicts if v.verdict == word)
 
 
 def _named(one: Compared, verdict: RequirementVerdict) -> VerdictItem:
@@ -188,13 +187,9 @@ def _group_table(
     rows = []
     for name in names:
         unit = "ms" if name.unit == "s" else name.unit.replace("^2", "²")
-        row: Row = {"figure": _title(name.label), "unit": unit}
+        row: Row = {"figure": capital(name.label), "unit": unit}
         rows.append(row | {f"d{k}": _cell(one, name, comparison) for k, one in enumerate(designs)})
     return doc.table(title, columns, rows)
-
-
-def _title(words: str) -> str:
-    return words[:1].upper() + words[1:]
 
 
 def _cell(one: Compared, name: FigureName, comparison: Comparison) -> str | None:
@@ -222,8 +217,7 @@ def differences(comparison: Comparison) -> Section:
         blocks.append(doc.details(f"{one.variant.name}: {keys}"[:400], [_moved_table(one, comparison)]))
     intro = (
         "Each changed key is applied alone to the base, over the exact sampled loops. What the keys do not "
-        "explain "
-        "is their interaction. Large-signal figures are not taken apart."
+        "explain is their interaction. Large-signal figures are not taken apart."
     )
     variants = comparison.everything.variants
     changed = sum(bool(one.changed) for one in variants)
@@ -233,28 +227,27 @@ def differences(comparison: Comparison) -> Section:
 
 def _moved_table(one: Compared, comparison: Comparison) -> Block:
     columns = [
-        doc.column("figure", "Figure"),
-        doc.column("unit", "Unit"),
-        doc.column("base", "Base", format="sig:4"),
-        doc.column("value", "Variant", format="sig:4"),
-        doc.column("difference", "Difference", format="sig:3"),
-        doc.column("moved", "Cause"),
-        doc.column("rest", "Interaction", format="sig:2"),
+        doc.of(lambda name: f"{GROUPS[name.group]}: {name.label}", "figure", "Figure"),
+        doc.of("unit", "unit", "Unit"),
+        doc.of(lambda name: comparison.base.figures[name.key], "base", "Base", format="sig:4"),
+        doc.of(lambda name: one.figures[name.key], "value", "Variant", format="sig:4"),
+        doc.of(lambda name: one.differences[name.key], "difference", "Difference", format="sig:3"),
+        doc.of(lambda name: _movers(one, name), "moved", "Cause"),
+        doc.of(lambda name: _interaction(one, name), "rest", "Interaction", format="sig:2"),
     ]
-    rows = []
-    for name in comparison.names:
-        if name.key not in one.differences:
-            continue
-        parts = one.moved_by.get(name.key, ())
-        total = one.differences[name.key]
-        rest = total - sum(part.amount for part in parts)
-        shown = ", ".join(f"{part.path} {_signed(part.amount)}" for part in parts[:_MOST_MOVERS])
-        rows.append({
-            "figure": f"{GROUPS[name.group]}: {name.label}", "unit": name.unit,
-            "base": comparison.base.figures[name.key], "value": one.figures[name.key], "difference": total,
-            "moved": shown, "rest": rest if parts and abs(rest) > 1e-3 * abs(total) else None,
-        })  # fmt: skip
-    return doc.table(f"{one.variant.name} against the base", columns, rows)
+    names = [name for name in comparison.names if name.key in one.differences]
+    return doc.listing(f"{one.variant.name} against the base", names, columns)
+
+
+def _movers(one: Compared, name: FigureName) -> str:
+    parts = one.moved_by.get(name.key, ())[:_MOST_MOVERS]
+    return ", ".join(f"{part.path} {_signed(part.amount)}" for part in parts)
+
+
+def _interaction(one: Compared, name: FigureName) -> float | None:
+    parts, total = one.moved_by.get(name.key, ()), one.differences[name.key]
+    rest = total - sum(part.amount for part in parts)
+    return rest if parts and abs(rest) > 1e-3 * abs(total) else None
 
 
 def _signed(value: float) -> str:

@@ -75,43 +75,39 @@ def weakest(one: Compared) -> tuple[float, RequirementVerdict | None]:
 
 def _designs(comparison: Comparison) -> Block:
     """One row a design: what it meets, its weakest point, what it gains and gives up against the base."""
+    base = comparison.base
     columns = [
-        doc.column("design", "Design"),
-        doc.column("met", "Requirements met"),
-        doc.column("weakest", "Weakest point"),
-        doc.column("gains", "Gains most"),
-        doc.column("gives", "Gives up most"),
+        doc.of("variant.name", "design", "Design"),
+        doc.of(met_words, "met", "Requirements met"),
+        doc.of(_weakest_words, "weakest", "Weakest point"),
+        doc.of(lambda o: "the base" if o is base else _changes(o, comparison, 1), "gains", "Gains most"),
+        doc.of(lambda o: "" if o is base else _changes(o, comparison, -1), "gives", "Gives up most"),
     ]
-    rows = []
-    for one in comparison.all:
-        near, verdict = weakest(one)
-        gains, losses = _changes(one, comparison)
-        rows.append({
-            "design": one.variant.name,
-            "met": f"{tally(one.verdicts).met} of {len(one.verdicts)}",
-            "weakest": "" if verdict is None else f"{label(verdict)}, {_percent(near)}",
-            "gains": "the base" if one is comparison.base else _words(gains),
-            "gives": "" if one is comparison.base else _words(losses),
-            "_status": tally(one.verdicts).role,
-        })  # fmt: skip
     note = "Gains and losses are changes of the distance to the limit, in percent of the limit."
-    return doc.table("Each design", columns, rows, note)
+    return doc.listing("Each design", comparison.all, columns, note, lambda one: tally(one.verdicts).role)
 
 
-def _changes(
-    one: Compared, comparison: Comparison
-) -> tuple[list[tuple[str, float]], list[tuple[str, float]]]:
-    """Give what a variant gains and loses of each distance, the most first."""
+def met_words(one: Compared) -> str:
+    """How many requirements a design meets."""
+    return f"{tally(one.verdicts).met} of {len(one.verdicts)}"
+
+
+def _weakest_words(one: Compared) -> str:
+    near, verdict = weakest(one)
+    return "" if verdict is None else f"{label(verdict)}, {_percent(near)}"
+
+
+def _changes(one: Compared, comparison: Comparison, sign: int) -> str:
+    """Say what a variant gains (+1) or loses (-1) of each distance, the most first."""
     base = {v.id: nearness(v) for v in comparison.base.verdicts}
     moved = [
         (label(v), near - before)
         for v in one.verdicts
         if (near := nearness(v)) is not None
         and (before := base.get(v.id)) is not None
-        and abs(near - before) > _SEEN
+        and sign * (near - before) > _SEEN
     ]
-    moved.sort(key=lambda pair: -abs(pair[1]))
-    return [pair for pair in moved if pair[1] > 0.0], [pair for pair in moved if pair[1] < 0.0]
+    return _words(sorted(moved, key=lambda pair: -abs(pair[1])))
 
 
 def _words(moved: Sequence[tuple[str, float]]) -> str:

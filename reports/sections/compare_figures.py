@@ -70,11 +70,9 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
     hertz = [response.frequency_hz for response, _ in made]
     style.frequency(bottom, (min(f[0] for f in hertz), max(f[-1] for f in hertz)))
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
-    return [doc.figure(
-        "overlay", chart,
-        caption=f"{title}, {which}: the base and its variants.",
-        alt=f"Bode diagram of the {which} of the {name} loop of {len(made)} designs.",
-    )]  # fmt: skip
+    caption = f"{title}, {which}: the base and its variants."
+    alt = f"Bode diagram of the {which} of the {name} loop of {len(made)} designs."
+    return [doc.figure("overlay", chart, caption=caption, alt=alt)]
 
 
 def _look(k: int) -> style.Style:
@@ -104,11 +102,9 @@ def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[Block]:
         panel.curve(np.asarray(step.time_s)[keep] * scale, response, label, **_look(k))
     panel.x.limits(0.0)
     panel.y.label = "response to a unit step"
-    return [doc.figure(
-        "overlay", chart,
-        caption=f"{title}, unit step: the base and its variants.",
-        alt=f"Step responses of the {name} loop of {len(shown)} designs.",
-    )]  # fmt: skip
+    caption = f"{title}, unit step: the base and its variants."
+    alt = f"Step responses of the {name} loop of {len(shown)} designs."
+    return [doc.figure("overlay", chart, caption=caption, alt=alt)]
 
 
 def tornadoes(comparison: Comparison) -> Section:
@@ -182,10 +178,9 @@ def _tornado(comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], li
     panel.y.limits(-0.6, max(len(bars), 1) - 0.4)
     panel.y.reversed, panel.y.grid = True, False
     panel.x.label = f"{words}, {name.unit}" if name and name.unit else words
-    return doc.figure(
-        "tornado", chart, caption=f"{words}: each parameter alone at both its ends.",
-        alt=f"Tornado chart of {words}; the strongest is {bars[0].path}.",
-    )  # fmt: skip
+    caption = f"{words}: each parameter alone at both its ends."
+    alt = f"Tornado chart of {words}; the strongest is {bars[0].path}."
+    return doc.figure("tornado", chart, caption=caption, alt=alt)
 
 
 def _bar_label(bar: Sensitivity) -> str:
@@ -196,19 +191,14 @@ def _bar_label(bar: Sensitivity) -> str:
 
 def _slopes(comparison: Comparison) -> Block:
     """Slopes of the strongest figures, one row a parameter and figure."""
-    columns = [
-        doc.column("figure", "Figure"),
-        doc.column("path", "Parameter"),
-        doc.column("slope", "Change per +1 %", format="sig:3"),
-        doc.column("low", "At its low end", format="sig:5"),
-        doc.column("base", "Nominal", format="sig:5"),
-        doc.column("high", "At its high end", format="sig:5"),
-    ]
     known = comparison.sensitivities
-    rows = [
-        {"figure": key, "path": e.path, "slope": e.per_percent, "low": e.low, "base": known.base[key],
-         "high": e.high}
-        for key in known.base
-        for e in known.tornado(key)[:MOST_BARS]
-    ]  # fmt: skip
-    return doc.table("Slopes and ranges, the ten strongest parameters of each figure", columns, rows)
+    columns = [
+        doc.of(lambda pair: pair[0], "figure", "Figure"),
+        doc.of(lambda pair: pair[1].path, "path", "Parameter"),
+        doc.of(lambda pair: pair[1].per_percent, "slope", "Change per +1 %", format="sig:3"),
+        doc.of(lambda pair: pair[1].low, "low", "At its low end", format="sig:5"),
+        doc.of(lambda pair: known.base[pair[0]], "base", "Nominal", format="sig:5"),
+        doc.of(lambda pair: pair[1].high, "high", "At its high end", format="sig:5"),
+    ]
+    slopes = [(key, one) for key in known.base for one in known.tornado(key)[:MOST_BARS]]
+    return doc.listing("Slopes and ranges, the ten strongest parameters of each figure", slopes, columns)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from actuator_lti.asked.verdict import Tally
 from reports import document as doc
-from reports.document_schema import Block, Row, Section, Status
-from reports.numbers import significant
+from reports.document_schema import Block, Row, Section
+from reports.numbers import capital, significant
+from reports.sections.names import unit_words
 from reports.sections.validation import loop_name, quantity_name
 
 if TYPE_CHECKING:
@@ -39,10 +40,8 @@ def sections(comparison: Comparison) -> list[Section]:
         "Simulated values, or the relative error of a response; in brackets the difference from the linear "
         "prediction where it is more than rounding."
     )
-    status: Status = tally.role
-    return [
-        doc.section("ledger", "Predictions and simulation", blocks, result=result, intro=intro, status=status)
-    ]
+    title = "Predictions and simulation"
+    return [doc.section("ledger", title, blocks, result=result, intro=intro, status=tally.role)]
 
 
 def _key(entry: Check) -> Key:
@@ -58,16 +57,9 @@ def _table(loop: str, condition: str, keys: list[Key], tested: list[Compared]) -
     rows = []
     for key in keys:
         unit = units.get(key, "")
-        row: Row = {
-            "what": _title(names[key]),
-            "unit": "" if unit == "1" else unit,
-        }
+        row: Row = {"what": capital(names[key]), "unit": unit_words(unit)}
         rows.append(row | {f"d{k}": _cell(result.get(key)) for k, result in enumerate(known)})
     return doc.table(f"{loop_name(loop)}: {condition}", columns, rows)
-
-
-def _title(words: str) -> str:
-    return words[:1].upper() + words[1:]
 
 
 def _cell(entry: Check | None) -> dict[str, str] | None:

@@ -96,23 +96,18 @@ def table_text(comparison: Comparison) -> str:
     """A row for each design with every figure and every value of a requirement, as CSV."""
     from reports.nightly.text import csv_text
 
-    wanted = comparison.base.verdicts
     header = ["design", "met", "not_met", "not_proven", "weakest", "room_percent"]
     header += [f"{name.key} [{name.unit}]" for name in comparison.names]
-    header += [f"requirement {verdict.id} [{verdict.requirement.unit}]" for verdict in wanted]
+    header += [f"requirement {one.id} [{one.requirement.unit}]" for one in comparison.base.verdicts]
     return csv_text(header, (_row(one, comparison) for one in comparison.all))
 
 
 def _row(one: Compared, comparison: Comparison) -> list[object]:
     near, verdict = weakest(one)
     values, count = {v.id: v.value for v in one.verdicts}, tally(one.verdicts)
+    least = (None, None) if verdict is None else (verdict.id, 100.0 * near)
     return [
-        one.variant.name,
-        count.met,
-        count.not_met,
-        count.not_proven,
-        None if verdict is None else verdict.id,
-        None if verdict is None else 100.0 * near,
+        *(one.variant.name, count.met, count.not_met, count.not_proven, *least),
         *(one.figures.get(name.key) for name in comparison.names),
         *(values.get(wanted.id) for wanted in comparison.base.verdicts),
     ]

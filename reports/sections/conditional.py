@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from analyses.large_signal.conditional import Conditional, Prediction
 from reports import document as doc
 from reports.document_schema import Block, Section, Status
 from reports.findings import Finding
-from reports.sections.names import POINTS
+from reports.sections.names import POINTS, output_unit
 
 
 def section(conditional: Conditional, axis: str = "rotary") -> Section:
     """Make the section: what the describing functions say, and what steps of growing size do."""
-    scale, unit = (1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")
+    scale, unit = output_unit(axis)
     result, *more = _words(conditional, scale, unit)
     blocks = [*map(doc.text, more), _facts(conditional, scale, unit)]
     if conditional.predictions:
         blocks.append(_table(conditional.predictions, scale, unit))
     intro = (
         "A limit reduces the effective gain. A loop with a lower gain margin can then become unstable at "
-        "large "
-        "commands, although every linear margin is sufficient."
+        "large commands, although every linear margin is sufficient."
     )
     status: Status = "fail" if conditional.diverges else "pass"
     findings = findings_of(conditional, axis)
@@ -33,15 +33,14 @@ def section(conditional: Conditional, axis: str = "rotary") -> Section:
 
 def findings_of(conditional: Conditional, axis: str = "rotary") -> list[Finding]:
     """What a reader must know of large commands."""
-    findings = []
-    if conditional.diverges:
-        findings.append(Finding(severity="fail", text=sentence(conditional, axis), where="conditional"))
-    return findings
+    if not conditional.diverges:
+        return []
+    return [Finding(severity="fail", text=sentence(conditional, axis), where="conditional")]
 
 
 def sentence(conditional: Conditional, axis: str = "rotary") -> str:
     """Say in one sentence what large commands do."""
-    return _words(conditional, *((1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")))[0]
+    return _words(conditional, *output_unit(axis))[0]
 
 
 def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
@@ -94,31 +93,26 @@ def _facts(conditional: Conditional, scale: float, unit: str) -> Block:
     for point, margins in conditional.margins.items():
         if margins.stable and margins.gain_lower > 0.0:
             label = f"Lower gain margin at {POINTS.get(point, point)}, all loops closed"
-            items.append(doc.fact(label, 20.0 * math.log10(margins.gain_lower), "dB", better=2))
+            items.append(doc.fact(label, _lower_db(margins), "dB", better=2))
     return doc.facts(items)
+
+
+WINDUP = {True: "yes: safer than predicted", False: "no"}
+
+
+def _lower_db(of: Any) -> float:
+    return 20.0 * math.log10(of.gain_lower)
 
 
 def _table(predictions: tuple[Prediction, ...], scale: float, unit: str) -> Block:
     columns = [
-        doc.column("limiter", "Limit"),
-        doc.column("point", "In front of it"),
-        doc.column("gain", "Lower gain margin", "dB", format="sig:4", better=2),
-        doc.column("ratio", "Amplitude over limit", format="sig:3"),
-        doc.column("hertz", "Oscillates at", "Hz", format="sig:3"),
-        doc.column("output", "Output", unit, format="sig:3"),
-        doc.column("antiwindup", "Anti-windup in front"),
-    ]
-    rows = [
-        {
-            "limiter": one.limiter,
-            "point": POINTS.get(one.point, one.point),
-            "gain": 20.0 * math.log10(one.gain_lower),
-            "ratio": one.amplitude / one.limit,
-            "hertz": one.frequency_hz,
-            "output": one.output_rad * scale,
-            "antiwindup": "yes: safer than predicted" if one.antiwindup else "no",
-        }
-        for one in predictions
+        doc.of("limiter", "limiter", "Limit"),
+        doc.of(lambda one: POINTS.get(one.point, one.point), "point", "In front of it"),
+        doc.of(_lower_db, "gain", "Lower gain margin", "dB", format="sig:4", better=2),
+        doc.of(lambda one: one.amplitude / one.limit, "ratio", "Amplitude over limit", format="sig:3"),
+        doc.of("frequency_hz", "hertz", "Oscillates at", "Hz", format="sig:3"),
+        doc.of("output_rad", "output", "Output", unit, scale=scale, format="sig:3"),
+        doc.of(lambda one: WINDUP[one.antiwindup], "antiwindup", "Anti-windup in front"),
     ]
     note = "Describing function of saturation: from this amplitude on an oscillation is sustained."
-    return doc.table("Predicted limit cycles", columns, rows, note)
+    return doc.listing("Predicted limit cycles", predictions, columns, note)

@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Literal
 from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
 from reports import document as doc
 from reports.document_schema import Block, Row, Section
-from reports.findings import Finding
 from reports.sections.margins import shown
 from reports.sections.names import figure_column, loop_words
 
 if TYPE_CHECKING:
     from analyses.corners import Corner, Corners
-    from analyses.linear.loop_figures import LoopFigures
 
 PER_LOOP = [QUANTITIES[name] for name in (*CORNERED, "bandwidth")]
 
@@ -25,15 +23,15 @@ def section(result: Corners) -> Section:
         "The worst ends are those that one by one lower the margin of the loop where it is smallest, all "
         "taken together; the worst-case search of montecarlo looks inside the box as well."
     )
-    rows = [_row(corner, name, one) for corner in result.corners for name, one in corner.figures.items()]
     words = [doc.text(f"{corner.name.capitalize()}: {corner.words}.") for corner in result.corners[1:]]
-    blocks = [_summary_table(result), doc.details("Every loop at every corner", [_loop_table(rows), *words])]
-    told = summary(result)
-    severity: Literal["info", "warn"] = "info" if result.passed else "warn"
+    blocks = [
+        _summary_table(result),
+        doc.details("Every loop at every corner", [_loop_table(result), *words]),
+    ]
+    told: Literal["info", "warn"] = "info" if result.passed else "warn"
     return doc.section(
-        "corners", "Corners", blocks, result=told, intro=intro, status="info" if result.passed else "warn",
-        findings=[Finding(severity=severity, text=told, where="corners")],
-    )  # fmt: skip
+        "corners", "Corners", blocks, result=summary(result), intro=intro, status=told, told=told
+    )
 
 
 def summary(result: Corners) -> str:
@@ -86,23 +84,17 @@ def superlative(quantity: Quantity) -> str:
     return "least" if quantity.better > 0 else "largest"
 
 
-def _loop_table(rows: list[Row]) -> Block:
+def _loop_table(result: Corners) -> Block:
     columns = [
-        doc.column("corner", "Corner"),
-        doc.column("loop", "Loop"),
-        doc.column("stable", "Stable", format="yesno"),
-        *(
-            figure_column(each.name, each.name, label=each.label, format=each.at_a_glance)
-            for each in PER_LOOP
-        ),
+        doc.of(lambda pair: pair[0].name, "corner", "Corner"),
+        doc.of(lambda pair: loop_words(pair[1].loop.name, pair[1].rotor), "loop", "Loop"),
+        doc.of(lambda pair: pair[1].sound is True, "stable", "Stable", format="yesno"),
+        *(_figure(each) for each in PER_LOOP),
     ]
-    return doc.table("Loops at the corners", columns, rows)
+    loops = [(corner, one) for corner in result.corners for one in corner.figures.values()]
+    return doc.listing("Loops at the corners", loops, columns)
 
 
-def _row(corner: Corner, name: str, one: LoopFigures) -> Row:
-    return {
-        "corner": corner.name,
-        "loop": loop_words(name, one.rotor),
-        "stable": one.sound is True,
-        **{each.name: shown(each, one.judged) for each in PER_LOOP},
-    }
+def _figure(of: Quantity) -> doc.Shown:
+    column = figure_column(of.name, of.name, label=of.label, format=of.at_a_glance)
+    return column, lambda pair: shown(of, pair[1].judged)

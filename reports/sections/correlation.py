@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from analyses.correlation.summary import agrees, moves_alike, summarise, worst_of
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Column, Section, Status
+from reports.document_schema import Block, Section, Status
 from reports.numbers import show
 from reports.sections.record_tables import finding_table, input_table
 from reports.sections.thinning import kept_rows
@@ -98,17 +98,14 @@ def summary_section(results: Sequence[CorrelationResult], *, error_limit: float 
     for name, one in summarise(results).items():
         rows += [(result.record, result[name]) for result in results if name in result.signals]
         rows.append((f"all {one.records}; worst: {one.worst}", one))
-    columns: list[tuple[Column, Callable[[tuple[str, Any]], Any]]] = [
-        (doc.column("name", "Signal"), lambda row: NAMES.get(row[1].name, row[1].name)),
-        (doc.column("record", "Record"), lambda row: row[0]),
-        (doc.column("mean", "Mean |e|", format="sig:4"), lambda row: row[1].mean_error),
-        (doc.column("rms", "rms", format="sig:4"), lambda row: row[1].rms_error),
-        (doc.column("largest", "Largest", format="sig:4"), lambda row: row[1].max_error),
-        (doc.column("unit", "Unit"), lambda row: row[1].unit),
-        (
-            doc.column("relative", "Relative error", "%", format="sig:4"),
-            lambda row: 100.0 * row[1].relative_error,
-        ),
+    columns = [
+        doc.of(lambda row: NAMES.get(row[1].name, row[1].name), "name", "Signal"),
+        doc.of(lambda row: row[0], "record", "Record"),
+        doc.of(lambda row: row[1].mean_error, "mean", "Mean |e|", format="sig:4"),
+        doc.of(lambda row: row[1].rms_error, "rms", "rms", format="sig:4"),
+        doc.of(lambda row: row[1].max_error, "largest", "Largest", format="sig:4"),
+        doc.of(lambda row: row[1].unit, "unit", "Unit"),
+        doc.of(lambda row: 100.0 * row[1].relative_error, "relative", "Relative error", "%", format="sig:4"),
     ]
     table = doc.listing(
         "All records", rows, columns, status=lambda row: "info" if row[0].startswith("all ") else None
@@ -125,19 +122,16 @@ def summary_section(results: Sequence[CorrelationResult], *, error_limit: float 
 
 def comparison_table(result: CorrelationResult) -> Block:
     """One row a signal."""
-    columns: list[tuple[Column, Callable[[SignalComparison], Any]]] = [
-        (doc.column("name", "Signal"), lambda s: NAMES.get(s.name, s.name)),
-        (doc.column("relative", "Relative error", "%", format="sig:4"), lambda s: 100.0 * s.relative_error),
-        (doc.column("fit", "Fit", "%", format="fix:3"), lambda s: s.fit_percent),
-        (doc.column("mean", "Mean |e|", format="sig:3"), lambda s: s.mean_error),
-        (doc.column("rms", "rms", format="sig:3"), lambda s: s.rms_error),
-        (doc.column("largest", "Largest error", format="sig:3"), lambda s: s.max_error),
-        (doc.column("unit", "Unit"), lambda s: s.unit),
-        (doc.column("at", "at", "s", format="fix:3"), lambda s: s.max_error_time_s),
-        (
-            doc.column("delay", "Measured lags by", "ms", format="fix:3"),
-            lambda s: None if s.delay_s is None else 1e3 * s.delay_s,
-        ),
+    columns = [
+        doc.of(lambda s: NAMES.get(s.name, s.name), "name", "Signal"),
+        doc.of("relative_error", "relative", "Relative error", "%", scale=100.0, format="sig:4"),
+        doc.of("fit_percent", "fit", "Fit", "%", format="fix:3"),
+        doc.of("mean_error", "mean", "Mean |e|", format="sig:3"),
+        doc.of("rms_error", "rms", "rms", format="sig:3"),
+        doc.of("max_error", "largest", "Largest error", format="sig:3"),
+        doc.of("unit", "unit", "Unit"),
+        doc.of("max_error_time_s", "at", "at", "s", format="fix:3"),
+        doc.of("delay_s", "delay", "Measured lags by", "ms", scale=1e3, format="fix:3"),
     ]
     note = (
         "Relative error: norm of the difference over the norm of the measured signal. Fit: 100 % minus the "

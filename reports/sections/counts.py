@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from typing import Any
 
 from analyses.limit_cycles import Confirmation
 from analyses.limit_cycles.counts import WITHIN, Counts
 from reports import document as doc
 from reports.document_schema import Block, FactItem, Section, Status
 from reports.findings import Finding
+from reports.sections.names import output_unit
 
+FOUND = {True: "found", False: "not found"}
 NAMES = {"motor": "Motor encoder", "output": "Output encoder"}
 
 
@@ -54,17 +56,14 @@ def sentence(one: Counts, axis: str) -> str:
 def _facts(one: Counts, axis: str) -> list[FactItem]:
     scale, unit, speed = _units(axis)
     name = NAMES[one.sensor]
+    linear = f"Linear within {WITHIN:.0%} from this amplitude at the sensor on, by describing function"
     items = [
         doc.fact(f"{name}: one count", one.quantum_rad * scale, unit),
         doc.fact("Ripple of the motor's speed, largest", one.ripple_rad_s, speed),
         doc.fact("at a motor speed of", one.ripple_at_rad_s, speed),
         doc.fact("Standing error, one count", one.standing_rad * scale, unit, better=-1),
         doc.fact("Standing error after a step, simulated", one.standing_seen_rad * scale, unit, better=-1),
-        doc.fact(
-            f"Linear within {WITHIN:.0%} from this amplitude at the sensor on, by describing function",
-            one.linear_rad * scale,
-            unit,
-        ),
+        doc.fact(linear, one.linear_rad * scale, unit),
     ]
     if one.linear_seen_rad is not None:
         label = "Linear from this amplitude on, simulated at the bandwidth"
@@ -77,29 +76,19 @@ def _facts(one: Counts, axis: str) -> list[FactItem]:
 def _cycles(cycles: Sequence[tuple[Counts, Confirmation]], axis: str) -> Block:
     """Predicted limit cycles beside what the simulator says of them."""
     scale, unit, _ = _units(axis)
+    size: dict[str, Any] = {"unit": unit, "scale": scale, "format": "sig:3"}
     columns = [
-        doc.column("sensor", "Sensor"),
-        doc.column("amplitude", "Amplitude at the sensor", unit, format="sig:3"),
-        doc.column("output", "At the output", unit, format="sig:3"),
-        doc.column("hertz", "Frequency", "Hz", format="sig:3"),
-        doc.column("ratio", "Simulated over predicted", format="sig:3"),
-        doc.column("verdict", "Simulation"),
-    ]
-    rows = [
-        {
-            "sensor": NAMES[one.sensor],
-            "amplitude": seen.cycle.inner_rad * scale,
-            "output": seen.cycle.output_rad * scale,
-            "hertz": seen.cycle.frequency_hz,
-            "ratio": seen.ratio,
-            "verdict": "found" if seen.verdict == "confirmed" else "not found",
-        }
-        for one, seen in cycles
+        doc.of(lambda pair: NAMES[pair[0].sensor], "sensor", "Sensor"),
+        doc.of(lambda pair: pair[1].cycle.inner_rad, "amplitude", "Amplitude at the sensor", **size),
+        doc.of(lambda pair: pair[1].cycle.output_rad, "output", "At the output", **size),
+        doc.of(lambda pair: pair[1].cycle.frequency_hz, "hertz", "Frequency", "Hz", format="sig:3"),
+        doc.of(lambda pair: pair[1].ratio, "ratio", "Simulated over predicted", format="sig:3"),
+        doc.of(lambda pair: FOUND[pair[1].verdict == "confirmed"], "verdict", "Simulation"),
     ]
     note = "Without dry friction, which quiets most of them; the drive as it is: see the sentence above."
-    return doc.table("Limit cycles of the counts", columns, rows, note)
+    return doc.listing("Limit cycles of the counts", cycles, columns, note)
 
 
 def _units(axis: str) -> tuple[float, str, str]:
     """Scale and unit of an angle, unit of a speed."""
-    return (1e3, "mm", "m/s") if axis == "linear" else (math.degrees(1.0), "deg", "rad/s")
+    return (*output_unit(axis), "m/s" if axis == "linear" else "rad/s")

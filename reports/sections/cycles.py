@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from analyses.motion.settling import words
 from reports import document as doc
-from reports.document_schema import Block, Row, Section
-from reports.findings import Finding
-from reports.sections.large_signal import load_unit, output_unit
+from reports.document_schema import Block, Section
+from reports.sections.names import fine_unit, load_unit
 
 if TYPE_CHECKING:
     from analyses.limit_cycles import Confirmation, LimitCycles
@@ -23,8 +22,7 @@ CAUSES = {
 
 def section(result: LimitCycles) -> Section:
     """Make the section from `analyses.limit_cycles.limit_cycles`."""
-    scale, unit = output_unit(result.design)
-    fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
+    fine, small = fine_unit(result.design.axis)
     intro = (
         "Play acts for a sinusoidal twist as a softer coupling, a sensor's count for a small swing about its "
         "edge as a relay. A cycle is predicted where the sampled loop with that gain keeps an oscillation's "
@@ -40,18 +38,15 @@ def section(result: LimitCycles) -> Section:
         )
         blocks.append(doc.text(f"No limit cycle of {causes} is predicted."))
     blocks.append(_rests(result, fine, small))
-    text = summary(result)
     severity: Any = "info" if result.hunting is None else "warn"
     return doc.section(
-        "cycles", "Limit cycles", blocks, result=text, intro=intro, status=severity,
-        findings=[Finding(severity=severity, text=text, where="cycles")],
-    )  # fmt: skip
+        "cycles", "Limit cycles", blocks, result=summary(result), intro=intro, status=severity, told=severity
+    )
 
 
 def summary(result: LimitCycles) -> str:
     """Say whether the drive as it is comes to rest."""
-    scale, unit = output_unit(result.design)
-    fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
+    fine, small = fine_unit(result.design.axis)
     swing, count = result.hunting, len(result.confirmations)
     seen = sum(one.verdict == "confirmed" for one in result.confirmations)
     tail = f"; {seen} of {count} predicted cycles confirmed" if count else "; none is predicted"
@@ -62,57 +57,42 @@ def summary(result: LimitCycles) -> str:
 
 
 def _predicted(result: LimitCycles, fine: float, small: str) -> Block:
+    size: dict[str, Any] = {"unit": small, "format": "sig:3"}
     columns = [
-        doc.column("cause", "Cause"),
-        doc.column("friction", "Dry friction"),
-        doc.column("kind", "Kind"),
-        doc.column("size", "Predicted, peak", small, format="sig:3", better=-1),
-        doc.column("hz", "at", "Hz", format="sig:3"),
-        doc.column("seen", "Simulated", small, format="sig:3"),
-        doc.column("seen_hz", "at", "Hz", format="sig:3"),
-        doc.column("verdict", "Verdict"),
+        doc.of(lambda one: CAUSES[one.cycle.cause], "cause", "Cause"),
+        doc.of(lambda one: "in it" if one.cycle.with_friction else "left out", "friction", "Dry friction"),
+        doc.of(lambda one: "attracting" if one.cycle.stable else "border", "kind", "Kind"),
+        doc.of("cycle.output_rad", "size", "Predicted, peak", scale=fine, **size, better=-1),
+        doc.of("cycle.frequency_hz", "hz", "at", "Hz", format="sig:3"),
+        doc.of(lambda one: _seen(one, fine), "seen", "Simulated", **size),
+        doc.of("frequency_hz", "seen_hz", "at", "Hz", format="sig:3"),
+        doc.of("verdict", "verdict", "Verdict"),
     ]
     note = (
         "Attracting: motion near it ends in it. Border: smaller motion dies out, larger grows. Friction left "
         "out or by its own describing function, as the column says; no limit acts."
     )
-    rows = [_row(one, fine) for one in result.confirmations]
-    return doc.table("Predicted limit cycles, at the output", columns, rows, note)
+    return doc.listing("Predicted limit cycles, at the output", result.confirmations, columns, note)
 
 
-def _row(one: Confirmation, fine: float) -> Row:
-    cycle = one.cycle
-    return {
-        "cause": CAUSES[cycle.cause],
-        "friction": "in it" if cycle.with_friction else "left out",
-        "kind": "attracting" if cycle.stable else "border",
-        "size": fine * cycle.output_rad,
-        "hz": cycle.frequency_hz,
-        "seen": None if one.ratio is None else fine * one.ratio * cycle.output_rad,
-        "seen_hz": one.frequency_hz,
-        "verdict": one.verdict,
-    }
+def _seen(one: Confirmation, fine: float) -> float | None:
+    return None if one.ratio is None else fine * one.ratio * one.cycle.output_rad
 
 
 def _rests(result: LimitCycles, fine: float, small: str) -> Block:
+    size: dict[str, Any] = {"unit": small, "scale": fine, "format": "sig:3"}
     columns = [
-        doc.column("load", "Load", load_unit(result.design), format="short:4"),
-        doc.column("step", "Step", small, format="sig:3"),
-        doc.column("end", "Ends"),
-        doc.column("size", "Swing, peak", small, format="sig:3", better=-1),
-        doc.column("hz", "at", "Hz", format="sig:3"),
+        doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
+        doc.of("amplitude_rad", "step", "Step", **size),
+        doc.of(_end, "end", "Ends"),
+        doc.of(lambda one: one.swing_rad if one.hunting else None, "size", "Swing, peak", **size, better=-1),
+        doc.of("rest.frequency_hz", "hz", "at", "Hz", format="sig:3"),
     ]
-    rows = [_rest_row(one, fine) for one in result.rests]
     note = "The drive as it is: dry friction, play, quantisation and limits at work."
-    return doc.table("What steps end in", columns, rows, note)
+    return doc.listing(
+        "What steps end in", result.rests, columns, note, lambda one: "warn" if one.hunting else None
+    )
 
 
-def _rest_row(one: Settling, fine: float) -> Row:
-    return {
-        "load": one.load_Nm,
-        "step": fine * one.amplitude_rad,
-        "end": one.rest.verdict + (", a limit acting" if one.rest.limited else ""),
-        "size": fine * one.swing_rad if one.hunting else None,
-        "hz": one.rest.frequency_hz,
-        "_status": "warn" if one.hunting else None,
-    }
+def _end(one: Settling) -> str:
+    return one.rest.verdict + (", a limit acting" if one.rest.limited else "")

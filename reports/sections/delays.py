@@ -9,7 +9,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.paint import HATCHES
 from reports.charts.style import Chart, Panel
-from reports.document_schema import Row, Section
+from reports.document_schema import Section
 from reports.sections.names import hertz, loop_words
 
 PARTS = {
@@ -26,24 +26,23 @@ def section(budgets: Mapping[str, DelayBudget]) -> Section:
     """Make the section from the budget of each loop."""
     parts = _parts(budgets)
     columns = [
-        doc.column("loop", "Loop"),
-        doc.column("crossover_hz", "Crossover", "Hz", format="sig:4"),
-        *(doc.column(key, label.capitalize(), "deg", format="fix:2") for key, label in parts.items()),
-        doc.column("total", "Phase in all", "deg", format="fix:2"),
-        doc.column("margin", "Left to −180°", "deg", format="fix:2", better=1),
-        doc.column("one_more", "One more sample", "deg", format="fix:2"),
+        doc.of(lambda one: loop_words(one[0]), "loop", "Loop"),
+        doc.of(lambda one: hertz(one[1].frequency_rad_s), "crossover_hz", "Crossover", "Hz", format="sig:4"),
+        *(_part(key, label.capitalize()) for key, label in parts.items()),
+        doc.of(lambda one: one[1].total_deg, "total", "Phase in all", "deg", format="fix:2"),
+        doc.of(
+            lambda one: 180.0 + one[1].total_deg, "margin", "Left to −180°", "deg", format="fix:2", better=1
+        ),
+        doc.of(lambda one: one[1].one_more_sample_deg, "one_more", "One more sample", "deg", format="fix:2"),
     ]
-    nothing: Row = dict.fromkeys(parts, 0.0)
-    rows = [nothing | _row(name, budget) for name, budget in budgets.items()]
     note = (
         "The loop is built up cause by cause, so the parts add up to the phase of the exact sampled loop. "
-        "One more "
-        "sample: cost of one more period of computing delay, not included in the total."
+        "One more sample: cost of one more period of computing delay, not included in the total."
     )
     caption = "Lag at the gain crossover of each loop, by cause. The rest to 180° is phase margin."
     blocks = [
         doc.figure("delay_budget", chart(budgets), caption=caption, alt=f"Stacked bars. {caption}"),
-        doc.table("Phase at the gain crossover", columns, rows, note),
+        doc.listing("Phase at the gain crossover", budgets.items(), columns, note),
     ]
     intro = "The phase at the gain crossover of each loop, divided into its causes."
     return doc.section("delays", "Delay budget", blocks, result=_result(budgets), intro=intro)
@@ -93,9 +92,8 @@ def _result(budgets: Mapping[str, DelayBudget]) -> str:
     lost = {name: -sum(budget.items[key] for key in digital) for name, budget in budgets.items()}
     name = max(lost, key=lambda key: lost[key])
     return (
-        f"Sampling, hold and computing delay cost the {name} loop {lost[name]:.1f} deg of phase margin, more "
-        "than "
-        f"any other loop; it has {180.0 + budgets[name].total_deg:.1f} deg left."
+        f"Sampling, hold and computing delay cost the {name} loop {lost[name]:.1f} deg of phase margin, "
+        f"more than any other loop; it has {180.0 + budgets[name].total_deg:.1f} deg left."
     )
 
 
@@ -107,12 +105,5 @@ def _parts(budgets: Mapping[str, DelayBudget]) -> dict[str, str]:
     return parts | {name: name for name in filters} | after
 
 
-def _row(name: str, budget: DelayBudget) -> Row:
-    return {
-        "loop": loop_words(name),
-        "crossover_hz": hertz(budget.frequency_rad_s),
-        **budget.items,
-        "total": budget.total_deg,
-        "margin": 180.0 + budget.total_deg,
-        "one_more": budget.one_more_sample_deg,
-    }
+def _part(key: str, label: str) -> doc.Shown:
+    return doc.of(lambda one: one[1].items.get(key, 0.0), key, label, "deg", format="fix:2")

@@ -9,8 +9,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Row, Section
-from reports.findings import Finding
-from reports.sections.large_signal import load_unit, output_unit
+from reports.sections.names import load_unit, output_unit
 
 if TYPE_CHECKING:
     from analyses.duty import Duty, Heating
@@ -27,12 +26,10 @@ def section(result: Duty) -> Section:
     )
     blocks = [doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), _note(result))]
     blocks.append(_figure(result))
-    words = summary(result)
     severity: Literal["info", "warn"] = "info" if result.passed else "warn"
     return doc.section(
-        "duty", "Duty cycle", blocks, result=words, intro=intro, status=severity,
-        findings=[Finding(severity=severity, text=words, where="duty")],
-    )  # fmt: skip
+        "duty", "Duty cycle", blocks, result=summary(result), intro=intro, status=severity, told=severity
+    )
 
 
 _COLUMNS = [
@@ -46,7 +43,7 @@ _COLUMNS = [
 
 def asked_words(result: Duty) -> str:
     """Say the duty."""
-    scale, unit = output_unit(result.design)
+    scale, unit = output_unit(result.design.axis)
     asked = result.asked
     words = f"±{scale * asked.amplitude_rad:.3g} {unit} at {asked.frequency_hz:.3g} Hz"
     words += f" under {asked.load_Nm:.3g} {load_unit(result.design)}"

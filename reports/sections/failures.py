@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,13 +10,12 @@ from analyses.motion.settling import largest_swing, words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Row, Section
-from reports.findings import Finding
+from reports.document_schema import Block, Section, Severity
 from reports.numbers import short
-from reports.sections.large_signal import load_unit, output_unit
+from reports.sections.names import load_unit, output_unit
 
 if TYPE_CHECKING:
-    from analyses.failures import FailureCase, Failures
+    from analyses.failures import Failures
 
 NAMES = {
     "hard-over": "Hard-over of the power stage",
@@ -32,7 +31,7 @@ _SHOWN = 400
 
 def section(result: Failures) -> Section:
     """Make the section from `analyses.failures.failures`."""
-    scale, unit = output_unit(result.design)
+    scale, unit = output_unit(result.design.axis)
     load, asked = load_unit(result.design), result.asked
     stop, near = f"{scale * asked.stop_rad:.4g} {unit}", f"{scale * asked.deflection_rad:.4g} {unit}"
     detected = f"{1e3 * asked.detection_s:.4g} ms"
@@ -50,14 +49,13 @@ def section(result: Failures) -> Section:
     blocks += [
         doc.text(f"{NAMES[name]}: not for this drive, as {why}.") for name, why in result.left_out.items()
     ]
-    text = summary(result)
-    finding = Finding(severity="info" if swing is None else "warn", text=text, where="failures")
-    return doc.section("failures", "Failure cases", blocks, result=text, intro=intro, findings=[finding])
+    told: Severity = "info" if swing is None else "warn"
+    return doc.section("failures", "Failure cases", blocks, result=summary(result), intro=intro, told=told)
 
 
 def summary(result: Failures) -> str:
     """Say which failure moves the output most until it is detected."""
-    scale, unit = output_unit(result.design)
+    scale, unit = output_unit(result.design.axis)
     worst = max(result.cases, key=lambda case: case.at_detection_rad)
     size = short(scale * worst.at_detection_rad, 3)
     when = f"{1e3 * result.asked.detection_s:.4g} ms"
@@ -68,32 +66,23 @@ def summary(result: Failures) -> str:
 
 
 def _table(result: Failures, scale: float, unit: str, near: str) -> Block:
+    time: dict[str, Any] = {"unit": "ms", "scale": 1e3, "format": "ms:3"}
+    most: dict[str, Any] = {"format": "sig:3", "better": -1}
+    has_current = result.design.motor.has_electrical_dynamics
     columns = [
-        doc.column("case", "Failure"),
-        doc.column("near", f"To {near}", "ms", format="ms:3"),
-        doc.column("stop", "To the stop", "ms", format="ms:3"),
-        doc.column("seen", "Until detected", unit, format="sig:3", better=-1),
-        doc.column("current", "Peak current", "A", format="sig:3", better=-1),
-        doc.column("moment", "Peak moment", load_unit(result.design), format="sig:3", better=-1),
-        doc.column("protected", "I²t acts at", "ms", format="ms:3"),
-        doc.column("words", "What happens"),
+        doc.of(lambda case: NAMES[case.name], "case", "Failure"),
+        doc.of("to_deflection_s", "near", f"To {near}", **time),
+        doc.of("to_stop_s", "stop", "To the stop", **time),
+        doc.of("at_detection_rad", "seen", "Until detected", unit, scale=scale, **most),
+        doc.of(
+            lambda case: case.peak_current_A if has_current else None, "current", "Peak current", "A", **most
+        ),
+        doc.of("peak_moment_Nm", "moment", "Peak moment", load_unit(result.design), **most),
+        doc.of("protected_s", "protected", "I²t acts at", **time),
+        doc.of("words", "words", "What happens"),
     ]
     note = f"No value: not within the {result.asked.watched_s:g} s watched."
-    rows = [_row(case, scale, result.design.motor.has_electrical_dynamics) for case in result.cases]
-    return doc.table("Failure cases", columns, rows, note)
-
-
-def _row(case: FailureCase, scale: float, has_current: bool) -> Row:
-    return {
-        "case": NAMES[case.name],
-        "words": case.words,
-        "near": None if case.to_deflection_s is None else 1e3 * case.to_deflection_s,
-        "stop": None if case.to_stop_s is None else 1e3 * case.to_stop_s,
-        "seen": scale * case.at_detection_rad,
-        "current": case.peak_current_A if has_current else None,
-        "moment": case.peak_moment_Nm,
-        "protected": None if case.protected_s is None else 1e3 * case.protected_s,
-    }
+    return doc.listing("Failure cases", result.cases, columns, note)
 
 
 def _figure(result: Failures, scale: float, unit: str, load: str) -> Block:

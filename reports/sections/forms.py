@@ -43,10 +43,9 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[st
         "Sampled: exact. Continuous: PI in s with the exact delays of computing and hold. Ideal: the same "
         "without any delay, the model of the paper. No form uses a Padé approximation."
     )
-    certified = [f.margins.evidence == "certified" for result in forms.values() for f in result.values()]
-    note += " All margins are certified." if all(certified) else ""
     named = {f"{FORMS[form]}, {name}": f for form, result in forms.items() for name, f in result.items()}
     reasons = evidence_notes(named)
+    note += "" if reasons else " All margins are certified."
     table = doc.table("Margins and bandwidths in the three forms", COLUMNS, rows, note)
     intro = "The forms differ by sampling, hold and computing delay."
     blocks = [_overlay(forms), table, *(doc.text(f"Not found: {reason}.") for reason in refused)]
@@ -63,8 +62,7 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
     change = to_minus(f"{row['phase_cost_deg']:+.1f}")
     return (
         f"Sampling and delay change the phase margin of the {row['loop'].lower()} by {change} deg, the "
-        "largest "
-        "change of all loops."
+        "largest change of all loops."
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,12 +12,13 @@ from analyses.motion.settling import words as end_words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Row, Section, Severity, Status, VerdictItem
-from reports.findings import Finding
-from reports.sections.large_signal import load_unit, output_unit
+from reports.document_schema import Block, Section, Severity, Status, VerdictItem
+from reports.sections.names import fine_unit, load_unit
 from reports.verdict_summary import tally
 
 if TYPE_CHECKING:
+    from analyses.settling import Settling
+
     from analyses.friction_effects import FrictionEffects
     from analyses.friction_effects.cycles import LimitCycles
     from analyses.friction_effects.result import FrictionPoint
@@ -31,8 +32,7 @@ def section(result: FrictionEffects) -> Section:
     title = "Dry friction at small signals"
     if not result.points:
         return doc.section("friction-effects", title, [], result=f"Not applicable: {result.reason}.")
-    scale, unit = output_unit(result.design)
-    fine, small = 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
+    fine, small = fine_unit(result.design.axis)
     load = load_unit(result.design)
     items = [_cycle_verdict(point, fine, small, load) for point in result.points]
     blocks = [doc.verdicts(items, what="checks"), _threshold_table(result, fine, small, load)]
@@ -46,9 +46,8 @@ def section(result: FrictionEffects) -> Section:
     severity: Severity = "fail" if status == "fail" else "warn" if status == "warn" else "info"
     words = _summary(result, fine, small)
     return doc.section(
-        "friction-effects", title, blocks, result=words, intro=intro, status=status,
-        findings=[Finding(severity=severity, text=words, where="friction-effects")],
-    )  # fmt: skip
+        "friction-effects", title, blocks, result=words, intro=intro, status=status, told=severity
+    )
 
 
 def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> VerdictItem:
@@ -102,18 +101,20 @@ def _slip_words(cycles: LimitCycles, fine: float, small: str) -> str:
 
 def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> Block:
     """List thresholds and lost motion by load."""
+    torque, torque_scale = ("mN m", 1e3) if load == "N m" else ("N", 1.0)
+    size: dict[str, Any] = {"unit": small, "scale": fine, "format": "sig:3"}
+    wait: dict[str, Any] = {"unit": "ms", "scale": 1e3, "format": "sig:3"}
     columns = [
-        doc.column("load", "Load", load, format="short:4"),
-        doc.column("dry", "Dry friction, motor", "mN m" if load == "N m" else "N", format="sig:3"),
-        doc.column("threshold", "Step that moves immediately", small, format="sig:3"),
-        doc.column("simulated", "simulated", small, format="sig:3"),
-        doc.column("wait", "Wait at half of it", "ms", format="sig:3"),
-        doc.column("waited", "simulated", "ms", format="sig:3"),
-        doc.column("width", "Lost motion", small, format="sig:3"),
-        doc.column("predicted", "predicted", small, format="sig:3"),
-        doc.column("largest", "Largest effect of friction", small, format="sig:3"),
+        doc.of("load_Nm", "load", "Load", load, format="short:4"),
+        doc.of("dry_torque_Nm", "dry", "Dry friction, motor", torque, scale=torque_scale, format="sig:3"),
+        doc.of("threshold.static.forward_rad", "threshold", "Step that moves immediately", **size),
+        doc.of("threshold.simulated_rad", "simulated", "simulated", **size),
+        doc.of(lambda point: _wait(point, "predicted_s"), "wait", "Wait at half of it", **wait),
+        doc.of(lambda point: _wait(point, "simulated_s"), "waited", "simulated", **wait),
+        doc.of(lambda point: _lost(point, "lost_motion_rad"), "width", "Lost motion", **size),
+        doc.of(lambda point: _lost(point, "predicted_rad"), "predicted", "predicted", **size),
+        doc.of("hysteresis.largest_rad", "largest", "Largest effect of friction", **size),
     ]
-    rows = [_threshold_row(point, fine, 1e3 if load == "N m" else 1.0) for point in result.points]
     note = (
         f"The {result.integrator} controller integrates: a step below the threshold moves the output later"
         f"{_after(result)}, and lost motion is recovered. The effect of friction is largest just after a "
@@ -124,7 +125,7 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
     )
     if result.design.command != Command():
         note += " Steps as they come behind the profile and filter of the command."
-    return doc.table("Threshold of motion and lost motion", columns, rows, note)
+    return doc.listing("Threshold of motion and lost motion", result.points, columns, note)
 
 
 def _after(result: FrictionEffects) -> str:
@@ -135,51 +136,43 @@ def _after(result: FrictionEffects) -> str:
     return ", after Tn (A0/A − 1)" if alone and not kicks else ""
 
 
-def _threshold_row(point: FrictionPoint, fine: float, torque_scale: float) -> Row:
-    row: Row = {"load": point.load_Nm, "dry": torque_scale * point.dry_torque_Nm}
-    result, loop = point.threshold, point.hysteresis
-    if result is not None:
-        row["threshold"] = fine * result.static.forward_rad
-        row["simulated"] = None if result.simulated_rad is None else fine * result.simulated_rad
-        half = [w for w in result.waiting if abs(w.amplitude_rad / result.static.forward_rad - 0.5) < 0.01]
-        if half:
-            row["wait"] = 1e3 * half[0].predicted_s
-            row["waited"] = None if half[0].simulated_s is None else 1e3 * half[0].simulated_s
-    if loop is not None:
-        row["width"], row["largest"] = fine * max(loop.lost_motion_rad, 0.0), fine * loop.largest_rad
-        row["predicted"] = 0.0 if loop.predicted_rad is None else fine * loop.predicted_rad
-    return row
+def _wait(point: FrictionPoint, name: str) -> float | None:
+    """A time of the wait at half the threshold, where that was waited for."""
+    known = point.threshold
+    if known is None:
+        return None
+    half = [w for w in known.waiting if abs(w.amplitude_rad / known.static.forward_rad - 0.5) < 0.01]
+    return getattr(half[0], name) if half else None
+
+
+def _lost(point: FrictionPoint, name: str) -> float | None:
+    """A width of the hysteresis, 0 where it has none."""
+    return None if point.hysteresis is None else max(getattr(point.hysteresis, name) or 0.0, 0.0)
 
 
 def _settling_table(result: FrictionEffects, fine: float, small: str, load: str) -> Block:
     """List the steady-state error after steps."""
+    size: dict[str, Any] = {"unit": small, "scale": fine}
     columns = [
-        doc.column("load", "Load", load, format="short:4"),
-        doc.column("step", "Step", small, format="sig:3"),
-        doc.column("wait", "Waited", "s", format="sig:2"),
-        doc.column("error", "Remaining error", small, format="sig:2"),
-        doc.column("end", "The drive"),
+        doc.of(lambda pair: pair[0], "load", "Load", load, format="short:4"),
+        doc.of(lambda pair: pair[1].amplitude_rad, "step", "Step", **size, format="sig:3"),
+        doc.of(lambda pair: pair[1].rest.after_s, "wait", "Waited", "s", format="sig:2"),
+        doc.of(lambda pair: _error(pair[1]), "error", "Remaining error", **size, format="sig:2"),
+        doc.of(lambda pair: end_words(pair[1].rest, fine, small), "end", "The drive"),
     ]
-    rows = []
-    for point in result.points:
-        for one in point.cycles.settlings:
-            error = fine * one.rest.error
-            rows.append(
-                {
-                    "load": point.load_Nm,
-                    "step": fine * one.amplitude_rad,
-                    "wait": one.rest.after_s,
-                    "error": error if abs(error) > 1e-6 * fine * one.amplitude_rad else 0.0,
-                    "end": end_words(one.rest, fine, small),
-                    "_status": "warn" if one.hunting else None,
-                }
-            )
+    ends = [(point.load_Nm, one) for point in result.points for one in point.cycles.settlings]
     note = (
         "The third step at each load is 0.3 of the threshold, the fourth that of a predicted cycle. Errors "
-        "below 10⁻⁶ "
-        "of the step are shown as 0."
+        "below 10⁻⁶ of the step are shown as 0."
     )
-    return doc.table("Steady-state error after a step", columns, rows, note)
+    return doc.listing(
+        "Steady-state error after a step", ends, columns, note,
+        lambda pair: "warn" if pair[1].hunting else None,
+    )  # fmt: skip
+
+
+def _error(one: Settling) -> float:
+    return one.rest.error if abs(one.rest.error) > 1e-6 * one.amplitude_rad else 0.0
 
 
 def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Block | None:
@@ -207,9 +200,8 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
         sizes = [fine * one.amplitude_rad for one in waiting]
         seen = [None if one.simulated_s is None else 1e3 * one.simulated_s for one in waiting]
         look: style.Style = {"colour": style.SERIES[k % 7], "marker": "os^D"[k % 4], "size": 6.0}
-        panel.curve(
-            sizes, [1e3 * one.predicted_s for one in waiting], f"{label}: predicted", **style.series(k)
-        )
+        predicted = [1e3 * one.predicted_s for one in waiting]
+        panel.curve(sizes, predicted, f"{label}: predicted", **style.series(k))
         panel.points(sizes, seen, f"{label}: simulated", **look)
     caption = "Position error over a slow triangular command; without friction only the small lag remains."
     if waits:

@@ -9,13 +9,14 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Section
+from reports.sections.names import output_unit
 
 
 def sections(sweep: RestSweep, axis: str) -> list[Section]:
     """Make the section where there is dry friction that is described; else none."""
     if not np.isfinite(sweep.described).any():
         return []
-    scale, unit = (1e3, "mm") if axis == "linear" else (57.29577951308232, "deg")
+    scale, unit = output_unit(axis)
     low, high = sweep.amplitude_rad.min() * scale, sweep.amplitude_rad.max() * scale
     clear = "" if any(sweep.limiter) else ", below every limit"
     words = described(sweep)
@@ -33,21 +34,14 @@ def _chart(sweep: RestSweep) -> Chart:
     chart = Chart(width=style.WIDE, height=500.0)
     top, bottom, off = chart.column(3, 3, 2)
     moves = np.abs(sweep.measured) > 0.0
-    points: style.Style = {
-        "colour": style.SERIES[0],
-        "marker": "o",
-        "size": 6.0,
-        "hollow": True,
-        "line": False,
+    points: style.Style = {"colour": style.BLUE, "marker": "o", "size": 6.0, "hollow": True, "line": False}
+    lines = {
+        "simulated from rest": sweep.measured,
+        "sliding loop": sweep.sliding,
+        "describing function of dry friction": sweep.described,
     }
     phases = []
-    for k, (label, values) in enumerate(
-        (
-            ("simulated from rest", sweep.measured),
-            ("sliding loop", sweep.sliding),
-            ("describing function of dry friction", sweep.described),
-        )
-    ):
+    for k, (label, values) in enumerate(lines.items()):
         look = points if k == 0 else style.series(k)
         size = np.abs(values)
         decibel = 20.0 * np.log10(np.where(size > 0.0, size, np.nan))
@@ -56,9 +50,8 @@ def _chart(sweep: RestSweep) -> Chart:
         top.curve(sweep.frequency_hz, decibel, label, **look)
         bottom.curve(sweep.frequency_hz, phase, label, **look)
         if k:
-            ratio = np.where(moves & (size > 0.0), size, np.nan) / np.where(
-                moves, np.abs(sweep.measured), 1.0
-            )
+            seen = np.where(moves, np.abs(sweep.measured), 1.0)
+            ratio = np.where(moves & (size > 0.0), size, np.nan) / seen
             off.curve(sweep.frequency_hz, 20.0 * np.log10(ratio), label, **look)
     off.rule_y(0.0)
     style.phase_axis(bottom, phases)

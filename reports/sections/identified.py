@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from analyses.estimation.parameters import parameter
 from reports import document as doc
-from reports.document_schema import Block, Column, Row, Section, Status
+from reports.document_schema import Block, Row, Section, Status, VerdictItem
 from reports.numbers import show
 
 if TYPE_CHECKING:
@@ -45,24 +45,18 @@ def verdict_words(items: Sequence[Item], result: str) -> str:
 
 def verdict_block(items: Sequence[Item]) -> Block:
     """The verdict, item by item; shares in per cent."""
-    made = []
-    for item in items:
-        value = None if item.value is None else 100.0 * item.value
-        limit = None if item.limit is None else 100.0 * item.limit
-        made.append(
-            doc.verdict(
-                item.id,
-                item.label,
-                value=value,
-                limit=limit,
-                unit="%" if value is not None else "",
-                distance=None if value is None or limit is None else limit - value,
-                passed=item.passed,
-                reason=item.reason,
-                comparison="<=" if limit is not None else "",
-            )
-        )
-    return doc.verdicts(made, "bench checks")
+    return doc.verdicts(map(_verdict, items), "bench checks")
+
+
+def _verdict(item: Item) -> VerdictItem:
+    value = None if item.value is None else 100.0 * item.value
+    limit = None if item.limit is None else 100.0 * item.limit
+    unit, comparison = "" if value is None else "%", "" if limit is None else "<="
+    return doc.verdict(
+        item.id, item.label, value=value, limit=limit, unit=unit, comparison=comparison,
+        distance=None if value is None or limit is None else limit - value,
+        passed=item.passed, reason=item.reason,
+    )  # fmt: skip
 
 
 def value_words(fit: Fit, name: str, axis: str = "rotary") -> str:
@@ -73,16 +67,11 @@ def value_words(fit: Fit, name: str, axis: str = "rotary") -> str:
 
 
 def parameter_table(
-    caption: str,
-    fit: Fit,
-    note: str = "",
-    *,
-    axis: str = "rotary",
-    more: Sequence[tuple[Column, Mapping[str, float | None]]] = (),
+    caption: str, fit: Fit, note: str = "", *, axis: str = "rotary", more: Sequence[doc.Shown] = ()
 ) -> Block:
     """Every value with standard error and 95 % interval; what was fixed, and why.
 
-    ``more`` are further columns, each with its numbers by name.
+    ``more`` are further columns, each with what it shows of a name that was fitted.
     """
     columns = [
         doc.column("name", "Parameter"),
@@ -103,6 +92,6 @@ def parameter_table(
         else:
             low, high = (known.scale * end for end in one.interval_95)
             row |= {"std": known.scale * (one.standard_error or 0.0), "low": low, "high": high}
-            row |= {column["key"]: numbers.get(name) for column, numbers in more}
+            row |= {column["key"]: read(name) for column, read in more}
         rows.append(row)
     return doc.table(caption, columns, rows, note)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reports import document as doc
-from reports.document_schema import Block, Column, Row, Section
+from reports.document_schema import Block, Row, Section
 from reports.sections.campaign_figures import (
     NAMES,
     region_figure,
@@ -22,12 +22,10 @@ from reports.sections.record_tables import input_table
 
 if TYPE_CHECKING:
     from analyses.identification.campaign import CampaignResult
-    from analyses.identification.campaign_design import CampaignSuggestion, MarginSpread
-    from analyses.identification.contributions import Contribution
+    from analyses.identification.campaign_design import CampaignSuggestion
     from analyses.identification.richer import LawScore, RicherLaws
     from analyses.identification.run import CampaignAnswer
-    from analyses.identification.surface_fit import Outlier, SurfaceFit
-    from analyses.records.campaign_import import SetAside
+    from analyses.identification.surface_fit import SurfaceFit
 
 
 def section(answer: CampaignAnswer) -> Section:
@@ -69,17 +67,11 @@ def _intro(result: CampaignResult) -> str:
 def coefficient_table(fit: SurfaceFit) -> Block:
     """Values, standard errors, 95 % intervals, and how they go together."""
     random = np.diag(fit.random_covariance) / np.maximum(np.diag(fit.covariance), 1e-300)
-    more: list[tuple[Column, dict[str, float | None]]] = [
-        (
-            doc.column("scatter", "Share of scatter", "%", format="fix:0"),
-            dict(zip(NAMES, (100.0 * random).tolist(), strict=True)),
-        )
-    ]
+    scatter = dict(zip(NAMES, (100.0 * random).tolist(), strict=True))
+    more = [doc.of(scatter.get, "scatter", "Share of scatter", "%", format="fix:0")]
     for j, (key, name) in enumerate((("c0", "C0"), ("cv", "Cv"))):
-        both: dict[str, float | None] = {
-            NAMES[k]: float(fit.correlation[k, j]) for k in fit.told if j < k and j in fit.told
-        }
-        more.append((doc.column(key, f"r with {name}", format="fix:2"), both))
+        both = {NAMES[k]: float(fit.correlation[k, j]) for k in fit.told if j < k and j in fit.told}
+        more.append(doc.of(both.get, key, f"r with {name}", format="fix:2"))
     note = (
         "Intervals by propagated distributions (GUM Supplement 1): Student for the scatter of the runs, "
         "uniform for the instruments' shared errors."
@@ -90,11 +82,11 @@ def coefficient_table(fit: SurfaceFit) -> Block:
 def contribution_table(answer: CampaignAnswer) -> Block:
     """Table 1 of the paper."""
     terms = {"C0": "C0", "Cv": "Cv w", "CM": "CM |M_ext|"}
-    columns: list[tuple[Column, Callable[[Contribution], Any]]] = [
-        (doc.column("name", "Term"), lambda one: terms[one.name]),
-        (doc.column("torque", "Torque", "mN m", format="sig:4"), lambda one: 1e3 * one.torque_Nm),
-        (doc.column("share", "Share", "%", format="fix:1"), lambda one: 100.0 * one.share),
-        (doc.column("std", "Standard error", "%", format="fix:2"), lambda one: 100.0 * one.share_std),
+    columns = [
+        doc.of(lambda one: terms[one.name], "name", "Term"),
+        doc.of("torque_Nm", "torque", "Torque", "mN m", scale=1e3, format="sig:4"),
+        doc.of("share", "share", "Share", "%", scale=100.0, format="fix:1"),
+        doc.of("share_std", "std", "Standard error", "%", scale=100.0, format="fix:2"),
     ]
     caption = f"Contributions at {answer.load_Nm:g} N m and {answer.speed_rad_s:g} rad/s"
     return doc.listing(caption, answer.shares, columns)
@@ -124,19 +116,13 @@ def law_table(laws: RicherLaws) -> Block:
     def verdict(one: LawScore) -> str:
         return "–" if one.name == "plain" else "yes" if one.warranted else one.reason or "no"
 
-    columns: list[tuple[Column, Callable[[LawScore], Any]]] = [
-        (doc.column("name", "Law"), lambda one: one.name),
-        (doc.column("formula", "Terms"), lambda one: one.formula),
-        (
-            doc.column("error", "Error, unseen runs", "µN m", format="sig:3"),
-            shown("error_Nm", 1e6),
-        ),
-        (
-            doc.column("gain", "Squared error less by", "%", format="fix:1"),
-            shown("gain", 100.0),
-        ),
-        (doc.column("std", "± standard error", "%", format="fix:1"), shown("gain_std", 100.0)),
-        (doc.column("verdict", "Warranted"), verdict),
+    columns = [
+        doc.of("name", "name", "Law"),
+        doc.of("formula", "formula", "Terms"),
+        doc.of(shown("error_Nm", 1e6), "error", "Error, unseen runs", "µN m", format="sig:3"),
+        doc.of(shown("gain", 100.0), "gain", "Squared error less by", "%", format="fix:1"),
+        doc.of(shown("gain_std", 100.0), "std", "± standard error", "%", format="fix:1"),
+        doc.of(verdict, "verdict", "Warranted"),
     ]
     note = (
         f"Cross-validation over {laws.folds} folds of runs; a law is warranted where it predicts runs it has "
@@ -158,15 +144,14 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[Block]:
     if suggestion.largest_shared is not None:
         note = (
             f"{100.0 * suggestion.shared_part:.0f} % of the margins' variance comes from errors that all "
-            "runs share "
-            f"and no further run reduces; the largest is the {suggestion.largest_shared}."
+            f"runs share and no further run reduces; the largest is the {suggestion.largest_shared}."
         )
-    margins: list[tuple[Column, Callable[[MarginSpread], Any]]] = [
-        (doc.column("label", "Margin"), lambda one: one.label),
-        (doc.column("value", "Value", format="sig:4"), lambda one: one.value),
-        (doc.column("std", "Standard deviation", format="sig:2"), lambda one: one.std),
-        (doc.column("floor", "Systematic part", format="sig:2"), lambda one: one.floor_std),
-        (doc.column("unit", "Unit"), lambda one: one.unit),
+    margins = [
+        doc.of("label", "label", "Margin"),
+        doc.of("value", "value", "Value", format="sig:4"),
+        doc.of("std", "std", "Standard deviation", format="sig:2"),
+        doc.of("floor_std", "floor", "Systematic part", format="sig:2"),
+        doc.of("unit", "unit", "Unit"),
     ]
     goal = "the margins'" if suggestion.criterion == "margins" else "the coefficients'"
     return [
@@ -193,16 +178,13 @@ def _grouped(suggestion: CampaignSuggestion) -> list[Row]:
 
 def account_blocks(result: CampaignResult) -> list[Block]:
     """Outliers and runs set aside, by name."""
-    outlier: list[tuple[Column, Callable[[Outlier], Any]]] = [
-        (doc.column("run", "Outlier, run"), lambda one: one.run),
-        (doc.column("size", "Residual, standard deviations", format="fix:1"), lambda one: one.standardised),
-        (doc.column("limit", "Limit", format="fix:1"), lambda one: one.limit),
-        (doc.column("state", "Treatment"), lambda one: "set aside" if one.set_aside else "kept"),
+    outlier = [
+        doc.of("run", "run", "Outlier, run"),
+        doc.of("standardised", "size", "Residual, standard deviations", format="fix:1"),
+        doc.of("limit", "limit", "Limit", format="fix:1"),
+        doc.of(lambda one: "set aside" if one.set_aside else "kept", "state", "Treatment"),
     ]
-    aside: list[tuple[Column, Callable[[SetAside], Any]]] = [
-        (doc.column("run", "Run"), lambda one: one.id),
-        (doc.column("reason", "Reason"), lambda one: one.reason),
-    ]
+    aside = [doc.of("id", "run", "Run"), doc.of("reason", "reason", "Reason")]
     outliers, gone = result.fit.outliers, result.set_aside
     return [
         doc.listing("Outliers", outliers, outlier) if outliers else doc.text("No run is an outlier."),
@@ -214,35 +196,21 @@ def account_blocks(result: CampaignResult) -> list[Block]:
 
 def run_table(result: CampaignResult) -> Block:
     """One row a run: means, window, rows, clock."""
+    records = {run.id: run.record for run in result.imported.runs}
+    fit = result.fit
+    residuals = {
+        p.run: (r, s) for p, r, s in zip(fit.points, fit.residuals_Nm, fit.residual_stds_Nm, strict=True)
+    }
     columns = [
-        doc.column("run", "Run"),
-        doc.column("speed", "Speed", "rad/s", format="fix:2"),
-        doc.column("load", "Load", "N m", format="fix:3"),
-        doc.column("torque", "Torque", "mN m", format="fix:4"),
-        doc.column("residual", "Residual", "µN m", format="fix:2"),
-        doc.column("std", "σ", "µN m", format="fix:2"),
-        doc.column("start", "Steady from", "s", format="fix:2"),
-        doc.column("stop", "to", "s", format="fix:2"),
-        doc.column("rows", "Rows in, out"),
-        doc.column("clock", "Clock of the sensor"),
+        doc.of("run", "run", "Run"),
+        doc.of(lambda p: p.direction * p.speed_rad_s, "speed", "Speed", "rad/s", format="fix:2"),
+        doc.of("load_Nm", "load", "Load", "N m", format="fix:3"),
+        doc.of("torque_Nm", "torque", "Torque", "mN m", scale=1e3, format="fix:4"),
+        doc.of(lambda p: residuals[p.run][0], "residual", "Residual", "µN m", scale=1e6, format="fix:2"),
+        doc.of(lambda p: residuals[p.run][1], "std", "σ", "µN m", scale=1e6, format="fix:2"),
+        doc.of("window.start_s", "start", "Steady from", "s", format="fix:2"),
+        doc.of("window.stop_s", "stop", "to", "s", format="fix:2"),
+        doc.of(lambda p: str(records[p.run].counts), "rows", "Rows in, out"),
+        doc.of(lambda p: "; ".join(records[p.run].notes) or "one recorder", "clock", "Clock of the sensor"),
     ]
-    runs = {run.id: run for run in result.imported.runs}
-    rows = []
-    residuals = zip(result.fit.residuals_Nm, result.fit.residual_stds_Nm, strict=True)
-    for point, (residual, std) in zip(result.fit.points, residuals, strict=True):
-        run = runs[point.run]
-        rows.append(
-            {
-                "run": point.run,
-                "speed": point.direction * point.speed_rad_s,
-                "load": point.load_Nm,
-                "torque": 1e3 * point.torque_Nm,
-                "residual": 1e6 * residual,
-                "std": 1e6 * std,
-                "start": point.window.start_s,
-                "stop": point.window.stop_s,
-                "rows": str(run.record.counts),
-                "clock": "; ".join(run.record.notes) or "one recorder",
-            }
-        )
-    return doc.table("Runs", columns, rows)
+    return doc.listing("Runs", fit.points, columns)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,13 +10,12 @@ from analyses.estimation.parameters import parameter
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Column, Section
+from reports.document_schema import Block, Section
 from reports.sections.identified import judged, parameter_table, value_words
 from reports.sections.record_tables import finding_table, input_table
 
 if TYPE_CHECKING:
     from analyses.identification.bench import BenchResult
-    from analyses.identification.friction_map import LawChoice
     from analyses.identification.joint_model import JointModel
     from analyses.identification.output_error import OutputErrorResult
 
@@ -73,22 +71,20 @@ def _intro(result: BenchResult) -> str:
     many = f"{len(result.records)} records, " if len(result.records) > 1 else ""
     rest = sum(record.rows_at_rest for record in model.records)
     return (
-        f"{many}{model.rows_in} rows in, {model.rows_used} used. Position filtered at "
-        f"{recipe.cutoff_hz:g} Hz (Butterworth of order {recipe.filter_order}, forward and backward), "
-        "differentiated twice, the first "
-        f"{recipe.skip_samples} samples dropped, decimated by {recipe.decimation}"
-        f"{f', {rest} rows at rest left out' if rest else ''}; inverse dynamic model by least squares. "
-        "Relative residual "
-        f"{100.0 * model.relative_residual:.4f} %."
+        f"{many}{model.rows_in} rows in, {model.rows_used} used. Position filtered at {recipe.cutoff_hz:g} "
+        f"Hz (Butterworth of order {recipe.filter_order}, forward and backward), differentiated twice, the "
+        f"first {recipe.skip_samples} samples dropped, decimated by "
+        f"{recipe.decimation}{f', {rest} rows at rest left out' if rest else ''}; inverse dynamic model by "
+        f"least squares. Relative residual {100.0 * model.relative_residual:.4f} %."
     )
 
 
 def _parameters(model: JointModel, axis: str) -> Block:
     """Values, their standard errors as published recipes give them, and as the record really tells."""
     white = dict(zip(model.names, model.white_errors.tolist(), strict=True))
-    more = [(doc.column("white", "Standard error if white", format="sig:4"), white)]
+    more = [doc.of(white.get, "white", "Standard error if white", format="sig:4")]
     if model.bias:
-        more.append((doc.column("bias", "Bias removed", format="sig:3"), dict(model.bias)))
+        more.append(doc.of(dict(model.bias).get, "bias", "Bias removed", format="sig:3"))
     note = (
         "White residuals: ordinary least squares, as is usually published. Standard error: with the "
         "autocorrelation of the residuals, and the scatter between records where there are several; this one "
@@ -110,19 +106,17 @@ def _refined(refined: OutputErrorResult, axis: str) -> Block:
 def law_table(result: BenchResult, axis: str) -> Block:
     """The friction laws that were tried, by the Bayesian criterion."""
     unit = "m/s" if axis == "linear" else "rad/s"
-    columns: list[tuple[Column, Callable[[LawChoice], Any]]] = [
-        (doc.column("name", "Law"), lambda one: one.name),
-        (
-            doc.column("breaks", f"Break points, {unit}"),
+    columns = [
+        doc.of("name", "name", "Law"),
+        doc.of(
             lambda one: ", ".join(f"{speed:.4g}" for speed in one.breaks_rad_s) or "–",
+            "breaks",
+            f"Break points, {unit}",
         ),
-        (doc.column("parameters", "Parameters", format="short:3"), lambda one: one.parameters),
-        (
-            doc.column("residual", "Relative residual", "%", format="sig:4"),
-            lambda one: 100.0 * one.relative_residual,
-        ),
-        (doc.column("criterion", "BIC difference", format="fix:1"), lambda one: one.criterion),
-        (doc.column("taken", "Chosen", format="yesno"), lambda one: one.taken),
+        doc.of("parameters", "parameters", "Parameters", format="short:3"),
+        doc.of("relative_residual", "residual", "Relative residual", "%", scale=100.0, format="sig:4"),
+        doc.of("criterion", "criterion", "BIC difference", format="fix:1"),
+        doc.of("taken", "taken", "Chosen", format="yesno"),
     ]
     note = (
         "BIC (Bayesian information criterion): n ln(mean square residual) + p ln n, n the effective number "
@@ -136,10 +130,7 @@ def scatter_table(model: JointModel, axis: str) -> Block:
     columns = [doc.column("name", "Parameter")]
     count = max((len(values) for values in model.singles.values()), default=0)
     columns += [doc.column(f"r{k}", f"record {k + 1} alone", format="sig:5") for k in range(min(count, 6))]
-    columns += [
-        doc.column("between", "Scatter between records", format="sig:3"),
-        doc.column("unit", "Unit"),
-    ]
+    columns += [doc.column("between", "Scatter between records", format="sig:3"), doc.column("unit", "Unit")]
     rows = []
     for name in model.names:
         one = parameter(name, axis)
@@ -158,9 +149,5 @@ def _figure(model: JointModel, axis: str) -> Block:
     panel = chart.panel()
     panel.curve(np.arange(len(model.residual)), model.residual, "residual")
     panel.x.label, panel.y.label = "row after decimation", f"residual, {unit}"
-    return doc.figure(
-        "residual",
-        chart,
-        caption="Residual of the inverse dynamic model",
-        alt="Residual of the drive force over the record",
-    )
+    caption, alt = "Residual of the inverse dynamic model", "Residual of the drive force over the record"
+    return doc.figure("residual", chart, caption=caption, alt=alt)

@@ -12,10 +12,9 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Section, Status, VerdictItem
-from reports.findings import Finding
 from reports.sections.amplitude_map import chart as map_chart
 from reports.sections.limits import words_of
-from reports.sections.names import figure_column
+from reports.sections.names import figure_column, load_unit, output_unit
 from reports.verdict_summary import tally
 
 if TYPE_CHECKING:
@@ -32,7 +31,7 @@ def section(result: LargeSignals) -> Section:
     from analyses.large_signal.classify import CAUSE_RULE, CRITERIA
 
     design = result.design
-    scale, unit = output_unit(design)
+    scale, unit = output_unit(design.axis)
     items = [*_border_verdict(result.border), *_sawtooth_verdicts(result.sawtooth)]
     rules = doc.details("How the map is read", [doc.text(words) for words in (CAUSE_RULE, CRITERIA)])
     blocks = [doc.verdicts(items, what="checks"), _map_figure(result, scale, unit), rules]
@@ -41,15 +40,13 @@ def section(result: LargeSignals) -> Section:
     blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
     blocks += [_bode_table(result.bode, scale, unit), *_sawtooth_blocks(result.sawtooth, design, scale, unit)]
     intro = (
-        "Each point of the map is one sine command, simulated until steady. Below the lines the linear model "
-        "holds. "
-        "Above them the limit that is reached first determines the output."
+        "Each point of the map is one sine command, simulated until steady. Below the lines the linear "
+        "model holds. Above them the limit that is reached first determines the output."
     )
     words = _result(result.bode, scale, unit)
-    findings = [Finding(severity="info", text=words, where="large-signal")]
     status: Status = tally(items).role
     return doc.section(
-        "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, findings=findings
+        "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, told="info"
     )
 
 
@@ -89,16 +86,6 @@ def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
     hz = amplitude_bode.frequency_hz
     unsteady = ", the points between are not steady" if np.any((hz > low) & (hz < high)) else ""
     return f"between {low:.3g} and {high:.3g} Hz{unsteady}" if math.isfinite(high) else f"above {low:.3g} Hz"
-
-
-def output_unit(design: Design) -> tuple[float, str]:
-    """Scale and unit of an output position: degrees, or millimetres on a linear axis."""
-    return (1e3, "mm") if design.axis == "linear" else (math.degrees(1.0), "deg")
-
-
-def load_unit(design: Design) -> str:
-    """Unit of the load at the output."""
-    return "N" if design.axis == "linear" else "N m"
 
 
 def _border_verdict(border: BorderCheck | None) -> list[VerdictItem]:
@@ -154,10 +141,8 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
     """Make the map with the linear onset lines and the simulated border."""
     caption = (
         "What limits a sine command, at no load, with friction. Colour: limit that acts longest. Marks: "
-        "waveform "
-        "of the output; a sine has none. Lines: amplitude at which the linear loop reaches each limit. "
-        "Diamonds "
-        "and triangles: where the simulation first reaches it."
+        "waveform of the output; a sine has none. Lines: amplitude at which the linear loop reaches each "
+        "limit. Diamonds and triangles: where the simulation first reaches it."
     )
     if result.design.command != Command():
         caption += " Simulated behind the profile and filter of the command, drawn in front of them."
@@ -182,33 +167,23 @@ def _border_table(result: LargeSignals, scale: float, unit: str) -> Block:
     """List the border frequency by frequency."""
     border, shifted = result.border, result.border_with_friction
     assert border is not None
+    small: dict[str, Any] = {"unit": unit, "scale": scale, "format": "sig:4"}
     columns = [
-        doc.column("hz", "Frequency", "Hz", format="sig:3"),
-        doc.column("predicted", "Smallest A_k", unit, format="sig:4"),
-        doc.column("simulated", "Simulated, friction off", unit, format="sig:4"),
-        doc.column("error", "Difference", "%", format="fix:3"),
-        doc.column("limiter", "Predicted limiter"),
-        doc.column("acts", "Acting limiter"),
+        doc.of(lambda k: border.frequency_hz[k], "hz", "Frequency", "Hz", format="sig:3"),
+        doc.of(lambda k: border.predicted_rad[k], "predicted", "Smallest A_k", **small),
+        doc.of(lambda k: border.simulated_rad[k], "simulated", "Simulated, friction off", **small),
+        doc.of(lambda k: 100.0 * (border.ratio[k] - 1.0), "error", "Difference", "%", format="fix:3"),
+        doc.of(lambda k: words_of(border.predicted_limiter[k]), "limiter", "Predicted limiter"),
+        doc.of(lambda k: words_of(border.simulated_limiter[k]), "acts", "Acting limiter"),
     ]
     if shifted is not None:
-        columns.append(doc.column("shift", "Shift by friction", "%", format="fix:2"))
-    rows = []
-    for k, hz in enumerate(border.frequency_hz):
-        row = {
-            "hz": hz,
-            "predicted": scale * border.predicted_rad[k],
-            "simulated": scale * border.simulated_rad[k],
-            "error": 100.0 * (border.ratio[k] - 1.0),
-            "limiter": words_of(border.predicted_limiter[k]),
-            "acts": words_of(border.simulated_limiter[k]),
-        }
-        if shifted is not None:
-            row["shift"] = 100.0 * (shifted.ratio[k] - 1.0)
-        rows.append(row)
+        shift = 100.0 * (shifted.ratio - 1.0)
+        columns.append(doc.of(lambda k: shift[k], "shift", "Shift by friction", "%", format="fix:2"))
     note = "The shift by friction is shown, not judged."
     if result.design.command != Command():
         note += " Amplitudes behind the profile and filter of the command."
-    return doc.table("Amplitude at which a limit is first reached", columns, rows, note)
+    places = range(len(border.frequency_hz))
+    return doc.listing("Amplitude at which a limit is first reached", places, columns, note)
 
 
 def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: float) -> Block:
@@ -238,8 +213,7 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
     _bandwidths(chart.panel(title="Bandwidth against amplitude"), amplitude_bode, scale, unit, full)
     caption = (
         "Fundamental of the output relative to the command at several amplitudes, simulated at no load with "
-        "friction "
-        "and limits. Right: frequencies of −3 dB and −90° against amplitude. Gaps: not steady."
+        "friction and limits. Right: frequencies of −3 dB and −90° against amplitude. Gaps: not steady."
     )
     return doc.figure("amplitude_bode", chart, caption=caption, alt=caption)
 
@@ -271,32 +245,21 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block
         figure_column("bandwidth_90deg", "phase", format="sig:3"),
         doc.column("note", "Note"),
     ]
-    rows = []
+    keys = [one["key"] for one in columns]
+    rows: list[tuple[object, ...]] = []
     for fraction, amplitude in zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True):
         k = int(np.argmin(np.abs(amplitude_bode.all_amplitude_rad - amplitude)))
         below, known = bool(amplitude_bode.below_from_start[k]), math.isfinite(amplitude_bode.minus3db_hz[k])
         note = f"below −3 dB at {amplitude_bode.frequency_hz[0]:.3g} Hz and above" if below else ""
         if not (below or known):
             note = f"−3 dB {_between(amplitude_bode, k)}"
-        rows.append(
-            {
-                "fraction": 100.0 * fraction,
-                "amplitude": scale * amplitude,
-                "gain": amplitude_bode.minus3db_hz[k],
-                "phase": amplitude_bode.minus90deg_hz[k],
-                "note": note,
-            }
-        )
-    rows.append(
-        {
-            "fraction": None,
-            "amplitude": None,
-            "gain": amplitude_bode.linear_minus3db_hz,
-            "phase": amplitude_bode.linear_minus90deg_hz,
-            "note": "linear loop, interpolated on the same grid",
-        }
+        corners = (amplitude_bode.minus3db_hz[k], amplitude_bode.minus90deg_hz[k])
+        rows.append((100.0 * fraction, scale * amplitude, *corners, note))
+    corners = (amplitude_bode.linear_minus3db_hz, amplitude_bode.linear_minus90deg_hz)
+    rows.append((None, None, *corners, "linear loop, interpolated on the same grid"))
+    return doc.table(
+        "Bandwidth against amplitude", columns, [dict(zip(keys, row, strict=True)) for row in rows]
     )
-    return doc.table("Bandwidth against amplitude", columns, rows)
 
 
 def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[Block]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TypedDict
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,17 +15,15 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section
-from reports.findings import Finding
-from reports.sections.names import hertz
+from reports.sections.names import hertz, output_unit
 
 
 def section(design: Design, border: Onset) -> Section:
     """Make the section from the onset amplitudes."""
-    scale, unit = (1.0, "m") if design.axis == "linear" else (math.degrees(1.0), "deg")
+    scale, unit = (1.0, "m") if design.axis == "linear" else output_unit(design.axis)
     caption = (
         "Peak amplitude of a sine command, at the output, at which each limit is just reached. Below the "
-        "lowest line "
-        "every linear figure of this report holds, except for dry friction."
+        "lowest line every linear figure of this report holds, except for dry friction."
     )
     rows = _rows(design, border, scale)
     blocks = [
@@ -34,9 +32,8 @@ def section(design: Design, border: Onset) -> Section:
     ]
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
     words = _result(rows, unit)
-    findings = [Finding(severity="info", text=words, where="limits")] if words else []
     return doc.section(
-        "limits", "Validity of the linear model", blocks, result=words, intro=intro, findings=findings
+        "limits", "Validity of the linear model", blocks, result=words, intro=intro, told="info"
     )
 
 
@@ -72,13 +69,12 @@ def _result(rows: Sequence[_Linear], unit: str) -> str:
     """Say how far the largest command of the table stays linear."""
     if not rows:
         return ""
-    row = max(rows, key=lambda row: float(row["amplitude"]))
-    full = row["fraction"] == 100.0
-    part = "full deflection" if full else f"{row['fraction']:.0f} % of full deflection"
-    size = f"{part} ({row['amplitude']:.3g} {unit})"
-    if row["hz"] is None:
+    row = max(rows, key=lambda row: row.amplitude)
+    part = "full deflection" if row.fraction == 1.0 else f"{100.0 * row.fraction:.0f} % of full deflection"
+    size = f"{part} ({row.amplitude:.3g} {unit})"
+    if row.hz is None:
         return f"A sine of {size} stays linear over the whole frequency range."
-    return f"A sine of {size} stays linear up to {row['hz']:.3g} Hz; above, the {_noun(row['limiter'])} acts."
+    return f"A sine of {size} stays linear up to {row.hz:.3g} Hz; above, the {_noun(row.limiter)} acts."
 
 
 def _noun(limiter: str) -> str:
@@ -90,7 +86,8 @@ def words_of(limiter: str) -> str:
     return LIMITERS[limiter].words if limiter else "none"
 
 
-class _Linear(TypedDict):
+@dataclass(frozen=True)
+class _Linear:
     """Up to which frequency one command amplitude passes unlimited."""
 
     amplitude: float
@@ -106,25 +103,20 @@ def _rows(design: Design, border: Onset, scale: float) -> list[_Linear]:
         amplitude = fraction * design.validation.full_deflection_rad
         reached = np.nonzero(border.amplitude_rad < amplitude)[0]
         first = int(reached[0]) if len(reached) else None
-        rows.append(
-            {
-                "amplitude": amplitude * scale,
-                "fraction": 100.0 * fraction,
-                "hz": None if first is None else hertz(_crossing(border, first, amplitude)),
-                "limiter": "none in this range" if first is None else words_of(border.active[first]),
-            }
-        )
+        up_to = None if first is None else hertz(_crossing(border, first, amplitude))
+        limiter = "none in this range" if first is None else words_of(border.active[first])
+        rows.append(_Linear(amplitude * scale, fraction, up_to, limiter))
     return rows
 
 
 def _table(rows: Sequence[_Linear], unit: str) -> Block:
     columns = [
-        doc.column("amplitude", "Command amplitude", unit, format="short:3"),
-        doc.column("fraction", "Of full deflection", "%", format="fix:0"),
-        doc.column("hz", "Linear up to", "Hz", format="sig:3"),
-        doc.column("limiter", "Then limited by"),
+        doc.of("amplitude", "amplitude", "Command amplitude", unit, format="short:3"),
+        doc.of("fraction", "fraction", "Of full deflection", "%", scale=100.0, format="fix:0"),
+        doc.of("hz", "hz", "Linear up to", "Hz", format="sig:3"),
+        doc.of("limiter", "limiter", "Then limited by"),
     ]
-    return doc.table("How far the linear model reaches", columns, rows)
+    return doc.listing("How far the linear model reaches", rows, columns)
 
 
 def _crossing(border: Onset, first: int, amplitude: float) -> float:

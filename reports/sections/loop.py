@@ -20,7 +20,7 @@ from analyses.linear.responses import (
 from analyses.specification.command_limits import said_of
 from reports import document as doc
 from reports.document_schema import Block, Section
-from reports.numbers import fixed, seconds, to_minus
+from reports.numbers import capital, fixed, seconds, to_minus
 from reports.numbers import hertz as hertz_words
 from reports.sections import loop_charts
 from reports.sections.margins import (
@@ -83,8 +83,7 @@ def result(figures: LoopFigures) -> str:
         words.append(f"bandwidth {hertz_words(bandwidth)}")
     rotor = "Rotor free, " if figures.loop.name == "current" else ""
     verdict = f"{rotor}{figures.margins.verdict} ({figures.margins.evidence})"
-    verdict = verdict[0].upper() + verdict[1:]
-    return to_minus(f"{verdict}: {', '.join(words)}." if words else f"{verdict}.")
+    return to_minus(capital(f"{verdict}: {', '.join(words)}." if words else f"{verdict}."))
 
 
 def _intro(name: str, figures: LoopFigures) -> str:
@@ -186,9 +185,8 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
         and item.loop in (name, "every", None)
         and item.maximum is not None
     ]
-    s_db, t_db = (
-        _db(response_at(each, grid)) for each in (figures.loop.plain_sensitivity, figures.loop.plain_closed)
-    )
+    both = (figures.loop.plain_sensitivity, figures.loop.plain_closed)
+    s_db, t_db = (_db(response_at(each, grid)) for each in both)
     found = (
         (finite(hertz(peaks.sensitivity_rad_s)), finite(peaks.sensitivity_db)),
         (finite(hertz(peaks.complementary_rad_s)), finite(peaks.complementary_db)),
@@ -202,12 +200,7 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
 
 
 def step(
-    title: str,
-    loop_figures: LoopFigures,
-    locked: LoopFigures | None,
-    *,
-    name: str = "",
-    small: bool = False,
+    title: str, loop_figures: LoopFigures, locked: LoopFigures | None, *, name: str = "", small: bool = False
 ) -> Block:
     """Make the step figure."""
     figures = loop_figures.step

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from actuator_lti.asked.quantities import Quantity
+from actuator_lti.asked.quantities import QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.tree import Tree
 from analyses.linear.held_loops import HELD, OPEN
@@ -21,6 +21,7 @@ from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit
 from reports.terminal import Brief, side_by_side
 
 if TYPE_CHECKING:
+    from actuator_lti.bandwidth import Bandwidth
     from analyses.margins import Margins
 
 STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "warn"}
@@ -32,34 +33,48 @@ MEANING = {
     "border",
     "withheld": "the numbers of the loop do not determine the answer",
 }
-MARGIN_COLUMNS = [
-    doc.column("loop", "Loop"),
-    doc.column("stable", "Closed loop"),
-    doc.column("evidence", "Margins are"),
-    figure_column("gain_margin", "gain_margin_db", format="fix:2"),
-    doc.column("gain_margin_hz", "at", "Hz", format="sig:4"),
-    figure_column("phase_margin", "phase_margin_deg", format="fix:2"),
-    doc.column("crossover_hz", "at", "Hz", format="sig:4"),
-    figure_column("delay_margin", "delay_margin_ms", format="ms:3"),
-    doc.column("delay_margin_samples", "", "samples", format="sig:3", better=1),
-    figure_column("modulus_margin", "modulus_margin", format="fix:3"),
-    figure_column("sensitivity_peak", "s_peak_db", format="fix:2"),
-    doc.column("disk_margin", "Disk margin", format="fix:3", better=1),
+
+
+def _figure(quantity: str, key: str, format: str) -> doc.Shown:
+    """The column of a figure of the registry, and the figure."""
+    of = QUANTITIES[quantity]
+    return figure_column(quantity, key, format=format), doc.of(of.reader, key, "", scale=of.shown[1])[1]
+
+
+def _at(name: str) -> Callable[[LoopFigures], float | None]:
+    """Where a margin is."""
+    return lambda figures: hertz(getattr(getattr(figures.margins, name), "frequency_rad_s", None))
+
+
+MARGINS = [
+    doc.of(lambda figures: _state(figures), "stable", "Closed loop"),
+    doc.of(lambda figures: _evidence(figures), "evidence", "Margins are"),
+    _figure("gain_margin", "gain_margin_db", "fix:2"),
+    doc.of(_at("gain_margin"), "gain_margin_hz", "at", "Hz", format="sig:4"),
+    _figure("phase_margin", "phase_margin_deg", "fix:2"),
+    doc.of(_at("phase_margin"), "crossover_hz", "at", "Hz", format="sig:4"),
+    _figure("delay_margin", "delay_margin_ms", "ms:3"),
+    doc.of(lambda f: _samples(f), "delay_margin_samples", "", "samples", format="sig:3", better=1),
+    _figure("modulus_margin", "modulus_margin", "fix:3"),
+    _figure("sensitivity_peak", "s_peak_db", "fix:2"),
+    doc.of("margins.disk_margin.alpha", "disk_margin", "Disk margin", format="fix:3", better=1),
 ]
-RESPONSE_COLUMNS = [
-    doc.column("loop", "Loop"),
-    figure_column("bandwidth", "minus3db_hz", format="sig:4"),
-    figure_column("bandwidth_90deg", "minus90deg_hz", format="sig:4"),
-    figure_column("resonance_peak", "resonance_db", format="fix:2"),
-    doc.column("resonance_hz", "at", "Hz", format="sig:4"),
-    doc.column("t_peak_db", "Peak of T", "dB", format="fix:2", better=-1),
-    figure_column("rise_time", "rise_ms", format="ms:3"),
-    figure_column("overshoot", "overshoot_percent", format="fix:1"),
-    figure_column("settling_time", "settling_ms", format="ms:3"),
-    doc.column("dc", "Gain at DC", format="sig:4"),
+RESPONSES = [
+    _figure("bandwidth", "minus3db_hz", "sig:4"),
+    _figure("bandwidth_90deg", "minus90deg_hz", "sig:4"),
+    _figure("resonance_peak", "resonance_db", "fix:2"),
+    doc.of(lambda f: _resonance_hz(f.bandwidth), "resonance_hz", "at", "Hz", format="sig:4"),
+    doc.of("peaks.complementary_db", "t_peak_db", "Peak of T", "dB", format="fix:2", better=-1),
+    _figure("rise_time", "rise_ms", "ms:3"),
+    _figure("overshoot", "overshoot_percent", "fix:1"),
+    _figure("settling_time", "settling_ms", "ms:3"),
+    doc.of("step.final_value", "dc", "Gain at DC", format="sig:4"),
 ]
+LOOP = doc.column("loop", "Loop")
+MARGIN_COLUMNS = [LOOP, *(column for column, _ in MARGINS)]
+RESPONSE_COLUMNS = [LOOP, *(column for column, _ in RESPONSES)]
 CROSSING_COLUMNS = [
-    doc.column("loop", "Loop"),
+    LOOP,
     doc.column("kind", "Crossing"),
     doc.column("value", "Margin", format="sig:5"),
     doc.column("unit", "Unit"),
@@ -99,9 +114,8 @@ def _where(result: Margins) -> str:
 
 def _notes(result: Margins, named: Mapping[str, LoopFigures]) -> list[str]:
     own = [note for one in named.values() for note in (*one.margins.notes, *one.notes)]
-    return list(
-        dict.fromkeys([*own, *(f"{name}: broken at the command of the drive" for name in result.around)])
-    )
+    around = [f"{name}: broken at the command of the drive" for name in result.around]
+    return list(dict.fromkeys([*own, *around]))
 
 
 def _stability(named: Mapping[str, LoopFigures]) -> str:
@@ -150,9 +164,7 @@ def _loops(loops: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigu
 
 def result(figures: Mapping[str, LoopFigures]) -> str:
     """Say whether all loops are stable, and which has the smallest margins."""
-    unstable = [
-        LOOPS[name].lower() for name, loop_figures in figures.items() if loop_figures.sound is not True
-    ]
+    unstable = [LOOPS[name].lower() for name, one in figures.items() if one.sound is not True]
     if unstable:
         return f"Not known to be stable: {', '.join(unstable)}."
     rows = {loop_words(name, one.rotor).lower(): margin_row(one.judged) for name, one in figures.items()}
@@ -175,8 +187,8 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
 def evidence_words(figures: Mapping[str, LoopFigures]) -> str:
     """Say how the margins of some loops are known: "certified", or which of them are not."""
     others: dict[str, list[str]] = {}
-    for name, loop_figures in figures.items():
-        others.setdefault(loop_figures.margins.evidence, []).append(LOOPS.get(name, name).lower())
+    for name, one in figures.items():
+        others.setdefault(one.margins.evidence, []).append(LOOPS.get(name, name).lower())
     if len(others) == 1:
         return next(iter(others))
     return ", ".join(f"{' and '.join(names)} {evidence}" for evidence, names in others.items())
@@ -202,8 +214,7 @@ def margin_table(named: Mapping[str, LoopFigures]) -> Block:
     note = (
         "Of several crossings the table quotes the gain margin nearest to 0 dB and the phase margin nearest "
         "to 0°; all of them are listed below. A dash means that there is no such crossing, or that the loop "
-        "is not stable and has no margins. "
-        "Disk margin: α, balanced (S + T)."
+        "is not stable and has no margins. Disk margin: α, balanced (S + T)."
     )
     rows = [{"loop": name, **margin_row(loop_figures)} for name, loop_figures in named.items()]
     return doc.table("Stability margins", MARGIN_COLUMNS, rows, note)
@@ -222,7 +233,7 @@ def response_table(named: Mapping[str, LoopFigures]) -> Block:
 
 
 SPREAD_COLUMNS = [
-    doc.column("loop", "Loop"),
+    LOOP,
     doc.column("gain", "Gain margin, operating points", "dB"),
     doc.column("phase", "Phase margin, operating points", "deg"),
 ]
@@ -259,31 +270,26 @@ def crossing_table(named: Mapping[str, LoopFigures]) -> Block:
 
 def margin_row(figures: LoopFigures) -> Tree:
     """Give the margins of one loop by column; an unstable loop has none, only the crossings listed below."""
-    m = figures.margins
-    row = _stable_row(figures)
-    if m.stable is not False:
+    row: Tree = {one["key"]: doc.plain(read(figures)) for one, read in MARGINS}
+    row["crossover_rad_s"] = getattr(figures.margins.phase_margin, "frequency_rad_s", None)
+    if figures.margins.stable is not False:
         return row
     return {key: row[key] if key in ("stable", "evidence") else None for key in row}
 
 
-def _stable_row(figures: LoopFigures) -> Tree:
-    """Give the figures of one loop by column, whatever they are margins of."""
-    m = figures.margins
-    gain, phase, delay, disk = m.gain_margin, m.phase_margin, m.delay_margin, m.disk_margin
-    return {
-        "stable": _state(figures),
-        "evidence": {"text": m.evidence, "status": EVIDENCE_STATUS[m.evidence]},
-        "gain_margin_db": finite(m.gain_margin_db),
-        "gain_margin_hz": hertz(gain.frequency_rad_s) if gain else None,
-        "phase_margin_deg": finite(m.phase_margin_deg),
-        "crossover_hz": hertz(phase.frequency_rad_s) if phase else None,
-        "crossover_rad_s": phase.frequency_rad_s if phase else None,
-        "delay_margin_ms": times(m.delay_margin_s, 1e3),
-        "delay_margin_samples": delay.samples if delay and m.stable else None,
-        "modulus_margin": m.modulus_margin,
-        "s_peak_db": finite(m.sensitivity_peak_db),
-        "disk_margin": disk.alpha if disk else None,
-    }
+def _samples(figures: LoopFigures) -> float | None:
+    """The delay margin in samples, of a loop that is known to be stable."""
+    delay = figures.margins.delay_margin
+    return delay.samples if delay and figures.margins.stable else None
+
+
+def _resonance_hz(band: Bandwidth | None) -> float | None:
+    """Where the resonance is, unless at DC."""
+    return (band.resonance_hz or None) if band else None
+
+
+def _evidence(figures: LoopFigures) -> State:
+    return {"text": figures.margins.evidence, "status": EVIDENCE_STATUS[figures.margins.evidence]}
 
 
 def _state(figures: LoopFigures) -> State:
@@ -330,18 +336,7 @@ def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
 
 def response_row(figures: LoopFigures) -> Tree:
     """Give bandwidth, resonance and step of one loop by column."""
-    band, peaks, step = figures.bandwidth, figures.peaks, figures.step
-    return {
-        "minus3db_hz": None if band is None else finite(band.minus3db_hz),
-        "minus90deg_hz": None if band is None else finite(band.minus90deg_hz),
-        "resonance_db": None if band is None else finite(band.resonance_peak_db),
-        "resonance_hz": None if band is None else finite(band.resonance_hz) or None,
-        "t_peak_db": None if peaks is None else finite(peaks.complementary_db),
-        "rise_ms": None if step is None else times(step.rise_time_s, 1e3),
-        "overshoot_percent": None if step is None else finite(step.overshoot_percent),
-        "settling_ms": None if step is None else times(step.settling_time_s, 1e3),
-        "dc": None if step is None else finite(step.final_value),
-    }
+    return {one["key"]: doc.plain(read(figures)) for one, read in RESPONSES}
 
 
 def shown(quantity: Quantity, figures: LoopFigures) -> float | None:

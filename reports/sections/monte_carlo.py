@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.asked.verdict import Verdict
@@ -14,6 +14,7 @@ from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Section, VerdictItem
 from reports.sections.margins import finite
+from reports.sections.names import unit_words
 from reports.sections.requirements import label
 from reports.terminal import Brief
 
@@ -21,32 +22,6 @@ if TYPE_CHECKING:
     from analyses.monte_carlo import ColumnStatistics, MonteCarloResult, Odds, WorstCase
     from analyses.specification.verdicts import RequirementVerdict
 
-ODDS_COLUMNS = [
-    doc.column("label", "Requirement"),
-    doc.column("limit", "Limit"),
-    doc.column("probability", "Probability met", "%", format="fix:3", better=1),
-    doc.column("low", "95 % lower bound", "%", format="fix:3"),
-    doc.column("high", "95 % upper bound", "%", format="fix:3"),
-    doc.column("nominal", "Nominal", format="sig:4"),
-    doc.column("sampled", "Worst sample", format="sig:4"),
-    doc.column("number", "No.", align="right"),
-    doc.column("worst", "Worst case", format="sig:4"),
-    doc.column("unit", "Unit"),
-]
-FIGURE_COLUMNS = [
-    doc.column("figure", "Figure"),
-    doc.column("unit", "Unit"),
-    doc.column("minimum", "Min", format="sig:4"),
-    doc.column("q01", "1 %", format="sig:4"),
-    doc.column("q05", "5 %", format="sig:4"),
-    doc.column("q50", "50 %", format="sig:4"),
-    doc.column("q95", "95 %", format="sig:4"),
-    doc.column("q99", "99 %", format="sig:4"),
-    doc.column("maximum", "Max", format="sig:4"),
-    doc.column("mean", "Mean", format="sig:4"),
-    doc.column("std", "Std", format="sig:3"),
-    doc.column("missing", "Missing", align="right"),
-]
 _SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
 
 
@@ -152,33 +127,45 @@ def _limit(odds: Odds) -> str:
 
 
 def _odds_table(result: MonteCarloResult) -> Block:
-    rows = []
-    for odds in result.odds:
-        case = result.case(odds)
-        rows.append({
-            "label": odds.label, "limit": _limit(odds), "probability": 100 * odds.probability,
-            "low": 100 * odds.low, "high": 100 * odds.high, "nominal": finite(odds.nominal),
-            "sampled": finite(odds.worst), "number": odds.worst_sample,
-            "worst": None if case is None else finite(case.value), "unit": odds.unit,
-            "_status": "info" if odds.id == "all" else result.judged(odds).role(),
-        })  # fmt: skip
+    share: dict[str, Any] = {"unit": "%", "scale": 100.0, "format": "fix:3"}
+    columns = [
+        doc.of("label", "label", "Requirement"),
+        doc.of(_limit, "limit", "Limit"),
+        doc.of("probability", "probability", "Probability met", **share, better=1),
+        doc.of("low", "low", "95 % lower bound", **share),
+        doc.of("high", "high", "95 % upper bound", **share),
+        doc.of("nominal", "nominal", "Nominal", format="sig:4"),
+        doc.of("worst", "sampled", "Worst sample", format="sig:4"),
+        doc.of("worst_sample", "number", "No.", align="right"),
+        doc.of(lambda odds: getattr(result.case(odds), "value", None), "worst", "Worst case", format="sig:4"),
+        doc.of("unit", "unit", "Unit"),
+    ]
     note = "A dash in the worst case: not computed, or a loop is unstable there."
-    return doc.table("Odds of meeting each requirement", ODDS_COLUMNS, rows, note)
+    return doc.listing(
+        "Odds of meeting each requirement", result.odds, columns, note,
+        lambda odds: "info" if odds.id == "all" else result.judged(odds).role(),
+    )  # fmt: skip
 
 
 def _figure_table(columns: Iterable[ColumnStatistics]) -> Block:
-    rows = []
-    for c in columns:
-        known = dict(zip(c.shares, c.quantiles, strict=True))
-        rows.append({
-            "figure": _words(c.name), "unit": "" if c.unit == "1" else c.unit, "minimum": finite(c.minimum),
-            "maximum": finite(c.maximum), "mean": finite(c.mean), "std": finite(c.std), "missing": c.missing,
-            **{key: finite(known.get(share)) for key, share in _SHOWN.items()},
-        })  # fmt: skip
+    shown = [
+        doc.of(lambda c: _words(c.name), "figure", "Figure"),
+        doc.of(lambda c: unit_words(c.unit), "unit", "Unit"),
+        doc.of("minimum", "minimum", "Min", format="sig:4"),
+        *(doc.of(_quantile(q), key, f"{100.0 * q:g} %", format="sig:4") for key, q in _SHOWN.items()),
+        doc.of("maximum", "maximum", "Max", format="sig:4"),
+        doc.of("mean", "mean", "Mean", format="sig:4"),
+        doc.of("std", "std", "Std", format="sig:3"),
+        doc.of("missing", "missing", "Missing", align="right"),
+    ]
     note = (
         "Quantiles are values of samples. Missing: samples without such a figure (unstable, or not reached)."
     )
-    return doc.table("Distribution of every figure", FIGURE_COLUMNS, rows, note)
+    return doc.listing("Distribution of every figure", columns, shown, note)
+
+
+def _quantile(share: float) -> Callable[[ColumnStatistics], float | None]:
+    return lambda c: dict(zip(c.shares, c.quantiles, strict=True)).get(share)
 
 
 def _words(name: str) -> str:
@@ -213,12 +200,9 @@ def _figures(result: MonteCarloResult) -> list[Block]:
         for odds, column in part:
             _histogram(chart.panel(title=_words(column.name)), result, odds, column)
         names = ", ".join(_words(column.name) for _, column in part)
-        blocks.append(
-            doc.figure(
-                "distribution", chart, caption=f"Distribution within the tolerances: {names}.",
-                alt=f"Histograms of {names} with nominal design, worst case and limit.",
-            )
-        )  # fmt: skip
+        caption = f"Distribution within the tolerances: {names}."
+        alt = f"Histograms of {names} with nominal design, worst case and limit."
+        blocks.append(doc.figure("distribution", chart, caption=caption, alt=alt))
     return blocks
 
 
@@ -239,7 +223,7 @@ def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: Colum
             panel.rule_x(value, label=name, colour=colour, dash=dash, width=1.7)
     known = [*edges, *style.known((nominal, worst))]
     low, high = min(known), max(known)
-    width, unit = max(high - low, 1e-3 * max(abs(high), 1e-9)), "" if column.unit == "1" else column.unit
+    width, unit = max(high - low, 1e-3 * max(abs(high), 1e-9)), unit_words(column.unit)
     for name, value in (("minimum", odds.minimum), ("maximum", odds.maximum)):
         if value is not None and low - 2 * width <= value <= high + 2 * width:
             panel.x.see([value])
@@ -250,16 +234,15 @@ def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: Colum
 
 
 def _worst_table(result: MonteCarloResult) -> Block:
-    columns = [doc.column("requirement", "Worst case for"), doc.column("file", "Design file")]
-    columns += [doc.column(f"p{k}", path, format="sig:5") for k, path in enumerate(result.paths)]
-    rows: list[Mapping[str, Any]] = [
-        {
-            "requirement": case.requirement,
-            "file": "" if case.file is None else case.file.name,
-            **{f"p{k}": case.parameters[path] for k, path in enumerate(result.paths)},
-        }
-        for case in result.worst
+    columns = [
+        doc.of("requirement", "requirement", "Worst case for"),
+        doc.of(lambda case: "" if case.file is None else case.file.name, "file", "Design file"),
     ]
-    return doc.table(
-        "Worst designs, SI values", columns, rows, "Each is saved as a design that `report` opens."
-    )
+    for k, path in enumerate(result.paths):
+        columns.append(doc.of(_parameter(path), f"p{k}", path, format="sig:5"))
+    note = "Each is saved as a design that `report` opens."
+    return doc.listing("Worst designs, SI values", result.worst, columns, note)
+
+
+def _parameter(path: str) -> Callable[[WorstCase], float]:
+    return lambda case: case.parameters[path]

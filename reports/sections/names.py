@@ -31,9 +31,25 @@ def figure_column(quantity: str, key: str, *, format: str, label: str = "") -> C
     return doc.column(key, label or of.heading, of.shown[0], format=format, better=of.direction)
 
 
+def output_unit(axis: str) -> tuple[float, str]:
+    """Scale and unit of a position at the output: degrees, or millimetres on a linear axis."""
+    return (1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")
+
+
+def fine_unit(axis: str) -> tuple[float, str]:
+    """The same a thousand times finer."""
+    scale, unit = output_unit(axis)
+    return 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
+
+
 def load_unit(design: Design) -> str:
     """Give the unit of the load at the output."""
     return "N" if design.axis == "linear" else "N m"
+
+
+def unit_words(unit: str) -> str:
+    """A unit as it is printed: of a ratio none."""
+    return "" if unit == "1" else unit
 
 
 def hertz(omega_rad_s: float | None) -> float | None:

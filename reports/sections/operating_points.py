@@ -8,7 +8,7 @@ from actuator_lti.design.model import Design
 from analyses.linear.loop_survey import OperatingPointFigures
 from reports import document as doc
 from reports.document_schema import Row, Section
-from reports.sections.margins import margin_row, response_row
+from reports.sections.margins import evidence_notes, margin_row, response_row
 from reports.sections.names import figure_column, load_unit
 
 
@@ -36,15 +36,11 @@ def section(points: Sequence[OperatingPointFigures], design: Design) -> Section:
         "At rest: slope Cv + Tc/w_s of the smoothed law. Speed amplitude W: describing function, "
         "slope Cv + 4 Tc/(π W); Tc = C0 + CM |load|."
     )
-    margins = [(point, name, f.margins) for point in points for name, f in point.figures.items()]
-    reasons = [
-        f"{point.label}, {name} loop, {m.evidence}: {m.evidence_reason}."
-        for point, name, m in margins
-        if m.evidence != "certified"
-    ]
+    loops = [(f"{point.label}, {name} loop", f) for point in points for name, f in point.figures.items()]
+    reasons = list(dict.fromkeys(reason for one in loops for reason in evidence_notes(dict([one]))))
     note += " All margins are certified" + (" but those named below." if reasons else ".")
     blocks = [doc.table("PM: phase margin, GM: gain margin, −3 dB: closed loop", columns, rows, note)]
-    blocks += [doc.text(reason) for reason in dict.fromkeys(reasons)]
+    blocks += [doc.text(reason) for reason in reasons]
     intro = "The effect of friction on small motions depends on speed and load."
     return doc.section("operating-points", "Operating points", blocks, result=_result(points), intro=intro)
 

@@ -6,22 +6,29 @@ from collections.abc import Sequence
 
 from actuator_lti.design.model import Design, Parameter
 from reports import document as doc
-from reports.document_schema import Block, Row, Section, Status
+from reports.document_schema import Block, Section, Status
 from reports.findings import Finding
+from reports.sections.names import unit_words
 
 GRADES = (
     "Grades: A maker's document or standard text; B file of a real device or a consistent second source; "
     "C community transcription; D derived; X assumed, to be replaced by whoever has the figure."
 )
 COLUMNS = [
-    doc.column("path", "Key"),
-    doc.column("symbol", "Symbol"),
-    doc.column("text", "As written"),
-    doc.column("value", "In SI", format="short:6"),
-    doc.column("unit", "Unit"),
-    doc.column("grade", "Grade"),
-    doc.column("tolerance", "Tolerance"),
-    doc.column("source", "Source"),
+    doc.of("path", "path", "Key"),
+    doc.of("symbol", "symbol", "Symbol"),
+    doc.of("text", "text", "As written"),
+    doc.of("value", "value", "In SI", format="short:6"),
+    doc.of(lambda item: unit_words(item.unit), "unit", "Unit"),
+    doc.of("grade", "grade", "Grade"),
+    doc.of(lambda item: tolerance_words(item), "tolerance", "Tolerance"),
+    doc.of("source", "source", "Source"),
+]
+FACTS = [
+    doc.of("label", "label", "What"),
+    doc.of("value", "value", "Value"),
+    doc.of("grade", "grade", "Grade"),
+    doc.of("source", "source", "Source"),
 ]
 
 
@@ -34,14 +41,10 @@ def section(design: Design, warnings: Sequence[str] = ()) -> Section:
         rows = [{"warning": warning, "_status": "warn"} for warning in warnings]
         blocks.append(doc.table("To be checked", [doc.column("warning", "Warning")], rows))
     if parameters:
-        blocks.append(doc.table("Values of the design file", COLUMNS, [_row(item) for item in parameters]))
+        blocks.append(doc.listing("Values of the design file", parameters, COLUMNS))
     if design.facts:
-        columns = [doc.column("label", "What"), doc.column("value", "Value")]
-        columns += [doc.column("grade", "Grade"), doc.column("source", "Source")]
-        rows = [
-            {"label": f.label, "value": f.value, "grade": f.grade, "source": f.source} for f in design.facts
-        ]
-        blocks.append(doc.details("Facts that enter no equation", [doc.table("Facts", columns, rows)]))
+        facts = doc.listing("Facts", design.facts, FACTS)
+        blocks.append(doc.details("Facts that enter no equation", [facts]))
     status: Status = "warn" if warnings else "info"
     findings = [Finding(severity="warn", text=words, where="parameters") for words in warnings]
     result = (
@@ -50,13 +53,8 @@ def section(design: Design, warnings: Sequence[str] = ()) -> Section:
         else "The design carries no record of where its values come from."
     )
     if assumed:
-        findings.append(
-            Finding(
-                severity="info",
-                text=f"{assumed} of {len(parameters)} values are assumed.",
-                where="parameters",
-            )
-        )
+        told = f"{assumed} of {len(parameters)} values are assumed."
+        findings.append(Finding(severity="info", text=told, where="parameters"))
     return doc.section(
         "parameters", "Parameters and their sources", blocks, result=result,
         intro=GRADES if parameters else "",
@@ -66,33 +64,16 @@ def section(design: Design, warnings: Sequence[str] = ()) -> Section:
 
 def _derived(design: Design) -> Block:
     """Give what follows from the values."""
-    rotary = design.axis == "rotary"
+    mass, unit = ("Inertia at the motor", "kg m²") if design.axis == "rotary" else ("Moving mass", "kg")
     items = [
         doc.fact("Total reduction N", float(f"{design.total_ratio:.6g}")),
-        doc.fact(
-            "Inertia at the motor" if rotary else "Moving mass",
-            design.inertia_kgm2,
-            "kg m²" if rotary else "kg",
-        ),
+        doc.fact(mass, design.inertia_kgm2, unit),
         doc.fact("Tick of the controller", design.controller.period_s * 1e6, "µs"),
         doc.fact("Computing delay", design.controller.computing_delay_s * 1e6, "µs"),
         doc.fact("Friction law", design.friction.law),
         doc.fact("Load path", design.load.path),
     ]
     return doc.facts(items)
-
-
-def _row(item: Parameter) -> Row:
-    return {
-        "path": item.path,
-        "symbol": item.symbol,
-        "text": item.text,
-        "value": item.value,
-        "unit": "" if item.unit == "1" else item.unit,
-        "grade": item.grade,
-        "tolerance": tolerance_words(item),
-        "source": item.source,
-    }
 
 
 def tolerance_words(item: Parameter) -> str:

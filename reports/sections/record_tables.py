@@ -16,14 +16,14 @@ if TYPE_CHECKING:
 def input_table(caption: str, inputs: Sequence[InputUse]) -> Block:
     """The columns of files: meaning, unit, range in SI, whether each is used and why not."""
     columns = [
-        *([(doc.column("file", "File"), lambda one: one.file)] if any(one.file for one in inputs) else []),
-        (doc.column("column", "Column"), lambda one: one.column),
-        (doc.column("meaning", "Meaning"), lambda one: one.meaning),
-        (doc.column("unit", "Unit read"), lambda one: one.unit),
-        (doc.column("low", "From", format="sig:4"), lambda one: one.low),
-        (doc.column("high", "to", format="sig:4"), lambda one: one.high),
-        (doc.column("si", "in"), lambda one: one.si),
-        (doc.column("use", "Used"), lambda one: one.use),
+        *([doc.of("file", "file", "File")] if any(one.file for one in inputs) else []),
+        doc.of("column", "column", "Column"),
+        doc.of("meaning", "meaning", "Meaning"),
+        doc.of("unit", "unit", "Unit read"),
+        doc.of("low", "low", "From", format="sig:4"),
+        doc.of("high", "high", "to", format="sig:4"),
+        doc.of("si", "si", "in"),
+        doc.of("use", "use", "Used"),
     ]
     return doc.listing(caption, inputs, columns, status=lambda one: None if one.is_used else "warn")
 
@@ -32,9 +32,9 @@ def finding_table(record: str, findings: Sequence[Finding]) -> Block:
     """Whether a record agrees with itself and with the design's limits."""
     words = {True: "yes", False: "NO", None: "not told"}
     columns = [
-        (doc.column("subject", "Looked at"), lambda one: one.subject),
-        (doc.column("state", "Agrees"), lambda one: words[one.passed]),
-        (doc.column("text", "Found"), lambda one: one.text),
+        doc.of("subject", "subject", "Looked at"),
+        doc.of(lambda one: words[one.passed], "state", "Agrees"),
+        doc.of("text", "text", "Found"),
     ]
     return doc.listing(
         f"Does {record} agree with itself and the design?", findings, columns,

@@ -9,7 +9,7 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
 from reports.document_schema import Section, Status, VerdictItem
-from reports.sections.names import QUANTITIES
+from reports.sections.names import QUANTITIES, unit_words
 
 
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> Section:
@@ -53,7 +53,7 @@ def item(verdict: RequirementVerdict, load_unit: str = "N m") -> VerdictItem:
         value=verdict.value,
         limit=limit,
         comparison=comparison,
-        unit="" if requirement.unit == "1" else requirement.unit,
+        unit=unit_words(requirement.unit),
         distance=verdict.distance,
         passed=None,
         source=source,

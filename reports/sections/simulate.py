@@ -13,7 +13,7 @@ from actuator_lti.files.tree import Tree
 from analyses.motion import Motion
 from analyses.motion.conduct import conduct
 from nonlinear import Trajectory
-from nonlinear.runs.trajectory import COMMAND_UNITS
+from nonlinear.runs.trajectory import COMMAND_UNITS, LimitUse
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -89,35 +89,25 @@ def _in_words(name: str, value: float) -> list[Row]:
 
 def _limits(run: Trajectory) -> Block:
     columns = [
-        doc.column("name", "Limit"),
-        doc.column("limit", "Value", format="short:6"),
-        doc.column("unit", "Unit"),
-        doc.column("share", "Acts, of the time", "%", format="short:3"),
-        doc.column("first", "First at", "s", format="short:6"),
+        doc.of(lambda pair: pair[0], "name", "Limit"),
+        doc.of(lambda pair: _there(pair[1], pair[1].limit, "none"), "limit", "Value", format="short:6"),
+        doc.of(lambda pair: _there(pair[1], pair[1].unit, ""), "unit", "Unit"),
+        doc.of(lambda pair: 100.0 * pair[1].fraction, "share", "Acts, of the time", "%", format="short:3"),
+        doc.of(lambda pair: pair[1].first_time_s, "first", "First at", "s", format="short:6"),
     ]
-    rows = [
-        {
-            "name": name,
-            "limit": use.limit if np.isfinite(use.limit) else "none",
-            "unit": use.unit if np.isfinite(use.limit) else "",
-            "share": 100.0 * use.fraction,
-            "first": use.first_time_s,
-        }
-        for name, use in run.limits.items()
-    ]
-    return doc.table("Limits", columns, rows)
+    return doc.listing("Limits", run.limits.items(), columns)
+
+
+def _there(use: LimitUse, shown: float | str, otherwise: str) -> float | str:
+    return shown if np.isfinite(use.limit) else otherwise
 
 
 def _energy(run: Trajectory) -> Block:
     assert run.energy is not None
     values = {**vars(run.energy), "balance, relative": run.energy.relative_error}
     rows = [
-        {
-            "what": name.removesuffix("_J").replace("_", " "),
-            "value": value,
-            "unit": "J" if "_J" in name else "",
-        }
-        for name, value in values.items()
+        {"what": n.removesuffix("_J").replace("_", " "), "value": value, "unit": "J" if "_J" in n else ""}
+        for n, value in values.items()
     ]
     return doc.table("Where the electrical energy went", COLUMNS, rows)
 

@@ -13,8 +13,8 @@ from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Section
 from reports.findings import Finding
 from reports.numbers import significant
-from reports.sections.large_signal import load_unit, output_unit
 from reports.sections.limits import words_of
+from reports.sections.names import load_unit, output_unit
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -35,8 +35,7 @@ def section(result: Specification) -> Section:
     blocks = [_capability_table(result), *_planes(result), _manoeuvre_table(result), _step_table(result)]
     intro = (
         "Closed form and simulation side by side, behind the profile of the command; manoeuvres and steps "
-        "with it. "
-        "Output side unless a column says motor."
+        "with it. Output side unless a column says motor."
     )
     findings = _findings(result)
     return doc.section(
@@ -46,7 +45,7 @@ def section(result: Specification) -> Section:
 
 def _result(result: Specification) -> str:
     """Say what the drive can do at the largest load."""
-    scale, unit = output_unit(result.design)
+    scale, unit = output_unit(result.design.axis)
     one = max(result.capabilities, key=lambda one: one.figures.load_Nm, default=None)
     if one is None:
         return ""
@@ -74,7 +73,7 @@ def _unlike(value: float, simulated: float | None, scale: float) -> str:
 
 def _commanded(design: Design) -> str:
     """What the profile of the command asks for at most."""
-    scale, unit = output_unit(design)
+    scale, unit = output_unit(design.axis)
     limits = ((design.command.rate_rad_s, f"{unit}/s"), (design.command.acceleration_rad_s2, f"{unit}/s²"))
     parts = [f"{significant(scale * value)} {per}" for value, per in limits if math.isfinite(value)]
     return f" The profile of its command asks for at most {' and '.join(parts)}." if parts else ""
@@ -97,50 +96,34 @@ def _findings(result: Specification) -> list[Finding]:
     ]
 
 
-def _finite(value: float | None, scale: float = 1.0) -> float | None:
-    return None if value is None or not math.isfinite(value) else scale * value
-
-
 def _capability_table(result: Specification) -> Block:
     """List rate, acceleration, current and duty by load."""
-    scale, unit = output_unit(result.design)
+    scale, unit = output_unit(result.design.axis)
+    rate: dict[str, Any] = {"unit": f"{unit}/s", "scale": scale, "format": "sig:4"}
+    push: dict[str, Any] = {"unit": f"{unit}/s²", "scale": scale, "format": "sig:4"}
+    share: dict[str, Any] = {"unit": "%", "scale": 100.0, "format": "sig:3"}
     columns = [
-        doc.column("load", "Load", load_unit(result.design), format="short:4"),
-        doc.column("rate", "Rate", f"{unit}/s", format="sig:4", better=1),
-        doc.column("rate_seen", "Simulated", f"{unit}/s", format="sig:4"),
-        doc.column("by", "Set by"),
-        doc.column("push", "Acceleration", f"{unit}/s²", format="sig:4", better=1),
-        doc.column("push_seen", "Simulated", f"{unit}/s²", format="sig:4"),
+        doc.of("figures.load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
+        doc.of("figures.output_rate_rad_s", "rate", "Rate", **rate, better=1),
+        doc.of("simulated_rate_rad_s", "rate_seen", "Simulated", **rate),
+        doc.of("figures.rate_limit", "by", "Set by"),
+        doc.of("figures.acceleration_rad_s2", "push", "Acceleration", **push, better=1),
+        doc.of("simulated_acceleration_rad_s2", "push_seen", "Simulated", **push),
     ]
-    electric = result.design.motor.has_electrical_dynamics
-    if electric:
+    if result.design.motor.has_electrical_dynamics:
+        at_rate = "Motor current at that rate"
         columns += [
-            doc.column("current", "Motor current at that rate", "A", format="sig:3", better=-1),
-            doc.column("current_seen", "simulated", "A", format="sig:3"),
-            doc.column("ratio", "of continuous", "%", format="sig:3"),
-            doc.column("duty", "Duty", "%", format="sig:3"),
+            doc.of("figures.motor_current_A", "current", at_rate, "A", format="sig:3", better=-1),
+            doc.of("simulated_current_A", "current_seen", "simulated", "A", format="sig:3"),
+            doc.of("current_ratio", "ratio", "of continuous", **share),
+            doc.of("duty", "duty", "Duty", **share),
         ]
-    rows = [
-        {
-            "load": one.figures.load_Nm,
-            "rate": _finite(one.figures.output_rate_rad_s, scale),
-            "rate_seen": _finite(one.simulated_rate_rad_s, scale),
-            "by": one.figures.rate_limit,
-            "push": _finite(one.figures.acceleration_rad_s2, scale),
-            "push_seen": _finite(one.simulated_acceleration_rad_s2, scale),
-            "current": one.figures.motor_current_A,
-            "current_seen": one.simulated_current_A,
-            "ratio": _finite(one.current_ratio, 100.0),
-            "duty": _finite(one.duty, 100.0),
-        }
-        for one in result.capabilities
-    ]
     note = (
         "Acceleration in closed form is that of the largest torque from rest; simulated, the mean over a "
         "tenth of the run-up, where the current controller lags behind the rising back-EMF. Duty is the "
         "share of the time that keeps the rms current at the continuous one."
     )
-    return doc.table("Rate, acceleration and current at each load", columns, rows, note)
+    return doc.listing("Rate, acceleration and current at each load", result.capabilities, columns, note)
 
 
 def _planes(result: Specification) -> list[Block]:
@@ -232,41 +215,27 @@ def _fastest(result: Specification, moves: list[Any]) -> float:
 
 def _manoeuvre_table(result: Specification) -> Block:
     """List currents and duty of the manoeuvres."""
-    electric = result.design.motor.has_electrical_dynamics
     columns = [
-        doc.column("name", "Manoeuvre"),
-        doc.column("load", "Load", load_unit(result.design), format="short:4"),
+        doc.of("name", "name", "Manoeuvre"),
+        doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
     ]
-    if electric:
+    if result.design.motor.has_electrical_dynamics:
         columns += [
-            doc.column("rms", "Current, rms", "A", format="sig:3"),
-            doc.column("peak", "peak", "A", format="sig:3"),
-            doc.column("duty", "Duty", "%", format="sig:3"),
+            doc.of("rms_current_A", "rms", "Current, rms", "A", format="sig:3"),
+            doc.of("peak_current_A", "peak", "peak", "A", format="sig:3"),
+            doc.of("duty", "duty", "Duty", "%", scale=100.0, format="sig:3"),
         ]
     else:
         columns += [
-            doc.column("rms_force", "Force, rms", "N", format="sig:3"),
-            doc.column("peak_force", "peak", "N", format="sig:3"),
+            doc.of("rms_torque_Nm", "rms_force", "Force, rms", "N", format="sig:3"),
+            doc.of("peak_torque_Nm", "peak_force", "peak", "N", format="sig:3"),
         ]
-    columns.append(doc.column("limits", "Limits that act"))
-    rows = [
-        {
-            "name": move.name,
-            "load": move.load_Nm,
-            "rms": move.rms_current_A,
-            "peak": move.peak_current_A,
-            "duty": _finite(move.duty, 100.0),
-            "rms_force": move.rms_torque_Nm,
-            "peak_force": move.peak_torque_Nm,
-            "limits": _limit_words(move.limits),
-        }
-        for move in result.manoeuvres
-    ]
-    return doc.table(f"Standard manoeuvres at {_full(result.design)}", columns, rows)
+    columns.append(doc.of(lambda move: _limit_words(move.limits), "limits", "Limits that act"))
+    return doc.listing(f"Standard manoeuvres at {_full(result.design)}", result.manoeuvres, columns)
 
 
 def _full(design: Design) -> str:
-    scale, unit = output_unit(design)
+    scale, unit = output_unit(design.axis)
     return f"{scale * design.validation.full_deflection_rad:.3g} {unit}"
 
 
@@ -277,28 +246,16 @@ def _limit_words(limits: dict[str, float]) -> str:
 
 def _step_table(result: Specification) -> Block:
     """List step times from small to full deflection."""
-    scale, unit = output_unit(result.design)
+    scale, unit = output_unit(result.design.axis)
     columns = [
-        doc.column("load", "Load", load_unit(result.design), format="short:4"),
-        doc.column("step", "Step", unit, format="sig:3"),
-        doc.column("fraction", "of full", "%", format="sig:2"),
-        doc.column("rise", "Rise 10–90 %", "ms", format="sig:3", better=-1),
-        doc.column("overshoot", "Overshoot", "%", format="fix:1", better=-1),
-        doc.column("settle", "Settled to 2 %", "ms", format="ms:3", better=-1),
-        doc.column("rate", "Peak rate", f"{unit}/s", format="sig:3"),
-        doc.column("limits", "Limits that act"),
+        doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
+        doc.of("amplitude_rad", "step", "Step", unit, scale=scale, format="sig:3"),
+        doc.of("fraction", "fraction", "of full", "%", scale=100.0, format="sig:2"),
+        doc.of("rise_time_s", "rise", "Rise 10–90 %", "ms", scale=1e3, format="sig:3", better=-1),
+        doc.of("overshoot_percent", "overshoot", "Overshoot", "%", format="fix:1", better=-1),
+        doc.of("settling_time_s", "settle", "Settled to 2 %", "ms", scale=1e3, format="ms:3", better=-1),
+        doc.of("peak_rate_rad_s", "rate", "Peak rate", f"{unit}/s", scale=scale, format="sig:3"),
+        doc.of(lambda one: ", ".join(map(words_of, one.limits)) or "none", "limits", "Limits that act"),
     ]
-    rows = [
-        {
-            "load": one.load_Nm,
-            "step": scale * one.amplitude_rad,
-            "fraction": 100.0 * one.fraction,
-            "rise": _finite(one.rise_time_s, 1e3),
-            "overshoot": one.overshoot_percent,
-            "settle": _finite(one.settling_time_s, 1e3),
-            "rate": scale * one.peak_rate_rad_s,
-            "limits": ", ".join(words_of(name) for name in one.limits) or "none",
-        }
-        for one in result.steps
-    ]
-    return doc.table("Steps, small and large", columns, rows, "Simulated with friction and all limits.")
+    note = "Simulated with friction and all limits."
+    return doc.listing("Steps, small and large", result.steps, columns, note)

@@ -11,7 +11,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section, Status
-from reports.sections.large_signal import load_unit, output_unit
+from reports.sections.names import load_unit, output_unit
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -47,12 +47,7 @@ def section(result: Stiffness) -> Section:
     )
     status: Status = "info" if not result.checks else "pass" if result.passed else "fail"
     return doc.section(
-        "stiffness",
-        "Stiffness",
-        blocks,
-        result=_result(result, unit),
-        intro=intro,
-        status=status,
+        "stiffness", "Stiffness", blocks, result=_result(result, unit), intro=intro, status=status
     )
 
 
@@ -91,20 +86,19 @@ def _figure(result: Stiffness, unit: str) -> list[Block]:
 
 def _table(result: Stiffness, unit: str) -> Block:
     note = "Infinite: the output comes back to its place, or does not move at all."
-    return doc.listing(
-        "Stiffness by state",
-        result.curves,
-        [
-            (doc.column("state", "State"), lambda one: STATES[one.state]),
-            (doc.column("static", "Static", unit, format="sig:4", better=1), _static),
-            (doc.column("least", "Least", unit, format="sig:4", better=1), lambda one: one.least[0]),
-            (
-                doc.column("at", "at", "Hz", format="sig:4"),
-                lambda one: one.least[1] if math.isfinite(one.least[0]) else None,
-            ),
-        ],
-        note,
-    )
+    columns = [
+        doc.of(lambda one: STATES[one.state], "state", "State"),
+        doc.of(_static, "static", "Static", unit, format="sig:4", better=1),
+        doc.of(lambda one: one.least[0], "least", "Least", unit, format="sig:4", better=1),
+        doc.of(
+            lambda one: one.least[1] if math.isfinite(one.least[0]) else None,
+            "at",
+            "at",
+            "Hz",
+            format="sig:4",
+        ),
+    ]
+    return doc.listing("Stiffness by state", result.curves, columns, note)
 
 
 def _static(curve: StiffnessCurve) -> float | str:
@@ -112,7 +106,7 @@ def _static(curve: StiffnessCurve) -> float | str:
 
 
 def _lost_motion(result: Stiffness) -> Block:
-    scale, unit = output_unit(result.design)
+    scale, unit = output_unit(result.design.axis)
     lost = result.lost_motion
     assert lost is not None
     columns = [
@@ -137,19 +131,12 @@ def _at_rest(result: Stiffness, unit: str) -> Block:
         "Fundamental of the simulated drive as it is, with its dry friction, play and quantisation, the "
         "command held. No value: the output does not move."
     )
-    return doc.listing(
-        "At rest, by amplitude",
-        result.at_rest,
-        [
-            (
-                doc.column("moment", "Moment, peak", load_unit(result.design), format="sig:3"),
-                lambda one: one.moment_Nm,
-            ),
-            (doc.column("frequency_hz", "Frequency", "Hz", format="sig:3"), lambda one: one.frequency_hz),
-            (doc.column("seen", "Stiffness", unit, format="sig:4"), lambda one: abs(one.seen_Nm_rad)),
-        ],
-        note,
-    )
+    columns = [
+        doc.of("moment_Nm", "moment", "Moment, peak", load_unit(result.design), format="sig:3"),
+        doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:3"),
+        doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Stiffness", unit, format="sig:4"),
+    ]
+    return doc.listing("At rest, by amplitude", result.at_rest, columns, note)
 
 
 def _checks(result: Stiffness, unit: str) -> Block:
@@ -158,14 +145,10 @@ def _checks(result: Stiffness, unit: str) -> Block:
         "load: predicted here is the linear stiffness of that drive, without the friction by load "
         "that the curves have."
     )
-    return doc.listing(
-        "Injected moment",
-        result.checks,
-        [
-            (doc.column("frequency_hz", "Frequency", "Hz", format="sig:4"), lambda one: one.frequency_hz),
-            (doc.column("foreseen", "Predicted", unit, format="sig:6"), lambda one: abs(one.foreseen_Nm_rad)),
-            (doc.column("seen", "Simulated", unit, format="sig:6"), lambda one: abs(one.seen_Nm_rad)),
-            (doc.column("difference", "Relative difference", format="sig:2"), lambda one: one.difference),
-        ],
-        note,
-    )
+    columns = [
+        doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:4"),
+        doc.of(lambda one: abs(one.foreseen_Nm_rad), "foreseen", "Predicted", unit, format="sig:6"),
+        doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Simulated", unit, format="sig:6"),
+        doc.of("difference", "difference", "Relative difference", format="sig:2"),
+    ]
+    return doc.listing("Injected moment", result.checks, columns, note)

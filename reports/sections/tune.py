@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from actuator_lti.design import write_design
 from actuator_lti.files.atomic import write_text
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Column, Section, VerdictItem
+from reports.document_schema import Block, Section, VerdictItem
+from reports.sections.names import output_unit, unit_words
 
 if TYPE_CHECKING:
     from analyses.specification.verdicts import RequirementVerdict
-    from analyses.tuning import BindingRequirement, GainSetting, TuningResult
-    from analyses.tuning.result import NonlinearCheck
+    from analyses.tuning import BindingRequirement, TuningResult
 
 
 def section(result: TuningResult) -> Section:
     """Make the section."""
     verdicts = doc.verdicts(_verdict(r) for r in result.requirements)
-    blocks: list[Block] = [verdicts, gains(result), requirements(result)]
-    if result.confirmed:
-        blocks.append(confirmed(result))
-    if result.trade_off:
-        blocks.append(_curve(result))
-    if result.checks:
-        blocks.append(checks(result))
-    blocks += [doc.remark(note) for note in result.notes]
+    blocks: list[Block] = [
+        *(verdicts, gains(result), requirements(result)),
+        *([confirmed(result)] if result.confirmed else []),
+        *([_curve(result)] if result.trade_off else []),
+        *([checks(result)] if result.checks else []),
+        *(doc.remark(note) for note in result.notes),
+    ]
     blocks.append(doc.details("How the start gains were found", [doc.text(step) for step in result.steps]))
     title = "Tuning" if result.feasible else "Tuning: the requirements cannot be met"
     return doc.section(
@@ -97,30 +94,30 @@ def gains(result: TuningResult) -> Block:
     note = (
         "Tuned: rounded to the steps of the motion controller's objects, where the drive is that controller."
     )
-    columns: list[tuple[Column, Callable[[GainSetting], Any]]] = [
-        (doc.column("path", "Gain"), lambda g: g.path),
-        (doc.column("unit", "Unit"), lambda g: g.unit),
-        (doc.column("before", "Before", format="sig:4"), lambda g: g.before),
-        (doc.column("rule", "By rule", format="sig:4"), lambda g: g.by_rule),
-        (doc.column("tuned", "Optimised", format="sig:5"), lambda g: g.tuned),
-        (doc.column("rounded", "Tuned", format="sig:5"), lambda g: g.rounded),
-        (doc.column("object", "Object"), lambda g: g.object or None),
-        (doc.column("steps", "Written", align="right"), lambda g: g.steps),
-        (doc.column("object_unit", "in"), lambda g: g.object_unit),
+    columns = [
+        doc.of("path", "path", "Gain"),
+        doc.of("unit", "unit", "Unit"),
+        doc.of("before", "before", "Before", format="sig:4"),
+        doc.of("by_rule", "rule", "By rule", format="sig:4"),
+        doc.of("tuned", "tuned", "Optimised", format="sig:5"),
+        doc.of("rounded", "rounded", "Tuned", format="sig:5"),
+        doc.of(lambda g: g.object or None, "object", "Object"),
+        doc.of("steps", "steps", "Written", align="right"),
+        doc.of("object_unit", "object_unit", "in"),
     ]
     return doc.listing("Gains", result.gains, columns, note)
 
 
 def requirements(result: TuningResult) -> Block:
     """Every requirement at its worst corner."""
-    columns: list[tuple[Column, Callable[[BindingRequirement], Any]]] = [
-        (doc.column("label", "Requirement"), lambda r: r.label),
-        (doc.column("value", "Worst corner", format="sig:4"), lambda r: r.value),
-        (doc.column("limit", "Limit", format="sig:4"), lambda r: r.limit),
-        (doc.column("distance", "Distance", format="sig:3"), lambda r: r.distance),
-        (doc.column("unit", "Unit"), lambda r: "" if r.unit == "1" else r.unit),
-        (doc.column("binds", "Binds", format="yesno"), lambda r: r.binds),
-        (doc.column("corner", "At"), _corner),
+    columns = [
+        doc.of("label", "label", "Requirement"),
+        doc.of("value", "value", "Worst corner", format="sig:4"),
+        doc.of("limit", "limit", "Limit", format="sig:4"),
+        doc.of("distance", "distance", "Distance", format="sig:3"),
+        doc.of(lambda r: unit_words(r.unit), "unit", "Unit"),
+        doc.of("binds", "binds", "Binds", format="yesno"),
+        doc.of(_corner, "corner", "At"),
     ]
     return doc.listing(
         "Requirements at their worst corner", result.requirements, columns,
@@ -134,12 +131,12 @@ def confirmed(result: TuningResult) -> Block:
     def limit(v: RequirementVerdict) -> float | None:
         return v.requirement.minimum if v.requirement.minimum is not None else v.requirement.maximum
 
-    columns: list[tuple[Column, Callable[[RequirementVerdict], Any]]] = [
-        (doc.column("label", "Requirement"), lambda v: v.id),
-        (doc.column("value", "Certified", format="sig:4"), lambda v: v.value),
-        (doc.column("limit", "Limit", format="sig:4"), limit),
-        (doc.column("unit", "Unit"), lambda v: "" if v.requirement.unit == "1" else v.requirement.unit),
-        (doc.column("met", "Met", format="yesno"), lambda v: v.verdict == "met"),
+    columns = [
+        doc.of("id", "label", "Requirement"),
+        doc.of("value", "value", "Certified", format="sig:4"),
+        doc.of(limit, "limit", "Limit", format="sig:4"),
+        doc.of(lambda v: unit_words(v.requirement.unit), "unit", "Unit"),
+        doc.of(lambda v: v.verdict == "met", "met", "Met", format="yesno"),
     ]
     return doc.listing("Confirmed by certified margins", result.confirmed, columns, status=lambda v: v.role)
 
@@ -174,31 +171,22 @@ def _curve(result: TuningResult) -> Block:
         panel.rule_y(max(margin), label="required", **required)
     panel.x.label = "bandwidth of the position loop, Hz"
     panel.y.label = "smallest phase margin of all loops, deg"
-    return doc.figure(
-        "trade_off", chart,
-        caption="Position bandwidth against the phase margin that every loop keeps at its worst corner.",
-        alt=f"Curve of {len(result.trade_off)} points, phase margin falling with bandwidth.",
-    )  # fmt: skip
+    caption = "Position bandwidth against the phase margin that every loop keeps at its worst corner."
+    alt = f"Curve of {len(result.trade_off)} points, phase margin falling with bandwidth."
+    return doc.figure("trade_off", chart, caption=caption, alt=alt)
 
 
 def checks(result: TuningResult) -> Block:
     """The nonlinear check."""
-    scale, unit = (1e3, "mm") if result.design.axis == "linear" else (math.degrees(1.0), "deg")
-
-    def ms(seconds: float | None) -> float | None:
-        return None if seconds is None else 1e3 * seconds
-
-    columns: list[tuple[Column, Callable[[NonlinearCheck], Any]]] = [
-        (doc.column("corner", "Design"), lambda c: c.corner),
-        (doc.column("amplitude", "Step", unit, format="sig:3"), lambda c: scale * c.amplitude_rad),
-        (doc.column("rise", "Rise", "ms", format="sig:3", better=-1), lambda c: ms(c.rise_time_s)),
-        (doc.column("overshoot", "Overshoot", "%", format="fix:1", better=-1), lambda c: c.overshoot_percent),
-        (
-            doc.column("settling", "Settling 2 %", "ms", format="sig:3", better=-1),
-            lambda c: ms(c.settling_time_s),
-        ),
-        (doc.column("error", "Final error", "%", format="fix:2"), lambda c: c.final_error_percent),
-        (doc.column("limited", "Limits that act"), lambda c: c.limited or "none"),
+    scale, unit = output_unit(result.design.axis)
+    columns = [
+        doc.of("corner", "corner", "Design"),
+        doc.of("amplitude_rad", "amplitude", "Step", unit, scale=scale, format="sig:3"),
+        doc.of("rise_time_s", "rise", "Rise", "ms", scale=1e3, format="sig:3", better=-1),
+        doc.of("overshoot_percent", "overshoot", "Overshoot", "%", format="fix:1", better=-1),
+        doc.of("settling_time_s", "settling", "Settling 2 %", "ms", scale=1e3, format="sig:3", better=-1),
+        doc.of("final_error_percent", "error", "Final error", "%", format="fix:2"),
+        doc.of(lambda c: c.limited or "none", "limited", "Limits that act"),
     ]
     note = "Steps from rest in the nonlinear model, dry friction and every limit on. A dash: not reached."
     return doc.listing(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
@@ -11,10 +12,11 @@ from actuator_lti.drive.signals import LIMITERS
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
-from reports.document_schema import Block, Row, Section, Severity, Status, VerdictItem
+from reports.document_schema import Block, Section, Severity, Status, VerdictItem
 from reports.findings import Finding
+from reports.numbers import capital
 from reports.sections.conditional import findings_of
-from reports.sections.names import LOOPS, POINTS, QUANTITIES
+from reports.sections.names import LOOPS, POINTS, QUANTITIES, unit_words
 from reports.terminal import Brief
 
 MORE = {
@@ -56,35 +58,25 @@ def _others(validation: Validation) -> list[Section]:
     """Make the sections of large signals, friction and specification, as far as they were asked for."""
     from reports.sections import friction_effects, large_signal, specification
 
-    made: list[Section] = []
-    if validation.large_signals is not None:
-        made.append(large_signal.section(validation.large_signals))
-    if validation.friction is not None:
-        made.append(friction_effects.section(validation.friction))
-    if validation.specification is not None:
-        made.append(specification.section(validation.specification))
-    return made
+    shown: list[tuple[Callable[[Any], Section], Any]] = [
+        (large_signal.section, validation.large_signals),
+        (friction_effects.section, validation.friction),
+        (specification.section, validation.specification),
+    ]
+    return [make(result) for make, result in shown if result is not None]
 
 
 def brief(validation: Validation) -> Brief:
     """The verdict, why it is none where it is none, and every check by loop."""
     made = section(validation)
     shown = ("quantity", "predicted", "found", "unit", "error", "allowed", "verdict")
-    items = [
-        item
-        for part in made
-        for block in part["blocks"]
-        if block["kind"] == "verdicts"
-        for item in block["items"]
-    ]
+    items = [item for part in made for item in doc.judged(part["blocks"])]
     said = [
         f"{item['label']}: {item['verdict']}. {item['reason']}" for item in items if item["verdict"] != "met"
     ]
     large = [part["result"] for part in made if part["id"] == "conditional"]
-    tables = [
-        doc.with_columns(table(rows, loop_name(name)), shown)
-        for name, rows in by_loop(validation.rows).items()
-    ]
+    grouped = by_loop(validation.rows).items()
+    tables = [doc.with_columns(table(rows, loop_name(name)), shown) for name, rows in grouped]
     return Brief(validation.words, [*map(doc.text, said), *tables, *map(doc.text, large)], validation.notes)
 
 
@@ -113,7 +105,7 @@ def result(validation: Validation) -> str:
     """Say how many predictions are met, and what the drive does that it must not."""
     words = [validation.tally.words("predictions"), *validation.failures]
     words += [f"stability of the {name} loop not known" for name in validation.undecided]
-    return " ".join(f"{each[:1].upper()}{each[1:]}." for each in words)
+    return " ".join(f"{capital(each)}." for each in words)
 
 
 def findings(validation: Validation) -> list[Finding]:
@@ -143,8 +135,7 @@ def verdict_items(validation: Validation) -> list[VerdictItem]:
     if not items:
         items.append(_item("judged", "Predictions", 0.0, None, None, "; ".join(validation.notes)))
     for k, failure in enumerate(validation.failures):
-        label = f"{failure[:1].upper()}{failure[1:]}"
-        items.append(_item(f"drive-{k}", label, None, None, False, ""))
+        items.append(_item(f"drive-{k}", capital(failure), None, None, False, ""))
     items += [
         _item(f"stable-{name}", f"{loop_name(name)}: stable", None, None, None, "not known")
         for name in validation.undecided
@@ -190,38 +181,27 @@ def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
 def table(rows: Sequence[Check], caption: str) -> Block:
     """Lay checks out as a table."""
     columns = [
-        doc.column("quantity", "Prediction"),
-        doc.column("predicted", "Predicted", format="sig:6"),
-        doc.column("found", "Simulated", format="sig:6"),
-        doc.column("unit", "Unit"),
-        doc.column("error", "Error", format="sig:2"),
-        doc.column("allowed", "Allowed", format="sig:2"),
-        doc.column("verdict", "Verdict"),
-        doc.column("because", "Where"),
-        doc.column("condition", "Condition"),
+        doc.of(quantity_name, "quantity", "Prediction"),
+        doc.of(lambda row: _rounded(row, row.predicted, 12), "predicted", "Predicted", format="sig:6"),
+        doc.of(lambda row: _rounded(row, row.found, 10), "found", "Simulated", format="sig:6"),
+        doc.of(lambda row: "ms" if row.unit == "s" else unit_words(row.unit), "unit", "Unit"),
+        doc.of(lambda row: _rounded(row, _error(row), 2), "error", "Error", format="sig:2"),
+        doc.of(lambda row: _rounded(row, row.allowed, 2), "allowed", "Allowed", format="sig:2"),
+        doc.of(lambda row: str(row.verdict), "verdict", "Verdict"),
+        doc.of("because", "because", "Where"),
+        doc.of("condition", "condition", "Condition"),
     ]
-    return doc.table(caption, columns, [row_of(row) for row in rows])
+    return doc.listing(caption, rows, columns, status=lambda row: row.verdict.role())
 
 
-def row_of(row: Check) -> Row:
-    """One check as a row; seconds as ms; without the digits that are noise of the last bit."""
-    scale, unit = (1e3, "ms") if row.unit == "s" else (1.0, "" if row.unit == "1" else row.unit)
-    error = max(row.error, NOISE * abs(row.predicted or 1.0))
-    return {
-        "quantity": quantity_name(row),
-        "predicted": _rounded(row.predicted, scale, 12),
-        "found": _rounded(row.found, scale, 10),
-        "unit": unit,
-        "error": _rounded(error, scale, 2),
-        "allowed": _rounded(row.allowed, scale, 2),
-        "verdict": str(row.verdict),
-        "because": row.because,
-        "condition": row.condition,
-        "_status": row.verdict.role(),
-    }
+def _error(row: Check) -> float:
+    """Without the digits that are noise of the last bit."""
+    return max(row.error, NOISE * abs(row.predicted or 1.0))
 
 
-def _rounded(value: float | None, scale: float, digits: int) -> float | None:
+def _rounded(row: Check, value: float | None, digits: int) -> float | None:
+    """Seconds as ms."""
+    scale = 1e3 if row.unit == "s" else 1.0
     return None if value is None else float(f"{value * scale:.{digits}g}")
 
 

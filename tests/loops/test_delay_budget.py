@@ -10,7 +10,7 @@ from loop_designs import amber, ctms_position, designs, emps
 
 from actuator_lti import InputError, assemble_loops
 from actuator_lti.design.model import Design
-from actuator_lti.loops import delay_budget
+from actuator_lti.loops.delay_budget import delay_budget
 
 
 @settings(max_examples=6, deadline=None)

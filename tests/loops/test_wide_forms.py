@@ -15,7 +15,7 @@ from actuator_lti import InputError, assemble_loops
 from actuator_lti.design.model import Design, Encoder, Filter, Limits, PositionLoop
 from actuator_lti.drive.blocks import biquad, lag, tracking
 from actuator_lti.drive.signals import LIMITERS
-from actuator_lti.loops import delay_budget
+from actuator_lti.loops.delay_budget import delay_budget
 
 
 def faster(design: Design, factor: float) -> Design:
