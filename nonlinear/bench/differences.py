@@ -1,10 +1,11 @@
 """Central differences of the compiled tick over one base period, all numbers of the state at once.
 
 Which numbers take part, a kick at the place shows: those that it moves.  A first estimate, by steps as large
-as no event forbids, says how far a large sine at the place moves each number.  From ten times that motion on
-steps fall by tens.  Each column is taken where successive steps agree best, by what their difference does
-to the response: larger steps bend, smaller ones are lost in rounding.  The sum of these differences is the
-stated error.
+as no event forbids, says how far a large sine at the place moves each number.  From far above that motion on
+steps fall by tens, until a smaller one agrees no better.  Each column is taken where successive steps agree
+best, by what their difference does to the response: larger steps bend, smaller ones are lost in rounding.
+Steps over many periods of a torque that repeats agree too, on nothing: they lie beyond steps that do not, and
+are not looked at.  The sum of these differences is the stated error.
 """
 
 from __future__ import annotations
@@ -23,8 +24,9 @@ from nonlinear.bench.loop_setup import LoopSetup
 from nonlinear.bench.stepper import Stepper
 
 Parts = tuple[Floats, Floats, Floats, Floats]
-DECADES, MOST_DECADES = 11, 40  # of steps; where events forbid the larger ones
-SWAY = 10.0  # times the motion that a large sine makes: the largest step
+DECADES, MOST_DECADES = 13, 40  # of steps; where events forbid the larger ones, or they bend
+TENFOLD = 100.0  # what the truncation of central differences grows by with a step ten times as large
+SWAY = 1e3  # times the motion that a large sine makes: the largest step
 LEAST = float(np.sqrt(np.finfo(float).eps))  # of the number itself: the largest step is no smaller
 FAR = 1e8  # times a kick's first motion: the largest step of the first estimate
 FRESH = 4  # periods from when a number is first moved, in which its motion gives its scale
@@ -68,7 +70,7 @@ class Differences:
         """A, B, C and D, and the stated error: the largest of the response, relative."""
         left, right = self._felt(self._estimate())
         sway = SWAY * self.kick * np.max(right, axis=0)
-        tried = self._tried(np.maximum(sway, LEAST * np.abs(self.start[self.places])))
+        tried = self._tried(np.maximum(sway, LEAST * np.abs(self.start[self.places])), left, right)
         for _ in range(2):  # what is felt of an error is known once the response is
             whole, off = tried.best(left, right)
             left, right = self._felt(whole)
@@ -146,17 +148,19 @@ class Differences:
             steps = np.where(free, 0.0, 0.1 * steps)
         raise self._refused(free)
 
-    def _tried(self, largest: Floats) -> _Columns:
-        """Columns by steps that fall by tens, until each has three successive ones without an event."""
+    def _tried(self, largest: Floats, left: Floats, right: Floats) -> _Columns:
+        """Columns by steps that fall by tens, each until three had no event and the last did not bend."""
         tried: list[tuple[Floats, Floats]] = []
+        going = np.ones(largest.size, bool)
         for decade in range(MOST_DECADES):
-            tried.append(self._differences(largest * 10.0**-decade))
+            tried.append(self._differences(np.where(going, largest * 10.0**-decade, 0.0)))
             if decade + 1 < DECADES:
                 continue
             columns = _Columns(*zip(*tried, strict=True))
-            if columns.free.all():
+            going = ~columns.free | columns.bend(left, right)
+            if not going.any():
                 return columns
-        raise self._refused(columns.free)
+        raise self._refused(~going)
 
     def _refused(self, free: npt.NDArray[np.bool_]) -> NumericalError:
         """No step without an event."""
@@ -194,16 +198,29 @@ class _Columns:
         there = np.asarray(np.isfinite(self.off).all(axis=2))
         return np.asarray((there[:-1] & there[1:]).any(axis=0))
 
+    def _felt(self, left: Floats, right: Floats) -> Floats:
+        """What the error of each column by each step does to the response."""
+        return np.asarray(np.max((self.off @ left.T) * right.T, axis=2))
+
+    def bend(self, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
+        """Of which truncation still falls with the smallest step."""
+        felt = self._felt(left, right)
+        return np.asarray(felt[-1] * np.sqrt(TENFOLD) < felt[-2])
+
     def best(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:
         """Each column by the step whose error does least to the response; and that error.
 
         Of a step counts what its neighbours are off by as well: a step that is lost in rounding changes
-        nothing, and agrees with the next smaller one by that.
+        nothing, and agrees with the next smaller one by that.  From small steps up, what lies beyond a rise
+        that truncation makes is left.
         """
-        felt = np.max((self.off @ left.T) * right.T, axis=2)
+        felt = self._felt(left, right)
         larger = np.nan_to_num(np.vstack([0.0 * felt[:1], felt[:-1]]), nan=0.0)
         smaller = np.vstack([felt[1:], np.full_like(felt[:1], np.inf)])
         felt = np.maximum(np.maximum(felt, smaller), larger)
-        chosen = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
+        felt = np.where(np.isfinite(felt), felt, np.inf)[::-1]  # from small steps up
+        least = np.minimum.accumulate(felt, axis=0)
+        beyond = np.logical_or.accumulate(felt > TENFOLD**2 * least, axis=0)
+        chosen = len(felt) - 1 - np.argmin(np.where(beyond, np.inf, felt), axis=0)
         columns = np.arange(chosen.size)
         return self.values[chosen, columns].T, self.off[chosen, columns].T

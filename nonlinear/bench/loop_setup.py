@@ -200,15 +200,19 @@ class LoopSetup:
         return steady.command
 
     def _position(self, row: Rows, wanted: Value) -> None:
-        """Let the command run with the drive, the motor behind it by what the controller needs."""
-        row["angle_start"] = -wanted / row["position_gain"]
+        """Let the command run with the drive, ahead of the motor by what the controller needs.
+
+        The motor starts at zero: a large angle would round what its derivative is made of.
+        """
+        ahead = wanted / row["position_gain"]
         at_output = self.design.controller.position_loop.sensor == "output"
         seen = self.design.total_ratio * self.bias.output_rad(self.design) if at_output else 0.0
         if self.bias.speed_rad_s == 0.0:
+            row["angle_start"] = -ahead
             row.step("bias", seen / self.design.total_ratio, -1.0)
             return
-        row["angle_start"] -= seen
-        row.ramp("bias", self.bias.speed_rad_s / self.design.total_ratio)
+        speed = self.bias.speed_rad_s
+        row.ramp("bias", speed / self.design.total_ratio, -(ahead + seen) / speed)
 
     @property
     def steady_start(self) -> bool:

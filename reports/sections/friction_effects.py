@@ -17,11 +17,10 @@ from reports.sections.names import fine_unit, load_unit
 from reports.verdict_summary import tally
 
 if TYPE_CHECKING:
-    from analyses.settling import Settling
-
     from analyses.friction_effects import FrictionEffects
     from analyses.friction_effects.cycles import LimitCycles
     from analyses.friction_effects.result import FrictionPoint
+    from analyses.motion.settling import Settling
 
 
 LEFT = 1e-3  # of a step: an error that is spoken of

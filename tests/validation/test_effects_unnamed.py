@@ -10,6 +10,7 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
+from analyses.validation import CHECKS, validate
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import small_signal
 
@@ -43,3 +44,14 @@ def test_green_with_it_red_where_one_side_is_one_per_cent_wrong(
         assert Verdict.NOT_MET in verdicts(design, effect(plain, 1.01), place)
         assert Verdict.NOT_MET in verdicts(effect(plain, 1.01), design, place)
         assert Verdict.NOT_MET in verdicts(design, plain, place)
+
+
+def test_cogging_in_front_of_a_coupling_with_play() -> None:
+    """Every row of the whole drive, not of a place alone."""
+    plain = load_design("ilr33-amber-compliant")
+    motor = replace(plain.motor, cogging_Nm=2e-3, cogging_periods=5.0)
+    result = validate(replace(plain, motor=motor), CHECKS)
+    assert plain.coupling is not None
+    assert plain.coupling.play_rad > 0.0
+    assert result.tally.met == result.tally.total > 100
+    assert result.passed
