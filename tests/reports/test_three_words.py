@@ -37,8 +37,7 @@ def status(path: Path, design: Design, capsys: pytest.CaptureFixture[str], *call
 
 
 @pytest.mark.parametrize(
-    ("waivers", "code", "head", "word"),
-    [((), 1, "NOT PROVEN", "not proven"), ((WAIVED,), 0, "PASS", "met")],
+    ("waivers", "code", "head", "word"), [((), 1, "NOT PROVEN", "not proven"), ((WAIVED,), 0, "PASS", "met")]
 )
 def test_margins_and_report_say_the_same(
     waivers: tuple[Waiver, ...], code: int, head: str, word: str, tmp_path: Path,
