@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import Place
-from nonlinear.bench.differences import RETURNED
+from nonlinear.bench.injection import RETURNED
 from nonlinear.bench.loop_setup import LoopSetup
 from nonlinear.bench.stepper import Stepper
 

@@ -24,7 +24,7 @@ from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
 from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, pole_near
 from nonlinear import tangent
-from nonlinear.bench.differences import RETURNED
+from nonlinear.bench.injection import RETURNED
 from nonlinear.bench.loop_setup import LoopSetup
 from nonlinear.bench.stepper import Stepper
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from math import inf
+from functools import cached_property, partial
+from math import inf, isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,9 +18,11 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.wiring import wire
+from actuator_lti.loops.limiters import LimiterPath, limiter_places
 from analyses.linear.loop_figures import LoopFigures, loop_figures
 from analyses.validation.small_signal import Place
 from nonlinear import tangent
+from nonlinear.bench.injection import Watched
 from nonlinear.bench.loop_setup import PATHS, LoopSetup, loop_setup, points_of, stages_of
 from nonlinear.bench.on_the_bench import on_the_bench
 from nonlinear.bench.operating_motion import may_stand, on_its_stand, standing
@@ -139,16 +141,46 @@ class Bench:
             return Place(name=name, condition=setup.condition, tangent=found, predicted=response, poles=poles)
         return self._point(name, setup, found, loops)
 
+    def onsets(self) -> Iterator[Place]:
+        """From the command to what stands in front of each limiter, at its last update before the next one.
+
+        The amplitude at which a limiter first acts is its limit over that response.
+        """
+        setup, loops = self.setup("command"), self.loops("command")
+        wired = wire(loops.design)
+        for limiter in limiter_places(wired):
+            if not isfinite(limiter.limit):
+                continue
+            path, signals = loops.limiters[limiter.limiter.name], limiter.signals
+            period_s = limiter.every * self.drive.controller.period_s
+            name = f"{limiter.limiter.name}_onset".replace("-", "_")
+            for k, signal in enumerate(signals, -len(signals)):
+                seen = Watched(signal, limiter.limiter.kind, limiter.every, period_s)
+                found = tangent(setup.design, "command", setup=setup, watched=seen)
+                yield Place(
+                    name="command", condition=setup.condition, tangent=found,
+                    predicted=partial(self._last, path, found.hold_s, k), poles=np.empty(0, complex),
+                    quantity=name if signal == signals[0] else f"{name}_integral",
+                )  # fmt: skip
+
+    def _last(self, path: LimiterPath, hold_s: float, k: int, z: Complexes) -> Complexes:
+        """The row of a limiter's path at its last update."""
+        return np.asarray(self._geared * path.responses(np.angle(z) / hold_s)[k], dtype=complex)
+
     def _path(self, name: str, loops: Loops) -> tuple[Callable[[Complexes], Complexes], Complexes]:
         """Response of the output to command or load, and no poles: those of the loops are its own."""
         none = np.empty(0, complex)
         if name == "load":
             assert loops.moment_system is not None
             return loops.moment_system(), none
-        scale = self.linear.total_ratio if self.linear.controller.outermost == "velocity" else 1.0
         plain = loops.plain_response
         assert plain is not None
-        return (lambda z: np.asarray(scale * plain(z), dtype=complex)), none
+        return (lambda z: np.asarray(self._geared * plain(z), dtype=complex)), none
+
+    @property
+    def _geared(self) -> float:
+        """Reference of the linear writing over the simulator's command: that of a speed is the motor's."""
+        return self.linear.total_ratio if self.linear.controller.outermost == "velocity" else 1.0
 
     def _point(self, name: str, setup: LoopSetup, found: Tangent, loops: Loops) -> Place:
         """A break point with all loops closed."""

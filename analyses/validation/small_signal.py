@@ -67,6 +67,8 @@ class Place:
         Eigenvalues over one base period at a gain, by the linear writing.
     delayed : callable or None
         Design with a longer computing delay, and its poles over one base period; only at the voltage.
+    quantity : str
+        Name of the row that judges the response.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Place:
     exact: ExactMargins | None = None
     critical: Callable[[float], Complexes] | None = None
     delayed: Callable[[float], tuple[Tangent, Complexes]] | None = None
+    quantity: str = "response"
 
     @property
     def allowed(self) -> float:
@@ -116,7 +119,7 @@ def _response(place: Place) -> Row:
     off = relative(place.tangent.closed(z), wanted)
     k = int(np.argmax(off))
     where = f"worst at {angles[k] / (2.0 * pi * place.tangent.hold_s):.3g} Hz, of {angles.size} frequencies"
-    row = place.judged("response", 0.0, float(off[k]), place.allowed, "1", where)
+    row = place.judged(place.quantity, 0.0, float(off[k]), place.allowed, "1", where)
     return replace(row, predicted=None, found=None, error=float(off[k]))
 
 

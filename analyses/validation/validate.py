@@ -182,7 +182,13 @@ class _Work:
             made = self._part(f"checks at {name}", partial(small_signal, place), None)
             rows += [_unproven(name, self.notes)] if made is None else made
             self._step()
+        onsets = self._part("checks at onsets", self._onsets, None)
+        rows += [_unproven("onsets", self.notes)] if onsets is None else onsets
         return rows, places
+
+    def _onsets(self) -> list[Row]:
+        """What stands in front of each limiter under a command."""
+        return [row for place in self.bench.onsets() for row in small_signal(place)]
 
     def _values(self) -> list[Row]:
         return design_value_rows(self.design, self.bench.model)

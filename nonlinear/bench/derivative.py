@@ -29,6 +29,7 @@ import numpy.typing as npt
 from actuator_lti.design.loader import as_design
 from actuator_lti.systems.resolvent import balanced
 from nonlinear.bench.differences import Differences
+from nonlinear.bench.injection import Watched
 from nonlinear.bench.lifted import Complexes, Floats, response
 from nonlinear.bench.loop_setup import LoopSetup, loop_setup
 
@@ -112,7 +113,12 @@ class Tangent:
 
 
 def tangent(
-    design: Design | str | PathLike[str], place: str, *, setup: LoopSetup | None = None, hold: bool = True
+    design: Design | str | PathLike[str],
+    place: str,
+    *,
+    setup: LoopSetup | None = None,
+    hold: bool = True,
+    watched: Watched | None = None,
 ) -> Tangent:
     """Measure the derivative of the running drive.
 
@@ -127,6 +133,8 @@ def tangent(
         Operating motion and test set-up; by default `nonlinear.bench.loop_setup.loop_setup` chooses one.
     hold : bool
         Whether the rotor is locked for the current loop, as on a bench.
+    watched : Watched, optional
+        What is read instead of what comes back: a signal in front of a limiter.
 
     Returns
     -------
@@ -156,7 +164,7 @@ def tangent(
     """
     if setup is None:
         setup = loop_setup(as_design(design), place, limits_on=False, held=hold and place == "current")
-    measured, tick_s = Differences(setup, place), setup.design.controller.period_s
+    measured, tick_s = Differences(setup, place, watched), setup.design.controller.period_s
     parts, stated_error = measured.parts()
     return Tangent(
         place,

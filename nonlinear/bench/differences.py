@@ -10,7 +10,6 @@ stated error.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isfinite
 
 import numpy as np
 import numpy.typing as npt
@@ -18,15 +17,12 @@ import numpy.typing as npt
 from actuator_lti.errors import NumericalError
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.state_kinds import CONTINUOUS, COUNTER, FLAG, names_of, places_of
+from nonlinear.bench.injection import Injection, Watched
 from nonlinear.bench.lifted import GRID, Floats, response, sensitivities, sized
-from nonlinear.bench.loop_setup import LoopSetup, every
+from nonlinear.bench.loop_setup import LoopSetup
 from nonlinear.bench.stepper import Stepper
 
 Parts = tuple[Floats, Floats, Floats, Floats]
-RETURNED = {
-    "u": at.S_VOLTAGE_BEFORE, "i_ref": at.S_CURRENT_BEFORE, "w_ref": at.S_SPEED_COMMAND,
-    "output": at.S_OUTPUT_BEFORE,
-}  # fmt: skip
 DECADES, MOST_DECADES = 11, 40  # of steps; where events forbid the larger ones
 SWAY = 10.0  # times the motion that a large sine makes: the largest step
 LEAST = float(np.sqrt(np.finfo(float).eps))  # of the number itself: the largest step is no smaller
@@ -47,9 +43,9 @@ class Differences:
         Places of the numbers of the state that take part.
     """
 
-    def __init__(self, setup: LoopSetup, place: str) -> None:
+    def __init__(self, setup: LoopSetup, place: str, watched: Watched | None = None) -> None:
         self.where = f"{setup.design.name}: {place}"
-        self.injected = _Injection(setup, place)
+        self.injected = Injection(setup, place, watched)
         self.drive = Stepper(self.injected.rows)
         self.injected.prepare(self.drive.p)
         self.base, self.hold = setup.base_ticks, self.injected.hold_ticks
@@ -93,9 +89,7 @@ class Differences:
         states, injected = rows[:, : self.size].copy(), rows[:, self.size :]
         back, flags = np.empty(injected.shape), np.empty((*injected.shape, self.watched.size))
         for k in range(self.updates):
-            early = self.injected.read(states, self.drive.p)
-            self.drive.each(states, self.hold, self.injected.at, injected[:, k])
-            back[:, k] = early if self.injected.at_start else self.injected.read(states, self.drive.p)
+            back[:, k] = self.injected.run(self.drive, states, injected[:, k])
             flags[:, k] = states[:, self.watched]
         return states, back, flags
 
@@ -213,39 +207,3 @@ class _Columns:
         chosen = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
         columns = np.arange(chosen.size)
         return self.values[chosen, columns].T, self.off[chosen, columns].T
-
-
-class _Injection:
-    """Where the signal is added, how much would be large there, and what is read."""
-
-    def __init__(self, setup: LoopSetup, place: str) -> None:
-        design = setup.design
-        self.place, self.rows, self.ratio = place, setup.row(), design.total_ratio
-        self.at_start = place in ("command", "load")
-        self.outermost = design.controller.outermost
-        if place == "load":
-            self.hold_ticks, self.at = 1, at.LOAD
-        elif place == "command":
-            self.rows.step("command", 0.0, -1.0)
-            self.hold_ticks, self.at = every(design, self.outermost), at.COMMAND + 1
-        else:
-            point = setup.point
-            self.rows.step(point, 0.0, -1.0)
-            probe = at.PROBES + at.POINTS.index(point) * at.PROBE_SIZE
-            self.hold_ticks, self.at = setup.hold_ticks, probe + at.PROBE_SIGNAL + 1
-            self.read_at = RETURNED[point]
-        self.size = setup.range if isfinite(setup.range) and setup.range > 0.0 else 1.0
-        self.steady = float(self.rows.values[0, self.at])
-
-    def prepare(self, p: Floats) -> None:
-        """Let the load be looked at in every tick where it is what is moved."""
-        if self.place == "load":
-            p[at.RARE_LOAD] = 1.0
-
-    def read(self, s: Floats, p: Floats) -> Floats:
-        """What comes back, negated; the output itself for command and load."""
-        if not self.at_start:
-            return -s[:, self.read_at]
-        if self.place == "command" and self.outermost != "position":
-            return s[:, at.S_CURRENT if self.outermost == "current" else at.S_SPEED].copy()
-        return s[:, at.S_OUTPUT].copy() if p[at.ELASTIC_DRIVE] > 0.0 else s[:, at.S_ANGLE] / self.ratio

@@ -8,6 +8,7 @@ from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
+from actuator_lti.drive.signals import LIMITERS
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
@@ -31,6 +32,10 @@ MORE = {
     "inside_the_margin": "run just inside the gain margin",
     "outside_the_margin": "run just outside the gain margin",
 }
+for _limiter in LIMITERS.values():
+    _onset = f"{_limiter.name}_onset".replace("-", "_")
+    MORE[_onset] = f"command in front of the {_limiter.words}"
+    MORE[f"{_onset}_integral"] = f"integral that the {_limiter.words} clamps"
 PLACES = {"command": "Command to output", "load": "Load torque to output", "drive": "Numbers of the design"}
 NOISE = 1e-9  # of the value: a smaller error changes with the order in which sums are taken
 

@@ -94,6 +94,19 @@ def test_peaks_of_S_and_T() -> None:
     assert result.sensitivity_db == pytest.approx(stability_margins(loop).sensitivity_peak_db)
 
 
+@pytest.mark.parametrize("shown", ["not moved", "not seen"])
+def test_peaks_beside_a_mode_at_rest_that_the_loop_does_not_show(shown: str) -> None:
+    """L = 0.3/(z - 0.5): |S| = 1.5/1.2 at z = -1, |T| = 0.3/0.8 at z = 1, where z - A is singular."""
+    A, b, c = np.diag([1.0, 0.5]), [[0.0], [0.3]], [[1.0, 1.0]]
+    if shown == "not seen":
+        A, b, c = np.array([[1.0, 1e-3], [0.0, 0.5]]), [[1.0], [0.3]], [[0.0, 1.0]]
+    result = peaks(control.ss(A, b, c, [[0.0]], 1e-3))
+    assert result.sensitivity_db == pytest.approx(20.0 * math.log10(1.5 / 1.2), abs=1e-9)
+    assert result.sensitivity_rad_s == pytest.approx(math.pi / 1e-3)
+    assert result.complementary_db == pytest.approx(20.0 * math.log10(0.3 / 0.8), abs=1e-9)
+    assert result.complementary_rad_s == 0.0
+
+
 def test_peaks_with_delay_and_without_any() -> None:
     omega = np.linspace(1, 1000, 400_001)
     L = 100 / (1j * omega) * np.exp(-0.005j * omega)

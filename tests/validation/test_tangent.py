@@ -115,9 +115,12 @@ def test_python_control_draws_it() -> None:
     )
 
 
-@pytest.mark.parametrize("seed", [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301])
+FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035]
+
+
+@pytest.mark.parametrize("seed", FAILED_ONCE)
 def test_drives_that_failed_once(seed: int) -> None:
-    """A filter of the command lags behind a ramp; margins at rest lie on a mode at rest, on an angle."""
+    """A filter of the command lags behind a ramp; margins and peaks lie on a mode at rest, or on an angle."""
     result = validate(full_drive(seed), CHECKS)
     assert result.passed, [str(row) for row in result.not_met]
 

@@ -1,0 +1,108 @@
+"""Where a signal is added to a drive that runs by hand, and what is read of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+from actuator_lti.drive.signals import Kind
+from nonlinear._kernels import layout as at
+from nonlinear.bench.lifted import Floats
+from nonlinear.bench.loop_setup import LoopSetup, every, target
+from nonlinear.bench.stepper import Stepper
+
+RETURNED = {
+    "u": at.S_VOLTAGE_BEFORE, "i_ref": at.S_CURRENT_BEFORE, "w_ref": at.S_SPEED_COMMAND,
+    "output": at.S_OUTPUT_BEFORE,
+}  # fmt: skip
+HELD = {"velocity_integral": at.S_VELOCITY_INTEGRATOR, "current_integral": at.S_CURRENT_INTEGRATOR}
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A signal in front of a limiter, at its last update before the next command.
+
+    Attributes
+    ----------
+    signal : str
+        ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"torque_command"``, ``"i"``, ``"velocity_integral"`` or
+        ``"current_integral"``.
+    kind : {"value", "rate", "rms"}
+        The signal itself; its change over the update, over ``period_s``; the plant's own at the last tick.
+    every : int
+        Ticks between two updates.
+    period_s : float
+        Time of them.
+    """
+
+    signal: str
+    kind: Kind
+    every: int
+    period_s: float
+
+
+class Injection:
+    """A place of a drive: where the signal is added, how much would be large there, and what is read."""
+
+    def __init__(self, setup: LoopSetup, place: str, watched: Watched | None = None) -> None:
+        design = setup.design
+        self.place, self.rows, self.ratio = place, setup.row(), design.total_ratio
+        self.at_start = place in ("command", "load")
+        self.outermost, self.watched = design.controller.outermost, watched
+        if place == "load":
+            self.hold_ticks, self.at = 1, at.LOAD
+        elif place == "command":
+            self.rows.step("command", 0.0, -1.0)
+            self.hold_ticks, self.at = every(design, self.outermost), at.COMMAND + 1
+        else:
+            point = setup.point
+            self.rows.step(point, 0.0, -1.0)
+            probe = at.PROBES + at.POINTS.index(point) * at.PROBE_SIZE
+            self.hold_ticks, self.at = setup.hold_ticks, probe + at.PROBE_SIGNAL + 1
+            self.read_at = RETURNED[point]
+        if watched is not None:
+            there = {"i": at.S_CURRENT} | RETURNED | HELD
+            signal = target(design, "velocity") if watched.signal == "torque_command" else watched.signal
+            self.read_at = there[signal]
+        self.size = setup.range if isfinite(setup.range) and setup.range > 0.0 else 1.0
+        self.steady = float(self.rows.values[0, self.at])
+
+    def prepare(self, p: Floats) -> None:
+        """Let the load be looked at in every tick where it is what is moved."""
+        if self.place == "load":
+            p[at.RARE_LOAD] = 1.0
+
+    def run(self, drive: Stepper, states: Floats, values: Floats) -> Floats:
+        """Run every state to the next update with its own value; what is read, one a state."""
+        if self.watched is not None:
+            return self._watch(drive, states, values, self.watched)
+        early = self._read(states, drive.p)
+        drive.each(states, self.hold_ticks, self.at, values)
+        return early if self.at_start else self._read(states, drive.p)
+
+    def _read(self, s: Floats, p: Floats) -> Floats:
+        """What comes back, negated; the output itself for command and load."""
+        if not self.at_start:
+            return -s[:, self.read_at]
+        if self.place == "command" and self.outermost != "position":
+            return s[:, at.S_CURRENT if self.outermost == "current" else at.S_SPEED].copy()
+        return s[:, at.S_OUTPUT].copy() if p[at.ELASTIC_DRIVE] > 0.0 else s[:, at.S_ANGLE] / self.ratio
+
+    def _watch(self, drive: Stepper, states: Floats, values: Floats, watched: Watched) -> Floats:
+        """What the signal is, or what it changed by, at its last update.
+
+        What stands in front of the torque filters is no number of the state: that update is made once more
+        without them.
+        """
+        drive.each(states, self.hold_ticks - watched.every, self.at, values)
+        before = states[:, self.read_at].copy()
+        if watched.signal == "torque_command":
+            bare, filters = states.copy(), drive.p[at.TORQUE_FILTERS]
+            drive.p[at.TORQUE_FILTERS] = 0.0
+            drive.each(bare, 1, self.at, values)
+            drive.p[at.TORQUE_FILTERS] = filters
+        drive.each(states, watched.every, self.at, values)
+        if watched.signal == "torque_command":
+            return bare[:, self.read_at]
+        after = states[:, self.read_at].copy()
+        return {"value": after, "rate": (after - before) / watched.period_s, "rms": before}[watched.kind]
