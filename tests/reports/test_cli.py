@@ -235,10 +235,7 @@ def test_progress_stays_off_where_nobody_looks(capsys: pytest.CaptureFixture[str
 
 @pytest.mark.parametrize("command", ["report", "validate", "compare", "tune", "montecarlo"])
 def test_a_folder_that_cannot_be_is_refused_before_anything_is_computed(
-    command: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def unwanted(*_: object) -> None:
         raise AssertionError("the design was read before the folder was looked at")

@@ -132,29 +132,23 @@ def test_the_command_line_judges_it(tmp_path: Path, capsys: pytest.CaptureFixtur
         ({"num": None, "den": None, "A": [[1.0, 2.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]]}, "n by n"),
         ({"num": None, "den": None, "A": [[1.0], [1.0, 2.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]]},
          "rows of different lengths"),
+        *((text, "airframe.json") for text in ("", "[1, 2]", "{", '{"num": [NaN]}', '{"dt": 0, "dt": 1}')),
     ],
 )  # fmt: skip
 def test_a_bad_file_is_one_line(
-    change: dict,  # type: ignore[type-arg]
+    change: dict | str,  # type: ignore[type-arg]
     said: str,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    table = {key: value for key, value in {**AIRFRAME, **change}.items() if value is not None}
     path = tmp_path / "airframe.json"
-    path.write_text(json.dumps(table))
+    if isinstance(change, str):
+        path.write_text(change)
+    else:
+        table = {key: value for key, value in {**AIRFRAME, **change}.items() if value is not None}
+        path.write_text(json.dumps(table))
     assert main(["margins", "ilr33-amber", "--around", str(path)]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert said in error
-
-
-@pytest.mark.parametrize("text", ["", "[1, 2]", "{", '{"num": [NaN]}', '{"dt": 0, "dt": 1}'])
-def test_a_file_that_is_no_object_is_one_line(
-    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "airframe.json"
-    path.write_text(text)
-    assert main(["margins", "ilr33-amber", "--around", str(path)]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
     assert main(["margins", "ilr33-amber", "--around", str(tmp_path / "none.json")]) == 2

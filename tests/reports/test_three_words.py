@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,6 +14,8 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import design_hash, load_design, read_design_text, write_design
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.errors import InputError
+from analyses.linear import loop_figures
+from analyses.margins import run
 from analyses.validation import CHECKS, validate
 from reports.cli.main import main
 from reports.sections.validation import section
@@ -33,8 +37,7 @@ def status(path: Path, design: Design, capsys: pytest.CaptureFixture[str], *call
 
 
 @pytest.mark.parametrize(
-    ("waivers", "code", "head", "word"),
-    [((), 1, "NOT PROVEN", "not proven"), ((WAIVED,), 0, "PASS", "met")],
+    ("waivers", "code", "head", "word"), [((), 1, "NOT PROVEN", "not proven"), ((WAIVED,), 0, "PASS", "met")]
 )
 def test_margins_and_report_say_the_same(
     waivers: tuple[Waiver, ...], code: int, head: str, word: str, tmp_path: Path,
@@ -60,6 +63,22 @@ def test_margins_and_report_say_the_same(
     page = (folder / "report.html").read_text()
     assert f'<p class="overall {"info" if waivers else "warn"}">' in page
     assert ("the motor is outside" in page) is bool(waivers)
+
+
+def test_a_loop_whose_stability_is_not_known_is_no_pass(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    known = loop_figures.all_loop_figures
+
+    def undecided(*args: Any, **options: Any) -> Mapping[str, loop_figures.LoopFigures]:
+        figures = known(*args, **options)
+        current = figures["current"]
+        return {**figures, "current": replace(current, margins=replace(current.margins, stable=None))}
+
+    monkeypatch.setattr(run, "all_loop_figures", undecided)
+    assert main(["margins", "ilr33-amber"]) == 1
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith("NOT PROVEN  ilr33-amber: stability not known: Current loop.")
 
 
 def test_a_design_without_requirements_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

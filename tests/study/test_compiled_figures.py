@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_lti import (
-    assemble_loops,
-    closed_loop_bandwidth,
-    load_design,
-    stability_margins,
-    step_figures,
-)
+from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins, step_figures
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, with_overrides, with_values
 from actuator_lti.errors import InputError
