@@ -143,11 +143,8 @@ def _closed_figures(count, n, a, b, c, lead, poles, dc, row, xs, rs, ss, work, s
     row[DC_GAIN] = dc
     for i in range(n):
         if math.hypot(poles[2 * n + i] - 1.0, poles[3 * n + i]) <= HIDDEN:
-            still = math.nan if math.isnan(lead) else 0.0
-            real, _imaginary = closed_loop(rs[0], rs[1], xs[0], still)
-            half_r, half_i = response_at(n, a, b, c, 0.5 * xs[0], work, state, exchanged)
-            nearer, _imaginary = closed_loop(half_r, half_i, 0.5 * xs[0], still)
-            row[DC_GAIN] = nearer + (nearer - real) / 3.0  # even in the angle
+            real, _imaginary = closed_loop(rs[0], rs[1], xs[0], math.nan if math.isnan(lead) else 0.0)
+            row[DC_GAIN] = real
     row[FINAL] = row[DC_GAIN]
     resonance(count, xs, rs, ss, lead, row, n, a, b, c, work, state, exchanged)
     if abs(row[DC_GAIN]) < NO_GAIN * row[PEAK_T]:  # speed against a spring: nothing to measure a fall from
@@ -188,14 +185,14 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
     figures are written. The other rows lend their space: see `many_loops`.
     """
     balance(n, a, b, c)
+    hessenberg(n, a, b, c, state)
     for i in range(n):
         a[i * n + i] -= 1.0
-    dc = _closed_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, work, state)
-    hessenberg(n, a, b, c, state)
     kept = _grid(n, poles, points)
     count = scan(n, a, b, c, points, kept, SMOOTH, stack, xs, rs, ss, work, state, exchanged)
     row[RADIUS] = _radius(n, poles)
     row[STABLE] = 1.0 if row[RADIUS] < 1.0 else 0.0
+    dc = _closed_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, work, state)
     _closed_figures(count, n, a, b, c, lead, poles, dc, row, xs, rs, ss, work, state, exchanged)
     if not math.isnan(lead):
         _open_figures(count, n, a, b, c, row, xs, rs, ss, work, state, exchanged)

@@ -11,9 +11,9 @@ from actuator_lti.systems.rest_mode import without_rest_mode
 def at_rest(A: np.ndarray, B: np.ndarray, C: np.ndarray, rows: np.ndarray) -> None:
     """Correct the figures at zero frequency: the margin listed there, and the distance |1 + L(0)|.
 
-    The compiled code scans A in Hessenberg form, which keeps 16 digits of A but not of slow poles, the
-    differences of A and the identity: behind a spring the smallest angles lose half of their digits. Here
-    A is taken as it is, without a mode at rest that the loop does not show.
+    The compiled code brings A to Hessenberg form first, which keeps 16 digits of A but not of slow poles, the
+    differences of A and the identity: behind a spring L(0) loses half of its digits. Here A is taken as it
+    is, without a mode at rest that the loop does not show.
 
     Parameters
     ----------

@@ -11,11 +11,8 @@ import numpy as np
 import pytest
 from random_drives import random_drive, random_elastic_drive
 
-from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design
+from actuator_lti import load_design
 from actuator_lti.asked.drive_figure import drive_figure
-from actuator_lti.asked.quantities import LOOPS
-from actuator_lti.batch import Population, linear_figures
-from actuator_lti.batch._figures import DC_GAIN
 from actuator_lti.design.access import parameter_value, stacked
 from actuator_lti.design.model import Design, FrictionPoint, Supply
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
@@ -114,13 +111,3 @@ def test_what_sets_a_figure_changes_it_and_nothing_else() -> None:
     assert changes_figure(design, "limits.speed", "output_rate", 0.0)
     assert not changes_figure(design, "control.position.gain", "output_rate", 0.0)
     assert not changes_figure(design, "motor.resistance", "lost_motion", 0.0)
-
-
-def test_the_gain_at_rest_of_many_designs_behind_a_soft_spring() -> None:
-    """A velocity loop hides the angle's pole at z = 1, beside one 6e-6 away; T(0) in exact rationals."""
-    design = random_elastic_drive(np.random.default_rng(13))
-    figures = linear_figures(Population(design, {}, 1), time_figures=False)
-    velocity = assemble_loops(design).velocity
-    assert velocity is not None
-    found = figures.raw[0, LOOPS.index("velocity"), DC_GAIN]
-    assert found == pytest.approx(closed_loop_bandwidth(velocity.closed_loop).dc_gain, rel=1e-7)

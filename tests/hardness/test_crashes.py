@@ -27,7 +27,7 @@ BROKEN = {
     "analyses.linear.loop_survey:_onset": {"margins", "loop-position", "parameters"},
     "analyses.specification.requirements:evaluate_requirements": {"margins", "loop-position", "parameters"},
     "reports.sections.answer:section": {"margins", "loop-position", "parameters"},
-    "reports.sections.margins:section": {"loop-position", "parameters"},
+    "reports.sections.margins:of_loops": {"loop-position", "parameters"},
     "reports.sections.loop:section": {"margins", "parameters"},
     "reports.sections.forms:section": {"margins", "loop-position", "parameters"},
     "reports.sections.requirements:section": {"margins", "loop-position", "parameters"},
