@@ -18,6 +18,8 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.wiring import wire
+from actuator_lti.loops import assemble_loops, exact_margins, periodic_loop, periodic_loop_of
+from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.limiters import LimiterPath, limiter_places
 from analyses.linear.loop_figures import LoopFigures, loop_figures
 from analyses.validation.small_signal import Place
@@ -92,8 +94,6 @@ class Bench:
         return self._loops_at(setup.bias.operating(setup.design), filtered=self._filtered)
 
     def _loops_at(self, at: Operating, *, filtered: bool) -> Loops:
-        from actuator_lti.loops.assemble import loops_at
-
         if (at, filtered) not in self._assembled:
             linear = _faint(self.linear, self.model) if filtered else self.linear
             self._assembled[at, filtered] = loops_at(linear, at)
@@ -108,8 +108,6 @@ class Bench:
 
     def loop(self, name: str) -> Loop:
         """The linear loop of a stage; of the current with the rotor locked, as it is tested."""
-        from actuator_lti.loops import assemble_loops
-
         if name == "current":
             return assemble_loops(self.linear, rotor="locked").present["current"]
         return self.loops(name).present[name]
@@ -184,8 +182,6 @@ class Bench:
 
     def _point(self, name: str, setup: LoopSetup, found: Tangent, loops: Loops) -> Place:
         """A break point with all loops closed."""
-        from actuator_lti.loops import exact_margins, periodic_loop
-
         loop = periodic_loop(loops, name)
         own = loops.break_points[name]
         return Place(
@@ -197,8 +193,6 @@ class Bench:
 
     def _delayed(self, more_s: float) -> tuple[Tangent, Complexes]:
         """Tangent at the voltage, and predicted poles over a base period, under a longer computing delay."""
-        from actuator_lti.loops import periodic_loop_of
-
         longer = Bench(_later(self.design, more_s), _later(self.model, more_s))
         setup = longer.setup("u")
         predicted = periodic_loop_of(wire(longer.linear, setup.bias.operating(longer.drive)), "u")
