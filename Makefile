@@ -70,7 +70,7 @@ machines: $(ALL)
 # The page's scripts: types, rules, and their pure parts by node's own runner.
 page:
 	@if command -v npm >/dev/null 2>&1 && npm ci --silent --no-audit --no-fund; then \
-	  npx tsc -p jsconfig.json && npx eslint && node --test tests/page/*.test.mjs; \
+	  npx tsc -p jsconfig.json && npx eslint reports/templates/page && node --test tests/page/*.test.mjs; \
 	else echo "no npm here, or no registry: the page's scripts are not checked"; fi
 
 check: $(ALL) page
