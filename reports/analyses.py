@@ -198,7 +198,8 @@ ANALYSES = (
 
         The duty is a sine under a load, for a share of the time; what is not given comes from
         \\[duty]. The temperature needs thermal_resistance and thermal_time in \\[temperature], the
-        protection limits.peak_time. The exit status is 1 where the drive cannot do the duty for ever.
+        protection limits.peak_time. The exit status is 1 where the duty is beyond the continuous rating, or
+        where none is stated.
         """,
     ),
     Analysis(

@@ -47,7 +47,7 @@ def drive_column(quantity: str, load_Nm: float | None) -> str:
 
 
 def by_loop(design: Design) -> list[Requirement]:
-    """The requirements of a design, each once for every loop that it holds for: as all verdicts count them."""
+    """The requirements of a design, once for every loop that each holds for: as all verdicts count them."""
     made = []
     for one in design.requirements:
         named = one.quantity not in LOOP_QUANTITIES or one.loop not in (None, "every")

@@ -36,7 +36,7 @@ def section(result: LargeSignals) -> Section:
     rules = doc.details("How the map is read", [doc.text(words) for words in (CAUSE_RULE, CRITERIA)])
     blocks = [doc.verdicts(items, what="checks"), _map_figure(result, scale, unit), rules]
     if result.border is not None and np.isfinite(result.border.predicted_rad).any():
-        blocks.append(doc.details("The border in numbers", [_border_table(result, scale, unit)]))
+        blocks.append(doc.details("The linear limit in numbers", [_border_table(result, scale, unit)]))
     blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
     blocks += [_bode_table(result.bode, scale, unit), *_sawtooth_blocks(result.sawtooth, design, scale, unit)]
     intro = (
