@@ -24,6 +24,8 @@ from analyses.motion.asked import Asked as MotionAsked
 from analyses.studies.study_asked import Asked as StudyAsked
 from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.asked import Asked as ValidationAsked
+from reports.design_files.keys import Asked as KeysAsked
+from reports.design_files.start import Asked as StartAsked
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -55,6 +57,8 @@ class Analysis:
         Whether a report has the section where it is asked for (``--also``).
     doing : str
         What the bar says while the function works, which then takes ``progress``.
+    alone : bool
+        Whether it is asked of no design, and has no page.
     study : bool
         Whether it is asked of a study (a file, or a design with variants), not of a design.
     written : str
@@ -79,6 +83,7 @@ class Analysis:
     shown: str = ""
     also: bool = False
     doing: str = ""
+    alone: bool = False
     study: bool = False
     keeps: bool = False
     written: str = ""
@@ -98,7 +103,8 @@ class Analysis:
     def run(self, design: Design | Study | None, *asked: Any, **more: Any) -> Any:
         """Ask."""
         package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
-        return getattr(import_module(package), name)(design, *asked, **more)
+        of = () if self.alone else (design,)
+        return getattr(import_module(package), name)(*of, *asked, **more)
 
     def sections(self, result: Any) -> list[Section]:
         """Show: ``section(result)`` of the section's module, one or several."""
@@ -132,6 +138,37 @@ class Analysis:
 
 
 ANALYSES = (
+    Analysis(
+        name="designs",
+        group="Designs",
+        alone=True,
+        function="reports.design_files.catalogue.catalogue",
+        shown="listing",
+        words="List the shipped designs: name, title, and the stages that each drive has.",
+    ),
+    Analysis(
+        name="init",
+        group="Designs",
+        alone=True,
+        request=StartAsked,
+        function="reports.design_files.start.start",
+        shown="listing",
+        words="Write a commented design file to start one's own drive from.",
+    ),
+    Analysis(
+        name="keys",
+        group="Designs",
+        alone=True,
+        request=KeysAsked,
+        function="reports.design_files.keys.keys",
+        shown="listing",
+        words="""
+        List the keys of a design file: unit, default, allowed range, meaning, example.
+
+        A repeated table stands as gear.* (by name), friction.point.* and control.velocity.filter.* (by
+        number). Try: actuator-lti keys notch, or actuator-lti keys --explain my.toml
+        """,
+    ),
     Analysis(
         name="margins",
         group="Linear loops",

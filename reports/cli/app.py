@@ -19,7 +19,7 @@ def _declared(group: str) -> tuple[str, ...]:
 
 # In the order in which the help lists them, by the panel that they stand in.
 PANELS: dict[str, tuple[str, ...]] = {
-    "Designs": ("designs", "init", "keys", "objects"),
+    "Designs": (*_declared("Designs"), "objects"),
     "Linear loops": (*_declared("Linear loops"), "report", "pdf"),
     "Nonlinear checks": _declared("Nonlinear checks"),
     "Bench records": _declared("Bench records"),
