@@ -26,6 +26,7 @@ from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.asked import Asked as ValidationAsked
 from reports.design_files.keys import Asked as KeysAsked
 from reports.design_files.start import Asked as StartAsked
+from reports.exports import AskedC, AskedFmu, AskedLinear
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -58,7 +59,9 @@ class Analysis:
     doing : str
         What the bar says while the function works, which then takes ``progress``.
     alone : bool
-        Whether it is asked of no design, and has no page.
+        Whether it is asked of no design; it has no page then.
+    page : bool
+        Whether it has a page (``--out``).
     study : bool
         Whether it is asked of a study (a file, or a design with variants), not of a design.
     written : str
@@ -84,6 +87,7 @@ class Analysis:
     also: bool = False
     doing: str = ""
     alone: bool = False
+    page: bool = True
     study: bool = False
     keeps: bool = False
     written: str = ""
@@ -391,7 +395,38 @@ ANALYSES = (
         cannot be met.
         """,
     ),
+    Analysis(
+        name="export c",
+        group="Out of Python",
+        page=False,
+        request=AskedC,
+        function="reports.exports.export_c",
+        shown="listing",
+        words="Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README.",
+    ),
+    Analysis(
+        name="export fmu",
+        group="Out of Python",
+        page=False,
+        request=AskedFmu,
+        function="reports.exports.export_fmu",
+        shown="listing",
+        words="Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a "
+        "parameter.",
+    ),
+    Analysis(
+        name="export linear",
+        group="Out of Python",
+        page=False,
+        request=AskedLinear,
+        function="reports.exports.export_linear",
+        shown="listing",
+        words="Write every loop, break point, command and load response as state space, with units and "
+        "margins.",
+    ),
 )
+COMMANDS_IN = {"export": "The drive outside of Python: C99, FMU, linear models."}
+"""Words of a name that stands before others."""
 BY_NAME = {one.name: one for one in ANALYSES}
 FURTHER = tuple(one.name for one in ANALYSES if one.also)
 """Sections that a report has only where they are asked for, as they take their time."""

@@ -79,8 +79,8 @@ def command(one: Analysis) -> Callable[..., None]:
         _parameter("quiet", QuietOption, False),
         *([_parameter("example", _example(one), False)] if one.example else []),
     ]
-    if one.alone:
-        parameters = [each for each in parameters if each.name not in ("design", "changes", "out", "quiet")]
+    left_out = ("design", "changes") * one.alone + ("out", "quiet") * (one.alone or not one.page)
+    parameters = [each for each in parameters if each.name not in left_out]
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}
     run.__doc__ = cleandoc(one.words) + (f" In the report: --also {one.name}." if one.also else "")

@@ -12,7 +12,8 @@ from reports.document_schema import Section
 def section(result: Any) -> Section:
     """Make the section of a result whose one tuple, if there is any, holds the rows."""
     rows = next((value for value in vars(result).values() if isinstance(value, tuple)), ())
-    blocks = [doc.listing("", rows, _columns(type(rows[0])))] if rows else []
+    columns = _columns(type(rows[0])) if rows else []
+    blocks = [doc.listing("", rows, columns)] if columns else []
     return doc.section("list", "List", blocks, result=str(result))
 
 
