@@ -20,7 +20,7 @@ from reports.sections.names import hertz, output_unit
 
 def section(design: Design, border: Onset) -> Section:
     """Make the section from the onset amplitudes."""
-    scale, unit = (1.0, "m") if design.axis == "linear" else output_unit(design.axis)
+    scale, unit = output_unit(design.axis)
     caption = (
         "Peak amplitude of a sine command, at the output, at which each limit is just reached. Below the "
         "lowest line every linear figure of this report holds, except for dry friction."
