@@ -21,13 +21,13 @@ class Exported:
 
     Attributes
     ----------
-    files : tuple of Path
+    files : tuple of str
     words : str
     check : CodeCheck or None
         ``None`` where it was not asked for.
     """
 
-    files: tuple[Path, ...]
+    files: tuple[str, ...]
     words: str
     check: CodeCheck | None = None
 
@@ -62,7 +62,7 @@ def export_c(design: Design, asked: AskedC) -> Exported:
     check = _checked(design) if asked.check else None
     texts["README.md"] += "\n" + check_text(check, single_precision=asked.single)
     write_together({folder / name: text.encode() for name, text in texts.items()})
-    return Exported(tuple(folder / name for name in texts), f"{folder}: {', '.join(texts)}", check)
+    return Exported(tuple(str(folder / name) for name in texts), f"{folder}: {', '.join(texts)}", check)
 
 
 def export_fmu(design: Design, asked: AskedFmu) -> Exported:
@@ -94,7 +94,7 @@ def export_fmu(design: Design, asked: AskedFmu) -> Exported:
     )
     write_bytes(target, data)
     words = f"{target}: FMI {asked.version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes"
-    return Exported((target,), words, check)
+    return Exported((str(target),), words, check)
 
 
 def export_linear(design: Design, asked: AskedLinear) -> Exported:
@@ -114,7 +114,7 @@ def export_linear(design: Design, asked: AskedLinear) -> Exported:
     data = written_models(tree, asked.to)
     write_bytes(target, data)
     named = [*tree["sampled"]["loops"], *tree["sampled"]["break_points"], *tree["sampled"]["responses"]]
-    return Exported((target,), f"{target}: {', '.join(named)}, {' and '.join(FORMS)}, {len(data)} bytes")
+    return Exported((str(target),), f"{target}: {', '.join(named)}, {' and '.join(FORMS)}, {len(data)} bytes")
 
 
 def _checked(design: Design) -> CodeCheck:
