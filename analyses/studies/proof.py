@@ -102,10 +102,16 @@ def code_version(packages: Sequence[str] = CODE) -> str:
             digest.update(f"{name}: no file\0".encode())
             continue
         file = Path(source or "")
-        whole = file.name == "__init__.py"
-        for path in sorted(file.parent.rglob("*.py")) if whole else [file]:
-            digest.update(f"{name}/{path.relative_to(file.parent)}\0".encode() + path.read_bytes() + b"\0")
+        digest.update(f"{name}: {hash_of(file.parent if file.name == '__init__.py' else file)}\0".encode())
     return digest.hexdigest()[:16]
+
+
+def hash_of(place: Path, endings: Sequence[str] = (".py",)) -> str:
+    """Content hash of a file, or of all files below a folder that end so, with their names."""
+    files = [place] if place.is_file() else sorted(p for p in place.rglob("*") if p.suffix in endings)
+    parts = ((path.relative_to(place.parent).as_posix(), path) for path in files if path.is_file())
+    each = (f"{name}\0".encode() + hashlib.sha256(path.read_bytes()).digest() for name, path in parts)
+    return hashlib.sha256(b"".join(each)).hexdigest()
 
 
 def _linear_algebra() -> list[bytes]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
 import shutil
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+from analyses.studies.proof import hash_of
 from reports.nightly.job import canonical
 from reports.nightly.text import one_line, sha256
 
@@ -44,7 +44,8 @@ def code_version(root: Path | None = None) -> CodeVersion:
     """Version of the code as installed (or below ``root``)."""
     folder = Path(__file__).resolve().parents[2] if root is None else root
     libraries = {name: _version(name) for name in LIBRARIES}
-    return CodeVersion(sources=_hash_sources(folder), libraries=libraries, commit=commit_of(folder))
+    sources = sha256(canonical([hash_of(folder / package, _SUFFIXES) for package in PACKAGES]))
+    return CodeVersion(sources=sources, libraries=libraries, commit=commit_of(folder))
 
 
 def _version(name: str) -> str:
@@ -52,17 +53,6 @@ def _version(name: str) -> str:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
         return "absent"
-
-
-def _hash_sources(folder: Path) -> str:
-    digest = hashlib.sha256()
-    for package in PACKAGES:
-        for path in sorted((folder / package).rglob("*")):
-            if path.suffix in _SUFFIXES and path.is_file():
-                digest.update(path.relative_to(folder).as_posix().encode())
-                digest.update(b"\0")
-                digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()
 
 
 def commit_of(path: Path) -> str:
