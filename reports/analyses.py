@@ -53,7 +53,8 @@ class Analysis:
         ``package.name`` of ``(design, request) -> result``; ``analyses.NAME.NAME`` where empty. Where the
         result says ``passed``, that is the exit status.
     shown : str
-        The section's module in `reports.sections`, whose ``section(result)`` shows the result.
+        The section's module in `reports.sections`, whose ``section(result)`` shows the result; without a page
+        that of a list.
     also : bool
         Whether a report has the section where it is asked for (``--also``).
     doing : str
@@ -138,7 +139,8 @@ class Analysis:
 
     @property
     def _shown(self) -> ModuleType:
-        return import_module(f"reports.sections.{self.shown or self.name}")
+        own = self.name if self.page and not self.alone else "listing"
+        return import_module(f"reports.sections.{self.shown or own}")
 
 
 ANALYSES = (
@@ -147,7 +149,6 @@ ANALYSES = (
         group="Designs",
         alone=True,
         function="reports.design_files.catalogue.catalogue",
-        shown="listing",
         words="List the shipped designs: name, title, and the stages that each drive has.",
     ),
     Analysis(
@@ -156,7 +157,6 @@ ANALYSES = (
         alone=True,
         request=StartAsked,
         function="reports.design_files.start.start",
-        shown="listing",
         words="Write a commented design file to start one's own drive from.",
     ),
     Analysis(
@@ -165,7 +165,6 @@ ANALYSES = (
         alone=True,
         request=KeysAsked,
         function="reports.design_files.keys.keys",
-        shown="listing",
         words="""
         List the keys of a design file: unit, default, allowed range, meaning, example.
 
@@ -401,7 +400,6 @@ ANALYSES = (
         page=False,
         request=AskedC,
         function="reports.exports.run.export_c",
-        shown="listing",
         words="Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README.",
     ),
     Analysis(
@@ -410,7 +408,6 @@ ANALYSES = (
         page=False,
         request=AskedFmu,
         function="reports.exports.run.export_fmu",
-        shown="listing",
         words="Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a "
         "parameter.",
     ),
@@ -420,7 +417,6 @@ ANALYSES = (
         page=False,
         request=AskedLinear,
         function="reports.exports.run.export_linear",
-        shown="listing",
         words="Write every loop, break point, command and load response as state space, with units and "
         "margins.",
     ),

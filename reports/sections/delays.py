@@ -91,9 +91,10 @@ def _result(budgets: Mapping[str, DelayBudget]) -> str:
     digital = ("measurement", "hold", "computing delay", "sampling")
     lost = {name: -sum(budget.items[key] for key in digital) for name, budget in budgets.items()}
     name = max(lost, key=lambda key: lost[key])
+    most = ", more than at any other" if len(lost) > 1 else ""
     return (
-        f"Sampling, hold and computing delay cost the {name} loop {lost[name]:.1f} deg of phase margin, "
-        f"more than any other loop; it has {180.0 + budgets[name].total_deg:.1f} deg left."
+        f"At the gain crossover of the {loop_words(name).lower()} speed measurement, hold, computing delay "
+        f"and sampling take {lost[name]:.1f} deg{most}; {180.0 + budgets[name].total_deg:.1f} deg are left."
     )
 
 

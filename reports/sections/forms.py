@@ -60,9 +60,10 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
         return "No phase margin is known in both the sampled and the ideal form."
     row = min(costs, key=lambda row: float(row["phase_cost_deg"]))
     change = to_minus(f"{row['phase_cost_deg']:+.1f}")
+    most = ", the largest change of all loops" if len(costs) > 1 else ""
     return (
-        f"Sampling and delay change the phase margin of the {row['loop'].lower()} by {change} deg, the "
-        "largest change of all loops."
+        f"Sampling and delay change the phase margin of the {row['loop'].lower()} by {change} deg{most}; "
+        "its crossover moves, too."
     )
 
 

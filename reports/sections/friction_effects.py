@@ -117,8 +117,8 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
     ]
     note = (
         f"The {result.integrator} controller integrates: a step below the threshold moves the output later"
-        f"{_after(result)}, and lost motion is recovered. The effect of friction is largest just after a "
-        "reversal."
+        f"{_after(result)}, and motion lost in front of its sensor is recovered. The effect of friction is "
+        "largest just after a reversal."
         if result.integrator
         else "No controller integrates: a step below the threshold never moves the output. Each "
         "reversal loses 2 Tc over the stiffness."
