@@ -76,7 +76,7 @@ def _row(point: OperatingPointFigures, scale: float) -> Row:
         margins, response = margin_row(result), response_row(result)
         row[f"{name}_phase"] = margins["phase_margin_deg"] if result.stable else result.margins.verdict
         row[f"{name}_gain"] = margins["gain_margin_db"]
-        row[f"{name}_band"] = response["minus3db_hz"]
+        row[f"{name}_band"] = response["minus3db_hz"] or None
     if any(result.sound is False for result in point.figures.values()):
         row["_status"] = "fail"
     return row

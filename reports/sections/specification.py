@@ -257,5 +257,5 @@ def _step_table(result: Specification) -> Block:
         doc.of("peak_rate_rad_s", "rate", "Peak rate", f"{unit}/s", scale=scale, format="sig:3"),
         doc.of(lambda one: ", ".join(map(words_of, one.limits)) or "none", "limits", "Limits that act"),
     ]
-    note = "Simulated with friction and all limits."
+    note = "Simulated with friction and all limits; a load sets in with the step, and its motion counts."
     return doc.listing("Steps, small and large", result.steps, columns, note)

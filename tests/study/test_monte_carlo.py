@@ -12,6 +12,7 @@ from actuator_lti.errors import InputError
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
 from analyses.monte_carlo.reduction import Reduction, reduced, unpacked
 from analyses.monte_carlo.sketch import MOST
+from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
 from analyses.studies.sampling import sampler_of
 
@@ -43,6 +44,12 @@ def test_odds_of_a_current_limit_are_the_closed_form(study):
     assert 0.5 < truth < 0.95
     assert odds.low <= truth <= odds.high
     assert odds.probability == pytest.approx(truth, abs=2e-3)
+
+
+def test_requirements_are_counted_as_all_verdicts_count_them(study, design):
+    judged = [odds.id for odds in study.odds if odds.id != "all"]
+    assert judged == [verdict.id for verdict in evaluate_requirements(design)]
+    assert study.tally.total == len(judged)
 
 
 def test_the_worst_case_lies_beyond_the_worst_sample_in_the_corner(study, design):
