@@ -37,7 +37,7 @@ def test_a_study_that_fails_says_so_and_can_be_accepted(app, wide, tmp_path):
     made = json.loads((tmp_path / "montecarlo.json").read_text())
     verdicts = {v["id"]: v for v in made["sections"][0]["blocks"][0]["items"]}
     assert verdicts["tolerance/motor-current"]["verdict"] == "not met"
-    assert verdicts["tolerance/gain-margin"]["verdict"] == "met"
+    assert verdicts["tolerance/gain-margin/position"]["verdict"] == "met"
     again = run(app, "montecarlo", wide, "--samples", 300, "--out", tmp_path, "--quiet", "--at-least", 0.5)
     assert again.exit_code == 0
     assert "<svg" in (tmp_path / "montecarlo.html").read_text()
