@@ -109,6 +109,6 @@ def _at_rest(As: np.ndarray, Cs: np.ndarray, at: float, j: int, alone: bool) -> 
         u = np.where(np.abs(v) > least * np.abs(v).max(), v, 0.0)
         at_rest = (np.abs(rows @ u) <= ROUNDED * (allowed @ np.abs(u))).all()
         unseen = (np.abs(c @ u) <= ROUNDED * (np.abs(c) @ np.abs(u))).all()
-        if at_rest and unseen and (alone or u[o].any()):
+        if at_rest and unseen and u[j] and (alone or u[o].any()):  # without j it is another's mode
             return u
     return None

@@ -27,10 +27,9 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.loader import as_design
-from actuator_lti.systems.resolvent import balanced
 from nonlinear.bench.differences import Differences
 from nonlinear.bench.injection import Watched
-from nonlinear.bench.lifted import Complexes, Floats, response
+from nonlinear.bench.lifted import Complexes, Floats, lifted, response
 from nonlinear.bench.loop_setup import LoopSetup, loop_setup
 
 if TYPE_CHECKING:
@@ -95,9 +94,7 @@ class Tangent:
 
     def lifted(self, point: complex) -> Complexes:
         """The transfer matrix over a base period, shape (M, M), at a point z = exp(j w period_s)."""
-        A, scale = balanced(self.A)
-        inside = np.linalg.solve(point * np.eye(len(A)) - A, (self.B / scale[:, None]).astype(complex))
-        return np.asarray(self.C * scale @ inside + self.D)
+        return lifted(self.A, self.B, self.C, self.D, np.array([point], complex))[0]
 
     def at_gain(self, gain: float) -> Floats:
         """A with the loop gain at the place multiplied: v = (gain - 1) times what comes back."""

@@ -118,12 +118,16 @@ def test_python_control_draws_it() -> None:
     )
 
 
-FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035]
+FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035, 740_026,
+               741_646]  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", FAILED_ONCE)
 def test_drives_that_failed_once(seed: int) -> None:
-    """A filter of the command lags behind a ramp; margins, peaks at rest lie on a mode at rest, an angle."""
+    """A filter of the command lags behind a ramp; margins, peaks at rest lie on a mode at rest, an angle.
+
+    A slow pair was taken for the rest that an integral holds; a response of 1e-10 was left to rounding.
+    """
     result = validate(full_drive(seed), CHECKS)
     assert result.passed, [str(row) for row in result.not_met]
 
