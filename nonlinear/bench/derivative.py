@@ -29,7 +29,7 @@ import numpy.typing as npt
 from actuator_lti.design.loader import as_design
 from nonlinear.bench.differences import Differences
 from nonlinear.bench.injection import Watched
-from nonlinear.bench.lifted import Complexes, Floats, lifted, response
+from nonlinear.bench.lifted import Complexes, Floats, lifted, response, sensitivities
 from nonlinear.bench.loop_setup import LoopSetup, loop_setup
 
 if TYPE_CHECKING:
@@ -54,6 +54,8 @@ class Tangent:
         Names of the numbers of the state that the injection moves, as the layout has them.
     stated_error : float
         Largest error of the response, relative, by what two step sizes differ in.
+    entry_errors : ndarray, shape (n + M, n + M)
+        The same of the entries of A over C beside B over D; see `error_at`.
     places : ndarray of int, shape (n,)
         Where the states lie in the row of the state.
     """
@@ -67,7 +69,8 @@ class Tangent:
     hold_s: float
     states: tuple[str, ...]
     stated_error: float
-    places: npt.NDArray[np.intp] = field(repr=False, default_factory=lambda: np.empty(0, np.intp))
+    entry_errors: Floats = field(repr=False)
+    places: npt.NDArray[np.intp] = field(repr=False)
 
     @cached_property
     def system(self) -> Any:
@@ -86,6 +89,13 @@ class Tangent:
         That is what a sinusoid injected at the place brings back at its own frequency.
         """
         return response(self.A, self.B, self.C, self.D, np.asarray(points, complex))
+
+    def error_at(self, points: npt.ArrayLike) -> Floats:
+        """Stated error of T at points z, of their shape: a sharp resonance feels errors of entries more."""
+        z = np.asarray(points, complex)
+        left, right = sensitivities(self.A, self.B, self.C, self.D, z.reshape(-1))
+        felt = np.einsum("zi,ik,zk->z", np.abs(left), self.entry_errors, np.abs(right))
+        return np.asarray(felt).reshape(z.shape)
 
     def open(self, points: npt.ArrayLike) -> Complexes:
         """L = T/(1 - T) at points z."""
@@ -162,7 +172,7 @@ def tangent(
     if setup is None:
         setup = loop_setup(as_design(design), place, limits_on=False, held=hold and place == "current")
     measured, tick_s = Differences(setup, place, watched), setup.design.controller.period_s
-    parts, stated_error = measured.parts()
+    parts, entry_errors, stated_error = measured.parts()
     return Tangent(
         place,
         *parts,
@@ -170,5 +180,6 @@ def tangent(
         hold_s=measured.hold * tick_s,
         states=measured.names,
         stated_error=stated_error,
+        entry_errors=entry_errors,
         places=measured.moved,
     )
