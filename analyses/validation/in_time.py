@@ -162,11 +162,11 @@ def margin_shown(bench: Bench, name: str) -> MarginShown | None:
     rows = [
         judged(
             f"{side}_the_margin", name, 1.0, found, max(WITHIN, own), unit="1",
-            because=f"{20.0 * log(gain, 10):.4g} dB: predicted to {'die out' if rate < 1.0 else 'grow'} "
-            f"{abs(size[-1]):.4g} times in {time_s[-1]:.3g} s; found over predicted",
-            condition=bench.setup(name).condition, resolved=own <= RESOLVED,
+            because=f"{20.0 * log(gain, 10):.4g} dB: predicted to {'shrink' if last < 1.0 else 'grow'} to "
+            f"{last:.4g} in {time_s[-1]:.3g} s; found over predicted",
+            condition=bench.setup(name).condition, resolved=own <= RESOLVED * abs(log(last)) / BESIDE,
         )
-        for side, (gain, rate, found, own, time_s, size) in zip(("inside", "outside"), runs, strict=True)
+        for side, (gain, last, found, own, time_s, _) in zip(("inside", "outside"), runs, strict=True)
     ]  # fmt: skip
     (inside, outside) = [(run[4], run[5]) for run in runs]
     hertz = margin.frequency_rad_s / (2.0 * np.pi)
@@ -176,9 +176,10 @@ def margin_shown(bench: Bench, name: str) -> MarginShown | None:
 def _beside(
     bench: Bench, name: str, gain: float, w: float
 ) -> tuple[float, float, float, float, Floats, Floats]:
-    """A run at a gain: gain, predicted factor a period, found over predicted, its own error, course.
+    """A run at a gain: gain, predicted factor over it, found over predicted, its own error, course.
 
-    The signal at the place begins with a part of what would be a large one.
+    An error e of the factor f is one of the margin of e BESIDE/|log f|: that is to be resolved.  The signal
+    at the place begins with a part of what would be a large one.
     """
     setup, plain = replace(bench.setup(name), gain=gain), bench.loop(name).plain_open
     found = tangent(bench.drive, name, setup=setup)
@@ -202,7 +203,7 @@ def _beside(
     seen = np.concatenate([[1.0], seen / begins])
     blur = SURE * (own / abs(begins) / last + found.stated_error)
     time_s: Floats = found.period_s * np.arange(periods + 1.0)
-    return gain, rate, float(np.abs(seen[-1])) / last, blur, time_s, seen.real
+    return gain, last, float(np.abs(seen[-1])) / last, blur, time_s, seen.real
 
 
 def _mode(A: Floats, pole: complex) -> tuple[Complexes, Complexes]:

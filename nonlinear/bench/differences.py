@@ -66,15 +66,15 @@ class Differences:
         """Of the numbers of the state that take part."""
         return names_of(self.moved)
 
-    def parts(self) -> tuple[Parts, float]:
-        """A, B, C and D, and the stated error: the largest of the response, relative."""
+    def parts(self) -> tuple[Parts, Floats, float]:
+        """A, B, C, D; stated errors of A over C beside B over D; the largest of the response, relative."""
         left, right = self._felt(self._estimate())
         sway = SWAY * self.kick * np.max(right, axis=0)
         tried = self._tried(np.maximum(sway, LEAST * np.abs(self.start[self.places])), left, right)
         for _ in range(2):  # what is felt of an error is known once the response is
             whole, off = tried.best(left, right)
             left, right = self._felt(whole)
-        return self._split(whole), float(np.max(np.einsum("zi,ik,zk->z", left, off, right)))
+        return self._split(whole), off, float(np.max(np.einsum("zi,ik,zk->z", left, off, right)))
 
     def _split(self, whole: Floats) -> Parts:
         n = self.moved.size
