@@ -110,7 +110,7 @@ class LoopSetup:
     def condition(self) -> str:
         """On which motion it is tested, in words."""
         if self.held:
-            return "rotor held" + (" at a constant speed" if self.bias.speed_rad_s else "")
+            return "rotor locked" + (" at a constant speed" if self.bias.speed_rad_s else "")
         if self.bias.speed_rad_s:
             pressed = ", coupling pressed by a constant moment" if self.bias.coupling_Nm else ""
             return f"on a constant speed{pressed}"

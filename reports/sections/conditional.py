@@ -87,7 +87,7 @@ def _ending(conditional: Conditional, scale: float, unit: str) -> str:
 def _facts(conditional: Conditional, scale: float, unit: str) -> Block:
     threshold, full_rad = conditional.threshold_rad, conditional.full_deflection_rad
     items = [
-        doc.fact("Largest step that settles", (threshold or full_rad) * scale, unit, better=1),
+        doc.fact("Largest step that no limit keeps moving", (threshold or full_rad) * scale, unit, better=1),
         doc.fact("Full deflection", full_rad * scale, unit),
     ]
     for point, margins in conditional.margins.items():
