@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, out_of_sight, within
-from actuator_lti.margins.axis_search import FAR_LOG, Found, last_above, search
+from actuator_lti.margins.axis_search import FAR_LOG, Found, passages, search
 from actuator_lti.margins.collocation import closed_loop_matrix, points_for
 from actuator_lti.margins.delay_form import in_series
+from actuator_lti.margins.distances import DISK, MODULUS, Distance
 from actuator_lti.margins.factored import Response, factored
-from actuator_lti.margins.factors_on_axis import Factored
+from actuator_lti.margins.factors_on_axis import Factored, half_turn
 from actuator_lti.margins.loop import Complex, Mask, RationalLoop, Real
 from actuator_lti.margins.nearest import nearest
-from actuator_lti.margins.nyquist import angle_about, angle_between
 from actuator_lti.margins.poles import SortedPoles, polynomial_roots, sorted_poles
 from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
 from actuator_lti.margins.trust import MOST_ERROR, Doubtful, error_bound, hardly_placed
@@ -30,6 +32,8 @@ _HARDLY = 1e-12  # rad
 _FLOORS = (0.01, 0.1, 0.5, 0.9)  # gain below which, behind a delay, no crossing of the real axis is listed
 _LEAST_GAIN = 1e-8
 _MOST_TURNS = 100_000  # of the delay that are listed, about a second's work
+_AT_NYQUIST = 1e8  # of the largest root: next to nothing is left of the half circle
+_NEAR = 1e-4  # relative: a crossing of the factors and one of the loop
 _LOW, _HIGH = 1e-3, 1e3  # of the smallest and largest root: where the ends of the axis begin
 
 
@@ -87,7 +91,7 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
             PhaseMargin(float(deg) if deg > -180.0 else 180.0, loop.frequency(x))
             for deg, x in zip(np.degrees(np.angle(-gain_L)), gain_x, strict=True)
         ),
-        *_distances(factors, response, parts, ends),
+        *_distances(factors, response, parts, ends, (MODULUS, DISK)),
     )
     top = listed_to if math.isfinite(listed_to) else None
     result = assembled(
@@ -102,6 +106,53 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
         band_rad_s=None if top is None else (0.0, top),
     )
     return within(result, band)
+
+
+def nearest_behind_delay(
+    loop: RationalLoop, delay_s: float, distances: tuple[Distance, ...]
+) -> list[tuple[float, float]]:
+    """Smallest values of distances, each with its frequency.
+
+    Raises
+    ------
+    Doubtful
+        They could not be checked.
+    """
+    with np.errstate(all="ignore"):
+        response = Response(loop, delay_s / (loop.period_s or 1.0))
+        factors = factored(response, sorted_poles(loop.A, loop.in_z))
+        parts, _, _ = _parts(factors, None)
+        return _distances(factors, response, parts, _ends(factors, response), distances)
+
+
+def first_turn(loop: RationalLoop, delay_s: float, floor: float) -> float | None:
+    """Where the phase first falls to 90 deg below that at zero frequency; ``None``: not above the floor.
+
+    Raises
+    ------
+    Doubtful
+        It could not be checked.
+    """
+    with np.errstate(all="ignore"):
+        response = Response(loop, delay_s / (loop.period_s or 1.0))
+        factors = factored(response, sorted_poles(loop.A, loop.in_z))
+        level = half_turn(factors.log_at(0.0)[1]) - 0.5 * math.pi
+        if factors.delay:  # no factor turns by more than half a turn
+            top = (factors.roots.size + 1.0) * math.pi / factors.delay
+        else:
+            top = _AT_NYQUIST * max(float(np.abs(factors.roots).max(initial=0.0)), 1.0)
+        top = float(passages(factors, 0.0, top, math.log(floor)).min(initial=top))
+        turns = passages(factors, 0.0, top, level, 1)
+        if not turns.size:
+            return None
+        sign = cmath.exp(-1j * level)
+
+        def beyond(w: float) -> float:
+            return float(np.angle(response.at(np.array([w]))[0] * sign))
+
+        near = float(turns[0])
+        w = brentq(beyond, near * (1.0 - _NEAR), near * (1.0 + _NEAR), xtol=1e-300, rtol=1e-14)
+        return response.frequency(float(w))
 
 
 def _refuse(loop: RationalLoop, delay_s: float) -> None:
@@ -153,9 +204,9 @@ def _reason(real_L: Complex, twice: bool, sure: bool) -> str:
 
 def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | None) -> None:
     """Poles that are clear of the border, but for exact ones at zero frequency."""
-    if poles.doubtful or (closed is not None and (closed.border_count or closed.doubtful)):
+    if poles.doubtful or (closed is not None and (closed.border or closed.doubtful)):
         raise Doubtful("a pole may lie on either side of the border")
-    if poles.border_count != poles.at_dc:
+    if poles.border != poles.at_dc:
         raise Doubtful("poles on the border")
     if hardly_placed(loop, poles.values, False):
         raise Doubtful("rounding of the coefficients moves a pole over the border")
@@ -225,7 +276,7 @@ def _turning_stop(
         return 10.0 * max(high, listed_to), listed_to, 0.0
     top = max(high, high * math.exp((math.log(_LEAST_GAIN) - factors.log_at(high)[0]) / slope))
     for floor in _FLOORS:
-        listed_to = last_above(factors, low, top, math.log(floor))
+        listed_to = float(passages(factors, low, top, math.log(floor)).max(initial=low))
         if listed_to <= most_turned:
             break
     return top, listed_to, floor
@@ -302,8 +353,14 @@ def _from_zero(factors: Factored, response: Response, found: Found, dc: complex)
         return 0.0, _leaving(1.0 + dc.real, found)
     low = float(found.known.low[0])
     on_real, on_axis = response.real_point(low), complex(response.at(np.array([low]))[0])
-    turned = angle_about(1.0 + on_real, 1.0 + on_axis, 0.5 * np.pi * factors.at_zero)
-    return turned, float(np.angle(1.0 + on_axis))
+    turn, about = _angle_between(1.0 + on_real, 1.0 + on_axis), 0.5 * math.pi * factors.at_zero
+    turn += 2.0 * math.pi * round((about - turn) / (2.0 * math.pi))
+    return turn, cmath.phase(1.0 + on_axis)
+
+
+def _angle_between(start: complex, stop: complex) -> float:
+    """Angle from one point to another of the same closed half plane."""
+    return cmath.phase(stop * start.conjugate())
 
 
 def _leaving(F: float, found: Found) -> float:
@@ -317,7 +374,7 @@ def _to_end(response: Response, part: _Part, end: complex) -> tuple[float, float
     """The turn of 1 + L onto the real axis at the end, and its angle before."""
     F = 1.0 + end
     if response.delay:
-        return angle_between(F, complex(F.real)), float(np.angle(F))
+        return _angle_between(F, complex(F.real)), cmath.phase(F)
     return 0.0, -_leaving(F.real, part.found)
 
 
@@ -349,33 +406,26 @@ def _gain_margins(
 
 
 def _distances(
-    factors: Factored, response: Response, parts: list[_Part], ends: tuple[complex, complex]
+    factors: Factored,
+    response: Response,
+    parts: list[_Part],
+    ends: tuple[complex, complex],
+    distances: tuple[Distance, ...],
 ) -> list[tuple[float, float]]:
-    """Modulus margin and disk margin, each with its frequency."""
+    """Smallest values of distances, each with its frequency."""
     nearest_ends = (ends[0], complex(-abs(ends[1])) if factors.delay else ends[1])
-    at_ends = [
-        min((float(_at_end(value, disk)), w) for value, w in zip(nearest_ends, (0.0, math.inf), strict=True))
-        for disk in (False, True)
+    best = [
+        min((d.at(value), w) for value, w in zip(nearest_ends, (0.0, math.inf), strict=True))
+        for d in distances
     ]
-    best = (at_ends[0], at_ends[1])
     for part in parts:
-        modulus, disk = nearest(part.factors, part.found.known, (best[0], best[1]))
-        found = [
-            (v, 1.0 / w if part.beyond else w) if v < b[0] else b
-            for (v, w), b in zip((modulus, disk), best, strict=True)
+        found = nearest(part.factors, part.found.known, distances, best)
+        best = [
+            (new[0], 1.0 / new[1] if part.beyond else new[1]) if new[0] < old[0] else old
+            for new, old in zip(found, best, strict=True)
         ]
-        best = (found[0], found[1])
-    inside = [w if 0.0 < w < math.inf else 1.0 for _, w in best]
-    L = response.at(np.array(inside))
-    return [
-        (_at_end(complex(L[k]), bool(k)) if w == inside[k] else value, response.frequency(w))
-        for k, (value, w) in enumerate(best)
-    ]
-
-
-def _at_end(L: complex, disk: bool) -> float:
-    if not math.isfinite(abs(L)):
-        return 2.0 if disk else math.inf
-    if not disk:
-        return abs(1.0 + L)
-    return math.inf if L == 1.0 else abs(2.0 * (1.0 + L) / (1.0 - L))
+    out = []
+    for d, (value, w) in zip(distances, best, strict=True):
+        inside = 0.0 < w < math.inf
+        out.append((d.at(complex(response.at(np.array([w]))[0])) if inside else value, response.frequency(w)))
+    return out

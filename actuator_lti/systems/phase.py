@@ -9,23 +9,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
-from actuator_lti.margins.delay_form import DelayForm, border_values, delay_form
-from actuator_lti.margins.delay_setting import low_frequency
+from actuator_lti.margins.delay_form import delay_form
+from actuator_lti.margins.delay_response import DelayResponse
 from actuator_lti.margins.factors import factor_phase, poles, zeros
 from actuator_lti.margins.loop import RationalLoop, Real, rational_loop
 from actuator_lti.margins.measured import measured_points
 from actuator_lti.margins.measured_bounds import bounds
 from actuator_lti.margins.measured_data import is_measured, measured_response
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.margins.sweep import subdivided, variation
 
 
 def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.0) -> Real:
     """Phase of a system over frequency, in deg, without jumps of 360 deg whatever the grid.
 
     The phase of a rational system is the sum of the phases of its poles and zeros, that of a delay is
-    -omega delay; a system with inner delays is followed from low frequency in steps that a bound keeps
-    below a quarter turn. At zero frequency the phase is -90 deg for each integrator (1/s^3 starts at -270),
+    -omega delay; that of a system with inner delays is counted from where it meets the negative real axis. At
+    zero frequency the phase is -90 deg for each integrator (1/s^3 starts at -270),
     and 180 deg less for a negative gain. An undamped resonance turns by -180 deg, as a damped one does.
 
     Parameters
@@ -65,7 +64,7 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
         return np.degrees(_measured_phase(system, flat, delay_s)).reshape(omega.shape)
     if hasattr(system, "delays_s"):
         if system.delays_s.size:
-            phase = _followed(delay_form(system), flat)
+            phase = DelayResponse.of(delay_form(system)).phase(flat)
             return np.degrees(phase - flat * delay_s).reshape(omega.shape)
         system = system.to_state_space()
     loop = rational_loop(system)
@@ -97,11 +96,8 @@ def rational_phase(loop: RationalLoop, x: Real) -> Real:
     """Unwrapped phase of a rational loop in rad; x as in `RationalLoop`."""
     roots, p = zeros(loop), poles(loop)
     at_dc = 1.0 + 0j if loop.in_z else 0j
-    border = [pole for pole in sorted_poles(loop.A, loop.in_z).border if pole.x == 0.0]
-    if border:  # a cluster of eigenvalues about the exact multiple pole
-        nearest = np.argsort(np.abs(p - at_dc))[: border[0].multiplicity]
-        p = p.copy()
-        p[nearest] = at_dc
+    at_rest = sorted_poles(loop.A, loop.in_z).at_dc
+    p[np.argsort(np.abs(p - at_dc))[:at_rest]] = at_dc  # a cluster of eigenvalues about the exact pole
     near = np.abs(np.concatenate((roots, p)) - at_dc)
     size = float(near.max()) if near.size else 1.0
     first = 1e-3 * float(min(near[near > 1e-7 * size].min(initial=1.0 if loop.in_z else size or 1.0), 1e300))
@@ -118,19 +114,3 @@ def rational_phase(loop: RationalLoop, x: Real) -> Real:
 
 def _wrapped(angle: Real) -> Real:
     return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
-
-
-def _followed(form: DelayForm, omega: Real) -> Real:
-    """Unwrapped phase of a system with inner delays, rad."""
-    low, order = low_frequency(form)
-    edges = np.geomspace(low, max(float(omega.max()), 2.0 * low) * 1.001, 60)
-    intervals = subdivided(form, edges, lambda c: variation(form, c) < 0.5 * np.abs(c.L))
-    start = -0.5 * np.pi * order
-    first = float(np.angle(intervals.L[0]) - start)
-    first -= 2.0 * np.pi * np.round(first / (2.0 * np.pi))
-    if first > 0.5 * np.pi:
-        first -= 2.0 * np.pi  # a negative gain counts as -180 deg
-    steps = np.angle(intervals.L[1:] * intervals.L[:-1].conj())
-    phase = start + first + np.concatenate(([0.0], np.cumsum(steps)))
-    nearest = np.clip(np.searchsorted(intervals.x + intervals.half, omega), 0, intervals.x.size - 1)
-    return phase[nearest] + np.angle(border_values(form, omega) * intervals.L[nearest].conj())
