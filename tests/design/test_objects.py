@@ -76,8 +76,6 @@ def test_a_real_set_of_another_motor_with_either_calibration() -> None:
     for factor, gain in ((1.0, 344e-6), (PER_RPM, 344e-6 * 30 / pi)):
         result = import_objects(objects(real, factor), AMBER)
         control = result.design.controller
-        assert control.current is not None
-        assert control.velocity is not None
         assert (control.current.gain_V_A, control.current.integral_time_s) == pytest.approx((1.028, 385e-6))
         assert (control.velocity.gain, control.velocity.integral_time_s) == pytest.approx((gain, 0.0371))
         assert control.position.gain == 2.0

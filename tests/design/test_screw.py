@@ -50,19 +50,18 @@ def test_energy_is_the_same_in_both_units() -> None:
     v = p * w
     motor = design.motor
     assert motor.rotor_inertia_kgm2 * v**2 == pytest.approx(3e-4 * w**2, rel=1e-14)
-    assert motor.torque_constant_Nm_A * v == pytest.approx(0.2 * w, rel=1e-14)  # type: ignore[operator]
-    assert motor.back_emf_constant_Vs_rad * v == pytest.approx(0.2 * w, rel=1e-14)  # type: ignore[operator]
+    assert motor.torque_constant_Nm_A * v == pytest.approx(0.2 * w, rel=1e-14)
+    assert motor.back_emf_constant_Vs_rad * v == pytest.approx(0.2 * w, rel=1e-14)
     assert design.friction.dry_torque_Nm * v == pytest.approx(0.05 * w, rel=1e-14)
     assert design.friction.viscous_Nms_rad == 2.0  # written in the axis's own unit
     assert design.limits.speed_rad_s == pytest.approx(2000 * 2 * pi / 60 * p, rel=1e-14)
-    assert design.controller.velocity.gain * v == pytest.approx(0.4 * w, rel=1e-14)  # type: ignore[union-attr]
+    assert design.controller.velocity.gain * v == pytest.approx(0.4 * w, rel=1e-14)
     assert design.controller.position.gain == 50.0  # 1/s, the same on either axis
     # 40 kg behind a 2:1 belt, and the pulley at its own shaft
     assert design.inertia_kgm2 == pytest.approx((3e-4 + 1e-4 / 4) / p**2 + 40 / 4, rel=1e-14)
     # a revolution of the motor is a lead on its side, half of it at the output
     assert design.angle_quantum_rad == pytest.approx(0.01 / 4000, rel=1e-15)
     tolerance = design.parameters["motor.rotor_inertia"].tolerance
-    assert tolerance is not None
     assert tolerance.half_width == pytest.approx(1e-5 / p**2, rel=1e-14)
 
 

@@ -122,7 +122,7 @@ def test_a_decimal_prefix_costs_no_digit(text: str) -> None:
 )
 def test_what_is_no_quantity_is_refused_with_the_unit_wanted(text: object, unit: str, says: str) -> None:
     with pytest.raises(InputError, match="allowed: ") as caught:
-        parse_quantity(text, unit)  # type: ignore[arg-type]
+        parse_quantity(text, unit)
     assert says in str(caught.value)
 
 

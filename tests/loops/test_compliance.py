@@ -1,7 +1,5 @@
 """The compliance by periodic response, and the figures of stiffness that a requirement names."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The slope limit of the current command: closed forms of the linear and of the running drive."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, pi, sin
 
@@ -18,7 +16,6 @@ def heavy(n_v: int, rate_A_s: float) -> Design:
     """A speed drive with P control whose load hardly moves: i_ref is Kp times the speed command."""
     design = amber(n_v)
     control = design.controller
-    assert control.velocity is not None
     velocity = replace(control.velocity, integral_time_s=None, every=n_v)
     return replace(
         design,
@@ -34,7 +31,6 @@ def test_onset_is_that_of_the_difference_of_a_sine(n_v: int) -> None:
     """Of A sin(w t) sampled every T the change is at most 2 A sin(w T/2): A = r T/(2 Kp N sin(w T/2))."""
     design = heavy(n_v, 150.0)
     velocity, T = design.controller.velocity, n_v * design.controller.period_s
-    assert velocity is not None
     path = assemble_loops(design).limiters["current-rate"]
     assert (path.limit, path.unit) == (150.0, "A/s")
     for w in (20.0, 700.0, 0.9 * pi / T):

@@ -1,7 +1,5 @@
 """The delay budget sums to the loop's phase, and each item is what it says."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,7 +1,5 @@
 """DelaySystem against the expressions it stands for, and as a python-control system."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import control

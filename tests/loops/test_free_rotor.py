@@ -1,7 +1,5 @@
 """A rotor without friction or behind a weak spring: what the current loop shows at zero frequency."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from typing import Any
@@ -74,7 +72,6 @@ def test_a_gain_of_one_at_rest_has_its_distances(certify: bool) -> None:
     """
     text = SERVO + WITHOUT.replace("0.02 V*s/rad", "6 mV*s/rad")
     loop = assemble_loops(read_design_text(text, "rc"), form="continuous").velocity
-    assert loop is not None
     result = stability_margins(loop.open_loop, certify=certify)
     assert result.stable is True
     assert result.evidence == "certified"
@@ -82,7 +79,6 @@ def test_a_gain_of_one_at_rest_has_its_distances(certify: bool) -> None:
     grid = 1j * np.geomspace(1.0, 1e5, 20_001)
     L = np.array([loop.open_loop(s) for s in grid]).ravel()
     assert result.modulus_margin == pytest.approx(np.abs(1.0 + L).min(), rel=1e-5)
-    assert result.disk_margin is not None
     assert result.disk_margin.alpha == pytest.approx((2.0 * np.abs((1.0 + L) / (1.0 - L))).min(), rel=1e-5)
 
 
@@ -92,8 +88,6 @@ def test_a_weak_spring_is_told_from_none(slope: float) -> None:
     design = load_design("ilr33-amber")
     load = replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope)
     loops = assemble_loops(replace(design, load=load), form="continuous")
-    assert loops.current is not None
-    assert loops.velocity is not None
     assert stability_margins(loops.current.open_loop).stable is (slope < 0.0)
     assert stability_margins(loops.velocity.open_loop).stable is True
 
@@ -102,7 +96,6 @@ def test_the_gain_at_rest_of_a_current_loop_on_a_free_rotor() -> None:
     """L(0) = Kp/Tn J/(kM kE): at constant current the ramp of the PI is one of the back-EMF."""
     design = read_design_text(SERVO + WITH_CURRENT_LOOP, "rc")
     loop = assemble_loops(design, form="continuous").current
-    assert loop is not None
     at_rest = 0.5 / 1e-3 * 1.2e-7 / 6e-3**2
     dc_gain = closed_loop_bandwidth(loop.closed_loop).dc_gain
     assert dc_gain == pytest.approx(at_rest / (1.0 + at_rest), rel=1e-9)

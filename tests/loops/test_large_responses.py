@@ -1,7 +1,5 @@
 """The response of a system of many states against its closed form, and at a pole of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

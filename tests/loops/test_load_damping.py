@@ -1,7 +1,5 @@
 """A load moment against the motion, per speed of the output: closed forms of both writings."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import exp
 
@@ -27,7 +25,7 @@ def coasting(path: str, viscous: float, load_coefficient: float = 0.0) -> Design
         controller=Controller(period_s=Ts, computing_delay_s=0.0),
         limits=Limits(voltage_V=10.0),
         validation=Validation(full_deflection_rad=1.0),
-        load=Load(path=path, moment_damping_Nms_rad=D),  # type: ignore[arg-type]
+        load=Load(path=path, moment_damping_Nms_rad=D),
         friction=Friction(viscous_Nms_rad=viscous, load_coefficient=load_coefficient),
     )
 
@@ -65,7 +63,6 @@ def test_energy_of_the_moment_is_work_on_the_load() -> None:
     design = coasting("back-drivable", 0.0)
     run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=80.0), energy=True)
     w, energy = run.motor_speed_rad_s, run.energy
-    assert energy is not None
     after = np.append(w, run.final.motor_speed_rad_s)
     assert energy.output_work_J == pytest.approx(0.5 * J * (80.0**2 - after[-1] ** 2), rel=1e-12)
     travel = 0.5 * (after[1:] + after[:-1]) * Ts  # under a constant torque
@@ -92,9 +89,6 @@ def test_top_speed_is_that_of_the_run(path: str) -> None:
     open_loop = replace(base.controller, position=None, velocity=None, current=None)
     design = replace(base, load=load, controller=open_loop)
     motor, friction, N = design.effective_motor, design.friction, design.total_ratio
-    assert motor.torque_constant_Nm_A is not None
-    assert motor.resistance_ohm is not None
-    assert motor.back_emf_constant_Vs_rad is not None
     per_volt = motor.torque_constant_Nm_A / motor.resistance_ohm
     passed = friction.load_coefficient + (1.0 / N if path == "back-drivable" else 0.0)
     slope = per_volt * motor.back_emf_constant_Vs_rad + friction.viscous_Nms_rad + passed * 20.0 / N

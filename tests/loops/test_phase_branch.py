@@ -1,7 +1,5 @@
 """The branch of a drawn phase: 90 deg for each decade a decade of the gain at low frequency."""
 
-from __future__ import annotations
-
 import control
 import numpy as np
 import pytest

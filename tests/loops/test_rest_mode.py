@@ -1,7 +1,5 @@
 """A spring under a velocity PI: the pole of the PI is cancelled by the zero of the plant, and known so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The exact hold with delay, against closed forms and against splitting the tick."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Many designs at once are each of them alone: random drives over decades, every stage left out."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -34,8 +32,6 @@ def everything() -> Design:
     """A position loop in front of a spring, every slot of the controller filled."""
     base = drive_e()
     control = base.controller
-    assert control.velocity is not None
-    assert control.current is not None
     position = PositionLoop(
         gain=20.0, every=4, feedforward=0.8, integral_time_s=0.2, derivative_time_s=2e-3,
         derivative_filter_s=1e-3, acceleration_feedforward=0.7, sensor="output",
@@ -85,7 +81,6 @@ def scattered(design: Design, count: int) -> dict[str, Any]:
     for path in values:  # what a filter may be is bounded by its period
         if path.startswith("control.velocity.filter") and not path.endswith(("depth", "damping")):
             velocity = design.controller.velocity
-            assert velocity is not None
             most = 2.0 if path.endswith("pole") else 2.5  # a pole on its zero would be no state at all
             values[path] = np.minimum(values[path], most / (velocity.every * values["control.period"]))
     return values
@@ -184,7 +179,6 @@ def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
 def test_gravity_may_differ_from_design_to_design() -> None:
     """The slope of the load is that of cos at each one's own angle."""
     joint = load_design("joint")
-    assert joint.load.gravity is not None
     offsets = np.array([0.1, 1.0, 2.5])
     many = replace(joint, load=replace(joint.load, gravity=replace(joint.load.gravity, offset_rad=offsets)))
     expected = joint.load.moment_slope_Nm_rad + joint.load.gravity.peak_Nm * np.cos(0.3 + offsets)

@@ -1,7 +1,5 @@
 """Every number of a rich design varied by itself in a stack: the figures are those of the design alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Torques that bend with the angle: closed forms of both writings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import acos, asin, cos, pi, sin, sqrt
 
@@ -180,7 +178,6 @@ def test_energy_balances(case: Case, name: str) -> None:
     run = simulate(design, commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3, energy=True)
     without = simulate(load_design(name), commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3)
     assert np.max(np.abs(run.current_A - without.current_A)) > 1e-4
-    assert run.energy is not None
     assert run.energy.relative_error < 1e-9
 
 
@@ -222,7 +219,6 @@ def test_keys_of_the_cogging() -> None:
     screw = load_design("ballscrew").with_values(
         {"motor.cogging": "5 mN*m", "motor.cogging_periods": "5 rad/rad"}
     )
-    assert screw.screw is not None
     travel = screw.screw.travel_m_rad
     assert screw.motor.over_angle.at(0.3 * travel) == pytest.approx(5e-3 / travel * sin(5 * 0.3), rel=1e-9)
 

@@ -1,7 +1,5 @@
 """Many runs: the bits of single runs, and reducers against histories."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

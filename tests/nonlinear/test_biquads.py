@@ -1,7 +1,5 @@
 """A biquad is (b0 + b1 z^-1 + b2 z^-2)/(1 + a1 z^-1 + a2 z^-2), a = [a1, a2], wherever a drive is written."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path

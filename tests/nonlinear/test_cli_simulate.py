@@ -1,7 +1,5 @@
 """`actuator-lti simulate` from the command line."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A drive without a position loop is commanded, judged and written in the unit of its outermost stage."""
 
-from __future__ import annotations
-
 import json
 from math import exp, pi
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Commands, loads and results: values, units and refusals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

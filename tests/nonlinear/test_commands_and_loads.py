@@ -1,7 +1,5 @@
 """Commands, loads and records of `simulate` say when they begin, and mean what they say."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -86,7 +84,6 @@ def test_a_record_holds_the_whole_load() -> None:
     from actuator_lti import load_design
 
     gravity = load_design("joint").load.gravity
-    assert gravity is not None
     own = gravity.mass_kg * 9.80665 * gravity.arm_m * np.sin(angle + gravity.offset_rad)
     slope = load_design("joint").load.moment_slope_Nm_rad
     np.testing.assert_allclose(run.load_Nm, 1.5 + (slope - 3.0) * angle + own, rtol=1e-12, atol=1e-12)

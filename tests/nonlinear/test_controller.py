@@ -1,7 +1,5 @@
 """Every slot of the controller against a plain writing of its equations, on random drives and inputs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, pi
 
@@ -51,7 +49,7 @@ def some_filters(rng: np.random.Generator, T: float) -> tuple[Filter, ...]:
 def some_drive(rng: np.random.Generator) -> Design:
     """Any stages, any options, on the motor of the baseline."""
 
-    def pick(*values):  # type: ignore[no-untyped-def]
+    def pick(*values):
         return values[rng.integers(len(values))]
 
     base = load_design("ilr33-amber")

@@ -1,7 +1,5 @@
 """Energy of the event-driven plant: balanced to 1e-9, each place with its own line, no loss ever falling."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -32,7 +30,6 @@ def stored(design: Design, x: np.ndarray) -> float:
     """Energy in the inductance, both inertias and the spring, of (i, w, W, th, phi)."""
     i, w, W, th, phi = x
     coupling, L = design.coupling, design.motor.inductance_H or 0.0
-    assert coupling is not None
     stretch = max(0.0, abs(th / design.ratio_to_coupling - phi) - coupling.play_rad / 2)
     kinetic = design.motor_side_inertia_kgm2 * w * w + design.load_side_inertia_kgm2 * W * W
     return 0.5 * (L * i * i + kinetic + coupling.stiffness_Nm_rad * stretch * stretch)
@@ -64,7 +61,6 @@ def test_energies_do_not_change_the_motion(seed: int) -> None:
 
 def test_trajectory_names_each_share() -> None:
     energy = simulate(drive_f(), commands.step(0.1), 0.1, energy=True).energy
-    assert energy is not None
     assert energy.relative_error < 1e-9
     assert energy.coupling_damping_J > 1e-5
     assert energy.parting_J > 1e-7

@@ -1,7 +1,5 @@
 """The parts of the rows that belong to the event-driven plant."""
 
-from __future__ import annotations
-
 from nonlinear._kernels import elastic_layout, layout
 
 

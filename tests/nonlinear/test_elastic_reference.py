@@ -1,7 +1,5 @@
 """The event-driven plant against an independent event-driven integration."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

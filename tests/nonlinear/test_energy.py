@@ -1,7 +1,5 @@
 """Energy: what goes in comes out, to 1e-9, whatever sticks, slips or saturates."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +22,6 @@ FRICTION = {
 )
 def test_baseline(amplitude: float, frequency: float, load: float, what: str) -> None:
     run = simulate(load_design("ilr33-amber"), commands.sine(amplitude, frequency), 1.0, load, energy=True)
-    assert run.energy is not None
     assert run.energy.relative_error < 1e-9
     assert run.energy.electrical_input_J > 0.0
     assert run.stick_fraction > 0.1 if what == "stick" else run.limits[what].fraction > 0.1
@@ -41,7 +38,6 @@ def test_asymmetric_back_drivable_with_fractional_delay() -> None:
     )
     run = simulate(design, commands.sine(0.01, 2.0), 1.0, loads.proportional(-40.0, 5.0), energy=True)
     energy = run.energy
-    assert energy is not None
     assert energy.relative_error < 1e-9
     assert abs(energy.conversion_J) > 1e-3
     assert abs(energy.output_work_J) > 1e-6
@@ -53,7 +49,6 @@ def test_other_drives(name: str) -> None:
     design = load_design(name)
     amplitude = design.validation.full_deflection_rad / 4
     run = simulate(design, commands.sine(amplitude, 1.0), 1.5, energy=True)
-    assert run.energy is not None
     assert run.energy.relative_error < 1e-9
 
 
@@ -61,7 +56,6 @@ def test_every_loss_of_a_steady_speed() -> None:
     design = load_design("ilr33-amber")
     run = simulate(design, commands.ramp(600.0 / design.total_ratio), 2.0, 8.0, energy=True)
     energy, turned = run.energy, run.final.motor_angle_rad
-    assert energy is not None
     assert energy.dry_friction_J == pytest.approx((2.25e-3 + 8 * 1.34e-3) * turned, rel=1e-9)
     assert energy.kinetic_J == pytest.approx(0.5 * design.inertia_kgm2 * run.final.motor_speed_rad_s**2)
 
@@ -70,7 +64,6 @@ def test_tanh_law_balances_to_its_steps() -> None:
     design = load_design("ilr33-amber")
     design = replace(design, friction=replace(design.friction, law="tanh"))
     run = simulate(design, commands.sine(0.01, 2.0), 0.5, 8.0, energy=True)
-    assert run.energy is not None
     assert run.energy.relative_error < 1e-6
 
 

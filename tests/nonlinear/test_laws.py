@@ -1,7 +1,5 @@
 """Symmetry, scaling, and the smoothed friction law."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -49,7 +49,6 @@ def test_the_motor_feels_the_load_as_friction_only(load_Nm: float) -> None:
     rate = radians(5.0)
     run = simulate(design, commands.ramp(rate_rad_s=rate), 1.0, load_Nm=load_Nm)
     friction, kM = design.friction, design.motor.torque_constant_Nm_A
-    assert kM is not None
     w = rate * design.total_ratio
     wanted = (friction.dry_torque_Nm + friction.load_coefficient * 4.0 + friction.viscous_Nms_rad * w) / kM
     last = slice(int(0.8 * len(run.time_s)), None)
@@ -62,7 +61,7 @@ def test_the_motor_feels_the_load_as_friction_only(load_Nm: float) -> None:
 def test_the_linear_motor_feels_the_spring_through_its_friction_only(point: str, sign: float) -> None:
     """dw/dt = ... -+ CM N_r k twist/J_m, by the side on which the coupling is pressed."""
     design = steering()
-    system = plant(design, "ideal", operating_point=point)  # type: ignore[arg-type]
+    system = plant(design, "ideal", operating_point=point)
     entry = system.A[system.state_labels.index("w"), system.state_labels.index("twist")]
     J_m, CM = design.motor_side_inertia_kgm2, design.friction.load_coefficient
     assert entry == pytest.approx(-sign * CM * 2.0 * 50.0 / J_m, rel=1e-12)

@@ -1,7 +1,5 @@
 """The plain C program that the benchmark measures against does the same: an independent oracle."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The layout says of each number of the state what it is, and the running drive agrees."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A bus voltage that varies over time: what the motor then has, in closed form."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -38,7 +36,6 @@ def _integrator(position: PositionLoop | None) -> Design:
 def _sampled_motion(design: Design, voltage_V: np.ndarray) -> np.ndarray:
     """Speed at the ticks under voltages held over them: the sum of what each tick adds."""
     gain = design.effective_motor.source_gain_Nm_V
-    assert gain is not None
     step = gain * TICK / design.inertia_kgm2
     return np.concatenate([[0.0], step * np.cumsum(voltage_V)[:-1]])
 
@@ -60,7 +57,6 @@ def test_a_duty_ratio_is_scaled_by_the_bus_between_the_loop_s_updates_too() -> N
     command = commands.step(30.0 / design.total_ratio)
     run = simulate(design, command, 1.0, supply=commands.sampled(TIME, BUS), supply_scales=True)
     gain = design.effective_motor.source_gain_Nm_V
-    assert gain is not None
     angle = speed = held = 0.0
     a = gain / design.inertia_kgm2
     expected = np.empty(len(TIME))

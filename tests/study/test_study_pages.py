@@ -30,6 +30,5 @@ def test_pages_of_studies_stand_alone_and_show_every_figure(browser, name, tmp_p
         assert drawn.count() == file.read_text(encoding="utf-8").count('<svg class="plot"') > 0
         for k in range(drawn.count()):
             box = drawn.nth(k).bounding_box()
-            assert box is not None
             assert box["width"] > 200
             assert drawn.nth(k).locator(".world path, .marks use").count() > 1

@@ -1,7 +1,5 @@
 """A report of a drive with many ticks in a period comes to its end."""
 
-from __future__ import annotations
-
 from actuator_lti import assemble_loops
 from actuator_lti.design import load_design, with_values
 from analyses.linear.loop_survey import MOST_STATES, survey_loops

@@ -1,7 +1,5 @@
 """Parameters that are one (kM and kE of one motor), and identified ones with their covariance."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -84,7 +82,6 @@ def test_a_value_poorly_known_is_cut_off_where_no_drive_is() -> None:
     fit = Fit(names=("friction.viscous",), values=np.array([2e-6]), covariance=np.array([[2.25e-12]]))
     design = read_design_text(write_design(design_with_fit(load_design("ilr33-amber"), fit, "test")))
     tolerance = design.parameters["friction.viscous"].tolerance
-    assert tolerance is not None
     assert tolerance.kind == "truncated-normal"
     sampler = sampler_of(design)
     drawn = sampler.draw(0, 2000)[:, sampler.paths.index("friction.viscous")]

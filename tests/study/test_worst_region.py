@@ -1,7 +1,5 @@
 """The region in which a worst case is looked for: what correlations leave of the tolerance box."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
