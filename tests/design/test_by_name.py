@@ -13,7 +13,7 @@ from nonlinear import commands, simulate
 DESIGN = load_design("ilr33-amber")
 
 
-def test_loops_and_runs_of_a_name_a_path_and_a_design_are_the_same(tmp_path: Path) -> None:
+def test_loops_and_runs_of_a_name_a_path_and_a_design_are_the_same(tmp_path) -> None:
     file = tmp_path / "copy.toml"
     file.write_text(write_design(DESIGN), encoding="utf-8")
     wanted = assemble_loops(DESIGN).position.open_loop

@@ -165,9 +165,7 @@ def test_amperes_of_an_ac_motor_that_say_nothing_are_warned_of() -> None:
     assert any(line.startswith("control.current.gain") and "30.62 V/A rms" in line for line in lines)
 
 
-def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(capsys) -> None:
     items = {item.path: item for item in explained(read_design_text(SERVO, "servo"))}
     assert items["motor.torque_constant"].written == "0.93 N*m/A"
     assert items["motor.torque_constant"].model == f"kM = {0.93 / sqrt(1.5):.9g} N*m/A"

@@ -260,7 +260,7 @@ def test_toml_that_is_no_settings_file_is_refused(text: str, says: str) -> None:
         read_settings_toml(text, "s")
 
 
-def test_a_settings_file_is_known_by_its_first_sign(tmp_path: object) -> None:
+def test_a_settings_file_is_known_by_its_first_sign(tmp_path) -> None:
     folder = __import__("pathlib").Path(str(tmp_path))
     some = objects({"0x2348.01": 50})
     (folder / "a.xdc").write_text(write_settings_xml(some))

@@ -238,8 +238,7 @@ def test_exact_margins_of_the_multirate_drive_bring_it_to_its_border() -> None:
     exact = exact_margins(assemble_loops(design), "u")
     for change, stable in ((0.999, True), (1.001, False)):
         slower = replace(
-            design.controller,
-            computing_delay_s=design.controller.computing_delay_s + change * exact.delay_s,
+            design.controller, computing_delay_s=design.controller.computing_delay_s + change * exact.delay_s
         )
         system = assemble_loops(replace(design, controller=slower)).tick_system
         assert bool(np.max(np.abs(np.linalg.eigvals(system.lifted().A))) < 1) is stable
@@ -283,10 +282,7 @@ def test_operating_points_of_the_friction() -> None:
     uneven = replace(
         design,
         friction=Friction(
-            dry_torque_Nm=2e-3,
-            dry_torque_reverse_Nm=4e-3,
-            viscous_Nms_rad=1e-6,
-            viscous_reverse_Nms_rad=3e-6,
+            dry_torque_Nm=2e-3, dry_torque_reverse_Nm=4e-3, viscous_Nms_rad=1e-6, viscous_reverse_Nms_rad=3e-6
         ),
     )
     assert friction_slope(uneven, direction=-1) == 3e-6

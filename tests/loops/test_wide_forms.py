@@ -20,9 +20,7 @@ def faster(design: Design, factor: float) -> Design:
     """The same continuous drive, sampled faster (its filters stay)."""
     control_ = design.controller
     quick = replace(
-        control_,
-        period_s=control_.period_s / factor,
-        computing_delay_s=control_.computing_delay_s / factor,
+        control_, period_s=control_.period_s / factor, computing_delay_s=control_.computing_delay_s / factor
     )
     return replace(design, controller=quick)
 
