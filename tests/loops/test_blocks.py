@@ -97,7 +97,7 @@ def test_with_one_frequency_it_is_the_notch() -> None:
     assert section(one, 2e-4) == pytest.approx(section(notch, 2e-4), rel=1e-12)
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(designs(), st.floats(0.01, 0.8))
 def test_items_sum_to_the_phase_of_the_exact_loop(design: Design, fraction: float) -> None:
     loops = assemble_loops(design)

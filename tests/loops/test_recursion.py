@@ -174,13 +174,13 @@ def wide_designs(draw: st.DrawFn) -> Design:
     )  # fmt: skip
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(wide_designs())
 def test_any_wide_design(design: Design) -> None:
     agree(design, 90, 1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(designs())
 def test_any_design_from_any_start(design: Design) -> None:
     agree(design, 120, 1e-9, torque=-2.25e-3, start=START)
