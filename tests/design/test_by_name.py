@@ -13,7 +13,7 @@ from nonlinear import commands, simulate
 DESIGN = load_design("ilr33-amber")
 
 
-def test_loops_and_runs_of_a_name_a_path_and_a_design_are_the_same(tmp_path: Path) -> None:
+def test_loops_and_runs_of_a_name_a_path_and_a_design_are_the_same(tmp_path) -> None:
     file = tmp_path / "copy.toml"
     file.write_text(write_design(DESIGN), encoding="utf-8")
     wanted = assemble_loops(DESIGN).position.open_loop
@@ -38,20 +38,20 @@ def test_anything_else_is_refused_in_one_line(given: object) -> None:
 
 
 BAD = {
-    "load": lambda: load_design(3),  # type: ignore[arg-type]
-    "text": lambda: read_design_text(b"x"),  # type: ignore[arg-type]
-    "write": lambda: write_design(3),  # type: ignore[arg-type]
-    "hash": lambda: design_hash(None),  # type: ignore[arg-type]
+    "load": lambda: load_design(3),
+    "text": lambda: read_design_text(b"x"),
+    "write": lambda: write_design(3),
+    "hash": lambda: design_hash(None),
     "lambda": lambda: DESIGN.with_values({"motor.resistance": lambda: 1.0}),
     "complex": lambda: DESIGN.with_values({"motor.resistance": 1j}),
-    "pairs": lambda: DESIGN.with_values([("motor.resistance", 1.0)]),  # type: ignore[arg-type]
-    "number": lambda: DESIGN.with_values({3: 1.0}),  # type: ignore[dict-item]
-    "key": lambda: parameter_value(DESIGN, 3),  # type: ignore[arg-type]
-    "no design": lambda: parameter_value("ilr33-amber", "motor.resistance"),  # type: ignore[arg-type]
-    "sweep key": lambda: sweep("ilr33-amber", 3, [1.0]),  # type: ignore[arg-type]
-    "sweep": lambda: sweep("ilr33-amber", "limits.voltage", 5),  # type: ignore[arg-type]
-    "load torque": lambda: assemble_loops(DESIGN, load_Nm="4 N*m"),  # type: ignore[arg-type]
-    "form": lambda: assemble_loops(DESIGN, form=["sampled"]),  # type: ignore[arg-type]
+    "pairs": lambda: DESIGN.with_values([("motor.resistance", 1.0)]),
+    "number": lambda: DESIGN.with_values({3: 1.0}),
+    "key": lambda: parameter_value(DESIGN, 3),
+    "no design": lambda: parameter_value("ilr33-amber", "motor.resistance"),
+    "sweep key": lambda: sweep("ilr33-amber", 3, [1.0]),
+    "sweep": lambda: sweep("ilr33-amber", "limits.voltage", 5),
+    "load torque": lambda: assemble_loops(DESIGN, load_Nm="4 N*m"),
+    "form": lambda: assemble_loops(DESIGN, form=["sampled"]),
     "filter": lambda: DESIGN.add_filter("velocity", kind="lowpass", frequency=[1.0]),
 }
 

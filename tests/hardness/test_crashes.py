@@ -1,7 +1,5 @@
 """A crash is no verdict: one line, exit 3, the traceback on disk, and the rest of the report is written."""
 
-from __future__ import annotations
-
 import json
 import re
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Devices, pipes and links as outputs: written through or refused, never replaced."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

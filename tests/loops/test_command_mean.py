@@ -1,7 +1,5 @@
 """The mean that limits the jerk of a command: its response against the simulator, and the word about it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, pi, sqrt
 

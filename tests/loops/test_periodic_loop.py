@@ -1,7 +1,5 @@
 """A loop over one period of the drive: its response is what comes back at the frequency that goes in."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Checks of a published site that several tests share."""
 
-from __future__ import annotations
-
 import json
 from html.parser import HTMLParser
 from pathlib import Path

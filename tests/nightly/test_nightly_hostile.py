@@ -1,7 +1,5 @@
 """Names and texts of other people stay text: in pages, SVG, PDF, CSV, JUnit, Markdown and paths."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

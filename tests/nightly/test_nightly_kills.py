@@ -1,7 +1,5 @@
 """Killed at any moment: the site stays whole, the history consistent, and the next run goes on."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -25,7 +23,7 @@ KILLS = 60
 
 
 @pytest.fixture
-def fast_folder(tmp_path: Path) -> Iterator[Path]:
+def fast_folder(tmp_path) -> Iterator[Path]:
     """A folder in memory where there is one: a killed process leaves the same there, and waits are short."""
     memory = Path("/dev/shm")
     if not os.access(memory, os.W_OK):

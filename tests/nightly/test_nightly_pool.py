@@ -1,7 +1,5 @@
 """Worker processes: one design that raises, dies or never ends does not stop the others."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

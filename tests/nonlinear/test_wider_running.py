@@ -1,7 +1,5 @@
 """Loads, supply, overload, instruments, profile and other outermost stages against laws and closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, pi, sqrt
 

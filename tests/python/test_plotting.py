@@ -118,7 +118,7 @@ def test_matplotlib_is_imported_only_when_something_is_drawn() -> None:
     assert done.stdout.strip() == "False"
 
 
-def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:
     run = simulate("ilr33-amber", commands.step(0.01), 0.01)
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(

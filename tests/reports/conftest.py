@@ -1,7 +1,5 @@
 """The report of the shipped baseline, validation included, built once for all tests of this folder."""
 
-from __future__ import annotations
-
 import pytest
 from built_report import Built, validated
 
@@ -10,7 +8,7 @@ from reports.build import design_report, write_report
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+def built(tmp_path_factory) -> Built:
     """Build the report of ilr33-amber at a fixed time."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")

@@ -1,13 +1,10 @@
 """The command line: exit statuses, one line an error, JSON alone on standard output."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 import typer
@@ -33,7 +30,7 @@ def one_line(error: str) -> str:
     return error
 
 
-def test_help_lists_every_command(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_lists_every_command(capsys) -> None:
     assert main(["--help"]) == 0
     words = capsys.readouterr().out
     wanted = {
@@ -54,7 +51,7 @@ def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
     assert not any(docs.values()), docs
 
 
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+def test_version(capsys) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out.startswith("actuator-lti ")
 
@@ -95,7 +92,7 @@ def test_a_report_with_validation_waits_for_no_library_that_it_does_not_use() ->
     assert done.stdout.splitlines()[-1] == "[]"
 
 
-def test_margins_in_json_and_nothing_else(capsys: pytest.CaptureFixture[str]) -> None:
+def test_margins_in_json_and_nothing_else(capsys) -> None:
     assert main(["margins", "--json"]) == 0
     captured = capsys.readouterr()
     result = json.loads(captured.out)
@@ -106,14 +103,14 @@ def test_margins_in_json_and_nothing_else(capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
-def test_margins_on_the_terminal_name_every_loop(form: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_margins_on_the_terminal_name_every_loop(form: str, capsys) -> None:
     assert main(["margins", "ilr33-amber", "--form", form]) == 0
     words = capsys.readouterr().out
     for name in ("Current loop", "Velocity loop", "Position loop", "Phase margin, deg", "✓ met"):
         assert name in words
 
 
-def test_a_failed_requirement_is_status_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_failed_requirement_is_status_1(tmp_path, capsys) -> None:
     design = tmp_path / "strict.toml"
     design.write_text(shipped_text().replace('minimum = "15 Hz"', 'minimum = "50 Hz"'), encoding="utf-8")
     assert main(["margins", str(design)]) == 1
@@ -139,16 +136,14 @@ def test_a_failed_requirement_is_status_1(tmp_path: Path, capsys: pytest.Capture
         (["report", "--processes", "2"], "--processes"),
     ],
 )
-def test_bad_input_is_one_line_and_status_2(
-    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_input_is_one_line_and_status_2(arguments: list[str], words: str, capsys) -> None:
     assert main(arguments) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
     assert words in one_line(captured.err)
 
 
-def test_a_bad_design_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_design_writes_nothing(tmp_path, capsys) -> None:
     design = tmp_path / "bad.toml"
     design.write_text(shipped_text().replace('"9.2 g*cm^2"', '"-9.2 g*cm^2"'), encoding="utf-8")
     assert main(["report", str(design), "--out", str(tmp_path / "out")]) == 2
@@ -156,15 +151,13 @@ def test_a_bad_design_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_that_is_a_file_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_is_a_file_is_named(tmp_path, capsys) -> None:
     (tmp_path / "out").write_text("in the way")
     assert main(["report", "ctms-motor-position", "--out", str(tmp_path / "out"), "--no-validation"]) == 2
     assert str(tmp_path / "out") in one_line(capsys.readouterr().err)
 
 
-def test_report_writes_both_files_and_gives_the_document(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_report_writes_both_files_and_gives_the_document(tmp_path, capsys) -> None:
     arguments = ["report", "ctms-motor-position", "--out", str(tmp_path), "--json", "--no-validation"]
     assert main(arguments) == 0
     assert json.loads(capsys.readouterr().out) == json.loads(
@@ -173,9 +166,7 @@ def test_report_writes_both_files_and_gives_the_document(
     assert sorted(os.listdir(tmp_path)) == ["report.html", "report.json"]
 
 
-def test_a_new_design_gets_its_report_with_one_command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_new_design_gets_its_report_with_one_command(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["init", "my-drive.toml"]) == 0
     assert main(["report", "my-drive.toml", "--no-validation"]) == 0
@@ -194,7 +185,7 @@ def test_a_new_design_gets_its_report_with_one_command(
         (typer.BadParameter("no"), 2, "no"),
     ],
 )
-def test_statuses(raised: BaseException, status: int, words: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_statuses(raised: BaseException, status: int, words: str, capsys) -> None:
     def call() -> None:
         raise raised
 
@@ -202,9 +193,7 @@ def test_statuses(raised: BaseException, status: int, words: str, capsys: pytest
     assert words in one_line(capsys.readouterr().err)
 
 
-def test_an_interrupted_command_says_so(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_interrupted_command_says_so(monkeypatch, capsys) -> None:
     def interrupted() -> None:
         raise KeyboardInterrupt
 
@@ -225,7 +214,7 @@ def test_a_closed_pipe_is_no_error() -> None:
     assert done.returncode == 141
 
 
-def test_progress_stays_off_where_nobody_looks(capsys: pytest.CaptureFixture[str]) -> None:
+def test_progress_stays_off_where_nobody_looks(capsys) -> None:
     from reports.cli.progress import progress
 
     with progress("work") as report:
@@ -235,7 +224,7 @@ def test_progress_stays_off_where_nobody_looks(capsys: pytest.CaptureFixture[str
 
 @pytest.mark.parametrize("command", ["report", "validate", "compare", "tune", "montecarlo"])
 def test_a_folder_that_cannot_be_is_refused_before_anything_is_computed(
-    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    command: str, tmp_path, capsys, monkeypatch
 ) -> None:
     def unwanted(*_: object) -> None:
         raise AssertionError("the design was read before the folder was looked at")
@@ -247,7 +236,7 @@ def test_a_folder_that_cannot_be_is_refused_before_anything_is_computed(
     assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_margins_say_what_is_suspicious_on_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
+def test_margins_say_what_is_suspicious_on_standard_error(capsys) -> None:
     assert main(["margins", "emps", "--json"]) in (0, 1)
     printed = capsys.readouterr()
     assert printed.err.startswith("warning: emps: control.position.gain:")

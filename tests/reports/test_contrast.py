@@ -1,7 +1,5 @@
 """The colours of every page against WCAG 2.2 AA: text 4.5, lines of figures and the focus ring 3."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

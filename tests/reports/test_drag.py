@@ -51,7 +51,6 @@ SCALE = """([chart, k]) => {
 def drive() -> Design:
     amber = load_design("ilr33-amber")
     velocity = amber.controller.velocity
-    assert velocity is not None
     notch = Filter(
         kind="notch", frequency_rad_s=2.0 * math.pi * 200.0, width_rad_s=2.0 * math.pi * 60.0, depth=0.3
     )
@@ -59,7 +58,7 @@ def drive() -> Design:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory) -> Path:
     return written(drive(), tmp_path_factory.mktemp("drag"))
 
 
@@ -130,7 +129,6 @@ def test_the_nyquist_curve_is_dragged_outwards(page: Page) -> None:
 def test_the_corner_and_the_notch_are_moved_by_their_handles(page: Page) -> None:
     def middle(name: str) -> tuple[float, float]:
         box = page.locator(f'[data-chart="bode"] circle[data-name="{name}"]').bounding_box()
-        assert box is not None
         return box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0
 
     low, high, apart = page.evaluate(SCALE, ["bode", 1])[0]
@@ -177,7 +175,7 @@ def test_a_value_that_does_not_parse_is_said_beside_itself(page: Page) -> None:
     assert read(page) == before
 
 
-def test_a_design_with_a_limit_that_fails_marks_only_that(browser: Browser, tmp_path: Path) -> None:
+def test_a_design_with_a_limit_that_fails_marks_only_that(browser: Browser, tmp_path) -> None:
     trouble: list[str] = []
     late = with_values(load_design("ilr33-amber"), {"control.velocity.gain": 0.75})
     page = opened(browser, written(late, tmp_path), trouble)

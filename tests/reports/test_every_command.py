@@ -2,7 +2,6 @@
 
 import json
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -59,14 +58,14 @@ def test_every_command_speaks_json_and_takes_changes(name: str) -> None:
 
 
 @pytest.mark.parametrize("words", [[], ["objects"], ["export"]])
-def test_no_command_prints_help(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_command_prints_help(words: list[str], capsys) -> None:
     main(words)
     shown = capsys.readouterr()
     assert "Usage" in shown.out + shown.err
     assert "Traceback" not in shown.err
 
 
-def test_json_of_commands_that_write(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_of_commands_that_write(tmp_path, capsys) -> None:
     file = tmp_path / "mine.toml"
     for words in (
         ["init", str(file)],
@@ -97,13 +96,7 @@ def test_json_of_commands_that_write(tmp_path: Path, capsys: pytest.CaptureFixtu
     ],
     ids=lambda value: " ".join(value[:1]) if isinstance(value, list) else str(value),
 )
-def test_the_first_line_is_the_verdict(
-    words: list[str],
-    passed: bool,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_first_line_is_the_verdict(words: list[str], passed: bool, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     status = main([*words, "--quiet"] if words[0] in ("compare", "tune") else words)
@@ -116,9 +109,7 @@ def test_the_first_line_is_the_verdict(
 
 
 @pytest.mark.parametrize("width", [30, 60, 80, 200])
-def test_side_by_side_tables_are_stacked_rather_than_broken(
-    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_side_by_side_tables_are_stacked_rather_than_broken(width: int, monkeypatch, capsys) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
     names = [f"Variant-{k}" for k in range(9)]
     columns = [
@@ -137,9 +128,7 @@ def test_side_by_side_tables_are_stacked_rather_than_broken(
         assert not re.search(r"^\s*\w\s*$", out, re.M)
 
 
-def test_a_name_of_a_record_is_changed_for_identify(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_name_of_a_record_is_changed_for_identify(tmp_path, capsys) -> None:
     file = tmp_path / "d.toml"
     file.write_text(write_design(load_design("emps")))
     assert main(["identify", str(file), "--set", "nothing"]) == 2

@@ -1,7 +1,5 @@
 """The first screen answers: five figures a loop with their distance, the weakest point, what to watch."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

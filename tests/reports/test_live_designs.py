@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,7 +50,7 @@ CHANGES = {  # in the units of the page; the last restores no design
 
 
 @pytest.fixture(params=sorted(CHANGES))
-def shown(request: pytest.FixtureRequest, browser: Browser, tmp_path: Path) -> Iterator[tuple[str, Page]]:
+def shown(request, browser: Browser, tmp_path) -> Iterator[tuple[str, Page]]:
     """Open the page of a shipped design."""
     trouble: list[str] = []
     page = opened(browser, written(load_design(request.param), tmp_path), trouble)
@@ -64,7 +63,7 @@ def test_no_shipped_design_is_left_out() -> None:
     assert sorted(CHANGES) == sorted(shipped_designs())
 
 
-def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page], tmp_path: Path) -> None:
+def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page], tmp_path) -> None:
     name, page = shown
     agree(read(page), command_line(saved(page, tmp_path / "same.toml")))
     verdicts_agree(page, command_line(tmp_path / "same.toml", "requirements"))
@@ -82,7 +81,7 @@ def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page],
         assert parameter_value(load_design(changed), key) != parameter_value(load_design(name), key)
 
 
-def test_periodic_break_points_follow_once_nothing_moves(browser: Browser, tmp_path: Path) -> None:
+def test_periodic_break_points_follow_once_nothing_moves(browser: Browser, tmp_path) -> None:
     """Their fundamental has the margins of the command line's; while a value moves the row says so."""
     design = load_design("ilr33-amber-multirate")
     trouble: list[str] = []
@@ -102,7 +101,7 @@ def test_periodic_break_points_follow_once_nothing_moves(browser: Browser, tmp_p
     assert trouble == []
 
 
-def test_where_rounding_decides_no_figure_is_shown(browser: Browser, tmp_path: Path) -> None:
+def test_where_rounding_decides_no_figure_is_shown(browser: Browser, tmp_path) -> None:
     """An unstable current loop between slow updates: the command line withholds, so does the page."""
     design = load_design("ilr33-amber-multirate")
     trouble: list[str] = []
@@ -120,7 +119,7 @@ def test_where_rounding_decides_no_figure_is_shown(browser: Browser, tmp_path: P
     assert trouble == []
 
 
-def test_whole_numbers_stay_whole_and_multiples(browser: Browser, tmp_path: Path) -> None:
+def test_whole_numbers_stay_whole_and_multiples(browser: Browser, tmp_path) -> None:
     design = load_design("ilr33-amber-multirate")
     trouble: list[str] = []
     page = opened(browser, written(design, tmp_path), trouble)
@@ -142,7 +141,7 @@ def test_whole_numbers_stay_whole_and_multiples(browser: Browser, tmp_path: Path
     assert trouble == []
 
 
-def test_a_friction_map_has_sliders(browser: Browser, tmp_path: Path) -> None:
+def test_a_friction_map_has_sliders(browser: Browser, tmp_path) -> None:
     """The loops have the slope of the map's first piece, as the linear form has at rest."""
     map_Nm = ((0.0, 3e-3), (40.0, 2e-3), (900.0, 4e-3))
     points = tuple(FrictionPoint(speed_rad_s=speed, torque_Nm=torque) for speed, torque in map_Nm)
@@ -169,7 +168,7 @@ def test_a_friction_map_has_sliders(browser: Browser, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "fin"])
 def test_cells_of_the_map_are_named_as_the_command_line_names_them(
-    browser: Browser, tmp_path: Path, name: str
+    browser: Browser, tmp_path, name: str
 ) -> None:
     """Every cell again, as a sine from rest, by the simulator and the rule of the large-signal map."""
     design = load_design(name)
@@ -208,7 +207,7 @@ ASKED = (
 )
 
 
-def test_requirements_on_the_whole_drive_follow(browser: Browser, tmp_path: Path) -> None:
+def test_requirements_on_the_whole_drive_follow(browser: Browser, tmp_path) -> None:
     """Rate, current, acceleration, torque margin and lost motion of a loaded drive as `margins` has them."""
     limits = [
         Requirement(id=f"r{k}", quantity=name, unit=unit, minimum=low, maximum=9.0 if low is None else None,
@@ -235,7 +234,7 @@ def test_requirements_on_the_whole_drive_follow(browser: Browser, tmp_path: Path
     assert trouble == []
 
 
-def test_a_requirement_that_needs_a_simulation_of_its_own_is_named(tmp_path: Path) -> None:
+def test_a_requirement_that_needs_a_simulation_of_its_own_is_named(tmp_path) -> None:
     limits = (Requirement(id="swing", quantity="limit_cycle", unit="deg", maximum=0.1),)
     design = replace(load_design("ilr33-amber"), requirements=limits)
     model = live_model(design)

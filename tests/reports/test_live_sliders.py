@@ -32,7 +32,7 @@ DESIGN = "ilr33-amber"
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory) -> Path:
     return written(load_design(DESIGN), tmp_path_factory.mktemp("sliders"))
 
 
@@ -45,7 +45,7 @@ def page(browser: Browser, made: Path) -> Iterator[Page]:
     assert trouble == []
 
 
-def test_figures_as_designed_and_as_changed_are_the_command_lines(page: Page, tmp_path: Path) -> None:
+def test_figures_as_designed_and_as_changed_are_the_command_lines(page: Page, tmp_path) -> None:
     agree(read(page), command_line(saved(page, tmp_path / "same.toml")))
     before = read(page)
     slider = page.locator('.row[data-path="control.position.gain"] input[type=range]')
@@ -92,7 +92,7 @@ def test_every_slider_leads_to_the_figures_of_the_changed_design(page: Page) -> 
         settled(page, lambda: page.click('[data-do="undo"]'))
 
 
-def test_a_requirement_that_fails_is_said_at_once(page: Page, tmp_path: Path) -> None:
+def test_a_requirement_that_fails_is_said_at_once(page: Page, tmp_path) -> None:
     assert page.get_attribute(".state", "data-failing") == "0"
     type_value(page, "control.position.gain", 590.0)
     failing = int(page.get_attribute(".state", "data-failing") or 0)
@@ -166,7 +166,7 @@ def record_of(design: Design, path: Path) -> None:
     np.savetxt(path, table, delimiter=",", header="time_s,command_deg,angle_deg", comments="", fmt="%.12g")
 
 
-def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path: Path) -> None:
+def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path) -> None:
     """The record is a run of another gain: the model meets it once that gain is set."""
     record_of(with_values(load_design(DESIGN), {"control.position.gain": 80.0}), tmp_path / "bench.csv")
     text = (tmp_path / "bench.csv").read_text()
@@ -187,7 +187,7 @@ def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path: Path) -> 
     assert float(fits) < 1e-6
 
 
-def test_nothing_of_a_design_becomes_markup(browser: Browser, tmp_path: Path) -> None:
+def test_nothing_of_a_design_becomes_markup(browser: Browser, tmp_path) -> None:
     design = replace(load_design(DESIGN), name=HOSTILE, title=HOSTILE, description=HOSTILE)
     trouble: list[str] = []
     result = opened(browser, written(design, tmp_path), trouble)

@@ -1,7 +1,5 @@
 """The headline of a report, its page, its JSON and the exit status say the same."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any
@@ -47,7 +45,7 @@ def run(folder: Path, *changes: str) -> tuple[int, str, Any]:
 @pytest.mark.parametrize(
     ("slope", "status", "word"), [("-1", 0, "PASS"), ("1", 0, "PASS"), ("1e9", 1, "FAIL")]
 )
-def test_the_report_of_a_drive_under_a_slope(slope: str, status: int, word: str, tmp_path: Path) -> None:
+def test_the_report_of_a_drive_under_a_slope(slope: str, status: int, word: str, tmp_path) -> None:
     """Held by the load, pushed by it, driven away by it."""
     changes = ("--set", "load.path=back-drivable", "--set", f"load.moment_slope={slope} N*m/rad")
     code, output, document = run(tmp_path, *changes)
@@ -61,7 +59,7 @@ def test_the_report_of_a_drive_under_a_slope(slope: str, status: int, word: str,
         assert "phase margin, current loop held" in [item["words"] for item in live["apart"]]
 
 
-def test_a_missing_part_is_in_headline_and_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_part_is_in_headline_and_json(tmp_path, monkeypatch) -> None:
     def fails(*_: Any) -> None:
         raise ZeroDivisionError("made up")
 

@@ -1,13 +1,10 @@
 """The report of a design: page and JSON say the same, nothing comes through unescaped."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -152,9 +149,7 @@ def test_parameters_come_with_source_and_grade(built: Built) -> None:
     assert rows["load.inertia"]["tolerance"] == "±50 %"
 
 
-def test_the_same_input_gives_the_same_bytes(
-    built: Built, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_same_input_gives_the_same_bytes(built: Built, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     document = design_report(load_design("ilr33-amber"), validated())
     page_path, data = write_report(document, tmp_path)
@@ -162,7 +157,7 @@ def test_the_same_input_gives_the_same_bytes(
     assert page_path.read_bytes() == built.page.read_bytes()
 
 
-def test_a_time_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_time_that_is_none_is_refused(monkeypatch) -> None:
     from reports.provenance import build_time
 
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")

@@ -1,12 +1,9 @@
 """The page's script, put together of modules: each once, behind what it imports, nothing lost, no circle."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess
 from importlib.resources import files
-from pathlib import Path
 
 import pytest
 
@@ -30,7 +27,7 @@ def test_every_module_is_on_the_page_once_behind_its_imports() -> None:
     assert not re.search(r"^\s*(import|export)\b", text, re.MULTILINE)
 
 
-def test_modules_in_a_circle_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_modules_in_a_circle_are_refused(monkeypatch) -> None:
     texts = {"page/a.js": 'import { b } from "./b.js";\nexport const a = 1;\n',
              "page/b.js": 'import { a } from "./a.js";\nexport const b = 2;\n'}  # fmt: skip
     monkeypatch.setattr(scripts, "asset", texts.__getitem__)
@@ -39,7 +36,7 @@ def test_modules_in_a_circle_are_refused(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
-def test_a_bundle_runs_as_its_modules_would(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_bundle_runs_as_its_modules_would(monkeypatch, tmp_path) -> None:
     texts = {"page/a.js": 'import { two } from "./b.js";\nconst own = 3;\nconsole.log(own * two());\n',
              "page/b.js": "const own = 2;\nexport const two = () => own;\n"}  # fmt: skip
     monkeypatch.setattr(scripts, "asset", texts.__getitem__)

@@ -24,9 +24,7 @@ def wide_table(columns: int) -> dict:
 
 @pytest.mark.parametrize("width", [40, 60, 80, 200])
 @pytest.mark.parametrize("columns", [1, 4, 12])
-def test_no_value_is_broken_and_no_line_is_too_long(
-    width: int, columns: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_no_value_is_broken_and_no_line_is_too_long(width: int, columns: int, monkeypatch, capsys) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
     block = wide_table(columns)
     print_blocks([block])
@@ -37,9 +35,7 @@ def test_no_value_is_broken_and_no_line_is_too_long(
 
 
 @pytest.mark.parametrize("width", range(70, 140, 5))
-def test_headings_break_before_a_word_of_a_cell_is_cut(
-    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_headings_break_before_a_word_of_a_cell_is_cut(width: int, monkeypatch, capsys) -> None:
     """A table whose headings are longer than its cells, narrower than they are, wider than the cells."""
     monkeypatch.setenv("COLUMNS", str(width))
     labels = ["Cause", "Dry friction", "Kind", "Predicted, peak", "at", "Simulated", "at", "Verdict"]
@@ -54,9 +50,7 @@ def test_headings_break_before_a_word_of_a_cell_is_cut(
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])
-def test_margins_say_the_verdict_first_and_fit(
-    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_margins_say_the_verdict_first_and_fit(width: int, monkeypatch, capsys) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
     assert main(["margins", "ilr33-amber"]) == 0
     first, *rest = capsys.readouterr().out.splitlines()
@@ -65,7 +59,7 @@ def test_margins_say_the_verdict_first_and_fit(
     assert sum(line.count("✓ met") for line in rest) == 12
 
 
-def test_a_failed_requirement_is_in_the_first_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_failed_requirement_is_in_the_first_line(capsys) -> None:
     assert main(["margins", "ilr33-amber", "--set", "control.position.gain=1560 1/s"]) == 1
     first = capsys.readouterr().out.splitlines()[0]
     said = "FAIL  ilr33-amber: every loop is stable. 9 of 12 requirements met, 3 not met. Not met: "

@@ -1,7 +1,5 @@
 """Met, not met, not proven: the same words, counts and exit status wherever a requirement is judged."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -30,7 +28,7 @@ def asking(*waivers: Waiver, requirements: tuple[Requirement, ...] = (HOT,)) -> 
     return replace(load_design("ilr33-amber"), requirements=requirements, waivers=waivers)
 
 
-def status(path: Path, design: Design, capsys: pytest.CaptureFixture[str], *call: str) -> tuple[int, str]:
+def status(path: Path, design: Design, capsys, *call: str) -> tuple[int, str]:
     path.write_text(write_design(design), encoding="utf-8")
     code = main([call[0], str(path), *call[1:]])
     return code, capsys.readouterr().out
@@ -40,8 +38,8 @@ def status(path: Path, design: Design, capsys: pytest.CaptureFixture[str], *call
     ("waivers", "code", "head", "word"), [((), 1, "NOT PROVEN", "not proven"), ((WAIVED,), 0, "PASS", "met")]
 )
 def test_margins_and_report_say_the_same(
-    waivers: tuple[Waiver, ...], code: int, head: str, word: str, tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    waivers: tuple[Waiver, ...], code: int, head: str, word: str, tmp_path,
+    capsys,
 ) -> None:  # fmt: skip
     design, path = asking(*waivers), tmp_path / "d.toml"
     made = status(path, design, capsys, "margins")
@@ -65,9 +63,7 @@ def test_margins_and_report_say_the_same(
     assert ("the motor is outside" in page) is bool(waivers)
 
 
-def test_a_loop_whose_stability_is_not_known_is_no_pass(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_loop_whose_stability_is_not_known_is_no_pass(monkeypatch, capsys) -> None:
     known = loop_figures.all_loop_figures
 
     def undecided(*args: Any, **options: Any) -> Mapping[str, loop_figures.LoopFigures]:
@@ -81,7 +77,7 @@ def test_a_loop_whose_stability_is_not_known_is_no_pass(
     assert first.startswith("NOT PROVEN  ilr33-amber: stability not known: Current loop.")
 
 
-def test_a_design_without_requirements_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_design_without_requirements_says_so(tmp_path, capsys) -> None:
     code, said = status(tmp_path / "d.toml", asking(requirements=()), capsys, "margins")
     assert code == 0
     assert "The design states no requirements." in said

@@ -1,7 +1,5 @@
 """The weakest point is the worst of all views, by how near L comes to -1; the spread names its points."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from math import inf, log10, radians, sin
@@ -62,13 +60,10 @@ def test_every_view_is_looked_at(fin: Design, survey: LoopSurvey) -> None:
 def test_the_weakest_point_of_the_fin_is_where_it_is_not_stable(fin: Design, survey: LoopSurvey) -> None:
     """Its position loop is unstable at the worst tolerances; without them the driven point is nearest."""
     point = weakest(survey, corners(fin))
-    assert point is not None
     assert (point.reserve, point.view.stable) == (-inf, False)
     assert words_of(point)["status"] == "warn"
     nominal = weakest(survey)
-    assert nominal is not None
     loop = assemble_loops(fin, operating_point="driven").position
-    assert loop is not None
     margins = stability_margins(loop.open_loop)
     wanted = {
         "gain_margin": (1 - 10 ** (-abs(margins.gain_margin_db) / 20)) / (1 - 10 ** (-6 / 20)),
@@ -89,7 +84,6 @@ def test_a_required_limit_stands_for_the_customary_one(survey: LoopSurvey, fin: 
 
     asked = Requirement(id="m", quantity="modulus_margin", unit="1", loop="every", minimum=0.7)
     point = weakest(replace(survey, design=replace(fin, requirements=(asked,))))
-    assert point is not None
     assert (point.view.place, point.view.loop, point.limit, point.required) == ("", "position", 0.7, True)
     assert words_of(point)["status"] == "fail"
 
@@ -100,14 +94,13 @@ def test_the_spread_is_that_of_the_operating_points(fin: Design) -> None:
     every = {"driving": 0.0, "driven": 0.0, "gap": 0.0, "sliding": 0.0}
     margins = []
     for point, load in [*every.items(), *(("rest", load) for load in loads)]:
-        loop = assemble_loops(fin, operating_point=point, load_Nm=load).position  # type: ignore[arg-type]
-        assert loop is not None
+        loop = assemble_loops(fin, operating_point=point, load_Nm=load).position
         margins.append(abs(stability_margins(loop.open_loop).gain_margin_db))
     assert (found.least, found.most) == (pytest.approx(min(margins)), pytest.approx(max(margins)))
     assert found.where == "motor driven by the load"
 
 
-def test_margins_shows_the_spread_and_names_the_points(capsys: pytest.CaptureFixture[str]) -> None:
+def test_margins_shows_the_spread_and_names_the_points(capsys) -> None:
     assert main(["margins", "fin", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["spread"]["position"]["gain_margin"]["where"] == "motor driven by the load"
