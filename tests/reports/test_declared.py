@@ -4,7 +4,6 @@ import cmath
 import json
 from dataclasses import fields, is_dataclass
 from functools import reduce
-from pathlib import Path
 
 import pytest
 import typer
