@@ -234,7 +234,7 @@ def pole_near(equation: Callable[[complex], complex], point: complex) -> complex
             break
         move = value / slope
         point -= move
-        if abs(move) < 1e-15 * abs(point):
+        if abs(move) < 1e-9 * abs(point):  # the slope is good to 1e-7: the next move would be below rounding
             break
     return complex(point)
 

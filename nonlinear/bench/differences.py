@@ -19,7 +19,7 @@ from actuator_lti.errors import NumericalError
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.state_kinds import CONTINUOUS, COUNTER, FLAG, names_of, places_of
 from nonlinear.bench.injection import Injection, Watched
-from nonlinear.bench.lifted import GRID, Floats, response, sensitivities, sized
+from nonlinear.bench.lifted import GRID, Floats, even, response, sensitivities, sized
 from nonlinear.bench.loop_setup import LoopSetup
 from nonlinear.bench.stepper import Stepper
 
@@ -84,7 +84,7 @@ class Differences:
         """What errors of the entries do to the response, over its size, see `sensitivities`."""
         z, parts = np.exp(1j * GRID), self._split(whole)
         left, right = (np.abs(each) for each in sensitivities(*parts, z))
-        return left / sized(response(*parts, z))[:, None], right
+        return left / sized(response(*even(*parts[:3]), parts[3], z))[:, None], right
 
     def _runs(self, rows: Floats) -> tuple[Floats, Floats, Floats]:
         """States behind one base period, what came back at each update, and flags on the way."""
