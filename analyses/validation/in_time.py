@@ -23,7 +23,7 @@ from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.resolvent import balanced
 from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
-from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, Place, pole_near
+from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, Place, nearest_pole
 from nonlinear import Rows
 from nonlinear.bench.injection import RETURNED
 from nonlinear.bench.loop_setup import LoopSetup
@@ -200,7 +200,8 @@ def margin_shown(bench: Bench, place: Place) -> MarginShown | None:
 def _beside(bench: Bench, place: Place, gain: float, w: float) -> MarginRun:
     """A run at a gain; the signal at the place begins with a part of what would be a large one."""
     setup, t, plain = bench.setup(place.name), place.tangent, bench.loop(place.name).plain_open
-    predicted = pole_near(lambda z: 1.0 + gain * complex(plain(z)), np.exp(1j * w * t.hold_s))
+    closed = plain.A - gain / (1.0 + gain * plain.D[0, 0]) * plain.B @ plain.C
+    predicted = nearest_pole(closed, np.exp(1j * w * t.hold_s))
     left, right = _mode(t.at_gain(gain), predicted)
     rate = float(abs(predicted))
     periods = int(np.clip(ceil(log(CHANGE) / max(abs(log(rate)), 1e-9)), SHORTEST, LONGEST))
