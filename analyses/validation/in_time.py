@@ -28,7 +28,6 @@ from nonlinear import Rows
 from nonlinear.bench.injection import RETURNED
 from nonlinear.bench.loop_setup import LoopSetup
 from nonlinear.bench.probe import Probe, write_probe
-from nonlinear.bench.stepper import Stepper
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
@@ -165,16 +164,9 @@ def _step(setup: LoopSetup, samples: int, size: float) -> Floats | None:
     """What comes back, negated, from a step at the place; None after an event."""
     rows = setup.row()
     rows.step(setup.point, size, -1.0)
-    return _followed(Stepper(rows), samples, setup.hold_ticks, lambda s: -s[RETURNED[setup.point]])
-
-
-def _followed(drive: Stepper, count: int, ticks: int, read: Callable[[Floats], Numbers]) -> Numbers | None:
-    """What is read of the state after each so many ticks; None after an event."""
-    seen = []
-    for _ in range(count):
-        drive.run(ticks)
-        seen.append(read(drive.s))
-    return np.array(seen) if drive.happened == (0.0, 0.0) else None
+    drive = rows.running()
+    piece = drive.advance(samples * setup.hold_ticks, setup.hold_ticks)
+    return -drive.returned(piece, setup.point) if drive.happened == (0.0, 0.0) else None
 
 
 def margin_shown(bench: Bench, place: Place) -> MarginShown | None:
@@ -214,9 +206,13 @@ def _beside(bench: Bench, place: Place, gain: float, w: float) -> MarginRun:
     rows = _at_gain(setup, gain)
 
     def course(size: float) -> Complexes | None:
-        drive = Stepper(rows)
+        drive = rows.running()
         drive.s[t.places] += size / returned * right.real
-        return _followed(drive, count, stride * setup.base_ticks, lambda s: left @ s[t.places])
+        seen = []
+        for _ in range(count):
+            drive.run(stride * setup.base_ticks)
+            seen.append(left @ drive.s[t.places])
+        return np.array(seen) if drive.happened == (0.0, 0.0) else None
 
     last = rate ** (count * stride)
     seen, own = _agreed(course, setup, WITHIN / SURE**2 * abs(begins) * last)
@@ -229,7 +225,7 @@ def _beside(bench: Bench, place: Place, gain: float, w: float) -> MarginRun:
 def _at_gain(setup: LoopSetup, gain: float) -> Rows:
     """The loop with its gain multiplied at the place, on the same operating motion."""
     rows = setup.row()
-    calm = Stepper(rows)
+    calm = rows.running()
     calm.run(1)
     write_probe(Probe(point=setup.point, gain=gain), rows.values[0])  # type: ignore[arg-type]
     rows.step(setup.point, (1.0 - gain) * calm.s[RETURNED[setup.point]], -1.0)
