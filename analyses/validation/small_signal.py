@@ -192,7 +192,7 @@ def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | No
     before = log_gain = float(np.log(gain))
     last = 0.0
     for k in range(NEWTON_STEPS):
-        point = _nearest(t.at_gain(float(np.exp(log_gain))), point)
+        point = nearest_pole(t.at_gain(float(np.exp(log_gain))), point)
         size = float(np.log(np.abs(point)))
         if k and size == last:
             break
@@ -234,7 +234,7 @@ def pole_near(equation: Callable[[complex], complex], point: complex) -> complex
             break
         move = value / slope
         point -= move
-        if abs(move) < 1e-15 * abs(point):
+        if abs(move) < 1e-9 * abs(point):  # the slope is good to 1e-7: the next move would be below rounding
             break
     return complex(point)
 
@@ -298,14 +298,14 @@ def _delay_row(place: Place, delay_s: float) -> Row:
     critical = poles[int(np.argmax(np.abs(poles)))]
     inside, poles = place.delayed(delay_s * (1.0 - BESIDE))
     before = poles[int(np.argmin(np.abs(poles - critical)))]
-    sizes = [abs(_nearest(inside.A, before)), abs(_nearest(outside.A, critical))]
+    sizes = [abs(nearest_pole(inside.A, before)), abs(nearest_pole(outside.A, critical))]
     rates = np.log(sizes)
     found = delay_s * (1.0 - BESIDE + 2.0 * BESIDE * float(-rates[0] / (rates[1] - rates[0])))
     words = f"spectral radius beside it {sizes[0] - 1.0:+.1e}, {sizes[1] - 1.0:+.1e}"
     return place.judged("delay_margin", delay_s, found, place.within, delay_s, "s", words)
 
 
-def _nearest(A: Floats, pole: complex) -> complex:
+def nearest_pole(A: Floats, pole: complex) -> complex:
     """The eigenvalue nearest to a pole."""
     poles = np.linalg.eigvals(balanced(A)[0])
     return complex(poles[int(np.argmin(np.abs(poles - pole)))])

@@ -29,7 +29,7 @@ import numpy.typing as npt
 from actuator_lti.design.loader import as_design
 from nonlinear.bench.differences import Differences
 from nonlinear.bench.injection import Watched
-from nonlinear.bench.lifted import Complexes, Floats, lifted, response, sensitivities
+from nonlinear.bench.lifted import Complexes, Floats, even, lifted, response, sensitivities
 from nonlinear.bench.loop_setup import LoopSetup, loop_setup
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ class Tangent:
 
         That is what a sinusoid injected at the place brings back at its own frequency.
         """
-        return response(self.A, self.B, self.C, self.D, np.asarray(points, complex))
+        return response(*self._even, self.D, np.asarray(points, complex))
 
     def error_at(self, points: npt.ArrayLike) -> Floats:
         """Stated error of T at points z, of their shape: a sharp resonance feels errors of entries more."""
@@ -104,7 +104,12 @@ class Tangent:
 
     def lifted(self, point: complex) -> Complexes:
         """The transfer matrix over a base period, shape (M, M), at a point z = exp(j w period_s)."""
-        return lifted(self.A, self.B, self.C, self.D, np.array([point], complex))[0]
+        return lifted(*self._even, self.D, np.array([point], complex))[0]
+
+    @cached_property
+    def _even(self) -> tuple[Floats, Floats, Floats]:
+        """A, B and C with states of like size."""
+        return even(self.A, self.B, self.C)
 
     def at_gain(self, gain: float) -> Floats:
         """A with the loop gain at the place multiplied: v = (gain - 1) times what comes back."""

@@ -13,14 +13,18 @@ GRID = np.geomspace(1e-4, 0.98, 60) * np.pi  # rad a sample: where responses are
 FAINT = 1e-6  # of the dominant part of a response: below that it is judged by that part
 
 
+def even(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
+    """The same system with states of like size, which what follows is meant for."""
+    A, scale = balanced(A)
+    return A, B / scale[:, None], C * scale
+
+
 def lifted(A: Floats, B: Floats, C: Floats, D: Floats, points: Complexes) -> Complexes:
     """C (p - A)^-1 B + D at points p = exp(j w period_s), shape (K, M, M).
 
     Refined once: what is left where large terms cancel is right to the rounding of the entries, so that a
     faint response has as many digits as they give it.
     """
-    A, scale = balanced(A)
-    B, C = B / scale[:, None], C * scale
     turned = points.reshape(-1, 1, 1) * np.eye(len(A)) - A
     states = np.linalg.solve(turned, np.broadcast_to(B.astype(complex), (points.size, *B.shape)))
     states += np.linalg.solve(turned, B - turned @ states)

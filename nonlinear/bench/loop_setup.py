@@ -51,8 +51,6 @@ class LoopSetup:
     limits_on : bool
     held : bool
         Whether the rotor is held at its speed.
-    gain : float
-        Factor on the loop gain at the place.
     """
 
     design: Design
@@ -60,7 +58,6 @@ class LoopSetup:
     bias: OperatingMotion
     limits_on: bool = True
     held: bool = False
-    gain: float = 1.0
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
@@ -118,7 +115,7 @@ class LoopSetup:
 
     def row(self) -> Rows:
         """Parameters of a run that starts in the steady state of the operating motion; see `rows`."""
-        return self.rows(self.gain)
+        return self.rows()
 
     def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
         """Parameters of runs that start in the steady state of the operating motion, one a value.
