@@ -26,7 +26,7 @@ from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.asked import Asked as ValidationAsked
 from reports.design_files.keys import Asked as KeysAsked
 from reports.design_files.start import Asked as StartAsked
-from reports.exports import AskedC, AskedFmu, AskedLinear
+from reports.exports.asked import AskedC, AskedFmu, AskedLinear
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -400,7 +400,7 @@ ANALYSES = (
         group="Out of Python",
         page=False,
         request=AskedC,
-        function="reports.exports.export_c",
+        function="reports.exports.run.export_c",
         shown="listing",
         words="Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README.",
     ),
@@ -409,7 +409,7 @@ ANALYSES = (
         group="Out of Python",
         page=False,
         request=AskedFmu,
-        function="reports.exports.export_fmu",
+        function="reports.exports.run.export_fmu",
         shown="listing",
         words="Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a "
         "parameter.",
@@ -419,7 +419,7 @@ ANALYSES = (
         group="Out of Python",
         page=False,
         request=AskedLinear,
-        function="reports.exports.export_linear",
+        function="reports.exports.run.export_linear",
         shown="listing",
         words="Write every loop, break point, command and load response as state space, with units and "
         "margins.",

@@ -15,15 +15,13 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.request import OnMachines, Option, flag, options
 from analyses.studies.study_asked import study_with
 from reports.analyses import Analysis
-from reports.cli.drive import SetOption, load_drive, output_quantity, read_changes
+from reports.cli.drive import SetOption, load_drive, read_changes
 from reports.cli.options import (
     DEFAULT_DESIGN,
     DesignArgument,
     JsonOption,
     QuietOption,
-    command_quantity,
-    on_axis,
-    read_load,
+    read_quantity,
 )
 from reports.cli.targets import folder_for_results
 
@@ -189,24 +187,18 @@ def _options(one: Analysis) -> dict[str, tuple[Any, Option]]:
 
 def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, Any]:
     """A field as an option of typer; what is not given is None, and the request knows what then."""
-    text = {"plain": kind, "load": float}.get(option.kind, str)
-    more: dict[str, Any] = {"parser": read_load} if option.kind == "load" else {}
+    text = kind if option.kind == "plain" else str
     if option.argument:
         needed = Parameter.empty if default is None else default
         return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], needed
-    made = typer.Option(
-        f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words, **more
-    )
+    made = typer.Option(f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words)
     return (Annotated[bool, made], default) if kind is bool else (Annotated[text | None, made], None)
 
 
 def _read(name: str, option: Option, value: Any, drive: Design) -> Any:
     """The value of an option in SI, once the drive is known."""
-    if option.kind == "command":
-        return command_quantity(f"--{option.flag or flag(name)}", value, drive)
-    if option.kind == "output":
-        return output_quantity(f"--{option.flag or flag(name)}", value, drive)
-    return on_axis(value, drive) if option.kind == "load" and value is not None else value
+    of = f"--{option.flag or flag(name)}"
+    return value if option.kind == "plain" else read_quantity(of, value, option.kind, drive)
 
 
 def _parameter(name: str, annotation: Any, default: Any) -> Parameter:

@@ -42,7 +42,7 @@ class Asked:
 class Started:
     """The file that was written."""
 
-    file: Path
+    file: str
 
     def __str__(self) -> str:
         return f"wrote {self.file}; next: actuator-lti report {self.file}"
@@ -64,7 +64,7 @@ def start(asked: Asked) -> Started:
     text = _renamed(_source_text(KINDS[asked.kind] if asked.kind else asked.source), asked.file.stem)
     read_design_text(text, str(asked.file))
     write_text(asked.file, text)
-    return Started(asked.file)
+    return Started(str(asked.file))
 
 
 def _source_text(source: str | None) -> str:

@@ -12,7 +12,6 @@ from reports.document_schema import Block, FactItem, Section
 from reports.findings import Finding
 from reports.sections.names import output_unit
 
-FOUND = {True: "found", False: "not found"}
 NAMES = {"motor": "Motor encoder", "output": "Output encoder"}
 
 
@@ -76,7 +75,7 @@ def _cycles(cycles: Sequence[tuple[Counts, Confirmation]], axis: str) -> Block:
         doc.of(lambda pair: pair[1].cycle.output_rad, "output", "At the output", **size),
         doc.of(lambda pair: pair[1].cycle.frequency_hz, "hertz", "Frequency", "Hz", format="sig:3"),
         doc.of(lambda pair: pair[1].ratio, "ratio", "Simulated over predicted", format="sig:3"),
-        doc.of(lambda pair: FOUND[pair[1].verdict == "confirmed"], "verdict", "Simulation"),
+        doc.of(lambda pair: pair[1].verdict, "verdict", "Verdict"),
     ]
     note = "Without dry friction, which quiets most of them."
     return doc.listing("Limit cycles of the counts", cycles, columns, note)

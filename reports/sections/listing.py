@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from reports import document as doc
@@ -20,12 +20,9 @@ def section(result: Any) -> Section:
 def _columns(kind: type) -> list[doc.Shown]:
     hints = get_type_hints(kind, include_extras=True).items()
     headed = {name: get_args(hint)[1] for name, hint in hints if get_origin(hint) is Annotated}
-    return [doc.of(_text(name), name, heading) for name, heading in headed.items()]
+    return [doc.of(partial(_text, name), name, heading) for name, heading in headed.items()]
 
 
-def _text(name: str) -> Callable[[Any], Any]:
-    def text(row: Any) -> Any:
-        value = getattr(row, name)
-        return ", ".join(value) if isinstance(value, tuple) else value
-
-    return text
+def _text(name: str, row: Any) -> Any:
+    value = getattr(row, name)
+    return ", ".join(value) if isinstance(value, tuple) else value

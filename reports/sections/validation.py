@@ -136,7 +136,7 @@ def verdict_items(validation: Validation) -> list[VerdictItem]:
     if not items:
         items.append(_item("judged", "Predictions", 0.0, None, None, "; ".join(validation.notes)))
     for k, failure in enumerate(validation.failures):
-        items.append(_item(f"drive-{k}", "The drive by itself", None, None, False, failure))
+        items.append(_item(f"drive-{k}", "Stable, and at rest where it is sent", None, None, False, failure))
     items += [
         _item(f"stable-{name}", f"{loop_name(name)}: stable", None, None, None, "not known")
         for name in validation.undecided

@@ -1,65 +1,18 @@
-"""The drive outside of Python: the running one as C99 or as an FMU, the linear one as state spaces."""
+"""Write the drive as C99, as an FMU, or its linear models; the compiled code is measured."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.request import FORCE, Option
 from reports.cli.targets import folder_for_results, refuse_existing
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.linear.code_check import CodeCheck
-
-CHECK = Option(
-    words="Measure the margins of the compiled code (sweep by injection, borders in time) and say so in the "
-    "export; needs a C compiler.",
-    flag="check/--no-check",
-)
-
-
-@dataclass(frozen=True, kw_only=True)
-class AskedC:
-    """C files."""
-
-    target: Annotated[Path, Option(words="Folder for the files; drive-c.", metavar="DIR", flag="out")] = Path(
-        "drive-c"
-    )
-    single: Annotated[bool, Option(words="float in place of double.")] = False
-    check: Annotated[bool, CHECK] = True
-    force: Annotated[bool, FORCE] = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class AskedFmu:
-    """A unit for co-simulation."""
-
-    target: Annotated[Path | None, Option(words="File to write; NAME.fmu.", metavar="FILE", flag="out")] = (
-        None
-    )
-    version: Annotated[int, Option(words="Version of FMI; 2.", metavar="2|3", flag="fmi")] = 2
-    platform: Annotated[
-        list[str] | None,
-        Option(words="linux64 or win64, may be repeated; both.", metavar="NAME"),
-    ] = None
-    plain: Annotated[bool, Option(words="Without reports inside, and no check.")] = False
-    check: Annotated[bool, CHECK] = True
-    force: Annotated[bool, FORCE] = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class AskedLinear:
-    """Linear models."""
-
-    to: Annotated[Literal["json", "mat", "python"], Option(words="Format; json.")] = "json"
-    target: Annotated[
-        Path | None,
-        Option(words="File to write; NAME-linear.json, .mat or .py.", metavar="FILE", flag="out"),
-    ] = None
-    force: Annotated[bool, FORCE] = False
+    from reports.exports.asked import AskedC, AskedFmu, AskedLinear
 
 
 @dataclass(frozen=True)
@@ -68,13 +21,13 @@ class Exported:
 
     Attributes
     ----------
-    files : tuple of Path
+    files : tuple of str
     words : str
     check : CodeCheck or None
         ``None`` where it was not asked for.
     """
 
-    files: tuple[Path, ...]
+    files: tuple[str, ...]
     words: str
     check: CodeCheck | None = None
 
@@ -109,7 +62,7 @@ def export_c(design: Design, asked: AskedC) -> Exported:
     check = _checked(design) if asked.check else None
     texts["README.md"] += "\n" + check_text(check, single_precision=asked.single)
     write_together({folder / name: text.encode() for name, text in texts.items()})
-    return Exported(tuple(folder / name for name in texts), f"{folder}: {', '.join(texts)}", check)
+    return Exported(tuple(str(folder / name) for name in texts), f"{folder}: {', '.join(texts)}", check)
 
 
 def export_fmu(design: Design, asked: AskedFmu) -> Exported:
@@ -141,7 +94,7 @@ def export_fmu(design: Design, asked: AskedFmu) -> Exported:
     )
     write_bytes(target, data)
     words = f"{target}: FMI {asked.version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes"
-    return Exported((target,), words, check)
+    return Exported((str(target),), words, check)
 
 
 def export_linear(design: Design, asked: AskedLinear) -> Exported:
@@ -161,7 +114,7 @@ def export_linear(design: Design, asked: AskedLinear) -> Exported:
     data = written_models(tree, asked.to)
     write_bytes(target, data)
     named = [*tree["sampled"]["loops"], *tree["sampled"]["break_points"], *tree["sampled"]["responses"]]
-    return Exported((target,), f"{target}: {', '.join(named)}, {' and '.join(FORMS)}, {len(data)} bytes")
+    return Exported((str(target),), f"{target}: {', '.join(named)}, {' and '.join(FORMS)}, {len(data)} bytes")
 
 
 def _checked(design: Design) -> CodeCheck:
