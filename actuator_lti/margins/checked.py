@@ -71,6 +71,8 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
         closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
     _trust_poles(loop, poles, closed)
     factors = factored(response, poles)
+    if np.unique(factors.weights[factors.roots == 0.0]).size > 1:
+        raise Doubtful("poles and zeros at zero frequency")
     parts, listed_to, floor = _parts(factors, band)
     ends = _ends(factors, response)
     gain_w, real_w, rising, far = _merged(parts)
