@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
+from actuator_lti.margins.certified_roots import half_planes
 from actuator_lti.margins.delay_form import delay_form
 from actuator_lti.margins.delay_response import DelayResponse
+from actuator_lti.margins.exact_loop import exact_loop
 from actuator_lti.margins.factored import Response, factored
 from actuator_lti.margins.factors_on_axis import Factored, half_turn
 from actuator_lti.margins.given import Given, given_of
@@ -116,9 +118,6 @@ def _rational_phase(given: Given, w: Real) -> Real:
 
 def _exact_factors(given: Given) -> Factored:
     """From the roots of the exact polynomials, but for their constant."""
-    from actuator_lti.margins.certified_roots import half_planes  # python-flint only where it is needed
-    from actuator_lti.margins.exact_loop import exact_loop
-
     loop = exact_loop(given)
     above, below = (np.array(half_planes(p).values, dtype=complex) for p in (loop.N, loop.D))
     roots, weights = np.append(above, below), np.append(np.ones(above.size), -np.ones(below.size))
