@@ -12,13 +12,13 @@ from actuator_lti.bandwidth.exact_gain import exact_gain
 from actuator_lti.bandwidth.measured import measured_bandwidth
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
 from actuator_lti.errors import InputError
-from actuator_lti.margins.checked import first_turn, nearest_behind_delay
 from actuator_lti.margins.delay_form import delay_form, in_series
 from actuator_lti.margins.delay_response import DelayResponse
 from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS
 from actuator_lti.margins.exact_extremes import smallest
-from actuator_lti.margins.exact_loop import exact_loop
+from actuator_lti.margins.exact_loop import exact_loop, exact_polynomials
 from actuator_lti.margins.given import Given, given_of, whole_samples
+from actuator_lti.margins.late_response import first_turn, nearest_behind_delay
 from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
 from actuator_lti.margins.measured_data import is_measured
 from actuator_lti.systems.exact_fraction import Fraction, dc_noise, double, exact_fraction, shown
@@ -70,8 +70,12 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     gain = exact_gain(seen, loop.in_z)
     if gain is None:
         raise InputError(_POLE)
-    if seen is not fraction and _taken(fraction, gain.dc, 1 if loop.in_z else 0):
-        raise InputError(_NO_GAIN)
+    if seen is not fraction:
+        at = 1 if loop.in_z else 0
+        if _taken(fraction, gain.dc, at):
+            raise InputError(_NO_GAIN)
+        if _told(given_of(system), gain.dc, at):
+            gain = exact_gain(fraction, loop.in_z) or gain
     if abs(double(gain.dc)) <= dc_noise(loop):
         raise InputError(_NO_GAIN)
     peak, place = gain.largest()
@@ -87,6 +91,16 @@ def _taken(fraction: Fraction, dc: flint.fmpq, at: int) -> bool:
     """Whether a mode seen at zero frequency alone takes the gain away there: a spring, however weak."""
     below = fraction.den(at)
     return bool(below != 0 and abs(fraction.num(at) / below) < _TAKEN * abs(dc))
+
+
+def _told(given: Given, dc: flint.fmpq, at: int) -> bool:
+    """Whether 8 ulp of the entries leave the gain at zero frequency what it is, apart from that given."""
+    values = []
+    for num, den in map(exact_polynomials, (given, *given.neighbours())):
+        if den(at) == 0:
+            return False
+        values.append(flint.fmpq(num(at), den(at)))
+    return all(abs(value - values[0]) < abs(values[0] - dc) / 100 for value in values[1:])
 
 
 def _without_rest_mode(system: Any) -> Any:
