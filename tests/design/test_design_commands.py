@@ -86,19 +86,3 @@ def test_settings_go_out_and_come_in(tmp_path, capsys) -> None:
     report = json.loads(capsys.readouterr().out)
     assert list(report["changed"]) == ["control.velocity.gain"]
     assert any("9.549" in note for note in report["notes"])
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["objects", "export", "emps"],
-        ["objects", "import", "missing.xdc"],
-        ["objects", "export", "--velocity-gain-per", "Hz"],
-        ["init", "."],
-    ],
-)
-def test_bad_use_is_status_2_and_one_line(arguments: list[str], capsys) -> None:
-    assert main(arguments) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1

@@ -106,34 +106,6 @@ def test_a_file_that_is_no_design_is_told_what_it_looks_like(name: str, tmp_path
     assert words is None or (words in said and said.count("\n") == 1)
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["margins", "--load", "4 kg"], '"kg" is the unit of a mass; allowed: a torque such as "4 N*m"'),
-        (["margins", "--load", "4,5"], 'use a decimal point: "4.5"'),
-        (["margins", "--load", "4 N"], '"N" is the unit of a force; allowed: a torque such as'),
-        (["margins", "emps", "--load", "4 N*m"], '"N*m" is the unit of a torque; allowed: a force such as'),
-        (["simulate", "emps", "--load", "4 N*m"], "--load '4 N*m': wrong dimension"),
-        (["simulate", "--duration", "1e9"], "--duration 1e+09: 10000000000000 ticks of one run; allowed"),
-        (["simulate", "--duration", "nan"], "--duration nan: must be a finite number"),
-        (
-            ["simulate", "--amplitude", "0,5"],
-            '--amplitude \'0,5\': a decimal comma; use a decimal point: "0.5"; allowed: "5 deg", or 5 in deg',
-        ),
-        (["margins", "--form", "sampld"], "--form 'sampld': one of sampled, continuous, ideal"),
-        (["margins", "--operating-point", "slide"], "--operating-point 'slide': one of sliding"),
-        (["margins", "--set", "control.period=0.1"], "has no unit; allowed: a number with a unit like s"),
-        (["margins", "--set", "motor.resistance"], "allowed: KEY=VALUE"),
-        (["margin"], "Did you mean 'margins'?"),
-    ],
-)
-def test_the_command_line_names_its_options(words: list[str], said: str, capsys) -> None:
-    status, result = shown(words, capsys)
-    assert status == 2
-    assert result.count("\n") == 1
-    assert said in result
-
-
 def test_python_names_its_arguments() -> None:
     with pytest.raises(InputError, match=r"^form = 'sampld': one of sampled, continuous, ideal$"):
         assemble_loops(AMBER, form="sampld")

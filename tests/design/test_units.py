@@ -83,6 +83,12 @@ def test_a_data_sheet_quantity_is_its_si_value(text: str, unit: str, value: floa
     assert parse_quantity(text, unit) == pytest.approx(value, rel=1e-14)
 
 
+def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
+    parse_unit.cache_clear()
+    assert parse_quantity("2 min", "s") == 120.0
+    assert parse_quantity("3000 1/min", "rad/s") == pytest.approx(100 * pi, rel=1e-14)
+
+
 @pytest.mark.parametrize("text", ["100 us", "9.2 g*cm^2", "5.9 mN*m/A", "6 uH", "20 mohm"])
 def test_a_decimal_prefix_costs_no_digit(text: str) -> None:
     unit = {"us": "s", "g*cm^2": "kg*m^2", "mN*m/A": "N*m/A", "uH": "H", "mohm": "ohm"}[text.split()[1]]

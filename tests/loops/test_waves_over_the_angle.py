@@ -62,8 +62,10 @@ CASES = [Case("gear error", 24.0 / N), Case("cogging", 12.0)]
 each = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 
-def rotor(viscous: float = 0.0) -> Design:
-    """A torque source without a controller on a drive train that the load turns."""
+def rotor(
+    viscous: float = 0.0, load_coefficient: float = 0.0, path: str = "back-drivable", damping: float = 0.0
+) -> Design:
+    """A torque source without a controller, so that the rotor coasts."""
     return Design(
         name="rotor",
         motor=Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=1.0),
@@ -71,8 +73,8 @@ def rotor(viscous: float = 0.0) -> Design:
         controller=Controller(period_s=Ts, computing_delay_s=0.0),
         limits=Limits(voltage_V=10.0),
         validation=Validation(full_deflection_rad=1.0),
-        load=Load(path="back-drivable"),
-        friction=Friction(viscous_Nms_rad=viscous),
+        load=Load(path=path, moment_damping_Nms_rad=damping),
+        friction=Friction(viscous_Nms_rad=viscous, load_coefficient=load_coefficient),
     )
 
 
@@ -283,60 +285,46 @@ def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: 
     assert np.max(np.abs(seen - expected)) < 1e-6 * np.max(np.abs(expected))
 
 
-J_COAST, N_COAST, T_COAST, D = 2e-5, 40.0, 1e-3, 3.0
-
-
-def coasting(path: str, viscous: float, load_coefficient: float = 0.0) -> Design:
-    """A torque source without a controller, so that the rotor coasts."""
-    return Design(
-        name="coasting",
-        motor=Motor(rotor_inertia_kgm2=J_COAST, source_gain_Nm_V=1.0),
-        gears=(Gear(name="one", ratio=N_COAST),),
-        controller=Controller(period_s=T_COAST, computing_delay_s=0.0),
-        limits=Limits(voltage_V=10.0),
-        validation=Validation(full_deflection_rad=1.0),
-        load=Load(path=path, moment_damping_Nms_rad=D),
-        friction=Friction(viscous_Nms_rad=viscous, load_coefficient=load_coefficient),
-    )
+D = 3.0  # N m s/rad
 
 
 def ratio(viscous: float, slope: float) -> float:
     """w_(k+1)/w_k under the torque -slope w_k, held over a tick, and viscous friction."""
     if viscous == 0.0:
-        return 1.0 - slope * T_COAST / J_COAST
-    kept = exp(-viscous * T_COAST / J_COAST)
+        return 1.0 - slope * Ts / J
+    kept = exp(-viscous * Ts / J)
     return kept - (1.0 - kept) * slope / viscous
 
 
 @pytest.mark.parametrize("viscous", [0.0, 1e-3])
 def test_a_rotor_coasts_to_the_held_recursion(viscous: float) -> None:
-    design = coasting("back-drivable", viscous)
-    expected = ratio(viscous, D / N_COAST**2)
-    run = simulate(design, commands.hold(), 50 * T_COAST, initial=State(motor_speed_rad_s=-80.0))
+    design = rotor(viscous, damping=D)
+    expected = ratio(viscous, D / N**2)
+    run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=-80.0))
     w = run.motor_speed_rad_s
     assert w == pytest.approx(-80.0 * expected ** np.arange(w.size), rel=1e-12)
-    assert run.load_Nm == pytest.approx(-D * w / N_COAST, rel=1e-12)
+    assert run.load_Nm == pytest.approx(-D * w / N, rel=1e-12)
     tick = TickProgram(wire(design), "voltage").tick(0)
     assert np.sort(np.linalg.eigvals(tick.A).real) == pytest.approx(sorted([expected, 1.0]), rel=1e-12)
 
 
 def test_a_self_locking_path_feels_it_as_friction_alone() -> None:
     """T_f = CM |M_ext| = CM D w/N while the load is that moment only."""
-    design = coasting("self-locking", 0.0, load_coefficient=2.0 / N_COAST)
-    run = simulate(design, commands.hold(), 50 * T_COAST, initial=State(motor_speed_rad_s=80.0))
+    design = rotor(0.0, 2.0 / N, "self-locking", D)
+    run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=80.0))
     w = run.motor_speed_rad_s
-    assert w == pytest.approx(80.0 * ratio(0.0, 2.0 * D / N_COAST**2) ** np.arange(w.size), rel=1e-12)
+    assert w == pytest.approx(80.0 * ratio(0.0, 2.0 * D / N**2) ** np.arange(w.size), rel=1e-12)
     assert wire(design).plant.moment == {}
 
 
 def test_energy_of_the_moment_is_work_on_the_load() -> None:
-    design = coasting("back-drivable", 0.0)
-    run = simulate(design, commands.hold(), 50 * T_COAST, initial=State(motor_speed_rad_s=80.0), energy=True)
+    design = rotor(damping=D)
+    run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=80.0), energy=True)
     w, energy = run.motor_speed_rad_s, run.energy
     after = np.append(w, run.final.motor_speed_rad_s)
-    assert energy.output_work_J == pytest.approx(0.5 * J_COAST * (80.0**2 - after[-1] ** 2), rel=1e-12)
-    travel = 0.5 * (after[1:] + after[:-1]) * T_COAST  # under a constant torque
-    assert energy.output_work_J == pytest.approx(float(np.sum(D * w / N_COAST**2 * travel)), rel=1e-9)
+    assert energy.output_work_J == pytest.approx(0.5 * J * (80.0**2 - after[-1] ** 2), rel=1e-12)
+    travel = 0.5 * (after[1:] + after[:-1]) * Ts  # under a constant torque
+    assert energy.output_work_J == pytest.approx(float(np.sum(D * w / N**2 * travel)), rel=1e-9)
 
 
 def test_the_plant_holds_the_sum() -> None:
@@ -358,14 +346,14 @@ def test_top_speed_is_that_of_the_run(path: str) -> None:
     load = replace(base.load, path=path, moment_damping_Nms_rad=20.0)
     open_loop = replace(base.controller, position=None, velocity=None, current=None)
     design = replace(base, load=load, controller=open_loop)
-    motor, friction, N_COAST = design.effective_motor, design.friction, design.total_ratio
+    motor, friction, N = design.effective_motor, design.friction, design.total_ratio
     per_volt = motor.torque_constant_Nm_A / motor.resistance_ohm
-    passed = friction.load_coefficient + (1.0 / N_COAST if path == "back-drivable" else 0.0)
-    slope = per_volt * motor.back_emf_constant_Vs_rad + friction.viscous_Nms_rad + passed * 20.0 / N_COAST
-    expected = (per_volt * design.limits.voltage_V - friction.dry_torque_Nm) / slope / N_COAST
+    passed = friction.load_coefficient + (1.0 / N if path == "back-drivable" else 0.0)
+    slope = per_volt * motor.back_emf_constant_Vs_rad + friction.viscous_Nms_rad + passed * 20.0 / N
+    expected = (per_volt * design.limits.voltage_V - friction.dry_torque_Nm) / slope / N
     assert capability(design).output_rate_rad_s == pytest.approx(expected, rel=1e-12)
     run = simulate(design, commands.step(design.limits.voltage_V), 0.5)
-    assert run.motor_speed_rad_s[-1] / N_COAST == pytest.approx(expected, rel=1e-9)
+    assert run.motor_speed_rad_s[-1] / N == pytest.approx(expected, rel=1e-9)
 
 
 def test_key_and_its_bound() -> None:

@@ -31,24 +31,25 @@ CASES = 120
 
 
 def some_filters(rng: np.random.Generator, T: float) -> tuple[Filter, ...]:
-    w = lambda: float(rng.uniform(0.02, 0.8) * pi / T)  # noqa: E731
+    def w() -> float:
+        return float(rng.uniform(0.02, 0.8) * pi / T)
+
     kinds = [
-        lambda on: Filter(kind="lowpass", on=on, frequency_rad_s=w(), order=1),
-        lambda on: Filter(
-            kind="lowpass", on=on, frequency_rad_s=w(), order=2, damping=float(rng.uniform(0.4, 1.2))
-        ),
-        lambda on: Filter(
-            kind="notch", on=on, frequency_rad_s=w(), width_rad_s=w(), depth=float(rng.uniform(0, 0.5))
-        ),
-        lambda on: Filter(kind="leadlag", on=on, zero_rad_s=w(), pole_rad_s=w()),
-        lambda on: Filter(
-            kind="skewed-notch", on=on, zero_rad_s=w(), pole_rad_s=w(), width_rad_s=w(), depth=0.2
-        ),
-        lambda on: Filter(kind="biquad", on=on, b=(0.3, 0.1, 0.05), a=(-0.4, 0.15)),
-        lambda on: Filter(kind="biquad", on=on, b=(0.5,), a=(-0.5,)),
-    ]
+        lambda: {"kind": "lowpass", "frequency_rad_s": w(), "order": 1},
+        lambda: {"kind": "lowpass", "frequency_rad_s": w(), "order": 2, "damping": rng.uniform(0.4, 1.2)},
+        lambda: {"kind": "notch", "frequency_rad_s": w(), "width_rad_s": w(), "depth": rng.uniform(0, 0.5)},
+        lambda: {"kind": "leadlag", "zero_rad_s": w(), "pole_rad_s": w()},
+        lambda: {
+            "kind": "skewed-notch", "zero_rad_s": w(), "pole_rad_s": w(), "width_rad_s": w(), "depth": 0.2
+        },
+        lambda: {"kind": "biquad", "b": (0.3, 0.1, 0.05), "a": (-0.4, 0.15)},
+        lambda: {"kind": "biquad", "b": (0.5,), "a": (-0.5,)},
+    ]  # fmt: skip
+    places = ("torque", "speed")
     count = int(rng.integers(0, 5))
-    return tuple(kinds[rng.integers(len(kinds))](("torque", "speed")[rng.integers(2)]) for _ in range(count))
+    return tuple(
+        Filter(on=places[rng.integers(2)], **kinds[rng.integers(len(kinds))]()) for _ in range(count)
+    )
 
 
 def some_drive(rng: np.random.Generator) -> Design:

@@ -1,6 +1,5 @@
 """Figures and tables of results in Python: what is drawn is what was found."""
 
-import subprocess
 import sys
 
 import matplotlib.pyplot as plt
@@ -107,15 +106,6 @@ def test_cells_keep_their_colours_when_some_are_missing() -> None:
 
 def test_pages_and_notebooks_have_the_same_colours() -> None:
     assert set(COLOURS) == {paint.COLOURS[name] for name in (*paint.SERIES, "ink", "muted")}
-
-
-def test_matplotlib_is_imported_only_when_something_is_drawn() -> None:
-    code = (
-        "import sys, nonlinear, analyses.linear.loop_survey, actuator_lti.drawing.plotting;"
-        "from actuator_lti import load_design; load_design('ilr33-amber'); print('matplotlib' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"
 
 
 def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:
