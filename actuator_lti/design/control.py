@@ -306,6 +306,11 @@ class Controller:
         return next(((stage, law) for stage, law in laws if law is not None), None)
 
     @property
+    def sampled_only(self) -> bool:
+        """Whether a law of one's own leaves the forms in continuous time out."""
+        return self.own_law is not None and self.own_law[1].continuous is None
+
+    @property
     def position_loop(self) -> PositionLoop:
         """The position loop, for questions that need one.
 

@@ -18,6 +18,7 @@ LawInput = Literal["command", "error", "speed", "angle", "current", "output_angl
 LAW_INPUTS: tuple[str, ...] = get_args(LawInput)
 MOST_STATES = 16
 """Order of a law that the running drive has room for."""
+SINGULAR = 1e12  # condition of I - A beyond which a law integrates
 Matrix = tuple[tuple[float, ...], ...]
 _LIST = {"low": -BIG, "high": BIG}
 
@@ -86,6 +87,27 @@ class Law(StateSpace):
         return self.matrices(len(self.inputs), self.L)
 
     @property
-    def poles(self) -> np.ndarray:
-        """Eigenvalues of A."""
-        return np.linalg.eigvals(self.sampled.A)
+    def integrates(self) -> bool:
+        """Whether it has a pole at z = 1."""
+        return bool(self.A) and bool(np.linalg.cond(np.eye(len(self.A)) - self.sampled.A) > SINGULAR)
+
+    @property
+    def direct(self) -> float:
+        """What a command of one gives at once."""
+        return self.gain * sum(self._commanded(self.sampled.D))
+
+    def steady(self, name: str) -> float:
+        """Gain on a signal at zero frequency (of the command by the error, too); inf: integrates."""
+        A, B, C, D, _ = self.sampled
+        if self.integrates:
+            return np.inf
+        gains = D + C @ np.linalg.solve(np.eye(len(A)) - A, B)
+        if name == "command":
+            return self.gain * sum(self._commanded(gains))
+        return self.gain * float(gains[self.inputs.index(name)]) if name in self.inputs else 0.0
+
+    def _commanded(self, gains: np.ndarray) -> list[float]:
+        """Of the gains on all inputs those that a command reaches."""
+        return [
+            float(one) for name, one in zip(self.inputs, gains, strict=True) if name in ("command", "error")
+        ]
