@@ -68,7 +68,7 @@ def _default(field: Field, kind: type | None, unit: str) -> str:
 def _allowed(field: Field, unit: str) -> str:
     if field.kind in ("text", "label"):
         return ""
-    if field.kind in ("quantity", "quantities") and field.low == -BIG and field.high == BIG:
+    if field.kind in ("quantity", "quantities", "matrix") and field.low == -BIG and field.high == BIG:
         return ""
     if field.high == BIG:
         return "above 0" if field.low > 0 else "0 or more"

@@ -106,7 +106,11 @@ class _Work:
         if self.design.controller.position is None:
             self.notes.append(NO_POSITION)
         steps = {name: self._shown("step", step_shown, name) for name in stable}
-        margins = {name: self._shown("runs beside the margin", margin_shown, name) for name in stable}
+        margins = {
+            name: self._shown("runs beside the margin", lambda b, n: margin_shown(b, places[n]), name)
+            for name in stable
+            if name in places
+        }
         rows += [shown.row for shown in steps.values() if shown is not None]
         rows += [row for shown in margins.values() if shown is not None for row in shown.rows]
         rows += self._part("numbers of the design", self._values, [])
@@ -195,9 +199,8 @@ class _Work:
 
     def _held_by_friction(self) -> tuple[str, ...]:
         """Loops that are not stable as they are tested, but are with the friction that is left out there."""
-
         bench, model = self.bench, on_the_bench(self.bench.model)
-        if bench.linear.friction == model.friction:
+        if bench.linear.friction == model.friction or all(own.stable for own in bench.figures.values()):
             return ()
         at = bench.setup(bench.names[0]).bias.operating(bench.drive)
         whole = assemble_loops(model, operating_point=at.point, speed_rad_s=at.speed_rad_s)

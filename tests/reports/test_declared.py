@@ -4,7 +4,6 @@ import cmath
 import json
 from dataclasses import fields, is_dataclass
 from functools import reduce
-from pathlib import Path
 
 import pytest
 import typer
@@ -63,7 +62,7 @@ def test_the_json_of_a_result_is_its_fields_and_properties() -> None:
     json.dumps(told, allow_nan=False)
 
 
-def test_the_page_of_a_command_is_its_section(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_page_of_a_command_is_its_section(tmp_path, capsys) -> None:
     assert main(["stiffness", "emps", "--out", str(tmp_path), "--quiet"]) == 0
     shown = capsys.readouterr().out
     made = load(tmp_path / "stiffness.json")
