@@ -50,13 +50,17 @@ def _ask(pair: Pair, stage: str, limit: float) -> float:
     gains = {"velocity": control.velocity and control.velocity.gain,
              "current": control.current and control.current.gain_V_A,
              "position": control.position and control.position.gain * pair.design.total_ratio}  # fmt: skip
-    return FAR * limit / (gains.get(stage) or 1.0)
+    own = control.own_law
+    direct = own[1].direct if own is not None and own[0] == stage else gains.get(stage)
+    return FAR * limit / (direct or 1.0)
 
 
 def _driven(pair: Pair) -> list[tuple[str, str]]:
     """Stage and the signal that it drives; the command drives the innermost signal of a drive without one."""
     design = pair.design
-    stages = [(stage, target(design, stage)) for stage in stages_of(design)]
+    own = design.controller.own_law  # without a direct term it answers no command within one tick
+    late = own[0] if own is not None and own[1].direct == 0.0 else ""
+    stages = [(stage, target(design, stage)) for stage in stages_of(design) if stage != late]
     outermost = {"velocity": "w_ref", "current": "i_ref", "voltage": "u"}.get(design.controller.outermost)
     return stages if outermost is None else [*stages, ("", outermost)]
 

@@ -77,7 +77,8 @@ def _supply(pair: Pair) -> Iterator[Row]:
 def _resolution(pair: Pair) -> Iterator[Row]:
     """The step of the measured current: one and a half of it, held against no command, is told as two."""
     wanted, own = (one.instruments.current_resolution_A for one in (pair.model, pair.design))
-    if pair.design.controller.current is None or not (wanted and own):
+    current = pair.design.controller.current
+    if current is None or current.law is not None or not (wanted and own):
         return
     rows = pair.rows(instruments=Instruments(current_resolution_A=own))
     drive = rows.running()

@@ -24,7 +24,7 @@ from analyses.large_signal.conditional import Conditional, conditional_stability
 from analyses.large_signal.settling_ticks import settling_ticks_of
 from analyses.limit_cycles.counts import Counts, counts_of
 from analyses.linear.loop_figures import LoopFigures, loop_figures
-from analyses.motion.settling import Settling, settle
+from analyses.motion.settling import Settling, settlings_of
 from analyses.validation.bench_sweep import bench_sweep
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.in_time import margin_shown, step_shown
@@ -246,11 +246,7 @@ class _Work:
         return sweep_from_rest(design, asked, amplitude, self._settle(), described=dry)
 
     def _settlings(self) -> tuple[Settling, ...]:
-        """What steps of the drive as it is end in, without load and at every named one."""
-        asked, full = self.design.validation, self.design.validation.full_deflection_rad
-        loads = dict.fromkeys((0.0, *asked.loads_Nm))
-        sizes = [part * full for part in asked.amplitude_fractions]
-        return tuple(settle(self.design, load, size) for load in loads for size in sizes)
+        return settlings_of(self.design)
 
     def _conditional(self) -> Conditional:
         return conditional_stability(self.design, self._loops, self._settle())

@@ -37,6 +37,8 @@ def init_controller(p, s):  # type: ignore[no-untyped-def]
     s[layout.S_VOLTAGE_BEFORE] = s[layout.S_VOLTAGE] = s[layout.S_HELD] = p[layout.VOLTAGE_START]
     s[layout.S_REFERENCE] = s[layout.S_REFERENCE_BEFORE] = angle_seen(p)
     s[layout.S_CURRENT_LIMIT], s[layout.S_VOLTAGE_LIMIT] = p[layout.CURRENT_LIMIT], p[layout.VOLTAGE_LIMIT]
+    for j in range(int(p[layout.OWN_STATES])):
+        s[int(p[layout.AT_OWN]) + j] = p[layout.OWN_START + j]
     chain = layout.TORQUE_CHAIN
     settle(p, chain, int(p[layout.TORQUE_FILTERS]), s, layout.S_TORQUE_CHAIN, p[layout.CURRENT_COMMAND_START])
 

@@ -82,7 +82,7 @@ def _in_time(validation: Validation) -> Section:
         "mode 1 % inside and 1 % outside of the gain margin, where it dies out or grows by the predicted "
         "factor."
     )
-    result = f"{met} of {len(rows)} runs go as predicted."
+    result = " ".join([f"{met} of {len(rows)} runs go as predicted.", *(one.text for one in findings[:1])])
     return doc.section(
         "confirmation", "Predictions in time", blocks, result=result, intro=intro, status=status,
         findings=findings,
