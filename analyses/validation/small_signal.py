@@ -193,6 +193,8 @@ def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | No
     last = 0.0
     for k in range(NEWTON_STEPS):
         point = nearest_pole(t.at_gain(float(np.exp(log_gain))), point)
+        if point == 0.0:
+            return None
         size = float(np.log(np.abs(point)))
         if k and size == last:
             break

@@ -49,6 +49,12 @@ class Differences:
         self.injected = Injection(setup, place, watched)
         self.drive = self.injected.rows.running()
         self.injected.prepare(self.drive.p)
+        control = setup.design.controller
+        if setup.bias.speed_rad_s == 0.0 and control.position and control.position.sensor == "output":
+            stands = setup.design.total_ratio * setup.bias.output_rad(setup.design)
+            self.drive.start[[at.S_REFERENCE, at.S_REFERENCE_BEFORE]] = (
+                stands  # else it is fed forward to there
+            )
         self.base, self.hold = setup.base_ticks, self.injected.hold_ticks
         self.updates, self.size = self.base // self.hold, self.drive.start.size
         self.watched = places_of(self.drive.p, FLAG, COUNTER)

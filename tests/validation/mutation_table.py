@@ -149,6 +149,10 @@ HEAD = """# What a validation sees of each key
 For each key of four shipped drives: the model is changed, the drive that is simulated is not, and the first
 row that is not met is told; rows of the design's numbers come before those of small signals. The change is
 1 %; of a whole number, or where a row resolves less, a larger one. A key that no row sees has its reason.
+Every limiter has an onset row besides, which sees what stands in front of it. The profile of the command has
+none: in front of it stands the command itself, so that its onset is `rate` and `acceleration` over the
+differences of a sine's samples, and each of its keys is seen by the update that it limits (`command_rate`,
+`command_acceleration`, `command_jerk`).
 Made by `python -m tests.validation.mutation_table`; tests/validation/test_design_values.py draws from it.
 """
 
