@@ -12,8 +12,8 @@ from actuator_lti.design.model import CurrentLoop, Design, VelocityLoop
 from analyses.validation.row import Row, judged
 from analyses.validation.value_pair import WITHIN, Pair, only
 from nonlinear.bench.loop_setup import every, producer, stages_of, target
-from nonlinear.bench.stepper import Stepper
 from nonlinear.rows import Rows
+from nonlinear.runs.running import Running
 
 FAR = 1e6  # times a limit: a command that nothing follows
 OVER = 3.0  # times a limit: what an integral is asked beyond it
@@ -33,11 +33,11 @@ CLAMPED = {"u": ("voltage_limit", "voltage_V", "V"), "i_ref": ("current_limit", 
            "w_ref": ("speed_limit", "speed_rad_s", "")}  # fmt: skip
 
 
-def _pushed(rows: Rows, pair: Pair, stage: str, size: float) -> Stepper:
+def _pushed(rows: Rows, pair: Pair, stage: str, size: float) -> Running:
     """One tick in which a stage is asked for ``size`` times its gain; 0 for the command of the drive."""
     if stage in ("velocity", "current"):
         rows.step("w_ref" if stage == "velocity" else "i_ref", size, -1.0)
-    drive = Stepper(rows)
+    drive = rows.running()
     if stage not in ("velocity", "current"):
         drive.command(size)
     drive.begin()

@@ -53,8 +53,6 @@ class LoopSetup:
     limits_on : bool
     held : bool
         Whether the rotor is held at its speed.
-    gain : float
-        Factor on the loop gain at the place.
     """
 
     design: Design
@@ -62,7 +60,6 @@ class LoopSetup:
     bias: OperatingMotion
     limits_on: bool = True
     held: bool = False
-    gain: float = 1.0
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
@@ -120,7 +117,7 @@ class LoopSetup:
     def condition(self) -> str:
         """On which motion it is tested, in words."""
         if self.held:
-            return "rotor held" + (" at a constant speed" if self.bias.speed_rad_s else "")
+            return "rotor locked" + (" at a constant speed" if self.bias.speed_rad_s else "")
         if self.bias.speed_rad_s:
             pressed = ", coupling pressed by a constant moment" if self.bias.coupling_Nm else ""
             return f"on a constant speed{pressed}"
@@ -128,7 +125,7 @@ class LoopSetup:
 
     def row(self) -> Rows:
         """Parameters of a run that starts in the steady state of the operating motion; see `rows`."""
-        return self.rows(self.gain)
+        return self.rows()
 
     def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
         """Parameters of runs that start in the steady state of the operating motion, one a value.
