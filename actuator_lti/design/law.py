@@ -12,7 +12,7 @@ from typing import Annotated, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from actuator_lti.design.field import BIG, matrix, names, positive, quantities, quantity
+from actuator_lti.design.field import BIG, matrix, names, positive, quantities, quantity, text
 
 LawInput = Literal["command", "error", "speed", "angle", "current", "output_angle", "output_speed"]
 LAW_INPUTS: tuple[str, ...] = get_args(LawInput)
@@ -72,6 +72,8 @@ class Law(StateSpace):
 
     inputs: Annotated[tuple[LawInput, ...], names(
         "inputs", "the signals that it takes, a column of B and D each")]
+    file: Annotated[str, text(
+        "a .mat or .json file with A, B, C, D and Ts, beside the design file; read in their place")] = ""
     L: Annotated[tuple[float, ...], quantities(
         "L", "1", "anti-windup: n numbers that the states take of u - v; zeros where left out", **_LIST)] = ()
     gain: Annotated[float, quantity(
@@ -85,6 +87,11 @@ class Law(StateSpace):
     def sampled(self) -> Matrices:
         """The matrices that run."""
         return self.matrices(len(self.inputs), self.L)
+
+    @property
+    def poles(self) -> np.ndarray:
+        """Eigenvalues of A."""
+        return np.linalg.eigvals(self.sampled.A)
 
     @property
     def integrates(self) -> bool:

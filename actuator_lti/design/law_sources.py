@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import json
 from math import isqrt
 from pathlib import Path
 from typing import Any
@@ -11,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import decode, read_bytes, shown_path
+from actuator_lti.files.mat5 import read_mat5
+from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
 from actuator_lti.files.tree import Tree
 
 PARTS = ("A", "B", "C", "D")
@@ -33,9 +32,9 @@ def read_law(path: Path) -> Tree:
     if path.suffix not in (".mat", ".json"):
         raise InputError(f"allowed: a {_WHAT}", where=where)
     try:
-        held = _from_mat(data) if path.suffix == ".mat" else json.loads(decode(data, where))
-    except (ValueError, TypeError, RecursionError, NotImplementedError, OSError) as error:
-        raise InputError(f"cannot be read: {error}; allowed: a {_WHAT}", where=where) from None
+        held = _from_mat(data) if path.suffix == ".mat" else parse_json(decode(data, where), where)
+    except InputError as error:
+        raise InputError(f"cannot be read: {error.message}; allowed: a {_WHAT}", where=where) from None
     held = _holding(held)
     if held is None:
         raise InputError(f"holds no A, B, C and D; allowed: a {_WHAT}", where=where)
@@ -50,29 +49,18 @@ def read_law(path: Path) -> Tree:
 
 
 def _from_mat(data: bytes) -> Tree:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    try:
-        return dict(loadmat(io.BytesIO(data), mat_dtype=True))
-    except MatReadError as error:
-        raise ValueError(error) from None
+    """Arrays by name, those of a structure in a table of its name."""
+    held: Tree = {}
+    for name, values in read_mat5(data).arrays.items():
+        table, _, field = name.rpartition(".")
+        (held.setdefault(f"{table}.", {}) if table else held)[field] = values
+    return held
 
 
 def _holding(held: Any) -> Tree | None:
-    """The table that has D and perhaps the others: the file itself, or the one structure in it."""
-    if not isinstance(held, dict):
-        return None
-    inside = [held, *(_fields(value) for value in held.values())]
-    return next((one for one in inside if one is not None and "D" in one), None)
-
-
-def _fields(value: Any) -> Tree | None:
-    """A table, or the fields of a MATLAB structure."""
-    names = getattr(getattr(value, "dtype", None), "names", None)
-    if names and value.size == 1:
-        return {name: value[name].flat[0] for name in names}
-    return value if isinstance(value, dict) else None
+    """The table that has D and perhaps the others: the file itself, or one in it."""
+    tables = [held, *(held.values() if isinstance(held, dict) else ())]
+    return next((one for one in tables if isinstance(one, dict) and "D" in one), None)
 
 
 def law_tree(A: Any, B: Any, C: Any, D: Any, L: Any = (), period_s: Any = None) -> Tree:

@@ -43,7 +43,7 @@ def load_design(name_or_path: str | PathLike[str]) -> Design:
     name = _name_of(name_or_path)
     if name in shipped_designs():
         return _shipped(name)
-    return read_design_text(design_text(name), shown(name, 200)[1:-1])
+    return read_design_text(design_text(name), shown(name, 200)[1:-1], Path(name).parent)
 
 
 def as_design(design: Design | str | PathLike[str]) -> Design:
@@ -97,8 +97,10 @@ def _shipped(name: str) -> Design:
     return read_design_text(design_text(name), name)
 
 
-def read_design_text(text: str, origin: str = "design") -> Design:
+def read_design_text(text: str, origin: str = "design", folder: Path = Path()) -> Design:
     """Read a design from TOML text; ``origin`` is named in errors and kept in the design.
+
+    Files that it names, as a law's, are sought in ``folder``.
 
     Raises
     ------
@@ -110,11 +112,13 @@ def read_design_text(text: str, origin: str = "design") -> Design:
     tree = parse_toml(text, origin)
     if not tree:
         raise InputError("is empty; allowed: a design file (actuator-lti init writes one)", where=origin)
-    return design_from_tree(tree, origin, lines_of(text, tree))
+    return design_from_tree(tree, origin, lines_of(text, tree), folder)
 
 
-def design_from_tree(tree: Tree, origin: str, lines: Mapping[str, int] | None = None) -> Design:
+def design_from_tree(
+    tree: Tree, origin: str, lines: Mapping[str, int] | None = None, folder: Path = Path()
+) -> Design:
     """Build and check a design from a parsed TOML tree, whose keys stand on these lines of a text."""
-    design = read_tree(tree, origin, Findings(origin, lines))
+    design = read_tree(tree, origin, Findings(origin, lines, folder))
     check_design(design, origin, lines)
     return design

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
 from actuator_lti.errors import InputError, Mistakes
@@ -29,10 +30,13 @@ def refusal_text(refusal: Refusal) -> str:
 
 
 class Findings:
-    """What is wrong in one file; ``lines`` gives the line of a dotted key, where there is a text."""
+    """What is wrong in one file; ``lines`` gives the line of a dotted key, where there is a text.
 
-    def __init__(self, where: str, lines: Mapping[str, int] | None = None) -> None:
-        self.where = where
+    ``folder`` is that of the file: what it names lies there.
+    """
+
+    def __init__(self, where: str, lines: Mapping[str, int] | None = None, folder: Path = Path()) -> None:
+        self.where, self.folder = where, folder
         self.lines = lines or {}
         self.found: list[tuple[int, InputError]] = []
 

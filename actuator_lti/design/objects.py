@@ -103,10 +103,11 @@ def _follows(known: KnownObject, value: int, given: _Values) -> bool:
 
 def _check_cascade(design: Design) -> None:
     control = design.controller
-    if design.axis != "rotary" or control.velocity is None or control.current is None:
+    cascade = control.velocity is not None and control.current is not None and control.own_law is None
+    if design.axis != "rotary" or not cascade:
         raise InputError(
             f"the design {design.name} cannot hold a motion controller's settings; "
-            "allowed: a rotary drive with current, velocity and position loop"
+            "allowed: a rotary drive with current, velocity and position loop, all by gains"
         )
 
 

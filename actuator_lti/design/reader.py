@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from dataclasses import replace
 from datetime import date
 from math import pi, sqrt
-from pathlib import Path
 from typing import Any
 
 from actuator_lti.design import model
@@ -297,7 +296,7 @@ class Reader:
             self.refuse(f"{path}.file", file, f"allowed: a file's name, without {', '.join(twice) or 'more'}")
             return rest
         try:
-            return {**read_law(Path(self.findings.where).parent / file), **rest}
+            return {**read_law(self.findings.folder / file), **rest}
         except InputError as error:
             self.refuse(f"{path}.file", file, error.message)
         return rest

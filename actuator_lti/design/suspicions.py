@@ -25,7 +25,8 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     """
     design = as_design(design)
     checks = (
-        _sampling, _crossovers, _limits, _unused, _loads, _pedigree, _encoder, _ac_motor, elastic_warnings,
+        _sampling, _crossovers, _law, _limits, _unused, _loads, _pedigree, _encoder, _ac_motor,
+        elastic_warnings,
     )  # fmt: skip
     return tuple(line for check in checks for line in check(design))
 
@@ -83,6 +84,12 @@ def _crossovers(design: Design) -> Iterator[str]:
                 f"control.{outer}.gain: crossover near {crossovers[outer]:.3g} rad/s lies above that of the "
                 f"{inner} loop inside it, {crossovers[inner]:.3g} rad/s"
             )
+
+
+def _law(design: Design) -> Iterator[str]:
+    own = design.controller.own_law
+    if own is not None and (size := max(abs(own[1].poles), default=0.0)) > 1.0 + 1e-9:
+        yield f"control.{own[0]}.law: unstable of itself, a pole of size {size:.6g}"
 
 
 def _limits(design: Design) -> Iterator[str]:

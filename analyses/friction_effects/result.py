@@ -107,7 +107,9 @@ def friction_effects(
 
 def _integrator(design: Design) -> str:
     """The controller whose integral overcomes dry friction: that of the speed, else of the position."""
-    control = design.controller
+    control, own = design.controller, design.controller.own_law
+    if own is not None and own[1].integrates and own[0] != "current":
+        return {"velocity": "speed"}.get(own[0], own[0])
     if control.velocity is not None and control.velocity.integral_time_s is not None:
         return "speed"
     return "" if control.position_loop.integral_time_s is None else "position"

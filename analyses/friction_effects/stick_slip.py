@@ -136,6 +136,8 @@ def _slip(design: Design, loops: Loops, load_Nm: float, ticks: int) -> _Slip | N
     symmetric = friction.dry_torque_reverse_Nm is None and friction.offset_torque_Nm == 0.0
     if velocity is None or velocity.integral_time_s is None or system is None or not symmetric:
         return None
+    if design.controller.own_law is not None:
+        return None  # what a law of one's own does meanwhile is not known here
     if friction.points:
         return None  # the slip is that of the linear loop: with a constant sliding friction
     if friction.law != "coulomb" or design.load.path == "back-drivable" or friction.dry_Nm(load_Nm) == 0.0:

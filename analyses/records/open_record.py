@@ -9,12 +9,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from actuator_lti.errors import InputError
+from actuator_lti.files.mat5 import MatContent
 from actuator_lti.files.reading import open_regular, shown_path
 from analyses.records.campaign_file import record_spec
 from analyses.records.campaign_import import read_record
 from analyses.records.csv_stream import MAX_ROWS
 from analyses.records.inputs import spec_of_names
-from analyses.records.mat5 import MatContent
 from analyses.records.mat_reader import columns_of, load_mat, names_in
 from analyses.records.parquet_reader import load_parquet
 from analyses.records.published import EMPS_SPEC, ODRIVE_SPEC

@@ -24,6 +24,7 @@ SLIDER_FACTOR = 5.0  # a slider goes from a fifth of the value to five times it
 UNUSED = "has no influence on the loops or the run that this page follows"
 ZERO = "0 in this design: change it in the design file"
 UNFOLLOWED = "enters through a function that this page does not have: change it in the design file"
+RESAMPLED = "the law of the stage was made for this period and is not resampled"
 LONGEST = 20.0  # control periods: the range of a time that is 0
 WIDEST = {"rad": 0.01, "m": 1e-4}  # the range of a play that is 0
 COUNTED = 10.0  # a whole number has at least this range
@@ -79,7 +80,9 @@ def _data(statements: Sequence[Statement]) -> list[list[Term]]:
 
 def _reason(design: Design, path: str, figures: Iterable[Figure]) -> str:
     """Say why a key has no slider; empty where it has one."""
-    value = parameter_value(design, path)
+    value, own = parameter_value(design, path), design.controller.own_law
+    if own is not None and path in ("control.period", f"control.{own[0]}.every"):
+        return RESAMPLED
     if value == 0.0 and not _top(design, path):
         return ZERO
     changes = changes_row(design, path)

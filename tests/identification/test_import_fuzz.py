@@ -112,7 +112,7 @@ def test_a_compressed_and_a_plain_file_read_alike() -> None:
     import numpy as np
     from scipy.io import savemat
 
-    from analyses.records.mat5 import read_mat5
+    from actuator_lti.files.mat5 import read_mat5
 
     values = {"t": np.arange(5.0), "n": np.array([[1, 2], [3, 4]], dtype=np.int16), "k": 3.5, "text": "abc"}
     result = []

@@ -19,6 +19,7 @@ from scipy.io import savemat
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins
 from actuator_lti.design import Design, design_hash, read_design_text, write_design
 from actuator_lti.design.model import Command, Encoder, Limits, OutputEncoder
+from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.writing import design_tree
 from actuator_lti.loops.assemble import loops_at
 from nonlinear import Drive, Rows, tangent
@@ -218,6 +219,13 @@ def test_hash_tolerance_and_values_follow() -> None:
     nominal, up = (stability_margins(assemble_loops(each).velocity.open_loop) for each in (mine, more))  # type: ignore[union-attr]
     assert up.gain_margins[-1].ratio == pytest.approx(nominal.gain_margins[-1].ratio / 1.2, rel=1e-9)
     assert "control.velocity.gain" not in {item.path for item in mine.parameters.values()}
+
+
+def test_a_law_unstable_of_itself_is_allowed_and_said() -> None:
+    base = load_design("ilr33-amber")
+    mine = base.with_law("velocity", ([[1.05]], [[0.01]], [[0.01]], [[0.1]], 1e-4), ["error"])
+    assert any("unstable of itself, a pole of size 1.05" in line for line in warnings_of(mine))
+    assert stability_margins(assemble_loops(mine).velocity.open_loop) is not None  # type: ignore[union-attr]
 
 
 def _refused(what: Any) -> str:
