@@ -1,4 +1,4 @@
-"""The compiled figures of many designs against assemble_loops and the margin engine, and their own bits."""
+"""Figures of many designs, compiled, against one design's own margins, surveys of them in time."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, sta
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, with_overrides, with_values
 from actuator_lti.errors import InputError
+from analyses.linear.loop_survey import MOST_STATES, survey_loops
 
 NAMES = ("ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps")
 
@@ -215,3 +216,17 @@ def test_a_step_is_followed_for_as_long_as_its_resonance_rings(above):
     assert row[_figures.SETTLING] == pytest.approx(truth.settling_time_s / 1e-3, abs=1e-6)
     assert row[_figures.RISE] == pytest.approx(truth.rise_time_s / 1e-3, abs=1e-6)
     assert row[_figures.OVERSHOOT] == pytest.approx(truth.overshoot_percent, rel=1e-7)
+
+
+def test_a_fundamental_of_very_many_states_has_exact_borders_and_a_reason() -> None:
+    changed = {"control.position.every": 40, "control.position.gain": 5.0}
+    design = with_values(load_design("ballscrew"), changed)
+    states = {name: len(loop.plain_open.A) for name, loop in assemble_loops(design).break_points.items()}
+    points = survey_loops(design).break_points
+    large = [name for name, count in states.items() if count > MOST_STATES]
+    assert large
+    for name in large:
+        assert points[name].figures is None
+        assert points[name].exact is not None
+        assert f"{states[name]} states" in points[name].reason
+    assert points["output"].figures is not None
