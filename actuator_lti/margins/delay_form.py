@@ -37,14 +37,14 @@ def delay_form(system: Any, series_s: float = 0.0) -> DelayForm:
     """From a system with the attributes of a `DelaySystem` (A, B1, ..., D22, delays_s)."""
     A = np.asarray(system.A, dtype=float)
     q, n = np.size(system.delays_s), A.shape[0]
-    B1, C1 = np.reshape(system.B1, (n, -1)), np.reshape(system.C1, (-1, n))
     if np.size(system.D11) != 1:
         raise InputError(f"a loop has one input and one output; this has D11 of shape {np.shape(system.D11)}")
-    top = np.hstack((A, np.reshape(system.B2, (n, q)), B1.reshape(n, 1)))
+    B1, C1 = np.reshape(system.B1, (n, 1)), np.reshape(system.C1, (1, n))
+    top = np.hstack((A.reshape(n, n), np.reshape(system.B2, (n, q)), B1))
     middle = np.hstack(
         (np.reshape(system.C2, (q, n)), np.reshape(system.D22, (q, q)), np.reshape(system.D21, (q, 1)))
     )
-    bottom = np.hstack((C1.reshape(1, n), np.reshape(system.D12, (1, q)), np.reshape(system.D11, (1, 1))))
+    bottom = np.hstack((C1, np.reshape(system.D12, (1, q)), np.reshape(system.D11, (1, 1))))
     return _form(
         np.vstack((top, middle, bottom)), n, np.asarray(system.delays_s, dtype=float).ravel(), series_s
     )

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -169,9 +169,9 @@ def exact_inside_delays(form: DelayForm, *, reduced: bool = True) -> tuple[Exact
 def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop:
     r"""Expand the determinants, affine in each exp(-s tau_k): one polynomial for each subset of delays.
 
-    D = det [sI - A, -B2 E; -C2, I - D22 E] and N the same bordered by (-B1, -D21; C1, D12 E, D11), with
-    E = diag exp(-s tau_k); a column without its delay is a unit vector, which takes its row away. A power of
-    s in every term of both is cancelled where the loop is to be ``reduced``.
+    D = det [sI - A, -B2 E; -C2, I - D22 E] with E = diag exp(-s tau_k), and N the same bordered by
+    (-B1, -D21; C1, D12 E, D11), which is (D11 - 1) D and D less the product of that column and row. A power
+    of s in every term of both is cancelled where the loop is to be ``reduced``.
 
     Raises
     ------
@@ -182,17 +182,13 @@ def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop
     if q > _MOST_DELAYS:
         raise InputError(f"exact arithmetic takes at most {_MOST_DELAYS} inner delays; this loop has {q}")
     delays = [_exact(tau) for tau in form.delays]
-    above, below = [], []
-    for size in range(q + 1):
-        for chosen in combinations(range(q), size):
-            tau = sum((delays[k] for k in chosen), fmpq(0))
-            S = list(chosen)
-            core = np.block([[-form.A, -form.B2[:, S]], [-form.C2[S], -form.D22[np.ix_(S, S)]]])
-            column = np.concatenate((-form.B1, -form.D21[S]))
-            row = np.concatenate((form.C1, form.D12[S]))
-            whole = np.block([[core, column[:, None]], [row[None], np.array([[form.D11]])]])
-            below.append((_determinant(core, n), tau))
-            above.append((_determinant(whole, n), tau))
+    late = [sum((tau for k, tau in enumerate(delays) if mask >> k & 1), fmpq(0)) for mask in range(1 << q)]
+    whole = _exact_matrix(np.block([[form.A, form.B2], [form.C2, form.D22]]))
+    column = _exact_matrix(np.concatenate((form.B1, form.D21))[:, None])
+    row = _exact_matrix(np.concatenate((form.C1, form.D12))[None])
+    below = list(zip(_determinants(whole, n), late, strict=True))
+    fed_back = _determinants(whole - column * row, n)
+    above = [(p + (_exact(form.D11) - 1) * d, tau) for p, (d, tau) in zip(fed_back, below, strict=True)]
     if any(p.degree() >= n for p, _ in below[1:]) or any(p.degree() >= n for p, _ in above):
         raise InputError(
             "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
@@ -220,28 +216,30 @@ def _exact(x: float) -> fmpq:
     return fmpq(above, below)
 
 
-def _determinant(M: Any, states: int) -> fmpq_poly:
-    """det(M + s I) with s on the first ``states`` rows only: by its values at 0, 1, ..., states."""
-    m = M.shape[0]
-    if not m:
-        return fmpq_poly([1])
-    entries = [_exact(x) for x in M.ravel()]
-    values = []
-    for s in range(states + 1):
-        shifted = list(entries)
-        for k in range(states):
-            shifted[k * m + k] = entries[k * m + k] + s
-        values.append(fmpq_mat(m, m, shifted).det())
-    return _newton(values)
+def _determinants(whole: fmpq_mat, n: int) -> list[fmpq_poly]:
+    """Of [sI - A, -B E; -C, I - D E], E = diag(e_k): the polynomials at each product of e_k, by its mask.
+
+    With e_k one or zero it is det(I - D) det(sI - A - B (I - D)^-1 C) of the delays that are there.
+    """
+    states, q, found = range(n), whole.nrows() - n, []
+    for mask in range(1 << q):
+        there = [n + k for k in range(q) if mask >> k & 1]
+        A, B, C, D = (_part(whole, rows, columns) for rows in (states, there) for columns in (states, there))
+        K = _exact_matrix(np.eye(len(there))) - D
+        if K.det() == 0:
+            raise InputError("delays feed back on themselves at once: of neutral type, no margins are given")
+        found.append((A + B * K.inv() * C).charpoly() * K.det() if there else A.charpoly())
+    for k in range(q):
+        for mask in range(len(found)):
+            if mask >> k & 1:
+                found[mask] -= found[mask ^ (1 << k)]
+    return found
 
 
-def _newton(values: list[fmpq]) -> fmpq_poly:
-    """The polynomial through (k, values[k])."""
-    differences, table = [values[0]], list(values)
-    for k in range(1, len(values)):
-        table = [(b - a) / k for a, b in pairwise(table)]
-        differences.append(table[0])
-    out = fmpq_poly([differences[-1]])
-    for k in range(len(values) - 2, -1, -1):
-        out = out * fmpq_poly([-k, 1]) + differences[k]
-    return out
+def _part(M: fmpq_mat, rows: Sequence[int], columns: Sequence[int]) -> fmpq_mat:
+    return fmpq_mat(len(rows), len(columns), [M[r, c] for r in rows for c in columns])
+
+
+def _exact_matrix(M: Any) -> fmpq_mat:
+    rows, columns = M.shape
+    return fmpq_mat(rows, columns, [_exact(x) for x in M.ravel()])
