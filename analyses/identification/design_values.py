@@ -25,6 +25,11 @@ NO_CHANCE = 1e-3
 EXPLAINED = 0.01
 """Level above which a cause explains what is off."""
 LEAST_VALUES = 3
+ALIKE = 0.02
+"""Relative standard deviation within which a cause has to explain: rough numbers of a design that are off
+alike by chance are no cause."""
+FEW = 2.0
+"""Least factor of a cause that only two values tell."""
 
 CAUSES: Mapping[str, Mapping[str, float]] = {
     "the scale of the current": {
@@ -145,6 +150,7 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     ('the scale of the current or the torque constant (and back-EMF constant)', 0.8)
     """
     x = np.log([one.ratio for one in values])
+    close = np.array([float(np.hypot(one.error / one.ratio, ALIKE)) for one in values])
     std = np.array([float(np.hypot(one.error / one.ratio, one.allowed)) for one in values])
     if len(values) < LEAST_VALUES or chi2.sf(float(np.sum((x / std) ** 2)), len(x)) > NO_CHANCE:
         return None
@@ -154,10 +160,12 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
         told = [one for one, power in zip(values, g, strict=True) if power]
         if len(told) < 2 or not np.any(g):
             continue
-        factor, rest = _along(x, g, std)
+        factor, rest = _along(x, g, close)
+        if len(told) < LEAST_VALUES and abs(factor) < log(FEW):
+            continue
         level = float(chi2.sf(rest, len(x) - 1))
         if level > EXPLAINED:
-            fitting.append((level, words, factor, float(1.0 / np.linalg.norm(g / std))))
+            fitting.append((level, words, factor, float(1.0 / np.linalg.norm(g / close))))
     if not fitting:
         return None
     level, _, factor, error = max(fitting)
