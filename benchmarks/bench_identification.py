@@ -29,6 +29,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0, counts.rows_o
 def rows(quick: bool = False) -> Iterable[Row]:
     """The rows of this group."""
     yield from _campaign(quick)
+    yield from _intervals(20 if quick else 100)
     if EMPS.exists():
         yield _emps()
     yield from _streaming(quick)
@@ -54,6 +55,26 @@ def _campaign(quick: bool) -> Iterable[Row]:
     what = f"{len(result.fit.points)} runs of {plan.duration_s:g} s at 1 kHz"
     yield Row(group=GROUP, name=f"{what}, from files", measured=done - start, unit="s", target=5.0)
     yield Row(group=GROUP, name=f"{what}, once read", measured=done - read, unit="s", target=5.0)
+
+
+def _intervals(drives: int) -> Iterable[Row]:
+    """Random drives, each identified from a record of its own: do the 95 % intervals hold what they say?"""
+    import numpy as np
+
+    from analyses.identification.bench import identify_bench
+    from benchmarks.random_records import KINDS, VALUES, random_record
+
+    for kind in KINDS:
+        errors = []
+        for seed in range(drives):
+            design, truth, record = random_record(kind, seed)
+            model = identify_bench(design, [record]).model
+            errors += [(model[name] - truth[name]) / model.std(name) for name in VALUES]
+        inside = 100.0 * float(np.mean(np.abs(errors) < 1.96))
+        name = f"95 % intervals of {drives} random drives, {kind}"
+        rms = float(np.sqrt(np.mean(np.square(errors))))
+        note = f"rms of error over stated error {rms:.2f}; wanted 92 to 98 % and 0.8 to 1.25"
+        yield Row(group=GROUP, name=name, measured=inside, unit="%", note=note)
 
 
 def _emps() -> Row:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -106,7 +107,7 @@ class Asked:
         if self.is_campaign and (self.validate or self.refine):
             raise InputError("--validate and --refine go with records, not with a campaign")
 
-    @property
+    @cached_property
     def is_campaign(self) -> bool:
         """Whether a single TOML file is given that lists runs, and is no record file."""
         first = self.files[0]

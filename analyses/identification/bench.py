@@ -11,6 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.driving import command_of
 from analyses.estimation.parameters import parameter
+from analyses.identification.design_values import DesignValue, design_values
 from analyses.identification.diagnosis import diagnosed
 from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
 from analyses.identification.following_error import following_item
@@ -21,7 +22,7 @@ from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.own_bias import without_bias
 from analyses.identification.refinement import refine_records
 from analyses.identification.resimulation import Resimulated, resimulate
-from analyses.identification.rows import recipe_for
+from analyses.identification.rows import is_loaded, recipe_for
 from analyses.identification.to_design import (
     INERTIAS,
     design_with_fit,
@@ -78,6 +79,7 @@ class BenchResult(Identified):
     refined: OutputErrorResult | None
     resimulated: tuple[Resimulated, ...]
     settings: BenchSettings
+    design_values: tuple[DesignValue, ...] = ()
     laws: tuple[LawChoice, ...] = ()
     electrical: ElectricalFit | None = None
 
@@ -125,7 +127,11 @@ def identify_bench(
     source = f"identified from {', '.join(record.name for record in records)}"
     sampled = tuple(item for record in used if (item := sampling_item(record)) is not None)
     lags = [following_item(start, *pair) for pair in zip(used, simulated, strict=bool(simulated))]
-    items = (*_fit_items(design, findings, model, settings.residual_limit), *sampled, *filter(None, lags))
+    compared = design_values(design, model, used, start)
+    size = size_item(
+        design, compared, kept_constants=electrical is None, loaded=any(is_loaded(record) for record in used)
+    )
+    items = (*_fit_items(findings, size, model, settings.residual_limit), *sampled, *filter(None, lags))
     try:
         values = joint_values(start, model, inertia_to=settings.inertia_to)
         made = design_with_fit(with_structure(start, model), values, source)
@@ -149,6 +155,7 @@ def identify_bench(
         resimulated=again,
         items=(*items, *_held_out(start, model, unseen, settings), *_again(again, settings)),
         settings=settings,
+        design_values=compared,
         laws=laws,
         electrical=electrical,
     )
@@ -212,11 +219,11 @@ def _held(design: Design, settings: BenchSettings) -> dict[str, float]:
 
 
 def _fit_items(
-    design: Design, findings: Mapping[str, tuple[Finding, ...]], model: JointModel, limit: float
+    findings: Mapping[str, tuple[Finding, ...]], size: Item, model: JointModel, limit: float
 ) -> tuple[Item, ...]:
     return (
         *(inputs_item(name, result) for name, result in findings.items()),
-        size_item(design, model),
+        size,
         rows_item(model.rows_used, len(model.names)),
         residual_item(model.relative_residual, limit),
     )

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.least_squares import covariance_of, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
-from analyses.identification.joint_model import JointModel, Recipe
+from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows
 from analyses.identification.simultaneous import SURE, Lag, lag_of, shifted
 from analyses.records.consistency import Finding
@@ -66,6 +67,11 @@ def diagnosed(
         before = model
         model, simulated = fit(used)
         model = _with_error_of(sure, before, model)
+    for record, part in zip(used, model.records, strict=True):
+        drift = None if is_benchmark(record) else _drift(part, model)
+        if drift is not None:
+            found[record.name].append(drift[0])
+            model = replace(model, covariance=model.covariance + drift[1])
     return Diagnosed(
         model=model,
         records=used,
@@ -102,6 +108,36 @@ def _with_error_of(lags: Sequence[Lag], before: JointModel, model: JointModel) -
     moved = model.values - before.values
     share = float(np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in lags]))
     return replace(model, covariance=model.covariance + share * np.outer(moved, moved))
+
+
+def _drift(part: RecordFit, model: JointModel) -> tuple[Finding, FloatArray] | None:
+    """Whether all torques change their scale along a record, and what that adds to the covariance.
+
+    The residual over the modelled torque times the time (-1 at the begin, 1 at the end) and over that time
+    alone, beside the model's own columns. A value that drifts by +-d about its mean is uniform in that.
+    """
+    time = np.linspace(-1.0, 1.0, len(part.keep))[part.keep]
+    torque = part.w @ model.values
+    table = np.column_stack([part.w, time * torque, time])
+    size = np.linalg.norm(table, axis=0)
+    names = (*model.names, "scale", "shift")
+    if len(told_apart(table, names)[0]) < len(names):
+        return None
+    found = np.linalg.lstsq(table / size, part.own_residual, rcond=None)[0] / size
+    rest = part.own_residual - table @ found
+    errors = np.sqrt(np.diag(covariance_of([(table / size, rest)]))) / size
+    scale, shift = found[-2:]
+    sure = np.abs(found[-2:]) > SURE * errors[-2:]
+    if not np.any(sure):
+        return None
+    moved = sure[0] * np.outer(model.values, model.values) * scale**2 / 3.0
+    text = f"all torques change by {200.0 * scale:+.2g} % from begin to end" if sure[0] else ""
+    if sure[1]:
+        text += f"{' and ' if text else ''}the offset by {2.0 * shift:+.2g}"
+        if "offset" in model.names:
+            moved[model.names.index("offset"), model.names.index("offset")] += shift**2 / 3.0
+    finding = Finding(subject="drift along the record", passed=None, text=f"{text}: the intervals hold it")
+    return finding, moved
 
 
 def flat_tops(values: FloatArray) -> NDArray[np.bool_]:

@@ -69,6 +69,11 @@ def is_benchmark(record: Record) -> bool:
     return "gtau" in record.constants
 
 
+def is_loaded(record: Record) -> bool:
+    """Whether a record holds the load."""
+    return bool({"load_force", "torque"} & set(record.signals))
+
+
 def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool]:
     """The drive torque (force) of a record: values, signal, in words, and whether kE w is still to be taken
     off.

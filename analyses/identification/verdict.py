@@ -8,7 +8,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from actuator_lti.design.model import Design
-from analyses.identification.joint_model import JointModel, default_value
+from analyses.estimation.parameters import parameter
+from analyses.identification.design_values import DesignValue, cause, told
 from analyses.records.consistency import Finding
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
@@ -16,7 +17,11 @@ from analyses.records.record import Record
 RESIDUAL_LIMIT = 0.20
 """Largest relative residual that is taken without being told to."""
 LARGEST_FACTOR = 3.0
+MOST_DRY_UNLOADED = 2.0
+"""Dry friction over the design's, where a load adds to it and none is recorded."""
 LARGEST_OF_ANY = 10.0
+COMMON = ("inertia", "dry", "viscous")
+"""Values that a wrong scale of the drive signal moves alike."""
 LARGEST_LINE_ERROR = 0.5
 ROWS_EACH = 10
 HELD_OUT_FACTOR = 1.5
@@ -125,32 +130,35 @@ def simulated_item(record: str, error: float, limit: float, how: str) -> Item:
     )
 
 
-def size_item(design: Design, model: JointModel) -> Item:
-    """Identified values against those that the design had: a common factor is no drive's doing."""
-    ratios, behind, far = {}, _behind(design), ""
-    for name in model.names:
-        kind = name.partition("_")[0]
-        before = default_value(design, name)
-        if kind in behind and before > 0.0:
-            ratios[name] = (model[name] + behind[kind]) / (before + behind[kind])
-        elif name == "load_coefficient" and before > 0.0:
-            ratio, sure = model[name] / before, abs(model[name] - before) > 3.0 * model.std(name)
-            if sure and not 1.0 / LARGEST_OF_ANY <= ratio <= LARGEST_OF_ANY:
-                factor = named_factor(ratio) if ratio else None
-                far = f"load friction is {ratio:.3g} times the design's" + (
-                    f": factor {factor}" if factor else ""
-                )
+def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: bool, loaded: bool) -> Item:
+    """Identified values against those that the design had, each and by the one cause that explains all.
+
+    ``kept_constants``: torques are the current times the design's own constant; ``loaded``: a record holds
+    the load.
+    """
+    ratios = {one.name: one.ratio for one in values if one.name.partition("_")[0] in COMMON}
     made = sizes_item(ratios, {design.total_ratio: f"the reduction {design.total_ratio:g}"}, "inertia")
-    return replace(made, passed=False, reason=made.reason or far) if far else made
-
-
-def _behind(design: Design) -> dict[str, float]:
-    """Friction behind the coupling, at the motor: it was taken off the torque that a wrong scale is in."""
-    ratio, friction = design.ratio_to_coupling, design.load.friction
-    if design.coupling is None or friction is None:
-        return {"inertia": 0.0, "viscous": 0.0, "dry": 0.0}
-    dry, viscous = friction.dry_torque_Nm / ratio, friction.viscous_Nms_rad / ratio**2
-    return {"inertia": 0.0, "viscous": viscous, "dry": dry}
+    explained = cause(values)
+    reasons = ["" if explained is None else told(*explained), made.reason]
+    if "all identified" in made.reason:
+        reasons.reverse()
+    feels = design.friction.load_coefficient > 0.0 and not loaded
+    most_dry = MOST_DRY_UNLOADED if feels else LARGEST_FACTOR
+    for one in values:
+        label = parameter(one.name, design.axis).label
+        off = f"{label} is {one.ratio:.3g} times the design's"
+        if one.name.partition("_")[0] == "back" and kept_constants and not one.agrees:
+            reasons.append(
+                f"{off}, so kM and all torques are as far off: --electrical takes it from the record"
+            )
+        elif not 1.0 / LARGEST_OF_ANY <= one.ratio <= LARGEST_OF_ANY and not one.agrees:
+            factor = named_factor(one.ratio)
+            reasons.append(off + (f": factor {factor}" if factor else ""))
+        elif one.name.startswith("dry") and one.ratio > most_dry and not one.agrees:
+            load = (one.found - one.design) / max(design.friction.load_coefficient, 1e-300)
+            reasons.append(f"{off}" + (f": as under a load of {load:.3g} N m, not recorded" if feels else ""))
+    reason = next(filter(None, reasons), "")
+    return replace(made, passed=False, reason=reason) if reason else made
 
 
 def sizes_item(ratios: Mapping[str, float], more: Mapping[float, str], leading: str) -> Item:

@@ -20,6 +20,9 @@ OVER = 1.2
 ELECTRICAL_FACTOR = 2.0
 SMOOTH_HZ = 20.0
 IN_MOTION = 0.05
+CLOSELY = 0.95
+"""Cosine above which a command is followed within 18 deg: no loop has another gain there than about one."""
+LARGEST_GAIN = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,8 +257,10 @@ def _command(design: Design, record: Record) -> Finding | None:
                 subject=f"{answer} against its command", passed=None, text=f"cosine {alike:.2f}: not followed"
             )
         factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
-        wrong = factor is not None and not 0.5 < ratio < 1.5
-        text = f"{answer} is {ratio:.4g} times {command}" + (f": factor {factor}" if wrong else "")
+        follows = abs(alike) > CLOSELY and not 1.0 / LARGEST_GAIN < ratio < LARGEST_GAIN
+        wrong = follows or (factor is not None and not 0.5 < ratio < 1.5)
+        why = f"factor {factor}" if factor else "the reduction, or the scale of one of them"
+        text = f"{answer} is {ratio:.4g} times {command}" + (f": {why}" if wrong else "")
         return Finding(subject=f"{answer} against its command", passed=not wrong, text=text)
     return None
 

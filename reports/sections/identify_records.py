@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from reports.sections.record_tables import finding_table, input_table
 
 if TYPE_CHECKING:
     from analyses.identification.bench import BenchResult
+    from analyses.identification.design_values import DesignValue
     from analyses.identification.joint_model import JointModel
     from analyses.identification.output_error import OutputErrorResult
 
@@ -24,6 +26,8 @@ def section(result: BenchResult) -> Section:
     """Make the section of an identification from records."""
     axis, model = result.design.axis, result.model
     blocks = [_parameters(model, axis)]
+    if result.design_values:
+        blocks.append(_against_design(result.design_values, axis))
     if result.refined is not None:
         blocks.append(_refined(result.refined, axis))
     if result.electrical is not None:
@@ -91,6 +95,25 @@ def _parameters(model: JointModel, axis: str) -> Block:
         "goes into the design." + (f" Bias of the fit: {model.bias_told}." if model.bias_told else "")
     )
     return parameter_table("Identified parameters", model, note, axis=axis, more=more)
+
+
+def _against_design(values: Sequence[DesignValue], axis: str) -> Block:
+    """Every number of the design that the records tell, beside what they say."""
+    columns = [
+        doc.of(lambda one: parameter(one.name, axis).label, "name", "Number"),
+        doc.of("design", "design", "Design", format="sig:4"),
+        doc.of("found", "found", "Records", format="sig:4"),
+        doc.of(lambda one: parameter(one.name, axis).unit, "unit", "Unit"),
+        doc.of("ratio", "ratio", "Records over design", format="sig:4"),
+        doc.of("error", "error", "Standard error", format="sig:2"),
+        doc.of("allowed", "allowed", "Design's own uncertainty", "%", scale=100.0, format="sig:2"),
+        doc.of("agrees", "agrees", "Agrees", format="yesno"),
+    ]
+    note = "A number agrees where chance, with both errors, explains the difference (level 0.1 %)."
+    return doc.listing(
+        "The design's numbers against the records", values, columns, note,
+        status=lambda one: "pass" if one.agrees else "warn",
+    )  # fmt: skip
 
 
 def _refined(refined: OutputErrorResult, axis: str) -> Block:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Design
 from analyses.identification.bench import BenchResult, identify_bench
 from analyses.records.record import Record, RowCounts
+from benchmarks.random_records import KINDS, VALUES, random_record
 from tests.identification.bench_records import Columns, columns_of, motion
 
 BASE = load_design("ilr33-amber")
@@ -91,10 +93,71 @@ def test_clipped_current_is_left_out(signals: tuple[str, ...], columns: Columns,
     assert _is_the_truth(result, drive, 0.01)
 
 
+def _scaled(factor: float, *names: str) -> Damage:
+    return lambda c: {**c, **{name: factor * c[name] for name in names}}
+
+
+WRONG: dict[str, tuple[Damage, dict[str, float], str]] = {
+    "rms of AC as DC": (_scaled(1.5**-0.5, "current"), {}, "root 3/2"),
+    "counts of the encoder": (_scaled(4.0, "angle", "speed"), {}, "the scale of angle and speed"),
+    "torque constant 20 % off": (
+        dict, {"motor.torque_constant": 7.08e-3, "motor.back_emf_constant": 7.08e-3}, "factor 1.2"
+    ),
+    "load friction": (dict, {"friction.load_coefficient": 1.34e-5}, "Load friction is 100 times"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("signals", [ALL, BARE], ids=["all", "bare"])
+@pytest.mark.parametrize("name", WRONG)
+def test_what_cannot_be_put_right_gives_no_design(
+    name: str, signals: tuple[str, ...], columns: Columns, drive: Design
+) -> None:
+    """The design is the drive's own but for what is wrong in it."""
+    damage, wrong, reason = WRONG[name]
+    records = [_record(damage(columns), signals)]
+    if name == "load friction":
+        loaded = motion(5, load_Nm=5.0, design=drive)
+        table = {"time": loaded.time_s[::10], "angle": loaded.motor_angle_rad[::10]}
+        table |= {"current": loaded.current_A[::10], "torque": np.full(len(table["time"]), 5.0)}
+        records.append(replace(_record(table, ("angle", "current", "torque")), name="loaded"))
+    result = identify_bench(with_values(drive, wrong), records)
+    assert not result.passed
+    assert reason in "; ".join(item.reason for item in result.items)
+
+
+def test_a_load_that_was_not_recorded_is_named_with_its_size(drive: Design) -> None:
+    run = motion(2, load_Nm=6.0, design=drive)
+    table = {"time": run.time_s[::10], "angle": run.motor_angle_rad[::10], "current": run.current_A[::10]}
+    result = identify_bench(drive, [_record(table, BARE)])
+    assert not result.passed
+    assert "as under a load of 6.0" in "; ".join(item.reason for item in result.items)
+
+
+def test_a_drift_widens_the_intervals(columns: Columns, drive: Design) -> None:
+    """All torques grow by 20 % along the record: the intervals about their mean hold the truth."""
+    rise = 1.0 + 0.2 * columns["time"] / columns["time"][-1]
+    result = identify_bench(BASE, [_record({**columns, "current": rise * columns["current"]})])
+    assert "drift along the record: all torques change by +1" in _said(result)
+    low, high = result.model.interval("dry")
+    assert low < drive.friction.dry_torque_Nm < high
+
+
 @pytest.mark.parametrize("signals", [ALL, BARE], ids=["all", "bare"])
 def test_an_undamaged_record_says_nothing(signals: tuple[str, ...], columns: Columns, drive: Design) -> None:
     result = identify_bench(BASE, [_record(columns, signals)])
     assert result.passed
     assert "at one time" not in _said(result)
     assert "clipped" not in _said(result)
+    assert "drift" not in _said(result)
     assert _is_the_truth(result, drive, 0.005)
+
+
+@pytest.mark.parametrize("kind", [KINDS[0], KINDS[3]])
+def test_intervals_hold_what_they_say(kind: str) -> None:
+    """Eight random drives: error over stated error is about one, rms (the benchmark draws a hundred)."""
+    errors = []
+    for seed in range(8):
+        design, truth, record = random_record(kind, seed)
+        model = identify_bench(design, [record]).model
+        errors += [(model[name] - truth[name]) / model.std(name) for name in VALUES]
+    assert 0.7 < np.sqrt(np.mean(np.square(errors))) < 1.4
