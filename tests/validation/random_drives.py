@@ -249,20 +249,9 @@ def full_drive(seed: int) -> Design:
     design = random_drive(seed)
     dice = Dice(10**6 + seed)
     for change in (
-        _elastic,
-        _frictions,
-        _loads,
-        _motor_data,
-        _filtered,
-        _regulators,
-        _outer,
-        _sensors,
-        _commanded,
-        _supplied,
-        _protected,
-        _instrumented,
-        _outermost,
-    ):
+        _elastic, _frictions, _loads, _motor_data, _filtered, _regulators, _outer, _sensors, _commanded,
+        _supplied, _protected, _instrumented, _outermost,
+    ):  # fmt: skip
         design = change(dice, design)
     return _damped(Dice(2 * 10**6 + seed), design) if seed >= DAMPED else design
 
