@@ -176,7 +176,7 @@ def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(capsys
          "model": "kM = 0.0059 N*m/A"}
     ]  # fmt: skip
     assert main(["keys", "--explain", "ilr33-amber"]) == 0
-    assert "in the model as" in capsys.readouterr().out
+    assert "In the model as" in capsys.readouterr().out
 
 
 def test_a_filter_is_added_behind_those_that_there_are() -> None:

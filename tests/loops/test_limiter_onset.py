@@ -73,6 +73,19 @@ def test_the_active_limiter_and_its_bias() -> None:
     assert gone.amplitude_rad[0] == 0
 
 
+def test_the_command_of_a_speed_drive_is_that_of_the_output() -> None:
+    """At low frequency the voltage is what a steady speed takes: N (k_E + R C_v/k_M) of it, in every form."""
+    design = replace(amber(), controller=replace(amber().controller, position=None))
+    motor, viscous = design.effective_motor, design.friction.viscous_Nms_rad
+    constants = motor.back_emf_constant_Vs_rad, motor.resistance_ohm, motor.torque_constant_Nm_A
+    k_E, R, k_M = (float(value or 0.0) for value in constants)
+    a_speed = k_E + R * viscous / k_M
+    wanted = design.limits.voltage_V / (design.total_ratio * a_speed)
+    for form in ("sampled", "continuous", "ideal"):
+        border = onset(assemble_loops(design, form), [1e-3])  # type: ignore[arg-type]
+        assert border.each_rad["voltage"] == pytest.approx(wanted, rel=1e-6)
+
+
 def test_limiters_follow_the_stages() -> None:
     assert list(assemble_loops(amber()).limiters) == ["speed", "acceleration", "current", "voltage"]
     assert list(assemble_loops(emps()).limiters) == ["speed", "acceleration", "voltage"]

@@ -3,6 +3,7 @@
 import cmath
 import json
 from dataclasses import fields, is_dataclass
+from functools import reduce
 
 import pytest
 import typer
@@ -16,13 +17,16 @@ from reports.cli.app import PANELS, build
 from reports.cli.main import main
 from reports.document import load
 
-COMMANDS = typer.main.get_command(build()).commands
+APP = typer.main.get_command(build())
+COMMANDS = APP.commands  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("one", ANALYSES, ids=lambda one: one.name)
 def test_every_field_of_a_request_is_an_option_of_the_command(one: Analysis) -> None:
-    given = {parameter.name: parameter for parameter in COMMANDS[one.name].params}
-    common = {"design", "changes", "out", "as_json", "quiet", *(["example"] if one.example else [])}
+    command = reduce(lambda group, word: group.commands[word], one.name.split(), APP)  # type: ignore[attr-defined]
+    given = {parameter.name: parameter for parameter in command.params}
+    common = {"as_json", *(["example"] if one.example else [])}
+    common |= set() if one.alone else {"design", "changes"} | ({"out", "quiet"} if one.page else set())
     if one.request is None:
         assert set(given) == common
         return
@@ -38,7 +42,7 @@ def test_every_field_of_a_request_is_an_option_of_the_command(one: Analysis) -> 
 
 def test_a_declared_analysis_stands_in_its_group_and_in_the_report() -> None:
     for one in ANALYSES:
-        assert one.name in PANELS[one.group]
+        assert one.name.split()[0] in PANELS[one.group]
     also = next(parameter for parameter in COMMANDS["report"].params if parameter.name == "also")
     assert all(name in also.help for name in FURTHER)
 

@@ -58,7 +58,8 @@ def test_a_large_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field
     )  # fmt: skip
     assert remark(item) == (
         "The position loop sustains an oscillation if its gain is raised by 6.02 dB or more after release "
-        "from 50 % of full range; the linear gain margin is 20 dB. The current limit acts."
+        "from 50 % of full range; the linear gain margin on the validation's operating motion is 20 dB. The "
+        "current limit acts."
     )
 
 
@@ -70,7 +71,7 @@ def test_a_drive_that_oscillates_as_it_is_is_said_so(kind: str, value: float, wo
     )  # fmt: skip
     assert remark(item) == (
         "The position loop, without dry friction, sustains an oscillation as designed after release from 2 % "
-        f"of full range; the linear {kind} margin is {words}."
+        f"of full range; the linear {kind} margin on the validation's operating motion is {words}."
     )
 
 

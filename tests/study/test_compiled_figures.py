@@ -118,7 +118,19 @@ def test_the_angle_under_an_elastic_load_is_no_instability():
         assert figures.quantity("phase_margin", name)[0] == pytest.approx(truth.phase_margin_deg, rel=1e-6)
     width = closed_loop_bandwidth(loops.velocity.closed_loop)
     # T at DC is read off at the lowest angle here, not at zero
-    assert figures.quantity("bandwidth", "velocity")[0] == pytest.approx(width.minus3db_hz, rel=1e-3)
+    assert figures.quantity("bandwidth", "velocity")[0] == pytest.approx(width.minus3db_hz, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-compliant", "ballscrew"])
+@pytest.mark.parametrize("slope", [-1e-2, -1e-3, -1e-4])
+def test_a_current_loop_with_an_integrator_has_a_gain_of_one_at_rest_behind_the_softest_spring(name, slope):
+    """For one design and for many: the spring's mode is slow, but seen, and takes T(0) back to 1."""
+    changes = {"load.path": "back-drivable", "load.moment_slope": f"{slope} N*m/rad"}
+    design = with_overrides(load_design(name), changes)
+    width = closed_loop_bandwidth(assemble_loops(design).current.closed_loop)
+    assert width.dc_gain == pytest.approx(1.0, abs=1e-9)
+    figures = linear_figures(Population(design, {}, 1), time_figures=False)
+    assert figures.quantity("bandwidth", "current")[0] == pytest.approx(width.minus3db_hz, rel=1e-9)
 
 
 def test_an_unstable_loop_is_called_so_and_takes_no_delay():
