@@ -17,13 +17,9 @@ ROOT = Path(__file__).parents[2]
 PAGES = [path for path in (ROOT / "docs").rglob("*.md") if path.parent.name != "generated"]
 RUN = re.compile(r"^```\{(code-cell|python-run|shell-run)\}[^\n]*\n(.*?)^```", re.M | re.S)
 PACKAGES = (
-    "actuator_lti",
-    "nonlinear",
-    "nonlinear.commands",
-    "nonlinear.loads",
-    "analyses",
+    "actuator_lti", "nonlinear", "nonlinear.commands", "nonlinear.loads", "analyses",
     "actuator_lti.drawing.plotting",
-)
+)  # fmt: skip
 
 
 def code_of_pages() -> tuple[str, str]:

@@ -10,25 +10,25 @@ TABLE = (0.1, -2.5, 1e-300)
 
 
 @kernel
-def small(x, limit):  # type: ignore[no-untyped-def]
+def small(x, limit):
     """Clamp."""
     return min(max(x, -limit), limit)
 
 
 @kernel
-def pair(x, y):  # type: ignore[no-untyped-def]
+def pair(x, y):
     """Two results, one a test."""
     return x * y + GAIN, x > y
 
 
 @kernel
-def passed_on(x):  # type: ignore[no-untyped-def]
+def passed_on(x):
     """Results of another function."""
     return pair(x, x)
 
 
 @kernel
-def push(s, at, x):  # type: ignore[no-untyped-def]
+def push(s, at, x):
     """Write a row and return what was there."""
     old = s[at]
     s[at] = x
@@ -36,7 +36,7 @@ def push(s, at, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def everything(p, s, n):  # type: ignore[no-untyped-def]
+def everything(p, s, n):
     """Each construct once."""
     total, last = 0.0, -1
     a, b = p[FIRST], p[SECOND]
@@ -70,13 +70,13 @@ def everything(p, s, n):  # type: ignore[no-untyped-def]
 
 @seldom
 @kernel
-def dear(p, x):  # type: ignore[no-untyped-def]
+def dear(p, x):
     """Called where something happens."""
     return x * p[SECOND] + GAIN
 
 
 @kernel
-def gated(p, x):  # type: ignore[no-untyped-def]
+def gated(p, x):
     """Parts that a row may rule out."""
     wanted = p[FIRST] > 0.0 and p[SECOND] > 0.0
     y = p[THIRD] * x if p[FIRST] > 0.0 else x
@@ -90,19 +90,19 @@ def gated(p, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def through(p, x):  # type: ignore[no-untyped-def]
+def through(p, x):
     """Calls it."""
     return gated(p, x)
 
 
 @kernel
-def power(x):  # type: ignore[no-untyped-def]
+def power(x):
     """Outside the subset."""
     return x**2
 
 
 @kernel
-def two_types(x):  # type: ignore[no-untyped-def]
+def two_types(x):
     """One variable, two types."""
     y = 0
     y = x + 1.0
@@ -110,19 +110,19 @@ def two_types(x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def open_order(s):  # type: ignore[no-untyped-def]
+def open_order(s):
     """A look into a row beside a call that writes it."""
     return s[0] + push(s, 0, 1.0)
 
 
 @kernel
-def twice(s):  # type: ignore[no-untyped-def]
+def twice(s):
     """Two writers in one expression."""
     return push(s, 0, 1.0) - push(s, 0, 2.0)
 
 
 @kernel
-def truth(x):  # type: ignore[no-untyped-def]
+def truth(x):
     """A float as a condition."""
     if x:
         return 1.0
@@ -130,6 +130,6 @@ def truth(x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def sliced(s):  # type: ignore[no-untyped-def]
+def sliced(s):
     """A slice."""
     s[0:2] = 1.0

@@ -1,7 +1,5 @@
 """The exported C is the simulator: the same bits in every row, no warning, one source for all designs."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 import shutil
@@ -43,7 +41,7 @@ def opened(folder: Path, texts: dict[str, str]) -> ctypes.CDLL:
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+def library(tmp_path_factory) -> ctypes.CDLL:
     return opened(tmp_path_factory.mktemp("c"), c_export(load_design("ilr33-amber")))
 
 
@@ -162,7 +160,7 @@ def test_a_state_goes_on_elsewhere_with_the_same_bits(library: ctypes.CDLL, seed
 @pytest.mark.parametrize("name", ["ilr33-amber-multirate", "emps", *ELASTIC])
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_the_example_builds_without_a_warning_and_is_the_simulator(
-    name: str, compiler: str, tmp_path: Path
+    name: str, compiler: str, tmp_path
 ) -> None:
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler} on this machine")
@@ -182,7 +180,7 @@ def test_the_example_builds_without_a_warning_and_is_the_simulator(
 
 @needs_compiler
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position"])
-def test_single_precision_keeps_its_stated_error(name: str, tmp_path: Path) -> None:
+def test_single_precision_keeps_its_stated_error(name: str, tmp_path) -> None:
     design = load_design(name)
     lib = opened(tmp_path, c_export(design, single_precision=True))
     ours = exported(design)
@@ -215,7 +213,7 @@ int main(void)
 
 @needs_compiler
 @pytest.mark.parametrize("single", [False, True])
-def test_the_headers_say_which_design_and_source_and_name_the_flags(single: bool, tmp_path: Path) -> None:
+def test_the_headers_say_which_design_and_source_and_name_the_flags(single: bool, tmp_path) -> None:
     design = replace(load_design("emps"), name='a "b" 1.5')
     texts = c_export(design, single_precision=single)
     files = {name: text for name, text in texts.items() if name.endswith(".h")} | {"show.c": SHOWS}
@@ -228,7 +226,7 @@ def test_the_headers_say_which_design_and_source_and_name_the_flags(single: bool
 
 
 @pytest.mark.skipif(shutil.which("cppcheck") is None, reason="no cppcheck on this machine")
-def test_every_deviation_from_misra_is_listed(tmp_path: Path) -> None:
+def test_every_deviation_from_misra_is_listed(tmp_path) -> None:
     texts = c_export(load_design("ilr33-amber"))
     for name, text in texts.items():
         (tmp_path / name).write_text(text)
@@ -258,7 +256,7 @@ def test_drive_c_is_the_same_for_every_design_and_has_no_memory_of_its_own() -> 
     assert all(line.startswith("static const ") for line in outside)
 
 
-def test_command_writes_all_files_or_none(tmp_path: Path) -> None:
+def test_command_writes_all_files_or_none(tmp_path) -> None:
     runner, app = CliRunner(), build()
     out = tmp_path / "c"
     assert runner.invoke(app, ["export", "c", "emps", "--out", str(out)]).exit_code == 0

@@ -35,7 +35,7 @@ static inline int t_min_int(int a, int b) { return b < a ? b : a; }
 
 def library(folder: Path, entries: dict[Any, list[str]], forms: Sequence[Form] = ()) -> ctypes.CDLL:
     """The entries compiled with every warning an error."""
-    program = emit_c(entries, "t_", forms)  # type: ignore[arg-type]
+    program = emit_c(entries, "t_", forms)
     heads = "#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n"
     declared = "\n".join(program.declarations.values())
     text = "\n".join([heads, program.constants_text(), HELPERS, program.types, declared, program.functions])
@@ -47,7 +47,7 @@ def library(folder: Path, entries: dict[Any, list[str]], forms: Sequence[Form] =
 
 
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler on this machine")
-def test_every_construct_gives_the_same_bits(tmp_path: Path) -> None:
+def test_every_construct_gives_the_same_bits(tmp_path) -> None:
     lib = library(tmp_path, {everything: ["row", "row", "int"]})
     row = np.ctypeslib.ndpointer(np.float64)
     lib.t_everything.argtypes, lib.t_everything.restype = [row, row, ctypes.c_int], ctypes.c_double
@@ -62,7 +62,7 @@ def test_every_construct_gives_the_same_bits(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler on this machine")
-def test_a_form_leaves_out_what_known_numbers_rule_out_and_gives_the_same_bits(tmp_path: Path) -> None:
+def test_a_form_leaves_out_what_known_numbers_rule_out_and_gives_the_same_bits(tmp_path) -> None:
     form = Form("gated", "bare", "p", {FIRST: 0.0})
     lib = library(tmp_path, {through: ["row", "float"]}, [form])
     text = emit_c({through: ["row", "float"]}, "t_", [form]).functions

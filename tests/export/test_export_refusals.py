@@ -1,7 +1,5 @@
 """What an export refuses: one line, status 2, nothing half-written."""
 
-from __future__ import annotations
-
 import re
 import sys
 from dataclasses import replace
@@ -21,7 +19,7 @@ needs_compiler = pytest.mark.skipif(
 )
 
 
-def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+def refused(arguments: list[str], capsys) -> str:
     """The line that a refused command says."""
     assert main(arguments) == 2
     said = capsys.readouterr()
@@ -33,9 +31,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 
 @pytest.mark.parametrize("command", [["c", "emps", "--no-check"], ["fmu", "emps", "--plain"]])
 @needs_compiler
-def test_a_folder_that_cannot_be_written(
-    command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_folder_that_cannot_be_written(command: list[str], tmp_path, capsys) -> None:
     """A file in the place of a folder stops the super-user too; ``/proc`` takes no new files from anyone."""
     (tmp_path / "file").write_text("mine")
     more = ["--platform", "linux64"] if command[0] == "fmu" else []
@@ -47,9 +43,7 @@ def test_a_folder_that_cannot_be_written(
     assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_one_file_that_exists_and_no_other_is_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_one_file_that_exists_and_no_other_is_written(tmp_path, capsys) -> None:
     (tmp_path / "main.c").write_text("mine")
     line = refused(["export", "c", "emps", "--no-check", "--out", str(tmp_path)], capsys)
     assert "main.c: exists already" in line
@@ -57,9 +51,7 @@ def test_one_file_that_exists_and_no_other_is_written(
     assert (tmp_path / "main.c").read_text() == "mine"
 
 
-def test_no_compiler_for_a_unit(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_compiler_for_a_unit(tmp_path, capsys, monkeypatch) -> None:
     monkeypatch.setattr(build, "system_compiler", lambda: None)
     monkeypatch.setattr(build, "zig_command", lambda: None)
     for platform, said in (("linux64", "gcc or clang, or pip install"), ("win64", "allowed: pip install")):
@@ -72,9 +64,7 @@ def test_no_compiler_for_a_unit(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_compiler_that_fails(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_compiler_that_fails(tmp_path, capsys, monkeypatch) -> None:
     broken = tmp_path / "cc"
     broken.write_text("#!/bin/sh\necho 'drive.c:1: error: out of order' >&2\nexit 1\n")
     broken.chmod(0o755)
@@ -85,7 +75,7 @@ def test_a_compiler_that_fails(
     assert not out.exists()
 
 
-def test_what_single_precision_cannot_say(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_single_precision_cannot_say(tmp_path, capsys) -> None:
     from actuator_lti.design.shipped import shipped_path
 
     design = tmp_path / "noisy.toml"
@@ -102,14 +92,9 @@ def test_what_single_precision_cannot_say(tmp_path: Path, capsys: pytest.Capture
 
 @pytest.mark.parametrize(
     ("more", "said"),
-    [
-        (["--fmi", "4"], "4: allowed: 2 or 3"),
-        (["--platform", "vax"], "allowed: linux64, win64"),
-    ],
+    [(["--fmi", "4"], "4: allowed: 2 or 3"), (["--platform", "vax"], "allowed: linux64, win64")],
 )
-def test_unknown_versions_and_platforms(
-    more: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_unknown_versions_and_platforms(more: list[str], said: str, tmp_path, capsys) -> None:
     out = tmp_path / "drive.fmu"
     assert said in refused(["export", "fmu", "emps", "--out", str(out), *more], capsys)
     assert not out.exists()

@@ -1,7 +1,5 @@
 """The unit is the simulator: the same bits, any communication step, every key a parameter, both versions."""
 
-from __future__ import annotations
-
 import io
 import os
 import shutil
@@ -34,7 +32,7 @@ OUTPUTS = ["output.angle", "motor.speed", "motor.current", "motor.voltage"]
 
 
 @pytest.fixture(scope="module", params=[2, 3])
-def unit(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def unit(request, tmp_path_factory) -> Path:
     path: Path = tmp_path_factory.mktemp("fmu") / f"drive{request.param}.fmu"
     path.write_bytes(fmu_bytes(load_design("ilr33-amber"), request.param, LINUX))
     return path
@@ -68,7 +66,7 @@ def test_unit_is_valid_and_gives_the_simulators_bits(unit: Path) -> None:
 
 @needs_compiler
 @pytest.mark.parametrize("name", ["joint", "ballscrew", "fin", "ilr33-amber-compliant"])
-def test_units_of_elastic_designs_are_valid_and_give_the_simulators_bits(name: str, tmp_path: Path) -> None:
+def test_units_of_elastic_designs_are_valid_and_give_the_simulators_bits(name: str, tmp_path) -> None:
     from fmpy.validation import validate_fmu
 
     design = load_design(name)
@@ -82,7 +80,7 @@ def test_units_of_elastic_designs_are_valid_and_give_the_simulators_bits(name: s
 
 @needs_compiler
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_random_drives_have_the_same_bits(seed: int, tmp_path: Path) -> None:
+def test_random_drives_have_the_same_bits(seed: int, tmp_path) -> None:
     design = random_drive(np.random.default_rng(100 + seed))
     path = tmp_path / "drive.fmu"
     path.write_bytes(fmu_bytes(design, 2, LINUX))
@@ -178,7 +176,7 @@ def test_one_hour_in_one_step(unit: Path) -> None:
 
 @needs_compiler
 @pytest.mark.parametrize(("step", "save_at"), [(1e-4, 50), (1.0 / 60.0, 7), (2.5e-5, 42), (1e-3, 0)])
-def test_own_host_saves_serialises_and_goes_on(step: float, save_at: int, tmp_path: Path) -> None:
+def test_own_host_saves_serialises_and_goes_on(step: float, save_at: int, tmp_path) -> None:
     design = load_design("ilr33-amber-multirate")
     (tmp_path / "u.fmu").write_bytes(fmu_bytes(design, 2, LINUX))
     with zipfile.ZipFile(tmp_path / "u.fmu") as archive:
@@ -211,9 +209,7 @@ def test_own_host_saves_serialises_and_goes_on(step: float, save_at: int, tmp_pa
         ("ilr33-amber", {"friction.dry_torque": 0.0, "friction.load_coefficient": 0.0}),
     ],
 )
-def test_tuning_between_steps_changes_what_follows(
-    name: str, change: dict[str, float], tmp_path: Path
-) -> None:
+def test_tuning_between_steps_changes_what_follows(name: str, change: dict[str, float], tmp_path) -> None:
     """Keys changed during the run: as if the simulator had been stopped and gone on with the other row."""
     from nonlinear._kernels import layout as at
     from nonlinear._kernels.start import derive, prepare_sizes, retune
@@ -260,7 +256,7 @@ def test_both_platforms_in_one_file_with_the_same_bytes_each_time() -> None:
 
 
 @pytest.fixture(scope="module")
-def wine_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def wine_prefix(tmp_path_factory) -> Path:
     """One Windows for all units: the first start of wine furnishes it, and takes the longest."""
     return tmp_path_factory.mktemp("wine")
 
@@ -269,7 +265,7 @@ def wine_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     zig_command() is None or shutil.which("wine") is None, reason="ziglang or wine is not installed"
 )
 @pytest.mark.parametrize("name", ["ilr33-amber", "fin", "joint"])
-def test_win64_binary_runs_under_wine(name: str, wine_prefix: Path, tmp_path: Path) -> None:
+def test_win64_binary_runs_under_wine(name: str, wine_prefix: Path, tmp_path) -> None:
     """Another C library's sine and exponential: equal to 1e-11 of full scale, events at the same ticks."""
     design = load_design(name)
     period_s = design.controller.period_s
@@ -293,7 +289,7 @@ def test_win64_binary_runs_under_wine(name: str, wine_prefix: Path, tmp_path: Pa
 
 
 @needs_compiler
-def test_command_writes_the_report_and_the_licence_into_it(tmp_path: Path) -> None:
+def test_command_writes_the_report_and_the_licence_into_it(tmp_path) -> None:
     target = tmp_path / "d.fmu"
     arguments = ["export", "fmu", "emps", "--out", str(target), "--platform", "linux64"]
     result = CliRunner().invoke(build(), arguments)
@@ -307,7 +303,7 @@ def test_command_writes_the_report_and_the_licence_into_it(tmp_path: Path) -> No
     assert isinstance(CliRunner().invoke(build(), arguments).exception, InputError)
 
 
-def test_no_compiler_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_compiler_is_one_line(monkeypatch) -> None:
     import actuator_lti.compiled.compiler as ours
 
     monkeypatch.setattr(ours, "system_compiler", lambda: None)

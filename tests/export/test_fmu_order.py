@@ -1,7 +1,5 @@
 """What a host may ask of the unit, and when: order of calls, types, keys that go together, log, states."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -26,7 +24,7 @@ PERIOD = 1e-4
 
 
 @pytest.fixture(scope="module", params=[2, 3])
-def unit(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def unit(request, tmp_path_factory) -> Path:
     path: Path = tmp_path_factory.mktemp("fmu") / f"drive{request.param}.fmu"
     path.write_bytes(fmu_bytes(load_design("ilr33-amber"), request.param, ("linux64",)))
     return path
@@ -139,7 +137,7 @@ def test_keys_that_contradict_each_other_are_refused_as_in_a_design_file(unit: P
         host.step(2.5 * PERIOD, PERIOD)
 
 
-def test_what_no_longer_applies_is_not_refused(tmp_path: Path) -> None:
+def test_what_no_longer_applies_is_not_refused(tmp_path) -> None:
     """Only a gear error bounds its order: without one, any order is a design and is taken."""
     design = with_values(load_design("ballscrew"), {"load.gear_error": 0.01})
     path = tmp_path / "u.fmu"
@@ -155,7 +153,7 @@ NUMBER = re.compile(r"-?\d+(\.\d*)?(e[+-]?\d+)?")
 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "joint", "ballscrew", "fin"])
-def test_random_keys_are_refused_with_the_words_of_the_design_file(name: str, tmp_path: Path) -> None:
+def test_random_keys_are_refused_with_the_words_of_the_design_file(name: str, tmp_path) -> None:
     rng = np.random.default_rng(11)
     design = replace(
         load_design(name), parameters=FrozenMap({})
@@ -194,7 +192,7 @@ def test_random_keys_are_refused_with_the_words_of_the_design_file(name: str, tm
     assert min(seen.values()) > 5, seen
 
 
-def test_what_the_units_of_the_file_were_turned_by_is_decided(tmp_path: Path) -> None:
+def test_what_the_units_of_the_file_were_turned_by_is_decided(tmp_path) -> None:
     """A screw's lead moves every number that the file gives on the motor's side: it is a constant."""
     path = tmp_path / "u.fmu"
     path.write_bytes(fmu_bytes(load_design("ballscrew"), 2, ("linux64",)))

@@ -4,8 +4,6 @@ The truth between ticks is the same plant run without its controller on ticks te
 voltages that the plain run has recorded.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -103,7 +101,7 @@ def latched(step: float, ticks: int, period: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", drives())
-def test_every_host_step_sees_the_same_motion(name: str, tmp_path: Path) -> None:
+def test_every_host_step_sees_the_same_motion(name: str, tmp_path) -> None:
     design = drives()[name]
     period = design.controller.period_s
     path = tmp_path / "u.fmu"
@@ -126,7 +124,7 @@ def test_every_host_step_sees_the_same_motion(name: str, tmp_path: Path) -> None
         assert np.array_equal(found[whole, 2], plain.motor_speed_rad_s[at[whole] // FINE])
 
 
-def test_a_command_between_ticks_is_seen_at_the_next(tmp_path: Path) -> None:
+def test_a_command_between_ticks_is_seen_at_the_next(tmp_path) -> None:
     """At 0.9 Ts it is that of a run whose command steps at Ts; voltages are of the tick they are in."""
     design = load_design("ilr33-amber")
     period = design.controller.period_s
@@ -169,11 +167,8 @@ def critical_gain(parts: int) -> float:
 def lifted(design: Design, K: float, Ts: float, parts: int, common: int) -> np.ndarray:
     """The map over the common period: y, v, u held, z, last y, command, angles of the difference."""
     c = design.controller
-    assert c.position is not None
-    assert c.velocity is not None
     J, b = design.motor.rotor_inertia_kgm2, design.friction.viscous_Nms_rad
     gain = design.motor.source_gain_Nm_V
-    assert gain is not None
     h, m = Ts / FINE, design.encoder.difference_samples
     y, v, u, z, seen, r = range(6)
     angles = list(range(6, 6 + m))
@@ -215,7 +210,7 @@ def test_an_outer_loop_has_its_critical_gain_at_every_step(parts: int, unfrictio
 
 
 @pytest.fixture(scope="module")
-def unfriction(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def unfriction(tmp_path_factory) -> Path:
     path: Path = tmp_path_factory.mktemp("emps") / "emps.fmu"
     path.write_bytes(fmu_bytes(load_design("emps"), 3, ("linux64",)))
     return path

@@ -1,7 +1,5 @@
 """Figures of the whole drive, followed from the keys into statements, against the same figures asked anew."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """What fused multiply-add does to a run: the sentence of the exported README, measured."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +24,7 @@ pytestmark = pytest.mark.skipif(
 
 
 @pytest.fixture(scope="module")
-def libraries(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+def libraries(tmp_path_factory) -> tuple[Path, Path]:
     """The simulator compiled plainly, and with products and sums in one rounding."""
     folder, command = tmp_path_factory.mktemp("fma"), [str(system_compiler())]
     texts = {"run.c": LIBRARY.text()}

@@ -1,7 +1,5 @@
 """The page's linear drive has no slope where the pendulum stands out level, as the linear loops have none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, radians
 

@@ -1,7 +1,5 @@
 """The linear models of a file give the margins and responses of the loops that they were written of."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +31,7 @@ def same(found: Any, known: Any) -> bool:
 
 
 @pytest.mark.parametrize(("name", "to"), [*((name, "mat") for name in NAMES), *OTHERS])
-def test_read_back_they_have_the_same_margins_and_responses(name: str, to: str, tmp_path: Path) -> None:
+def test_read_back_they_have_the_same_margins_and_responses(name: str, to: str, tmp_path) -> None:
     tree = read_models(written(name, to, tmp_path))
     for form in ("sampled", "continuous"):
         loops, kept = assemble_loops(name, form), tree[form]
@@ -53,7 +51,6 @@ def test_read_back_they_have_the_same_margins_and_responses(name: str, to: str, 
                     for found in (again[key], entry["margins"][key]):
                         assert found == value if isinstance(value, str) else same(found, value), (each, key)
         assert responds_alike(system_of(kept["responses"]["command"]), loops.plain_response)
-        assert loops.moment_system is not None
         assert responds_alike(system_of(kept["responses"]["load"]), loops.moment_system())
 
 
@@ -63,22 +60,20 @@ def responds_alike(found: Any, known: Any) -> bool:
     return same(found(points), known(points)) and tuple(found.states) == tuple(known.states)
 
 
-def test_the_python_file_makes_python_control_systems(tmp_path: Path) -> None:
+def test_the_python_file_makes_python_control_systems(tmp_path) -> None:
     """A program that knows nothing but the file, numpy and python-control."""
     scope: dict[str, Any] = {}
     exec(written("emps", "python", tmp_path).read_text(encoding="utf-8"), scope)
     ours = scope["system"](scope["MODELS"]["sampled"]["loops"]["position"]["open_loop"])
     known = assemble_loops("emps").position
-    assert known is not None
     z = np.exp(1j * 100.0 * ours.dt)
     assert ours(z) == pytest.approx(known.open_loop(z), rel=1e-12)
     delayed = scope["system"](scope["MODELS"]["continuous"]["loops"]["position"]["open_loop"])
     continuous = assemble_loops("emps", "continuous").position
-    assert continuous is not None
     assert delayed(100j) == pytest.approx(continuous.open_loop(100j), rel=1e-12)
 
 
-def test_files_that_are_none_and_files_that_are_there(tmp_path: Path) -> None:
+def test_files_that_are_none_and_files_that_are_there(tmp_path) -> None:
     (tmp_path / "a.json").write_text("{}")
     (tmp_path / "a.mat").write_text("{}")
     (tmp_path / "a.py").write_text("MODELS =")

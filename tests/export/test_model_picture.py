@@ -1,7 +1,5 @@
 """The picture of a unit: every part of the design is in it, and every design has one."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from dataclasses import replace
@@ -33,7 +31,6 @@ def test_the_coupling_stands_behind_its_gear() -> None:
     design = load_design("fin")
     assert [title for title, _ in train_boxes(design)] == ["motor", "spur", "coupling", "load"]
     inside = replace(design, gears=(*design.gears, replace(design.gears[0], name="belt")))
-    assert inside.coupling is not None
     inside = replace(inside, coupling=replace(inside.coupling, after="spur"))
     assert [title for title, _ in train_boxes(inside)] == ["motor", "spur", "coupling", "belt", "load"]
     motor = replace(inside, gears=(), coupling=replace(inside.coupling, after=None))
@@ -58,11 +55,11 @@ def test_names_cannot_break_the_picture() -> None:
 def test_units_carry_it() -> None:
     design = load_design("ctms-motor-position")
     for version, name in ((2, "model.png"), (3, "documentation/diagram.png")):
-        data = fmu_bytes(design, version, ("linux64",), picture=model_png(design))  # type: ignore[arg-type]
+        data = fmu_bytes(design, version, ("linux64",), picture=model_png(design))
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             assert archive.read(name).startswith(b"\x89PNG")
 
 
-def test_without_the_typesetter_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_typesetter_there_is_none(monkeypatch) -> None:
     monkeypatch.setattr(model_picture, "find_spec", lambda _: None)
     assert model_png(load_design("fin")) is None

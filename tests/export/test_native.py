@@ -1,11 +1,8 @@
 """The compiled kernels are the written ones, bit for bit; and which library is loaded, and when."""
 
-from __future__ import annotations
-
 import os
 import threading
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -116,12 +113,12 @@ def test_a_run_leaves_the_interpreter_to_other_threads() -> None:
 
 
 @pytest.fixture
-def library(tmp_path: Path) -> Library:
+def library(tmp_path) -> Library:
     """The library of many designs' figures in a package of its own."""
     return Library("figures", tmp_path, FIGURES.entries, FIGURES.sources)
 
 
-def test_a_library_is_named_by_its_sources(library: Library, tmp_path: Path) -> None:
+def test_a_library_is_named_by_its_sources(library: Library, tmp_path) -> None:
     changed = tmp_path / "_more.py"
     changed.write_text("# more\n")
     other = Library("figures", tmp_path, FIGURES.entries, (*FIGURES.sources, changed))
@@ -139,7 +136,7 @@ def test_a_checkout_compiles_at_its_first_call_and_drops_what_is_old(library: Li
     assert [path.name for path in old.parent.iterdir()] == [library.path().name]
 
 
-def test_without_a_compiler_an_error_says_which(library: Library, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_compiler_an_error_says_which(library: Library, monkeypatch) -> None:
     monkeypatch.setattr(compiler, "system_compiler", lambda: None)
     monkeypatch.setattr(compiler, "zig_command", lambda: None)
     with pytest.raises(InputError, match="allowed: gcc, clang, or pip install ziglang"):
@@ -147,9 +144,7 @@ def test_without_a_compiler_an_error_says_which(library: Library, monkeypatch: p
     assert not library.path().parent.exists()
 
 
-def test_a_package_that_cannot_be_written_is_left_alone(
-    library: Library, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_package_that_cannot_be_written_is_left_alone(library: Library, monkeypatch) -> None:
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(
         InputError, match=r"no compiled kernels of these sources; allowed: python -m nonlinear"

@@ -1,12 +1,8 @@
 """The line that says what is being waited for: on a terminal, once, and only where there is a wait."""
 
-from __future__ import annotations
-
 import io
 import sys
 import threading
-
-import pytest
 
 import nonlinear.runs.waiting as waiting
 
@@ -27,7 +23,7 @@ class Terminal(io.StringIO):
             self.written.set()
 
 
-def terminal_of(monkeypatch: pytest.MonkeyPatch) -> Terminal:
+def terminal_of(monkeypatch) -> Terminal:
     """Not a fixture: pytest puts its own stream in place between a fixture and its test."""
     made = Terminal()
     monkeypatch.setattr(sys, "stderr", made)
@@ -35,7 +31,7 @@ def terminal_of(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     return made
 
 
-def test_a_wait_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wait_is_told_once(monkeypatch) -> None:
     terminal = terminal_of(monkeypatch)
     for _ in range(2):
         with waiting.told_if_slow("the kettle boils", 0.0):
@@ -43,14 +39,14 @@ def test_a_wait_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
     assert terminal.getvalue() == "the kettle boils\n"
 
 
-def test_no_wait_no_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_wait_no_line(monkeypatch) -> None:
     terminal = terminal_of(monkeypatch)
     with waiting.told_if_slow("the kettle boils", 1e3):
         pass
     assert terminal.getvalue() == ""
 
 
-def test_nothing_is_said_to_a_log(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_said_to_a_log(monkeypatch) -> None:
     log = io.StringIO()
     monkeypatch.setattr(sys, "stderr", log)
     with waiting.told_if_slow("the kettle boils", 0.0):

@@ -1,7 +1,5 @@
 """The kept WebAssembly: made of today's sources, without imports, small, equal to the simulator in node."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil
@@ -64,7 +62,7 @@ def in_node(design: Design, command: np.ndarray, moment: np.ndarray, folder: Pat
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
 @pytest.mark.parametrize("seed", [-1, 0, 1, 2, 3])
-def test_equal_to_the_simulator_in_node(seed: int, tmp_path: Path) -> None:
+def test_equal_to_the_simulator_in_node(seed: int, tmp_path) -> None:
     """Another C library's exp, sin, log: 1e-9 of the largest value.  Instruments that round are left out."""
     rng = np.random.default_rng(200 + seed)
     design = load_design("ilr33-amber") if seed < 0 else random_drive(rng)

@@ -3,8 +3,6 @@
 In the module a loop is found by running the tick of the simulator; here it is assembled by the linear walk.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import shutil
@@ -133,7 +131,6 @@ def responses_agree(design: Design, ours: dict[str, Any]) -> None:
             long = known["n"] == linear.TOO_LONG and len(system.plain_open.A) > linear_periodic.MOST_STATES
             assert system is None or (name == "w_ref" and loops.position is None) or long
             continue
-        assert system is not None
         assert known["period"] == pytest.approx(system.period_s, rel=1e-12)
         pairs = numbers(known["response"]).reshape(-1, 2)
         wanted = wanted_response(design, name, system)
@@ -162,7 +159,7 @@ def limiters_agree(design: Design, ours: dict[str, Any]) -> int:
     return count
 
 
-def test_shipped_designs(tmp_path: Path) -> None:
+def test_shipped_designs(tmp_path) -> None:
     designs = [load_design(name) for name in shipped_designs()]
     assert any(design.coupling for design in designs)
     damped = ("fin", "joint", "ilr33-amber-compliant")
@@ -173,7 +170,7 @@ def test_shipped_designs(tmp_path: Path) -> None:
         assert limiters_agree(design, ours) > 0
 
 
-def test_drives_without_outer_stages(tmp_path: Path) -> None:
+def test_drives_without_outer_stages(tmp_path) -> None:
     whole = load_design("ilr33-amber")
     control = whole.controller
     designs = [
@@ -203,7 +200,7 @@ def agree_with_the_linear_form(designs: list[Design], folder: Path) -> tuple[int
     return loops, limiters
 
 
-def test_random_drives(tmp_path: Path) -> None:
+def test_random_drives(tmp_path) -> None:
     """Filters, sensors, estimators, delays and periods at random; instruments do not matter to a loop."""
     made = (random_drive(np.random.default_rng(seed)) for seed in range(40))
     designs = [replace(design, instruments=Instruments()) for design in made]
@@ -222,7 +219,7 @@ def smooth(design: Design) -> Design:
     )
 
 
-def test_random_elastic_drives(tmp_path: Path) -> None:
+def test_random_elastic_drives(tmp_path) -> None:
     """Couplings with play, damping and friction behind them, friction maps, or both."""
     made = (random_elastic_drive(np.random.default_rng(seed)) for seed in range(30))
     designs = [replace(design, instruments=Instruments()) for design in made]
@@ -233,7 +230,7 @@ def test_random_elastic_drives(tmp_path: Path) -> None:
     assert limiters > 20
 
 
-def test_seeds_that_once_differed(tmp_path: Path) -> None:
+def test_seeds_that_once_differed(tmp_path) -> None:
     """52004, 52023: margins of 0.01 deg and 70 dB; 52080: a response of 1e-4 beside states of 1e3.
 
     The first two differ by rounding of the entries, which is shown; in the last the linear form lost digits.
@@ -276,7 +273,7 @@ def test_a_gain_margin_at_nyquist_is_listed_once() -> None:
     assert [g.ratio for g in found.gain_margins] == pytest.approx([g.ratio for g in truth.gain_margins])
 
 
-def test_a_periodic_loop_of_many_states_has_its_poles(tmp_path: Path) -> None:
+def test_a_periodic_loop_of_many_states_has_its_poles(tmp_path) -> None:
     """Seed 51345: 153 states at the voltage, their poles on circles; the search for them gave up."""
     design = smooth(random_drive(np.random.default_rng(51345)))
     (found,) = in_node([design], tmp_path)
@@ -284,7 +281,7 @@ def test_a_periodic_loop_of_many_states_has_its_poles(tmp_path: Path) -> None:
     responses_agree(design, found)
 
 
-def test_random_elastic_drives_with_a_damped_load(tmp_path: Path) -> None:
+def test_random_elastic_drives_with_a_damped_load(tmp_path) -> None:
     """Stiff springs and soft ones, with the two keys of the load that random drives leave out."""
     designs = []
     for seed in range(300, 325):
@@ -297,7 +294,7 @@ def test_random_elastic_drives_with_a_damped_load(tmp_path: Path) -> None:
     assert loops > 40
 
 
-def test_unstable_drives_are_called_so(tmp_path: Path) -> None:
+def test_unstable_drives_are_called_so(tmp_path) -> None:
     """Gains far beyond the margin: the verdict from the poles in the module is that of the linear form."""
     from actuator_lti.design import with_values
 
@@ -320,7 +317,7 @@ def test_unstable_drives_are_called_so(tmp_path: Path) -> None:
     assert any(verdicts)
 
 
-def test_periodic_points_have_the_margins_of_the_fundamental(tmp_path: Path) -> None:
+def test_periodic_points_have_the_margins_of_the_fundamental(tmp_path) -> None:
     """The certified search of the command line reads the same margins from the same fundamental."""
     designs = [load_design("ilr33-amber-multirate"), load_design("joint")]
     for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
@@ -335,7 +332,7 @@ def test_periodic_points_have_the_margins_of_the_fundamental(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("base", ["ilr33-amber", "ilr33-amber-multirate", "ilr33-amber-compliant", "joint"])
-def test_zero_frequency_itself_counts_behind_a_spring(base: str, tmp_path: Path) -> None:
+def test_zero_frequency_itself_counts_behind_a_spring(base: str, tmp_path) -> None:
     """A load with a spring: the velocity loop's gain margin lies at rest, behind a mode speed does not show.
 
     Certified margins of the same loop say what it is; half of its digits were lost in the page.
@@ -359,11 +356,10 @@ def test_zero_frequency_itself_counts_behind_a_spring(base: str, tmp_path: Path)
     assert at_rest > 0 or base != "ilr33-amber"
 
 
-def test_a_crossover_below_the_scan_withholds_the_figures(tmp_path: Path) -> None:
+def test_a_crossover_below_the_scan_withholds_the_figures(tmp_path) -> None:
     """A current loop of almost no integral part: where no figure is certain, the page gives none either."""
     whole = load_design("ilr33-amber")
     control = whole.controller
-    assert control.current is not None
     slow = replace(control.current, integral_time_s=100.0)
     design = replace(whole, controller=replace(control, position=None, velocity=None, current=slow))
     (ours,) = in_node([design], tmp_path)
@@ -376,9 +372,6 @@ def unstable_inside(seed: int) -> Design:
     rng = np.random.default_rng([seed, 16])
     design = load_design("ilr33-amber-multirate")
     control = design.controller
-    assert control.current is not None
-    assert control.velocity is not None
-    assert control.position is not None
     every = int(rng.choice([4, 6, 8]))
     return replace(
         design,
@@ -391,7 +384,7 @@ def unstable_inside(seed: int) -> Design:
     )
 
 
-def test_where_rounding_decides_no_figure_is_given_as_sure(tmp_path: Path) -> None:
+def test_where_rounding_decides_no_figure_is_given_as_sure(tmp_path) -> None:
     """The module doubts at least what `actuator_lti.batch.withheld` withholds, and not everything."""
     designs = [unstable_inside(seed) for seed in range(16)]
     doubted = withheld = kept = 0

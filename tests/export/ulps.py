@@ -4,8 +4,6 @@ Two writings of the same drive give entries that differ by their rounding. Figur
 such a nudge moves them differ by rounding; beyond that one of the two writings is wrong.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

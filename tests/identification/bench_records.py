@@ -1,7 +1,5 @@
 """Records whose truth is known: simulated motions, written as a recorder would."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

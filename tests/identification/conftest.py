@@ -1,7 +1,5 @@
 """Where the measured records are, a small campaign, and commands with what they say."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -32,7 +30,7 @@ def odrive_files() -> dict[str, Path]:
 
 
 @pytest.fixture
-def command(capsys: pytest.CaptureFixture[str]) -> Command:
+def command(capsys) -> Command:
     """Run a command of `actuator-lti` in this process."""
 
     def run(*words: object) -> Ran:
@@ -44,7 +42,7 @@ def command(capsys: pytest.CaptureFixture[str]) -> Command:
 
 
 @pytest.fixture(scope="session")
-def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bench(tmp_path_factory) -> Path:
     """The folder of a small campaign: three speeds, three loads."""
     plan = BenchPlan(speeds_rad_s=(105.0, 500.0, 940.0), loads_Nm=(0.0, 3.0, 8.0), duration_s=2.5)
     logs, _ = measure_bench(simulate_bench(load_design("ilr33-amber"), plan), 2)

@@ -1,7 +1,5 @@
 """The model against records: figures of likeness by construction, EMPS and ODrive as measured."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +64,7 @@ def test_figures_of_likeness_by_construction() -> None:
     assert result.max_error == pytest.approx(0.1)
 
 
-def test_a_fit_below_zero_does_not_pass(tmp_path: Path, command: Command) -> None:
+def test_a_fit_below_zero_does_not_pass(tmp_path, command: Command) -> None:
     """A swing of 20 mrad about 1 rad, recorded 30 mrad off: 3 % of the angle, twice the motion (rms)."""
     time = np.arange(0.0, 1.0, 1e-3)
     swing = 0.02 * np.sin(6.0 * np.pi * time)
@@ -96,7 +94,7 @@ def test_flat_signals_have_no_delay_and_zero_is_refused() -> None:
         compare_signals("x", "1", time, np.zeros(100), np.ones(100))
 
 
-def test_the_record_s_supply_becomes_the_voltage_limit(tmp_path: Path) -> None:
+def test_the_record_s_supply_becomes_the_voltage_limit(tmp_path) -> None:
     from nonlinear import commands, simulate
 
     design = load_design("ilr33-amber")
@@ -112,7 +110,7 @@ def test_the_record_s_supply_becomes_the_voltage_limit(tmp_path: Path) -> None:
     assert any("supply" in note for note in result.notes)
 
 
-def test_a_record_file_tells_the_layout(tmp_path: Path) -> None:
+def test_a_record_file_tells_the_layout(tmp_path) -> None:
     (tmp_path / "log.csv").write_text(
         "t;cmd;pos\n" + "".join(f"{k};{k / 10};{k / 10}\n".replace(".", ",") for k in range(50))
     )
@@ -129,7 +127,7 @@ def test_a_record_file_tells_the_layout(tmp_path: Path) -> None:
         open_record(tmp_path / "log.toml")
 
 
-def test_an_unknown_layout_is_refused_with_advice(tmp_path: Path) -> None:
+def test_an_unknown_layout_is_refused_with_advice(tmp_path) -> None:
     (tmp_path / "x.csv").write_text("a,b\n1,2\n")
     with pytest.raises(InputError, match="describe it in a record file"):
         open_record(tmp_path / "x.csv")

@@ -1,7 +1,5 @@
 """Records of every kind of drive against the design that made them, and against one that did not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -83,7 +81,7 @@ def _swing(peak: float, hz: float = 3.0) -> Command:
     ids=["position", "speed", "current", "torque", "voltage", "two masses", "friction map", "voltage servo"],
 )
 def test_a_record_meets_the_drive_that_made_it(
-    design: Design, column: str, command: Command, factor: float, tmp_path: Path
+    design: Design, column: str, command: Command, factor: float, tmp_path
 ) -> None:
     """Every signal to rounding, as the command is recorded at each tick; another friction is seen."""
     run = simulate(design, command, 0.5)
@@ -106,15 +104,12 @@ def test_a_record_meets_the_drive_that_made_it(
         ("voltage_reference [V]", "voltage_V", "voltage"),
     ],
 )
-def test_an_inner_command_drives_the_loops_inside_it(
-    column: str, key: str, stage: str, tmp_path: Path
-) -> None:
+def test_an_inner_command_drives_the_loops_inside_it(column: str, key: str, stage: str, tmp_path) -> None:
     """A whole cascade, of which the record holds the command of an inner stage only."""
     run = simulate(BASE, _swing(0.03), 0.5)
     _record(tmp_path / "r.csv", run, ROTARY, **{column: getattr(run, key)})
     record = open_record(tmp_path / "r.csv")
     driven = command_of(BASE, record)
-    assert driven is not None
     assert driven.stage == driven.design.controller.outermost == stage
     result = correlate_record(BASE, record)
     for signal in result.signals.values():
@@ -122,7 +117,7 @@ def test_an_inner_command_drives_the_loops_inside_it(
     assert any("do not act" in note for note in result.notes)
 
 
-def test_the_measured_voltage_drives_the_motor_when_asked_to(tmp_path: Path) -> None:
+def test_the_measured_voltage_drives_the_motor_when_asked_to(tmp_path) -> None:
     run = simulate(BASE, _swing(0.03), 0.5)
     record = open_record(_record(tmp_path / "r.csv", run, ROTARY))
     with pytest.raises(InputError, match='no command: the signal "reference" is needed'):
@@ -137,7 +132,7 @@ def test_the_measured_voltage_drives_the_motor_when_asked_to(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(("design", "scales"), [(BASE, False), (DIRECT, True)], ids=["cascade", "duty ratio"])
-def test_a_supply_over_time_drives_the_model(design: Design, scales: bool, tmp_path: Path) -> None:
+def test_a_supply_over_time_drives_the_model(design: Design, scales: bool, tmp_path) -> None:
     """The bus sags to a third: with its median instead, the model would be off by more than 5 %."""
     time = np.arange(0.0, 0.6, 1e-4)
     bus = 12.0 - 8.0 * np.clip(np.sin(15.0 * time), 0.0, 1.0)
@@ -152,7 +147,7 @@ def test_a_supply_over_time_drives_the_model(design: Design, scales: bool, tmp_p
     assert correlate_record(design, replace(record, signals=flat))["voltage"].relative_error > 0.05
 
 
-def test_a_pendulum_that_begins_in_motion_under_a_speed_loop(tmp_path: Path) -> None:
+def test_a_pendulum_that_begins_in_motion_under_a_speed_loop(tmp_path) -> None:
     """The record starts late in a run: the state at its first row is found from it, the integral too."""
     load = replace(BASE.load, path="back-drivable", gravity=Gravity(mass_kg=2.0, arm_m=0.1, offset_rad=0.0))
     design = replace(SPEED, load=load)

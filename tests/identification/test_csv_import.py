@@ -1,7 +1,5 @@
 """Records from CSV: layouts, units, accounts of rows, and refusals that name line, column and reason."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +22,7 @@ SPEED = SignalColumn(name="speed", column="n", unit="rpm")
 
 def _spec(**changes: object) -> RecordSpec:
     base = {"time": TimeColumn(column="t"), "signals": (SPEED,)}
-    return RecordSpec(**{**base, **changes})  # type: ignore[arg-type]
+    return RecordSpec(**{**base, **changes})
 
 
 def _write(folder: Path, text: str | bytes) -> Path:
@@ -33,7 +31,7 @@ def _write(folder: Path, text: str | bytes) -> Path:
     return path
 
 
-def test_units_become_si(tmp_path: Path) -> None:
+def test_units_become_si(tmp_path) -> None:
     record = read_csv_record(_write(tmp_path, "t,n\n0,0\n0.5,9000\n"), _spec())
     assert record["speed"][1] == pytest.approx(9000 * np.pi / 30, rel=1e-12)
     assert record.units["speed"] == "rad/s"
@@ -54,14 +52,14 @@ def test_units_become_si(tmp_path: Path) -> None:
         ('"t","n"\n"0","1.5"\n"1","2.5"\n', CsvFormat()),
     ],
 )
-def test_layouts(tmp_path: Path, text: str, layout: CsvFormat) -> None:
+def test_layouts(tmp_path, text: str, layout: CsvFormat) -> None:
     record = read_csv_record(_write(tmp_path, text), _spec(format=layout))
     assert record.time_s.tolist() == [0.0, 1.0]
     assert record["speed"].tolist() == pytest.approx([1.5 * np.pi / 30, 2.5 * np.pi / 30])
     assert record.counts.rows_in == record.counts.rows_out == 2
 
 
-def test_every_line_is_accounted_for(tmp_path: Path) -> None:
+def test_every_line_is_accounted_for(tmp_path) -> None:
     text = "# log\nt,n\n0,1\n\n1,nan\n# pause\n2,3\n3,4\n"
     counts = read_csv_record(_write(tmp_path, text), _spec()).counts
     assert (counts.lines, counts.comments, counts.blanks, counts.header) == (8, 2, 1, 1)
@@ -70,20 +68,20 @@ def test_every_line_is_accounted_for(tmp_path: Path) -> None:
     assert counts.first_dropped == {"with a missing value": "line 5"}
 
 
-def test_ticks_that_wrap_around(tmp_path: Path) -> None:
+def test_ticks_that_wrap_around(tmp_path) -> None:
     rows = "".join(f"{(60000 + 3000 * k) % 65536},1\n" for k in range(6))
     time = TimeColumn(column="t", tick_s=1e-3, wrap=65536.0)
     record = read_csv_record(_write(tmp_path, "t,n\n" + rows), _spec(time=time))
     assert np.diff(record.time_s) == pytest.approx(3.0)
 
 
-def test_bad_rows_are_dropped_only_on_demand_and_counted(tmp_path: Path) -> None:
+def test_bad_rows_are_dropped_only_on_demand_and_counted(tmp_path) -> None:
     path = _write(tmp_path, "t,n\n0,1\n1,abc\n2\n3,4\n4,inf\n5,6\n")
     counts = read_csv_record(path, _spec(bad_rows="drop")).counts
     assert (counts.rows_in, counts.rows_out, counts.dropped) == (6, 3, {"not a row of numbers": 3})
 
 
-def test_time_that_goes_back_is_counted_on_demand(tmp_path: Path) -> None:
+def test_time_that_goes_back_is_counted_on_demand(tmp_path) -> None:
     path = _write(tmp_path, "t,n\n0,1\n2,1\n1,1\n3,1\n")
     counts = read_csv_record(path, _spec(disorder="drop")).counts
     assert (counts.rows_out, counts.dropped) == (3, {"whose time does not increase": 1})
@@ -102,20 +100,18 @@ def test_time_that_goes_back_is_counted_on_demand(tmp_path: Path) -> None:
         ("t,n\n0,1\n2,1\n1,1\n3,1\n", r"log.csv:4: time 1 s does not come after 2 s"),
     ],
 )
-def test_files_that_are_no_records(tmp_path: Path, content: str | bytes, reason: str) -> None:
+def test_files_that_are_no_records(tmp_path, content: str | bytes, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         read_csv_record(_write(tmp_path, content), _spec())
 
 
-def test_a_unit_of_the_wrong_kind_is_refused(tmp_path: Path) -> None:
+def test_a_unit_of_the_wrong_kind_is_refused(tmp_path) -> None:
     wrong = SignalColumn(name="speed", column="n", unit="kg")
     with pytest.raises(InputError, match=r"signals.speed.unit = \"kg\": must be a unit like rad/s"):
         read_csv_record(_write(tmp_path, "t,n\n0,1\n1,2\n"), _spec(signals=(wrong,)))
 
 
-def test_a_long_file_streams_in_blocks_and_is_averaged(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_long_file_streams_in_blocks_and_is_averaged(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(module, "BLOCK_BYTES", 1 << 12)
     n = 10_007
     text = "t,n\n" + "".join(f"{k},{k % 7}\n" for k in range(n))
@@ -131,7 +127,7 @@ def test_a_long_file_streams_in_blocks_and_is_averaged(
     assert "averaged over 16 rows" in record.notes[0]
 
 
-def test_careful_and_fast_reading_agree(tmp_path: Path) -> None:
+def test_careful_and_fast_reading_agree(tmp_path) -> None:
     rng = np.random.default_rng(3)
     values = rng.standard_normal(500)
     plain = "t,n\n" + "".join(f"{k},{v!r}\n" for k, v in enumerate(values.tolist()))

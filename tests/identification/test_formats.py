@@ -1,7 +1,5 @@
 """The formats that people have: one truth, written in many ways, reads the same."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -84,7 +82,7 @@ FORMATS = {
 
 
 @pytest.mark.parametrize("form", FORMATS)
-def test_one_record_in_many_formats(form: str, tmp_path: Path) -> None:
+def test_one_record_in_many_formats(form: str, tmp_path) -> None:
     record = open_record(FORMATS[form](tmp_path))
     assert record.time_s == pytest.approx(TIME, abs=1e-9)
     assert record["angle"] == pytest.approx(ANGLE, abs=1e-9)
@@ -109,7 +107,7 @@ def test_one_record_in_many_formats(form: str, tmp_path: Path) -> None:
         ("cmd [mm]", "position_reference", 1e-3),
     ],
 )
-def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path: Path) -> None:
+def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path) -> None:
     (tmp_path / "r.csv").write_text(f"time_s;{header}\n" + "".join(f"{k / 10};{k}\n" for k in range(9)))
     record = open_record(tmp_path / "r.csv")
     assert set(record.signals) == {signal}
@@ -126,7 +124,7 @@ def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path: 
     ],
 )
 def test_rms_and_phase_voltages_become_those_of_the_equivalent_dc_motor(
-    options: str, factor: float, tmp_path: Path
+    options: str, factor: float, tmp_path
 ) -> None:
     (tmp_path / "r.csv").write_text("t,u\n" + "".join(f"{k},{k}\n" for k in range(9)))
     (tmp_path / "r.toml").write_text(
@@ -173,7 +171,7 @@ def test_a_gap_is_bridged_only_within_the_tolerance() -> None:
     assert real <= 1.3 * stated < 0.01
 
 
-def test_the_tolerance_is_an_option_of_the_record_file(tmp_path: Path) -> None:
+def test_the_tolerance_is_an_option_of_the_record_file(tmp_path) -> None:
     rows = [f"{t},{a}" for t, a in zip(TIME, ANGLE, strict=True)]
     (tmp_path / "r.csv").write_text("\n".join(["t,a", *rows[:80], *rows[120:]]) + "\n")
     text = 'file = "r.csv"\ntime = { column = "t" }\nsignals.angle = { column = "a", unit = "rad" }\n'
@@ -194,15 +192,15 @@ def test_the_tolerance_is_an_option_of_the_record_file(tmp_path: Path) -> None:
         (lambda p: (p / "r.csv").write_text("time_s,banana_A\n1,2\n"), '"banana_A": no name'),
     ],
 )
-def test_what_cannot_be_read_says_why(write: object, reason: str, tmp_path: Path) -> None:
-    write(tmp_path)  # type: ignore[operator]
+def test_what_cannot_be_read_says_why(write: object, reason: str, tmp_path) -> None:
+    write(tmp_path)
     file = next(tmp_path.iterdir())
     with pytest.raises(InputError, match=reason):
         open_record(file)
 
 
 @pytest.mark.parametrize("value", ["rms", "peak"])
-def test_ac_currents_carry_the_power_of_the_equivalent_dc_motor(value: str, tmp_path: Path) -> None:
+def test_ac_currents_carry_the_power_of_the_equivalent_dc_motor(value: str, tmp_path) -> None:
     """P = u i with u the peak line-line voltage: 3 V_phase I_phase in rms of a motor without reactance."""
     (tmp_path / "r.csv").write_text("t,i,u\n" + "".join(f"{k},{k + 1},{k + 1}\n" for k in range(9)))
     (tmp_path / "r.toml").write_text(

@@ -1,7 +1,5 @@
 """`identify` and `correlate` from the command line: what they print, what they write, how they refuse."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path
@@ -16,7 +14,7 @@ from tests.identification.bench_records import Command
 
 
 @pytest.fixture(scope="module")
-def campaign(bench: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def campaign(bench: Path, tmp_path_factory) -> Path:
     """The small campaign with one file missing."""
     folder = shutil.copytree(bench, tmp_path_factory.mktemp("campaign"), dirs_exist_ok=True)
     (folder / "run05_torque.csv").unlink()
@@ -37,7 +35,7 @@ def test_a_campaign_as_json(campaign: Path, command: Command) -> None:
     assert len(result["suggestion"]["runs"]) == 2
 
 
-def test_a_campaign_on_paper(campaign: Path, tmp_path: Path, command: Command) -> None:
+def test_a_campaign_on_paper(campaign: Path, tmp_path, command: Command) -> None:
     status, out, _ = command("identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
     assert status == 0
     assert "8 of 9 runs" in out
@@ -50,19 +48,18 @@ def test_a_campaign_on_paper(campaign: Path, tmp_path: Path, command: Command) -
     assert page.count("<svg") >= 4
     identified = load_design(tmp_path / "ilr33-amber-identified.toml")
     tolerance = identified.parameters["friction.load_coefficient"].tolerance
-    assert tolerance is not None
     assert tolerance.kind == "normal"
     assert len(identified.correlations) >= 1
 
 
-def test_the_identified_design_goes_on_into_margins(campaign: Path, tmp_path: Path, command: Command) -> None:
+def test_the_identified_design_goes_on_into_margins(campaign: Path, tmp_path, command: Command) -> None:
     command("identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
     status, out, _ = command("margins", str(tmp_path / "ilr33-amber-identified.toml"), "--json")
     assert status == 0
     assert json.loads(out)["loops"]
 
 
-def test_emps_on_the_command_line(emps_file: Path, tmp_path: Path, command: Command) -> None:
+def test_emps_on_the_command_line(emps_file: Path, tmp_path, command: Command) -> None:
     status, out, _ = command("identify", str(emps_file), "--json", "--refine")
     result = json.loads(out)
     assert status == 0
@@ -78,7 +75,7 @@ def test_emps_on_the_command_line(emps_file: Path, tmp_path: Path, command: Comm
     assert (tmp_path / "correlation.html").stat().st_size > 10_000
 
 
-def test_the_results_become_sections_of_the_report(campaign: Path, tmp_path: Path, command: Command) -> None:
+def test_the_results_become_sections_of_the_report(campaign: Path, tmp_path, command: Command) -> None:
     command("identify", str(campaign), "--out", str(tmp_path / "i"), "--suggest", "0")
     result, out = str(tmp_path / "i" / "identification.json"), str(tmp_path / "r")
     command("report", "ilr33-amber", "--include", result, "--out", out)
@@ -94,9 +91,7 @@ def test_the_chirp_on_the_command_line(odrive_files: dict[str, Path], command: C
     assert json.loads(out)["chirp"]["whole"]["relative_error"] < 0.025
 
 
-def test_the_virtual_bench_writes_54_runs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_virtual_bench_writes_54_runs(tmp_path, capsys, monkeypatch) -> None:
     short = BenchPlan(duration_s=2.2)
     monkeypatch.setattr("examples.virtual_bench.campaign.BenchPlan", lambda: short)
     simulate([str(tmp_path), "--seed", "3"])
@@ -115,7 +110,7 @@ def test_the_virtual_bench_writes_54_runs(
     ],
 )
 def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(
-    arguments: tuple[str, ...], reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    arguments: tuple[str, ...], reason: str, tmp_path, capsys
 ) -> None:
     (tmp_path / "campaign.toml").touch()
     with pytest.raises(SystemExit, match="2"):
@@ -123,7 +118,7 @@ def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(
     assert reason in capsys.readouterr().err
 
 
-def test_the_example_is_a_campaign_file(tmp_path: Path, command: Command) -> None:
+def test_the_example_is_a_campaign_file(tmp_path, command: Command) -> None:
     from analyses.records import load_campaign
 
     status, out, _ = command("identify", "--example")
@@ -168,7 +163,7 @@ def test_bad_input_is_one_line_and_status_2(
     ],
 )
 def test_a_bad_campaign_file_is_one_line_with_its_key(
-    old: str, new: str, reason: str, campaign: Path, tmp_path: Path, command: Command
+    old: str, new: str, reason: str, campaign: Path, tmp_path, command: Command
 ) -> None:
     text = campaign.read_text()
     assert old in text

@@ -1,7 +1,5 @@
 """Fuzz: whatever a file holds, there is a record with every row accounted for, or one InputError."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 
@@ -40,8 +38,8 @@ def _spec(layout: CsvFormat, policy: str) -> RecordSpec:
         format=layout,
         time=TimeColumn(column="t"),
         signals=(SignalColumn(name="x", column="x"),),
-        bad_rows=policy,  # type: ignore[arg-type]
-        disorder=policy,  # type: ignore[arg-type]
+        bad_rows=policy,
+        disorder=policy,
     )
 
 

@@ -1,7 +1,5 @@
 """Several records together: joint fit, held-out record, fixed values, what is not told, honest errors."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -17,7 +15,7 @@ from tests.identification.bench_records import Command, columns_of, motion, stai
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def files(tmp_path_factory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("records")
     made = {
         "a": columns_of(motion(2), 0),
@@ -31,7 +29,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_another(
-    files: dict[str, str], tmp_path: Path, command: Command
+    files: dict[str, str], tmp_path, command: Command
 ) -> None:
     """Truth: the coefficients of the design that was simulated (Table 1 of the paper)."""
     arguments = ("identify", files["a"], files["b"], files["loaded"], "--validate", files["unseen"])
@@ -45,12 +43,7 @@ def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_anoth
     assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(
         1.5 * result["model"]["relative_residual"] + 0.02
     )
-    assert {one["record"] for one in result["resimulated"]} == {
-        "a.csv",
-        "b.csv",
-        "loaded.csv",
-        "unseen.csv",
-    }
+    assert {one["record"] for one in result["resimulated"]} == {"a.csv", "b.csv", "loaded.csv", "unseen.csv"}
     written = load_design(tmp_path / "ilr33-amber-identified.toml")
     assert written.friction.load_coefficient == pytest.approx(1.34e-3, rel=3e-3)
     assert written.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=5e-3)
@@ -58,13 +51,10 @@ def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_anoth
     for path, refined in result["refined"]["parameters"].items():
         tolerance = written.parameters[path].tolerance
         assert written.parameters[path].value == pytest.approx(refined["value"], rel=1e-6)
-        assert tolerance is not None
         assert tolerance.std == pytest.approx(refined["standard_error"], rel=1e-5)
 
 
-def test_a_held_out_record_of_another_drive_fails(
-    files: dict[str, str], tmp_path: Path, command: Command
-) -> None:
+def test_a_held_out_record_of_another_drive_fails(files: dict[str, str], tmp_path, command: Command) -> None:
     from actuator_lti.design import with_values
 
     other = with_values(load_design("ilr33-amber"), {"friction.dry_torque": 3.5e-3})
@@ -154,7 +144,7 @@ def test_scatter_between_records_is_found_again() -> None:
     assert np.sqrt(np.mean(np.square(result))) == pytest.approx(0.5, rel=0.05)
 
 
-def test_records_that_differ_widen_the_errors(tmp_path: Path, command: Command) -> None:
+def test_records_that_differ_widen_the_errors(tmp_path, command: Command) -> None:
     """Six records whose dry friction differs by 10 % rms: the joint error is the scatter over root six."""
     from actuator_lti.design import with_values
 
@@ -204,7 +194,7 @@ def test_correlation_over_several_records(files: dict[str, str], command: Comman
     )
 
 
-def test_a_record_that_contradicts_itself_fails_the_correlation(tmp_path: Path, command: Command) -> None:
+def test_a_record_that_contradicts_itself_fails_the_correlation(tmp_path, command: Command) -> None:
     columns = columns_of(motion(2))
     columns["motor_speed_rad_s"] = columns.pop("motor_speed_rpm")
     path = str(write(tmp_path / "r.csv", columns))

@@ -4,11 +4,8 @@ Each record is made by the simulator from a shipped design and read by the comma
 starts from a design whose inertia and friction are wrong by 40 %.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -136,10 +133,10 @@ def _truth(design: Design, name: str) -> float:
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.log.__name__[1:] for case in CASES])
-def test_a_drive_is_found_from_its_record(case: Case, tmp_path: Path, command: Run) -> None:
+def test_a_drive_is_found_from_its_record(case: Case, tmp_path, command: Run) -> None:
     design = _bare(case.name)
     run = simulate(design, case.command, case.seconds, record_every=case.every)
-    table: Columns = case.log(run, np.random.default_rng(7))  # type: ignore[operator]
+    table: Columns = case.log(run, np.random.default_rng(7))
     write(tmp_path / "r.csv", table, mark=";")
     (tmp_path / "wrong.toml").write_text(write_design(_wrong(design)))
     record, out = str(tmp_path / "r.csv"), str(tmp_path / "o")
@@ -162,13 +159,13 @@ def test_a_drive_is_found_from_its_record(case: Case, tmp_path: Path, command: R
 @pytest.mark.parametrize("name", ["ballscrew", "fin"])
 @pytest.mark.parametrize("clock", [1.05, 0.95])
 def test_a_clock_that_is_off_shows_in_the_following_error(
-    name: str, clock: float, tmp_path: Path, command: Run
+    name: str, clock: float, tmp_path, command: Run
 ) -> None:
     """A position and a current alone: inertia and friction agree with any clock, the loops' gains do not."""
     case = next(case for case in CASES if case.name == name)
     design = _bare(name)
     run = simulate(design, case.command, case.seconds, record_every=case.every)
-    table: Columns = case.log(run, np.random.default_rng(7))  # type: ignore[operator]
+    table: Columns = case.log(run, np.random.default_rng(7))
     first = next(iter(table))
     table[first] = clock * table[first]
     write(tmp_path / "r.csv", table, mark=";")
@@ -190,11 +187,7 @@ def test_a_clock_that_is_off_shows_in_the_following_error(
     ],
 )
 def test_a_fault_on_a_linear_axis_is_named(
-    change: dict[str, tuple[str, float]],
-    status: int,
-    reason: str,
-    tmp_path: Path,
-    command: Run,
+    change: dict[str, tuple[str, float]], status: int, reason: str, tmp_path, command: Run
 ) -> None:
     """Friction behind the coupling counts in the common factor of a wrong scale of the current."""
     case = next(case for case in CASES if case.name == "ballscrew")
@@ -209,7 +202,7 @@ def test_a_fault_on_a_linear_axis_is_named(
     assert not list((tmp_path / "o").glob("*.toml"))
 
 
-def test_a_current_sampled_too_slowly_is_named(tmp_path: Path, command: Run) -> None:
+def test_a_current_sampled_too_slowly_is_named(tmp_path, command: Run) -> None:
     """Steps of the voltage: the current peaks within a millisecond, the log has one row for each."""
     base = _bare("ilr33-amber")
     controller = replace(base.controller, position=None, velocity=None, current=None)
@@ -226,7 +219,7 @@ def test_a_current_sampled_too_slowly_is_named(tmp_path: Path, command: Run) -> 
     assert any("sampled too slowly" in reason for reason in failed)
 
 
-def test_a_stepped_command_is_taken_as_steps(tmp_path: Path, command: Run) -> None:
+def test_a_stepped_command_is_taken_as_steps(tmp_path, command: Run) -> None:
     """Logged at every tenth tick: taken as ramps of a millisecond, the current would be off by 20 %."""
     base = _bare("ilr33-amber")
     design = replace(base, controller=replace(base.controller, position=None))
@@ -242,7 +235,7 @@ def test_a_stepped_command_is_taken_as_steps(tmp_path: Path, command: Run) -> No
     assert summary["speed"]["relative_error"] < 1e-6
 
 
-def test_correlate_begins_with_its_result_and_judges_on_demand(tmp_path: Path, command: Run) -> None:
+def test_correlate_begins_with_its_result_and_judges_on_demand(tmp_path, command: Run) -> None:
     design = _bare("ctms-motor-position")
     run = simulate(design, commands.multisine(1.0, [0.5, 1.1], 4.0, 1e-3, seed=2), 4.0)
     table = _voltage(run, np.random.default_rng(1))
@@ -258,7 +251,7 @@ def test_correlate_begins_with_its_result_and_judges_on_demand(tmp_path: Path, c
         assert ran.out.startswith(f"{verdict}  ctms-motor-position: Motor angle of the model within")
 
 
-def test_signals_at_several_rates(tmp_path: Path, command: Run) -> None:
+def test_signals_at_several_rates(tmp_path, command: Run) -> None:
     """The current every 5 ms among rows of 1 ms: rows are dropped, which is said, or kept."""
     design = _bare("ctms-motor-position")
     motor = replace(design.motor, inductance_H=2e-3)

@@ -1,16 +1,20 @@
-"""Records that the simulator wrote, held against the same drive: the same run, so no error and no finding."""
+"""Records that the simulator wrote: no error and no finding; into a study with their covariance."""
 
-from __future__ import annotations
-
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from actuator_lti import load_design
+from actuator_lti.design.model import Tolerance
+from actuator_lti.design.parameters import FrozenMap
+from analyses.identification.inverse import fit_records
+from analyses.records import open_record
 from analyses.records.consistency import check_record
 from analyses.records.record import Record, RowCounts
-from tests.identification.bench_records import Command
+from analyses.studies.sampling import sampler_of
+from analyses.tuning.problem import loop_requirements, problem_of
+from tests.identification.bench_records import Command, columns_of, motion, write
 
 AMBER = load_design("ilr33-amber")
 
@@ -24,7 +28,7 @@ AMBER = load_design("ilr33-amber")
         ("emps", "--command step --amplitude 1 --duration 0.3"),
     ],
 )
-def test_own_record(design: str, motion: str, tmp_path: Path, command: Command) -> None:
+def test_own_record(design: str, motion: str, tmp_path, command: Command) -> None:
     path = tmp_path / "run.csv"
     assert command(*f"simulate {design} {motion} --csv {path} --quiet".split()).status == 0
     data = command("correlate", design, path, "--json").data
@@ -54,3 +58,44 @@ def test_a_clock_that_is_off_shows_in_a_short_motion() -> None:
     (found,) = (f for f in check_record(AMBER, _noisy(1.1)) if f.subject.startswith("speed against the rate"))
     assert found.passed is False
     assert "clock +1" in found.text
+
+
+NAMES = {"viscous": "friction.viscous", "dry": "friction.dry_torque", "offset": "friction.offset_torque"}
+
+
+def test_what_was_identified_is_what_the_studies_draw(tmp_path, command: Command) -> None:
+    """Covariance of the fit = that of the samples (4096 draws, 5 %); tuning knows them; a study runs."""
+    record = write(tmp_path / "a.csv", columns_of(motion(1)))
+    ran = command("identify", record, "--design", "ilr33-amber", "--out", tmp_path, "--json")
+    assert not ran.status
+    result = ran.data
+    design = load_design(tmp_path / "ilr33-amber-identified.toml")
+    fitted = result["model"]["names"]
+    assert fitted == ["inertia", "viscous", "dry", "offset"]
+    wanted = np.array(result["model"]["covariance"])[1:, 1:]
+    sampler = sampler_of(design)
+    paths = [NAMES[name] for name in fitted[1:]]
+    draws = sampler.draw(0, 4096)[:, [sampler.paths.index(path) for path in paths]]
+    size = np.sqrt(np.diag(wanted))
+    assert np.cov((draws / size).T) == pytest.approx(wanted / np.outer(size, size), abs=0.05)
+    corner = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
+    assert set(paths) <= {factor.path for factor in corner.factors}
+    drawn = ("--samples", "64", "--no-worst", "--out", tmp_path / "mc", "--json")
+    study = command("montecarlo", tmp_path / "ilr33-amber-identified.toml", *drawn)
+    assert not study.status
+    assert study.data["verdict"] == "met"
+
+
+def test_the_tolerance_of_a_value_that_is_kept_counts_in_those_that_were_found(tmp_path) -> None:
+    """At one constant load M, dry + CM M is all that shows: dry has the error M times that of CM."""
+    record = open_record(write(tmp_path / "a.csv", columns_of(motion(1, load_Nm=3.0), load_Nm=3.0)))
+    base = load_design("ilr33-amber")
+    key, std = "friction.load_coefficient", 2e-4
+    known = replace(base.parameters[key], tolerance=Tolerance(kind="normal", std=std))
+    design = replace(base, parameters=FrozenMap({**base.parameters, key: known}))
+    plain, wide = fit_records(base, [record]), fit_records(design, [record])
+    k = plain.names.index("dry")
+    assert plain.fixed["load_coefficient"].moves["dry"] == pytest.approx(3.0, rel=0.02)
+    added = wide.covariance[k, k] - plain.covariance[k, k]
+    assert np.sqrt(added) == pytest.approx(3.0 * std, rel=0.02)
+    assert "an error of it moves dry by -" in wide.fixed["load_coefficient"].reason

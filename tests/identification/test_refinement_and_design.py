@@ -1,7 +1,5 @@
 """Output error, the next runs of a campaign, dynamic results as designs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -140,7 +138,6 @@ def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -
         loops = assemble_loops(
             changed, operating_point="describing-function", load_Nm=0.0, speed_amplitude_rad_s=0.02 * 942.5
         )
-        assert loops.position is not None
         value = stability_margins(loops.position.open_loop).phase_margin_deg
         assert value is not None
         return value
@@ -185,7 +182,6 @@ def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:
 def test_refinement_on_emps_lowers_the_force_error_and_is_what_is_written(emps_file: Path) -> None:
     design, record = load_design("emps"), open_record(emps_file)
     result = identify_bench(design, [record], settings=BenchSettings(refine=True))
-    assert result.refined is not None
     assert result.refined.error_after < result.refined.error_before < 0.05848
     for path, value in zip(result.refined.names, result.refined.values, strict=True):
         assert parameter_value(read_design_text(result.text), path) == pytest.approx(value, rel=1e-6)
@@ -196,7 +192,7 @@ def test_refinement_on_emps_lowers_the_force_error_and_is_what_is_written(emps_f
 def test_the_emps_result_becomes_a_design(emps_file: Path) -> None:
     design, record = load_design("emps"), open_record(emps_file)
     for form in ("symmetric", "per-direction"):
-        model = fit_records(design, [record], form=form)  # type: ignore[arg-type]
+        model = fit_records(design, [record], form=form)
         identified = design_with_fit(design, joint_values(design, model), "EMPS")
         back = read_design_text(write_design(identified))
         assert back.motor.rotor_inertia_kgm2 == pytest.approx(model["inertia"], rel=1e-6)

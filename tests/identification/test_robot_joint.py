@@ -3,8 +3,6 @@
 Records of the simulator seen through instruments: gravity, load friction, a supply that sags.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -96,7 +94,7 @@ def _record(folder: Path, name: str, seed: int) -> str:
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+def files(tmp_path_factory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("joint")
     (folder / "guess.toml").write_text(write_design(GUESS))
     made = {name: _record(folder, name, k) for k, name in enumerate(MOTIONS)}
@@ -104,7 +102,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 def test_the_joint_is_identified_and_meets_its_records_within_0_06_rad(
-    files: dict[str, str], tmp_path: Path, command: Callable[..., Ran]
+    files: dict[str, str], tmp_path, command: Callable[..., Ran]
 ) -> None:
     """Identified from two motions, held against all of them; the guess misses them by more."""
     ran = command(
@@ -114,7 +112,6 @@ def test_the_joint_is_identified_and_meets_its_records_within_0_06_rad(
     assert ran.status == 0, [check for check in ran.data["items"] if check["passed"] is False]
     written = tmp_path / "joint-identified.toml"
     gravity = load_design(written).load.gravity
-    assert gravity is not None
     assert gravity.peak_Nm == pytest.approx(0.8 * 9.80665 * 0.15, rel=0.05)
     records = [files[name] for name in MOTIONS]
     after = command("correlate", written, *records, "--json").data

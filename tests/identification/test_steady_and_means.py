@@ -1,6 +1,4 @@
-"""The steady part of a run, and means of correlated series."""
-
-from __future__ import annotations
+"""The steady part of a run, means of correlated series, currents between samples, recorders on one clock."""
 
 import numpy as np
 import pytest
@@ -8,7 +6,9 @@ from scipy.signal import lfilter
 
 from actuator_lti.errors import InputError
 from analyses.estimation.means import correlated_means, correlation_time
+from analyses.identification.sampled_current import HeldVoltage
 from analyses.identification.steady import SteadyCriterion, find_steady_window
+from analyses.records import Record, RowCounts, join_records
 
 
 def _run(noise: float) -> tuple[np.ndarray, np.ndarray]:
@@ -60,3 +60,116 @@ def test_the_standard_error_of_a_correlated_mean_is_that_of_many_repetitions() -
     naive = 1.0 / np.sqrt(n)
     assert np.sqrt(np.mean(stated**2)) == pytest.approx(true, rel=0.15)
     assert true > 4.0 * naive
+
+
+FINE = 4000
+
+
+def _current(a: float, T: float, d: float, w: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times within one tick and i(t) of 1/(1 + s/a) under exp(j w k T), switched d after each tick.
+
+    Settled; the sum over every earlier step of the voltage, (u_k - u_(k-1)) (1 - exp(-a (t - t_k))).
+    """
+    t = (np.arange(FINE) + 0.5) * T / FINE
+    back = np.arange(-round(60.0 / (a * T)) - 20, 1)
+    u = np.exp(1j * w * np.arange(back[0] - 1, 1) * T)
+    steps, when = np.diff(u), back * T + d
+    since = np.maximum(t[:, None] - when, 0.0)
+    return t, u[0] + (steps * -np.expm1(-a * since)).sum(axis=1)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("a", [500.0, 9e3, 4e4])
+def test_the_mean_current_over_its_samples(a: float, share: float) -> None:
+    T, w = 1e-4, 2.0 * np.pi * 180.0
+    d = share * T
+    t, i = _current(a, T, d, w)
+    line = np.mean(i * np.exp(-1j * w * t))  # every tick repeats the one before, turned by exp(j w T)
+    sample = _at_zero(a, T, d, w)
+    held = HeldVoltage(rate_1_s=a, period_s=T, delay_s=d, back_emf_A_per_rad_s=0.0)
+    assert held.mean_over_sample(np.array([w]))[0] == pytest.approx(line / sample, rel=1e-6)
+
+
+def _at_zero(a: float, T: float, d: float, w: float) -> complex:
+    back = np.arange(-round(60.0 / (a * T)) - 20, 1)
+    u = np.exp(1j * w * np.arange(back[0] - 1, 1) * T)
+    since = np.maximum(-(back * T + d), 0.0)
+    return complex(u[0] + (np.diff(u) * -np.expm1(-a * since)).sum())
+
+
+def test_the_lead_in_the_limits() -> None:
+    """A slow winding goes straight from sample to sample; a quick one stands still between switches."""
+    T = 1e-4
+    for d in (0.0, 0.4 * T, T, 1.4 * T):
+        slow = HeldVoltage(rate_1_s=1.0, period_s=T, delay_s=d, back_emf_A_per_rad_s=0.0)
+        assert slow.lead_s == pytest.approx(0.0, abs=1e-4 * T)
+    for d in (0.1 * T, 0.4 * T, 0.9 * T):
+        quick = HeldVoltage(rate_1_s=1e7, period_s=T, delay_s=d, back_emf_A_per_rad_s=0.0)
+        assert quick.lead_s == pytest.approx(d - 0.5 * T, abs=2e-3 * T)
+
+
+def _record(name: str, time: np.ndarray, **signals: np.ndarray) -> Record:
+    units = dict.fromkeys(signals, "1")
+    counts = RowCounts(rows_in=len(time), rows_out=len(time))
+    return Record(name=name, time_s=time, signals=signals, units=units, counts=counts)
+
+
+def _happening(t: np.ndarray) -> np.ndarray:
+    """A motion from 2 s to 16 s with soft edges."""
+    return 1.0 / (1.0 + np.exp(-(t - 2.0) / 0.03)) - 1.0 / (1.0 + np.exp(-(t - 16.0) / 0.05))
+
+
+def _pair(offset: float, rate: float, noise: float = 0.01) -> tuple[Record, Record]:
+    """``t_first = offset + rate t_second``."""
+    rng = np.random.default_rng(5)
+    first = np.arange(0.0, 20.0, 1e-3)
+    second = np.arange(0.0, (19.0 - offset) / rate, 2.3e-3)
+    speed = 500.0 * _happening(first) + 500.0 * noise * rng.standard_normal(len(first))
+    torque = -7.0 * _happening(offset + rate * second) + 7.0 * noise * rng.standard_normal(len(second))
+    return _record("drive", first, speed=speed), _record("sensor", second, torque=torque)
+
+
+@pytest.mark.parametrize("method", ["correlation", "event"])
+@pytest.mark.parametrize(("offset", "rate"), [(0.7312, 1.0), (-0.4, 1.0002), (0.25, 0.9995)])
+def test_offset_and_rate_are_found(method: str, offset: float, rate: float) -> None:
+    first, second = _pair(offset, rate, 0.003)
+    joined, join = join_records(
+        first, second, first_signal="speed", second_signal="torque", method=method
+    )  # fmt: skip
+    assert abs(join.rate - rate) < max(5.0 * join.rate_std, 1e-4)
+    middle = 9.0
+    result = join.offset_s + join.rate * middle
+    assert result == pytest.approx(offset + rate * middle, abs=2e-3)
+    assert np.corrcoef(joined["speed"], -joined["torque"])[0, 1] > 0.999
+
+
+def test_a_single_event_tells_no_rate() -> None:
+    first, second = _pair(0.5, 1.0)
+    early = second.slice(0, 3000)
+    _, join = join_records(first, early, first_signal="speed", second_signal="torque", method="event")
+    assert join.rate_std is None
+    assert "rate not estimable" in str(join)
+
+
+def test_the_given_offset_is_used_as_it_is() -> None:
+    first, second = _pair(0.5, 1.0)
+    joined, join = join_records(
+        first, second, first_signal="speed", second_signal="torque", method="given", offset_s=0.5
+    )
+    assert join.offset_s == 0.5
+    assert joined.time_s[0] >= 0.5
+    assert "given offset" in joined.notes[-1]
+
+
+def test_records_that_do_not_belong_together_are_refused() -> None:
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, 5.0, 1e-3)
+    a = _record("a", time, speed=rng.standard_normal(5000))
+    b = _record("b", time, torque=rng.standard_normal(5000))
+    with pytest.raises(InputError, match="not alike"):
+        join_records(a, b, first_signal="speed", second_signal="torque")
+    flat = _record("c", time, torque=np.ones(5000))
+    with pytest.raises(InputError, match="flat"):
+        join_records(a, flat, first_signal="speed", second_signal="torque", method="correlation")
+    with pytest.raises(InputError, match="flat"):
+        join_records(a, flat, first_signal="speed", second_signal="torque", method="event")

@@ -1,8 +1,6 @@
 """A compliant drive from its frequency response; truth: drive D of the reference numbers, resonance 632.4555
 and antiresonance 447.2136 rad/s."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 
@@ -61,7 +59,7 @@ def _noiseless(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     motor, load = angle_responses(omega, TRUTH, N)
     time = np.arange(RATE) / RATE
     lines = np.exp(1j * np.outer(time, omega))
-    return tuple(np.tile(np.real(lines @ a), PERIODS + 1) for a in (torque, motor * torque, load * torque))  # type: ignore[return-value]
+    return tuple(np.tile(np.real(lines @ a), PERIODS + 1) for a in (torque, motor * torque, load * torque))
 
 
 def _record(seed: int) -> Record:
@@ -182,7 +180,6 @@ def test_the_play_is_within_its_interval() -> None:
     held = 0
     for seed in range(20):
         play = identify_frequency(_design(), _record(seed), play_record=_play_record(seed)).play
-        assert play is not None
         assert play.half_rad == pytest.approx(HALF_PLAY, rel=0.02)
         held += abs(play.half_rad - HALF_PLAY) <= 1.96 * play.half_std_rad
     assert held >= 17

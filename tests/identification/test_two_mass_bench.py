@@ -1,6 +1,4 @@
-"""The virtual bench of a compliant drive: simulator, instruments, identification within its own intervals."""
-
-from __future__ import annotations
+"""The virtual bench of a compliant drive, in Python and from the command line."""
 
 from dataclasses import replace
 from functools import cache
@@ -23,6 +21,8 @@ from actuator_lti.design.model import (
 from actuator_lti.errors import InputError
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
 from examples.virtual_bench import TwoMassPlan, reversal_record, sweep_record
+from examples.virtual_bench.__main__ import main as simulate
+from tests.identification.bench_records import Command
 
 TRUTH = {
     "motor_inertia": 2e-5,
@@ -61,7 +61,7 @@ def _design() -> Design:
         "output_encoder": OutputEncoder(counts_per_rev=1 << 20),
     }
     bare = {"parameters": {}, "requirements": (), "correlations": (), "facts": ()}
-    return replace(base, name="two-mass", **parts, **bare)  # type: ignore[arg-type]
+    return replace(base, name="two-mass", **parts, **bare)
 
 
 def _guess() -> Design:
@@ -80,7 +80,6 @@ def _identified(seed: int) -> FrequencyResult:
 def held(result: FrequencyResult) -> dict[str, bool]:
     """Whether each 95 % interval holds the truth; a value fixed at zero has none, and is left out."""
     fit, play = result.fit, result.play
-    assert play is not None
     outcome = {name: (fit[name], fit.std(name), truth) for name, truth in TRUTH.items() if name in fit.names}
     outcome |= {
         "resonance": (*fit.resonance_rad_s, RESONANCE),
@@ -101,7 +100,6 @@ def test_the_simulated_drive_is_identified_within_its_intervals() -> None:
         assert result.passed, result.items
         assert result.fit["stiffness"] == pytest.approx(400.0, rel=0.03)
         assert result.fit.resonance_rad_s[0] == pytest.approx(RESONANCE, rel=1e-3)
-        assert result.design.coupling is not None
         assert result.design.coupling.play_rad == pytest.approx(2.0 * HALF_PLAY, rel=0.02)
 
 
@@ -128,7 +126,6 @@ def test_a_response_whose_valley_drowns_is_fitted_from_another_start() -> None:
 def test_the_errors_of_the_stiffness_are_in_that_of_the_play() -> None:
     """The twist in contact is b + T/k: an error of k moves b by T/k times it."""
     result = _identified(0)
-    assert result.play is not None
     share = result.fit.std("stiffness") / result.fit["stiffness"]
     torque = 0.05 * 10.0 * 0.5  # N m at the coupling: half of the motor's peak, as the inertias are equal
     assert result.play.half_std_rad > 0.3 * share * torque / 400.0
@@ -146,3 +143,41 @@ def test_the_bench_says_where_it_cannot_measure() -> None:
         sweep_record(design, TwoMassPlan(moment_Nm=0.05))
     with pytest.raises(InputError, match="current loop and a coupling"):
         sweep_record(replace(design, coupling=None))
+
+
+WRONG = ("motor.rotor_inertia=1.1 kg*cm^2", "load.inertia=0.4 kg*m^2", "coupling.stiffness=1.7e4 N*m/rad")
+
+
+def _set(*changes: str) -> list[str]:
+    return [part for change in changes for part in ("--set", change)]
+
+
+def test_a_robot_joint_from_its_simulated_bench(tmp_path, command: Command) -> None:
+    """Truth: the shipped joint with 2 mrad of play; start: inertias and stiffness 20 to 30 % off.
+
+    Its friction grows with the load (CM) and it has dry friction on both sides: both are in the truth.
+    """
+    bench, out = tmp_path / "bench", tmp_path / "o"
+    made = _set("instruments.current_noise=30 mA", "coupling.play=2 mrad")
+    simulate([str(bench), "--sweep", "--design", "joint", "--seed", "3", *made])
+    files = ["--frequency-response", bench / "sweep.csv", "--play", bench / "reversal.csv"]
+    ran = command("identify", *files, "--design", "joint", *_set(*WRONG), "--out", out, "--json")
+    result = ran.data
+    assert not ran.status, result["items"]
+    design = load_design("joint")
+    truth = {
+        "motor_inertia": design.motor_side_inertia_kgm2,
+        "load_inertia": design.load_side_inertia_kgm2,
+        "stiffness": design.coupling.stiffness_Nm_rad,
+        "damping": design.coupling.damping_Nms_rad,
+        "play": 2e-3,
+    }
+    for label, value in truth.items():
+        found = result["found"]["parameters"][label]
+        assert found["value"] == pytest.approx(value, abs=3.0 * found["standard_error"]), label
+        assert found["standard_error"] < 0.03 * value, label
+    written = load_design(next(out.glob("*.toml")))
+    assert written.coupling.play_rad == pytest.approx(2e-3, rel=0.06)
+    assert written.parameters["coupling.play"].tolerance is not None
+    assert {check["id"]: check for check in result["items"]}["written-sweep.csv"]["value"] < 0.05
+    assert "two-mass" in (out / "identification.html").read_text()

@@ -1,7 +1,5 @@
 """The virtual bench: the value of Table 1 lies in the 95 % intervals of 90 to 99 of 100 campaigns."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -63,9 +61,7 @@ def _imported(runs: tuple[TrueRun, ...], seed: int) -> ImportedCampaign:
 
 
 @pytest.fixture(scope="module")
-def from_files(
-    design: Design, runs: tuple[TrueRun, ...], tmp_path_factory: pytest.TempPathFactory
-) -> CampaignResult:
+def from_files(design: Design, runs: tuple[TrueRun, ...], tmp_path_factory) -> CampaignResult:
     """All the way: files written, read by the importers, joined by correlation, one file broken."""
     folder = tmp_path_factory.mktemp("bench")
     logs, _ = measure_bench(runs, 11, INSTRUMENTS)
@@ -116,7 +112,6 @@ def test_clocks_are_found_from_the_files(from_files: CampaignResult, runs: tuple
     joined = [run for run in from_files.imported.runs if run.join is not None]
     assert len(joined) == 44
     for run in joined:
-        assert run.join is not None
         assert run.join.offset_s == pytest.approx(true[run.id], abs=0.012)
 
 
@@ -129,7 +124,6 @@ def test_the_contributions_are_those_of_the_paper(from_files: CampaignResult) ->
 
 
 def test_no_richer_law_is_warranted_on_a_plain_bench(from_files: CampaignResult) -> None:
-    assert from_files.laws is not None
     assert from_files.laws.best == "plain"
     impossible = [score.name for score in from_files.laws.scores if not score.possible]
     assert impossible == ["per direction"]
@@ -138,7 +132,6 @@ def test_no_richer_law_is_warranted_on_a_plain_bench(from_files: CampaignResult)
 def test_a_quadratic_term_is_found_by_cross_validation(design: Design, runs: tuple[TrueRun, ...]) -> None:
     bent = tuple(replace(r, current_A=r.current_A + 2e-7 * r.speed_rad_s**2) for r in runs)
     result = identify_campaign(_imported(bent, 3), design)
-    assert result.laws is not None
     assert result.laws.best == "quadratic"
 
 
@@ -151,7 +144,6 @@ def test_runs_in_both_directions_share_one_law(design: Design, runs: tuple[TrueR
     result = identify_campaign(_imported(tuple(_mirrored(run) for run in runs), 8), design)
     assert {point.direction for point in result.fit.points} == {-1, 1}
     assert np.all(np.abs(result.fit.values - TABLE_1) <= result.fit.half_widths)
-    assert result.laws is not None
     per_direction = next(score for score in result.laws.scores if score.name == "per direction")
     assert per_direction.possible
     assert not per_direction.warranted
@@ -162,7 +154,6 @@ def test_a_law_per_direction_is_found(design: Design, runs: tuple[TrueRun, ...])
     bent = [_mirrored(run) for run in runs]
     uneven = tuple(replace(r, current_A=r.current_A * (1.03 if int(r.id) % 2 else 1.0)) for r in bent)
     result = identify_campaign(_imported(uneven, 8), design)
-    assert result.laws is not None
     assert result.laws.best == "per direction"
 
 
@@ -190,14 +181,13 @@ def test_the_result_becomes_a_design_with_tolerances(from_files: CampaignResult,
     back = read_design_text(write_design(identified))
     for k, path in enumerate(PATHS):
         tolerance = back.parameters[path].tolerance
-        assert tolerance is not None
         assert tolerance.std == pytest.approx(from_files.fit.standard_errors[k], rel=1e-5)
         assert back.parameters[path].value == pytest.approx(from_files.fit.values[k], rel=1e-6)
     result = {(c.first, c.second): c.coefficient for c in back.correlations}
     assert result[PATHS[0], PATHS[1]] == pytest.approx(from_files.fit.correlation[0, 1], abs=1e-5)
 
 
-def test_the_same_seed_writes_the_same_files(runs: tuple[TrueRun, ...], tmp_path: Path) -> None:
+def test_the_same_seed_writes_the_same_files(runs: tuple[TrueRun, ...], tmp_path) -> None:
     few = runs[:2]
     for name in ("a", "b"):
         write_bench(tmp_path / name, measure_bench(few, 4)[0], design="ilr33-amber", seed=4)

@@ -1,7 +1,5 @@
 """Records that are wrong as records are on a bench: no design may come of them with status 0."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable
@@ -47,7 +45,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("fault", WRONG)
-def test_a_wrong_record_gives_no_design(fault: str, right: Columns, tmp_path: Path, command: Command) -> None:
+def test_a_wrong_record_gives_no_design(fault: str, right: Columns, tmp_path, command: Command) -> None:
     change, reason = WRONG[fault]
     record = str(write(tmp_path / "r.csv", right, change))
     status, out, err = command(
@@ -63,9 +61,7 @@ def test_a_wrong_record_gives_no_design(fault: str, right: Columns, tmp_path: Pa
     assert reason in " ".join(check["reason"] for check in result["items"])
 
 
-def test_the_right_record_gives_the_drive_that_made_it(
-    right: Columns, tmp_path: Path, command: Command
-) -> None:
+def test_the_right_record_gives_the_drive_that_made_it(right: Columns, tmp_path, command: Command) -> None:
     """The whole inertia at the motor is the drive's: what gears and load have is taken off the rotor's."""
     record, out = str(write(tmp_path / "r.csv", right)), tmp_path / "o"
     status, text, _ = command("identify", record, "--design", "ilr33-amber", "--out", str(out), "--json")
@@ -95,7 +91,7 @@ def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
         inertia_share(design, 1e-6, "gear.worm.ratio")
 
 
-def test_a_load_in_another_unit_shows_in_the_load_friction(tmp_path: Path, command: Command) -> None:
+def test_a_load_in_another_unit_shows_in_the_load_friction(tmp_path, command: Command) -> None:
     """N m written as kN m: all else is right, and the load friction comes out a thousand times too large."""
     free, loaded = columns_of(motion(2), 1, load_Nm=0.0), columns_of(motion(5, load_Nm=5.0), 3, load_Nm=5e-3)
     files = [write(tmp_path / name, table) for name, table in (("free.csv", free), ("loaded.csv", loaded))]
@@ -106,7 +102,7 @@ def test_a_load_in_another_unit_shows_in_the_load_friction(tmp_path: Path, comma
 
 
 def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
-    right: Columns, tmp_path: Path, command: Command
+    right: Columns, tmp_path, command: Command
 ) -> None:
     rng = np.random.default_rng(1)
     noisy = {**right, "current_A": right["current_A"] + 1.5 * rng.standard_normal(len(right["time_s"]))}
@@ -120,7 +116,7 @@ def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
     assert list(out.glob("*.toml"))
 
 
-def test_every_column_is_accounted_for(right: Columns, tmp_path: Path, command: Command) -> None:
+def test_every_column_is_accounted_for(right: Columns, tmp_path, command: Command) -> None:
     more = {**right, "temperature_C": right["time_s"], "current_mA": 1e3 * right["current_A"]}
     record = str(write(tmp_path / "r.csv", more))
     _, out, _ = command("identify", record, "--design", "ilr33-amber", "--json")
@@ -142,7 +138,7 @@ def test_every_column_is_accounted_for(right: Columns, tmp_path: Path, command: 
     ],
 )
 def test_a_signal_that_nothing_reads_is_refused(
-    signal: str, reason: str, right: Columns, tmp_path: Path, command: Command
+    signal: str, reason: str, right: Columns, tmp_path, command: Command
 ) -> None:
     write(tmp_path / "r.csv", right)
     text = f'file = "r.csv"\ntime = {{ column = "time_s" }}\n{signal}\n'
@@ -153,7 +149,7 @@ def test_a_signal_that_nothing_reads_is_refused(
     assert err.count("\n") == 1
 
 
-def test_the_designs_slope_of_the_load_is_used_by_correlate(tmp_path: Path) -> None:
+def test_the_designs_slope_of_the_load_is_used_by_correlate(tmp_path) -> None:
     from actuator_lti.design import with_values
     from analyses.correlation import correlate_record
     from analyses.records import open_record
@@ -215,7 +211,7 @@ WRONG_BENCH = {
 
 
 @pytest.mark.parametrize("fault", WRONG_BENCH)
-def test_a_wrong_campaign_gives_no_design(fault: str, bench: Path, tmp_path: Path, command: Command) -> None:
+def test_a_wrong_campaign_gives_no_design(fault: str, bench: Path, tmp_path, command: Command) -> None:
     change, reason = WRONG_BENCH[fault]
     folder = tmp_path / "bench"
     shutil.copytree(bench, folder)
@@ -236,7 +232,7 @@ def test_a_right_campaign_is_simulated_again_with_what_was_written(bench: Path, 
     assert inputs >= {("drive", "Current"), ("drive", "Position"), ("sensor", "torque")}
 
 
-def test_unloaded_runs_say_what_they_do_not_tell(bench: Path, tmp_path: Path, command: Command) -> None:
+def test_unloaded_runs_say_what_they_do_not_tell(bench: Path, tmp_path, command: Command) -> None:
     """The commonest friction test: no load, so CM stays the design's, and that is said."""
     folder = tmp_path / "bench"
     shutil.copytree(bench, folder)
@@ -254,7 +250,7 @@ def test_unloaded_runs_say_what_they_do_not_tell(bench: Path, tmp_path: Path, co
     assert fit["parameters"]["CM"]["value"] == 1.34e-3
 
 
-def test_a_coefficient_of_a_campaign_can_be_fixed(bench: Path, tmp_path: Path, command: Command) -> None:
+def test_a_coefficient_of_a_campaign_can_be_fixed(bench: Path, tmp_path, command: Command) -> None:
     arguments = ("identify", str(bench / "campaign.toml"), "--json", "--out", str(tmp_path))
     status, out, _ = command(*arguments, "--fix", "friction.viscous=5.25 uN*m*s/rad")
     result = json.loads(out)
@@ -267,7 +263,7 @@ def test_a_coefficient_of_a_campaign_can_be_fixed(bench: Path, tmp_path: Path, c
     assert (status, "a campaign can fix" in err) == (2, True)
 
 
-def test_the_designs_slope_of_the_load_is_used_by_simulate(tmp_path: Path, command: Command) -> None:
+def test_the_designs_slope_of_the_load_is_used_by_simulate(tmp_path, command: Command) -> None:
     """What `simulate` writes without being told of the slope is what the slope gives, and correlates."""
     from actuator_lti.design import with_values, write_design
 

@@ -6,8 +6,6 @@ systems, other units of time, certified or not. Truth: roots of integer polynomi
 written apart from the package; part p/r of a sample is a polynomial in the r-th root of z.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys

@@ -1,7 +1,5 @@
 """Harsh families of random loops, each a function of a generator: what an engine gets wrong."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

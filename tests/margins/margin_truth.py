@@ -1,7 +1,5 @@
 """Crossovers and verdicts of rational loops from polynomial roots at high precision, for the tests only."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise

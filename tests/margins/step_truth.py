@@ -1,7 +1,5 @@
 """Truth for step responses: recursions in exact numbers and partial fractions at high precision."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Bandwidths (cases F3, F5, F6, F7), resonance, peaks of S and T, against closed forms."""
 
-from __future__ import annotations
-
 import math
 
 import control
@@ -126,7 +124,7 @@ def test_no_value_to_fall_from(loop: control.LTI, message: str) -> None:
 
 def test_unknown_level() -> None:
     with pytest.raises(InputError, match="level"):
-        closed_loop_bandwidth(SECOND, level="3")  # type: ignore[arg-type]
+        closed_loop_bandwidth(SECOND, level="3")
 
 
 def test_every_crossing_is_listed_and_the_first_fall_is_meant() -> None:

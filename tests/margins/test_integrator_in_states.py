@@ -3,8 +3,6 @@
 The equations of the cascade in s, evaluated point by point, are the truth.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import control

@@ -1,20 +1,22 @@
 """Harsh families of loops: none wrong where the data determine the answer, hardly any withheld there.
 
-Truth is mpmath at high precision on the exact values of the doubles. What 8 ulp of the entries change, the
-data do not determine: there any answer is allowed, and withholding is.
+Truth is mpmath at high precision on the exact values of the doubles, or by construction. What 8 ulp of the
+entries change, the data do not determine: there any answer is allowed, and withholding is.
 """
 
-from __future__ import annotations
-
 import math
+import warnings
 from collections.abc import Callable
 
 import numpy as np
 import pytest
+from flint import fmpz_mat
 from margin_families import FAMILIES, Loop, near_the_border, over_twelve_decades
 from margin_truth import determined, difference, towards_the_border, truth_of
 
 from actuator_lti.margins import StabilityMargins, stability_margins
+from actuator_lti.margins.exact_charpoly import characteristic, numerator
+from tests.margins.differential import ALL, tried
 
 TRUE_LOOPS = 16  # of each family, against mpmath
 LOOPS = 120  # of each family, double precision against exact arithmetic
@@ -87,7 +89,6 @@ def test_zeros_far_from_the_poles_hide_nothing(k: int, use: int) -> None:
     assert difference(m, answer, 1.0, 1e-6) is None
     v = np.array([0.0, *np.geomspace(1e-8, 1e8, 40_001)])  # a grid from above
     L = np.polyval(loop.num[0][0], 1j * v) / np.polyval(loop.den[0][0], 1j * v)
-    assert m.modulus_margin is not None
     assert m.modulus_margin <= np.abs(1.0 + L).min() * (1.0 + 1e-9)
 
 
@@ -112,3 +113,53 @@ def unlike(m: StabilityMargins, exact: StabilityMargins) -> str | None:
     if not math.isclose(m.modulus_margin, exact.modulus_margin, rel_tol=1e-7, abs_tol=1e-12):
         return f"modulus margin {m.modulus_margin}, not {exact.modulus_margin}"
     return None
+
+
+def with_chain(rng: np.random.Generator, n: int, k: int) -> list[list[int]]:
+    """A matrix of integers with a chain of k states that hand on, in an order of its own."""
+    A = np.zeros((n + k, n + k), dtype=int)
+    A[:n, :n] = rng.integers(-9, 10, (n, n))
+    A[n, :n] = rng.integers(-9, 10, n)
+    for j in range(n + 1, n + k):
+        A[j, j - 1] = rng.choice([1, 3, -2])
+    A[:n, n + k - 1] = rng.integers(-9, 10, n)
+    order = rng.permutation(n + k)
+    return [[int(x) for x in row] for row in A[order][:, order]]
+
+
+@pytest.mark.parametrize(("n", "k"), [(3, 12), (1, 5), (4, 30), (5, 2), (6, 0)])
+def test_a_chain_taken_out_leaves_the_determinant(n: int, k: int) -> None:
+    rng = np.random.default_rng([n, k])
+    rows = with_chain(rng, n, k) if k else rng.integers(-9, 10, (n, n)).tolist()
+    p = characteristic(rows)
+    assert p.degree() == n + k
+    for z in range(-(n + k), n + k + 1):  # more points than coefficients
+        shifted = fmpz_mat([[z * (r == c) - x for c, x in enumerate(row)] for r, row in enumerate(rows)])
+        assert p(z) == shifted.det()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_numerator_is_a_bordered_determinant(seed: int) -> None:
+    rng = np.random.default_rng([seed, 5])
+    rows = with_chain(rng, 3, 4 + seed)
+    n = len(rows)
+    b, c = (rng.integers(-9, 10, n).tolist() for _ in range(2))
+    p = numerator(rows, b, c, characteristic(rows))
+    for z in range(-n, n + 1):
+        bordered = [[z * (r == k) - x for k, x in enumerate(row)] + [-b[r]] for r, row in enumerate(rows)]
+        assert p(z) == fmpz_mat([*bordered, [*c, 0]]).det()
+
+
+ROUNDS = 12
+
+
+@pytest.mark.parametrize("family", range(len(ALL)), ids=lambda k: f"{k}-{ALL[k].__name__}")
+def test_one_answer_in_every_form(family: int) -> None:
+    wrong = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        for k in range(ROUNDS):
+            kind, what = tried(ALL[family], 2026, k * len(ALL) + family)
+            if kind == "wrong":
+                wrong.append((k, what))
+    assert not wrong

@@ -1,7 +1,5 @@
 """Loops that a margin engine gets wrong (J1 to J7), truth by exact arithmetic; and the test for zero."""
 
-from __future__ import annotations
-
 import math
 
 import control

@@ -1,7 +1,5 @@
 """Measured data in every function that takes a response: at 1 % noise the ranges hold the truth."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
@@ -51,7 +49,6 @@ def test_bandwidth_ranges_hold_the_truth_at_one_percent_noise_nobody_stated(coun
     wrong = total = 0
     for name, system in CLOSED.items():
         exact = closed_loop_bandwidth(system)
-        assert exact.minus3db_rad_s is not None
         omega = np.geomspace(exact.minus3db_rad_s / 30.0, exact.minus3db_rad_s * 6.0, count)
         for seed in range(15):
             b = closed_loop_bandwidth(measured(system, omega, np.random.default_rng(seed)))
@@ -59,7 +56,6 @@ def test_bandwidth_ranges_hold_the_truth_at_one_percent_noise_nobody_stated(coun
             wrong += not holds(b.minus3db_range_rad_s, exact.minus3db_rad_s)
             if exact.minus90deg_rad_s is not None and exact.minus90deg_rad_s < omega[-1]:
                 wrong += not holds(b.minus90deg_range_rad_s, exact.minus90deg_rad_s)
-            assert b.minus3db_range_rad_s is not None
             assert b.minus3db_range_rad_s[1] < 1.6 * b.minus3db_range_rad_s[0]
             total += 1
     assert wrong <= 0.01 * total
@@ -111,7 +107,6 @@ def test_a_point_at_zero_frequency_is_what_the_fall_is_measured_from() -> None:
     assert b.minus3db_rad_s == pytest.approx(1.0, rel=1e-3)
     assert b.notes[0] == "T(0) is measured"
     without = closed_loop_bandwidth(control.frd(CLOSED["F5"](1j * omega[1:]), omega[1:]))
-    assert without.minus3db_range_rad_s is not None
     assert without.minus3db_range_rad_s[0] <= 1.0 <= without.minus3db_range_rad_s[1]
     assert "in" in str(without)
 

@@ -4,8 +4,6 @@ Lightly damped, non-minimum-phase, unstable, integrating and sampled loops of or
 functions and as badly scaled, permuted state spaces. What 8 ulp of the entries change is left out.
 """
 
-from __future__ import annotations
-
 import math
 
 import control

@@ -1,16 +1,17 @@
-"""Step figures against closed forms, and with delays against the method of steps."""
-
-from __future__ import annotations
+"""Step figures against closed forms, with delays by the method of steps; phases unwrapped by factors."""
 
 import math
 
 import control
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from actuator_lti.errors import InputError
 from actuator_lti.step import step_figures
 from actuator_lti.systems.delay_system import DelaySystem
+from actuator_lti.systems.phase import unwrapped_phase_deg
 
 s = control.tf("s")
 
@@ -104,3 +105,76 @@ def test_an_integrator_nobody_sees_does_not_matter() -> None:
 def test_refusals(system: control.LTI, message: str) -> None:
     with pytest.raises(InputError, match=message):
         step_figures(system)
+
+
+@pytest.mark.parametrize("grid", [[1e4], [1.0, 1e4], np.geomspace(1e-3, 1e4, 7), np.geomspace(1, 1e4, 1000)])
+def test_F1_on_any_grid(grid: list[float]) -> None:
+    lag = control.tf([1], [0.01, 1])
+    inner = DelaySystem.from_system(lag) * DelaySystem.delay(0.02)
+    assert unwrapped_phase_deg(lag, grid, delay_s=0.02)[-1] == pytest.approx(-11548.5829639, abs=1e-6)
+    assert unwrapped_phase_deg(inner, grid)[-1] == pytest.approx(-11548.5829639, abs=1e-6)
+
+
+@pytest.mark.parametrize("loop", [1 / s**3, control.ss(1 / s**3)])
+def test_F2_three_integrators_start_at_minus_270(loop: control.LTI) -> None:
+    assert unwrapped_phase_deg(loop, [1e-4, 1.0, 1e4]) == pytest.approx([-270.0] * 3, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("loop", "start", "end"),
+    [
+        (-1 / (s + 1), -180, -270),
+        (1 / (s - 2), -180, -90),
+        ((1 - s) / (1 + s), 0, -180),
+        ((s - 1) / (s + 1), -180, -360),
+        (1 / (s**2 + 1e-9 * s + 1), 0, -180),
+        (1 / (s**2 + 1), 0, -180),
+        (1 / (s**2 - 0.1 * s + 1), 0, 180),
+        ((s**2 + 1) / (s + 1) ** 4, 0, -180),
+        (10 / (s * (s + 1) ** 4), -90, -450),
+    ],
+)
+def test_start_and_end(loop: control.LTI, start: float, end: float) -> None:
+    for form in (loop, control.ss(loop)):
+        assert unwrapped_phase_deg(form, [1e-5, 1e7]) == pytest.approx([start, end], abs=0.02)
+
+
+def test_sampled_delays_turn_by_their_samples() -> None:
+    phase = unwrapped_phase_deg(control.tf([1], [1, 0, 0, 0, 0, 0], 0.01), [1.0, 100.0, 300.0])
+    assert phase == pytest.approx(np.degrees([-0.05, -5.0, -15.0]), abs=1e-9)
+
+
+def test_sampled_loop_follows_its_continuous_one_far_below_nyquist() -> None:
+    loop = control.ss(20 * (s + 2) / (s * (s**2 + 0.3 * s + 9) * (s + 5)))
+    held = control.c2d(loop, 1e-4)
+    omega = np.geomspace(0.01, 50, 40)
+    expected = unwrapped_phase_deg(loop, omega, delay_s=0.5e-4)
+    assert unwrapped_phase_deg(held, omega) == pytest.approx(expected, abs=0.01)
+
+
+def test_inner_delays_against_numpy_on_a_fine_grid() -> None:
+    inner = (DelaySystem.from_system(300 / (s * (s / 500 + 1))) * DelaySystem.delay(0.001)).feedback()
+    loop = inner * DelaySystem.delay(0.004) * DelaySystem.from_system(10 / s)
+    omega = np.geomspace(0.1, 5000, 20_001)
+    fine = np.degrees(np.unwrap(np.angle(loop(1j * omega))))
+    fine -= 360 * np.round((fine[0] + 90) / 360)
+    pick = [0, 137, 9000, 15000, 20000]
+    assert unwrapped_phase_deg(loop, omega[pick]) == pytest.approx(fine[pick], abs=1e-6)
+
+
+@settings(max_examples=30)
+@given(st.lists(st.floats(1e-2, 1e4), min_size=1, max_size=6), st.floats(0, 0.1))
+def test_grid_and_order_do_not_matter(omega: list[float], delay_s: float) -> None:
+    loop = control.ss(1e5 * (s - 3) / (s * (s + 1) * (s**2 + 0.5 * s + 400)))
+    together = unwrapped_phase_deg(loop, omega, delay_s)
+    alone = [float(unwrapped_phase_deg(loop, w, delay_s)) for w in omega]
+    assert together == pytest.approx(alone, abs=1e-8)
+
+
+def test_unwrapping_refuses() -> None:
+    with pytest.raises(InputError, match="positive"):
+        unwrapped_phase_deg(1 / s, [0.0])
+    with pytest.raises(InputError, match="Nyquist"):
+        unwrapped_phase_deg(control.tf([1], [1, 0.5], 0.01), [400.0])
+    with pytest.raises(InputError, match="measured"):
+        unwrapped_phase_deg(control.frd([1.0, 0.5], [1.0, 2.0]), [4.0])

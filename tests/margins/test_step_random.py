@@ -1,7 +1,5 @@
 """Step figures on random systems over decades, against exact recursions and partial fractions."""
 
-from __future__ import annotations
-
 import math
 
 import control

@@ -3,8 +3,6 @@
 Truth is mpmath on the exact values of the doubles of the single loop; what 8 ulp of them change is left out.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

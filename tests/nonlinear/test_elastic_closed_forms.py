@@ -156,14 +156,9 @@ def test_map_of_one_line_is_c0_and_cv() -> None:
 
 
 LOSSES = [
-    layout.ENERGY_COPPER,
-    layout.ENERGY_DRY,
-    layout.ENERGY_VISCOUS,
-    layout.ENERGY_DAMPING,
-    layout.ENERGY_PARTING,
-    layout.ENERGY_LOAD_DRY,
-    layout.ENERGY_LOAD_VISCOUS,
-]
+    layout.ENERGY_COPPER, layout.ENERGY_DRY, layout.ENERGY_VISCOUS, layout.ENERGY_DAMPING,
+    layout.ENERGY_PARTING, layout.ENERGY_LOAD_DRY, layout.ENERGY_LOAD_VISCOUS,
+]  # fmt: skip
 SPENT = [
     *LOSSES,
     layout.ENERGY_OFFSET,

@@ -7,7 +7,7 @@ from math import inf
 import control
 import numpy as np
 import pytest
-from test_controller import some_drive
+from test_running_controller import some_drive
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.model import Command, Design, Friction, Limits, LoadFriction

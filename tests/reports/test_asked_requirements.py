@@ -17,17 +17,10 @@ from analyses.monte_carlo import MonteCarloSettings, monte_carlo
 from analyses.specification.requirements import evaluate_requirements
 
 TABLES = {
-    "failure.stop": "15 deg",
-    "failure.deflection": "3 deg",
-    "failure.detection_time": "20 ms",
-    "failure.load": "2 N*m",
-    "duty.amplitude": "4 deg",
-    "duty.frequency": "2 Hz",
-    "duty.load": "3 N*m",
-    "duty.share": "0.5",
-    "duty.cycle": "20 s",
-    "temperature.thermal_resistance": "2 K/W",
-}
+    "failure.stop": "15 deg", "failure.deflection": "3 deg", "failure.detection_time": "20 ms",
+    "failure.load": "2 N*m", "duty.amplitude": "4 deg", "duty.frequency": "2 Hz", "duty.load": "3 N*m",
+    "duty.share": "0.5", "duty.cycle": "20 s", "temperature.thermal_resistance": "2 K/W",
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

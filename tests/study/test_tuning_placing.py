@@ -182,16 +182,8 @@ def test_the_command_places_and_says_so(tmp_path):
     from reports.cli.app import build
 
     words = [
-        "tune",
-        "fin",
-        "--place",
-        "notch,lowpass",
-        "--aim",
-        "least-change",
-        "--no-curve",
-        "--quiet",
-        "--out",
-    ]
+        "tune", "fin", "--place", "notch,lowpass", "--aim", "least-change", "--no-curve", "--quiet", "--out",
+    ]  # fmt: skip
     done = CliRunner().invoke(build(), [*words, str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert "least change" in done.output

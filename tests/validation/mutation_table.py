@@ -8,8 +8,6 @@ as a script it writes docs/validation_keys.md::
     python -m tests.validation.mutation_table
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path

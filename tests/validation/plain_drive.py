@@ -3,34 +3,16 @@
 It shares nothing with the simulator: what it shows of a finding is independent of it.
 """
 
-from __future__ import annotations
-
-import importlib.util
 from dataclasses import dataclass
 from math import ceil, sin, sqrt, tanh
-from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 
 from actuator_lti.design.model import Design
+from tests.nonlinear.controller_reference import Controller
 
-PLACE = Path(__file__).parents[1] / "nonlinear" / "controller_reference.py"
 PER_RADIAN = 8  # parts of a tick for a radian of the coupling's oscillation
 State = tuple[float, ...]  # i, w, th; behind a coupling also W, phi
-
-
-def _reference() -> ModuleType:
-    """The plain controller of the simulator's own tests."""
-    spec = importlib.util.spec_from_file_location("controller_reference_of_validation", PLACE)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    import sys
-
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 @dataclass
@@ -96,7 +78,6 @@ class PlainPlant:
     def spring(self, x: State) -> float:
         """Torque of the coupling at its own shaft."""
         coupling, N_c = self.design.coupling, self.design.ratio_to_coupling
-        assert coupling is not None
         twist, rate, b = x[2] / N_c - x[4], x[1] / N_c - x[3], 0.5 * coupling.play_rad
         if abs(twist) < b:
             return 0.0
@@ -182,7 +163,7 @@ def output_of_step(design: Design, size_rad: float, ticks: int, parts: int = 4) 
     Ts, delay = design.controller.period_s, design.controller.computing_delay_s
     whole = int(delay / Ts + 1e-9)
     part = delay - whole * Ts
-    control = _reference().Controller(design)
+    control = Controller(design)
     line, x, out = [0.0] * (whole + 1), plant.rest, np.empty(ticks)
     for k in range(ticks):
         out[k] = x[4] / design.ratio_behind_coupling if plant.elastic else x[2] / design.total_ratio

@@ -10,8 +10,6 @@ Run as a script it validates a number of them and prints a line for each::
 Every drive has to keep the bound of processor time; the last line is the table of all.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf, pi
@@ -242,9 +240,7 @@ def _widened(dice: Dice, design: Design) -> Design:
         return replace(design, controller=replace(control, position=None))
     place = replace(control.position_loop, sensor="output")
     return replace(
-        design,
-        controller=replace(control, position=place),
-        output_encoder=OutputEncoder(counts_per_rev=None),
+        design, controller=replace(control, position=place), output_encoder=OutputEncoder(counts_per_rev=None)
     )
 
 
@@ -253,20 +249,9 @@ def full_drive(seed: int) -> Design:
     design = random_drive(seed)
     dice = Dice(10**6 + seed)
     for change in (
-        _elastic,
-        _frictions,
-        _loads,
-        _motor_data,
-        _filtered,
-        _regulators,
-        _outer,
-        _sensors,
-        _commanded,
-        _supplied,
-        _protected,
-        _instrumented,
-        _outermost,
-    ):
+        _elastic, _frictions, _loads, _motor_data, _filtered, _regulators, _outer, _sensors, _commanded,
+        _supplied, _protected, _instrumented, _outermost,
+    ):  # fmt: skip
         design = change(dice, design)
     return _damped(Dice(2 * 10**6 + seed), design) if seed >= DAMPED else design
 
@@ -369,12 +354,7 @@ def _motor_data(dice: Dice, design: Design) -> Design:
         same = replace(design, motor=ac).effective_motor
         factors = {
             name: getattr(motor, name) / getattr(same, name)
-            for name in (
-                "resistance_ohm",
-                "inductance_H",
-                "torque_constant_Nm_A",
-                "back_emf_constant_Vs_rad",
-            )
+            for name in ("resistance_ohm", "inductance_H", "torque_constant_Nm_A", "back_emf_constant_Vs_rad")
         }
         return replace(
             design, motor=replace(ac, **{name: getattr(motor, name) * x for name, x in factors.items()})

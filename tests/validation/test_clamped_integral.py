@@ -8,8 +8,6 @@ An inertia J on an ideal torque source (gain k): with b = T k/J and every stage 
 An acceleration feed-forward of three times the inertia makes the integral carry twice what the motor needs.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -36,7 +34,7 @@ T, k, J, Kp, Tn, Kv, LIMIT = 5e-4, 0.5, 0.02, 6.0, 0.05, 12.0, 30.0
 
 def drive(law: str, feedforward: float = 3.0) -> Design:
     """The drive of the docstring."""
-    velocity = VelocityLoop(gain=Kp, integral_time_s=Tn, anti_windup=law)  # type: ignore[arg-type]
+    velocity = VelocityLoop(gain=Kp, integral_time_s=Tn, anti_windup=law)
     return Design(
         name="clamped",
         title="Clamped integral",
@@ -81,7 +79,6 @@ def test_the_border_check_judges_the_clamp() -> None:
     for law in ("clamped", "conditional"):
         design = drive(law)
         border = check_border(design, assemble_loops(design), count=6)
-        assert border is not None
         assert border.passed is True
         assert border.left_out == ""
         output, integral = sizes(border.frequency_hz)
@@ -92,7 +89,6 @@ def test_the_border_check_judges_the_clamp() -> None:
 def test_a_border_without_the_clamp_is_caught() -> None:
     """Judged by the loops of the other law, which has no clamp of its integral."""
     border = check_border(drive("clamped"), assemble_loops(drive("conditional")), count=6)
-    assert border is not None
     assert border.passed is False
 
 

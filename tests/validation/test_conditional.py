@@ -1,7 +1,5 @@
 """A design of healthy margins that diverges behind a limit: the validator finds it and says so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import degrees, inf, pi
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the validator says of large commands, confirmed by plain integration and closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import sqrt
 
@@ -23,12 +21,7 @@ from actuator_lti.design.model import (
     Validation,
     VelocityLoop,
 )
-from analyses.large_signal.conditional import (
-    Conditional,
-    conditional_stability,
-    step_rows,
-    step_threshold,
-)
+from analyses.large_signal.conditional import Conditional, conditional_stability, step_rows, step_threshold
 from analyses.large_signal.settling_ticks import settling_ticks_of
 from analyses.motion.settling import settle
 from tests.validation.random_drives import full_drive

@@ -1,7 +1,5 @@
 """Corners: each is the design that its words say, and the worst ends are the worst corner of the box."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from itertools import product
@@ -54,9 +52,9 @@ def test_the_worst_ends_are_the_worst_of_all_corners_of_the_box(quantity: str) -
     design = replace(design, parameters=type(design.parameters)(parameters))
     chosen = worst_ends(design, quantity)
     nominal = {path: design.parameters[path].value for path in kept}
-    width = {path: design.parameters[path].tolerance.half_width for path in kept}  # type: ignore[union-attr]
+    width = {path: design.parameters[path].tolerance.half_width for path in kept}
     every = np.array(list(product((-1.0, 1.0), repeat=4))).T
-    values = {path: nominal[path] + width[path] * every[k] for k, path in enumerate(kept)}  # type: ignore[operator]
+    values = {path: nominal[path] + width[path] * every[k] for k, path in enumerate(kept)}
     at_chosen = {path: np.append(values[path], chosen.get(path, nominal[path])) for path in kept}
     result = population_figures(Population(design, at_chosen, 17), design)
     margin = np.min([v for name, v in result.items() if name.endswith(f".{quantity}")], axis=0)
@@ -69,7 +67,7 @@ def test_torque_and_back_emf_constant_go_together() -> None:
     assert chosen["motor.back_emf_constant"] == pytest.approx(0.126, rel=1e-12)
 
 
-def test_command_and_section(capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_and_section(capsys) -> None:
     assert main(["corners", "fin", "--json"]) == 1
     told = {one["name"]: one for one in json.loads(capsys.readouterr().out)["corners"]}
     assert told["nominal"]["passed"]
@@ -89,6 +87,5 @@ def test_a_source_has_no_temperature() -> None:
 
 def test_a_value_set_to_zero_loses_its_relative_tolerance() -> None:
     changed = with_overrides(load_design("ballscrew"), {"coupling.damping": "0 N*s/m"})
-    assert changed.coupling is not None
     assert changed.coupling.damping_Nms_rad == 0.0
     assert changed.parameters["coupling.damping"].tolerance is None

@@ -1,7 +1,5 @@
 """Every number of a design is confronted, exactly: no false alarm, and 1 % is seen."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
@@ -165,7 +163,7 @@ def _without(design: Design, name: str) -> bool:
 def test_thirds_of_a_map_and_directions_are_told_apart() -> None:
     """One wrong point of a map is seen, of one direction alone, and only there."""
     points = tuple(
-        FrictionPoint(speed_rad_s=w, torque_Nm=T, direction=side)  # type: ignore[arg-type]
+        FrictionPoint(speed_rad_s=w, torque_Nm=T, direction=side)
         for side, scale in (("forward", 1.0), ("reverse", 1.3))
         for w, T in ((0.0, 2e-3 * scale), (50.0, 1.5e-3 * scale), (400.0, 3e-3 * scale))
     )

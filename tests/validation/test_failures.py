@@ -1,7 +1,5 @@
 """Failure cases against closed forms; nothing failed, the rig is the drive."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from math import pi, sqrt
@@ -46,7 +44,6 @@ def test_hard_over_is_the_motor_on_the_bus() -> None:
     design = load_design("ilr33-amber")
     m, U, d = design.motor, design.limits.voltage_V, design.controller.computing_delay_s
     J, N = design.inertia_kgm2, design.total_ratio
-    assert m.inductance_H is not None
     A = np.zeros((4, 4))
     A[0] = np.array([-m.resistance_ohm, -m.back_emf_constant_Vs_rad, 0.0, U]) / m.inductance_H
     A[1] = np.array([m.torque_constant_Nm_A, -design.friction.viscous_Nms_rad, 0.0, 0.0]) / J
@@ -83,7 +80,6 @@ def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
     assert abs(result.deflection_rad).max() < 1e-6
     k = np.searchsorted(result.time_s, 0.15)
     assert result.current_A[k] == pytest.approx(15.0, rel=1e-3)
-    assert result.protected_s is not None
     assert 0.1 < result.protected_s < 0.2  # a little was used on the way
     assert result.current_A[-1] == pytest.approx(6.0, rel=1e-3)
 
@@ -91,18 +87,16 @@ def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
 def test_a_jam_at_speed_is_an_impact_on_the_spring() -> None:
     """The motor's inertia runs into the coupling: W sqrt(k J_m) N_c, the motor's own push beside it."""
     design = load_design("ballscrew")
-    assert design.coupling is not None
     design = replace(design, coupling=replace(design.coupling, damping_Nms_rad=0.0))
     case = failures(design).case("jam")
-    assert design.coupling is not None
     k, J, N = design.coupling.stiffness_Nm_rad, design.motor_side_inertia_kgm2, design.ratio_to_coupling
     half = 0.5 * design.validation.full_deflection_rad
     run = simulate(design, commands.step(2.0 * half), 0.5)
     at = int(np.argmax(run.output_angle_rad >= half))
     speed = run.motor_speed_rad_s[at] / N
-    before = abs(run.coupling_torque_Nm[at])  # type: ignore[index]
+    before = abs(run.coupling_torque_Nm[at])
     impact = speed * sqrt(k * J) * N
-    limit = design.limits.peak_current_A * design.effective_motor.torque_constant_Nm_A * N  # type: ignore[operator]
+    limit = design.limits.peak_current_A * design.effective_motor.torque_constant_Nm_A * N
     assert impact - 2 * limit - before < case.peak_moment_Nm < impact + 2 * limit + before
     assert impact > 2 * limit  # the impact decides
 
@@ -127,11 +121,11 @@ def test_an_oscillating_command_is_followed_as_the_linear_drive_does() -> None:
     tail = case.deflection_rad[len(case.time_s) // 2 :]
     crossings = np.flatnonzero((tail[:-1] < 0) & (tail[1:] >= 0))
     f = (len(crossings) - 1) / ((crossings[-1] - crossings[0]) * design.controller.period_s)
-    T = abs(response(np.exp(2j * pi * f * 2e-4)))  # type: ignore[misc]
+    T = abs(response(np.exp(2j * pi * f * 2e-4)))
     assert tail.max() == pytest.approx(0.001 * T, rel=0.01)
 
 
-def test_section_figure_and_command(capsys: pytest.CaptureFixture[str]) -> None:
+def test_section_figure_and_command(capsys) -> None:
     result = failures(load_design("emps"), Asked.of(load_design("emps"), watched_s=0.5))
     made = section(result)
     (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
@@ -160,7 +154,7 @@ def free(name: str, **changes: str) -> Design:
     return with_overrides(load_design(name), {"load.path": "back-drivable", **changes})
 
 
-def load_position(design: Design):  # type: ignore[no-untyped-def]
+def load_position(design: Design):
     """The controller of drive D with a position loop of 150 1/s around it."""
     from actuator_lti.design.model import PositionLoop
 
@@ -174,7 +168,7 @@ def test_without_a_resonance_the_sine_is_at_the_bandwidth() -> None:
         design.controller.position_loop, gain=40.0)))  # fmt: skip
     frequency, words = _followed_most_hz(slow)
     response = assemble_loops(slow).reference_to_output
-    size = abs(response(np.exp(2j * pi * frequency * slow.controller.period_s)))  # type: ignore[misc]
+    size = abs(response(np.exp(2j * pi * frequency * slow.controller.period_s)))
     assert size == pytest.approx(np.sqrt(0.5), rel=0.02)
     assert "bandwidth" in words
 
@@ -186,8 +180,6 @@ def test_an_open_phase_of_three_says_what_one_winding_leaves_out() -> None:
 
 
 @pytest.mark.parametrize("command", ["stiffness", "failures"])
-def test_an_unstable_drive_is_a_verdict_and_no_bad_input(
-    command: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_unstable_drive_is_a_verdict_and_no_bad_input(command: str, capsys) -> None:
     assert main([command, "fin", "--set", "control.velocity.gain=5 V*s/rad"]) == 1
     assert "not stable" in capsys.readouterr().err

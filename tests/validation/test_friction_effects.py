@@ -1,7 +1,5 @@
 """Dry friction at small signals: threshold, lost motion, standing error, limit cycles."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +25,6 @@ def test_threshold_of_a_force_source_is_friction_over_stiffness() -> None:
     """EMPS: (Fc -+ offset)/(gtau kv kp), forward and backward; the simulator agrees to its grid of 0.2 %."""
     design = load_design("emps")
     result = friction_effects(design).points[0].threshold
-    assert result is not None
     stiffness = 35.15065 * 243.45 * 160.18
     assert result.static.forward_rad == pytest.approx((20.3935 - 3.1648) / stiffness, rel=1e-12)
     assert result.static.backward_rad == pytest.approx((20.3935 + 3.1648) / stiffness, rel=1e-12)
@@ -38,7 +35,6 @@ def test_lost_motion_of_a_force_source_and_the_error_that_stays() -> None:
     design = load_design("emps")
     point = friction_effects(design).points[0]
     loop = point.hysteresis
-    assert loop is not None
     assert loop.predicted_rad == pytest.approx(2.0 * 20.3935 / (35.15065 * 243.45 * 160.18), rel=1e-12)
     assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=1e-6)
     threshold = static_threshold(design)
@@ -51,7 +47,6 @@ def test_a_small_step_waits_for_the_integral(amber: Design) -> None:
     """Tn (A0/A - 1), and a few ticks until the current follows; the threshold is Tc/(kM Kp Kv N)."""
     for point in friction_effects(amber).points:
         result = point.threshold
-        assert result is not None
         expected = point.dry_torque_Nm / (5.9e-3 * 0.12 * 120.0 * 2376.0)
         assert result.static.forward_rad == pytest.approx(expected, rel=1e-12)
         for wait in result.waiting:
@@ -67,17 +62,13 @@ def test_breakaway_above_friction_counts_in_the_threshold(amber: Design) -> None
 def test_the_integral_takes_lost_motion_and_error_away(amber: Design) -> None:
     for point in friction_effects(amber).points:
         loop = point.hysteresis
-        assert loop is not None
         assert abs(loop.lost_motion_rad) < 1e-9 * loop.amplitude_rad
         assert loop.largest_rad > 0.5 * static_threshold(amber, point.load_Nm).forward_rad
         for one in point.cycles.settlings:
             assert abs(one.rest.error) < 1e-6 * one.amplitude_rad
 
 
-@pytest.mark.parametrize(
-    ("breakaway", "hunts"),
-    [(1.0, False), (1.5, True)],
-)
+@pytest.mark.parametrize(("breakaway", "hunts"), [(1.0, False), (1.5, True)])
 def test_hunting_needs_breakaway_above_sliding_friction(amber: Design, breakaway: float, hunts: bool) -> None:
     """A fast speed integral and high Kv: it hunts once breakaway exceeds sliding friction, else not.
 
@@ -136,7 +127,6 @@ def test_stick_slip_is_foreseen(amber: Design, integral_time: float, gain: float
         "control.position.gain": gain,
     }
     cycles = friction_effects(with_values(amber, values)).points[0].cycles
-    assert cycles.stick_slip is not None
     assert cycles.stick_slip.stable
     assert cycles.as_predicted
     swing = cycles.settlings[-1]
@@ -210,24 +200,23 @@ def _design(folder: Path, position: str = "", velocity: str = "", friction: str 
     return load_design(path)
 
 
-def test_a_friction_map_is_dry_friction(tmp_path: Path) -> None:
+def test_a_friction_map_is_dry_friction(tmp_path) -> None:
     """The torque at rest over the stiffness: 30 mN m / (kM/R Kp Kv N)."""
     stiffness = 0.05 / 2.0 * 0.25 * 25.0 * 20.0
     result = friction_effects(_design(tmp_path))
     assert result.integrator == ""
     (point,) = result.points
-    assert point.threshold is not None
     assert point.dry_torque_Nm == pytest.approx(0.03)
     assert point.threshold.static.forward_rad == pytest.approx(0.03 / stiffness, rel=1e-12)
     assert point.threshold.simulated_rad == pytest.approx(0.03 / stiffness, rel=3e-3)
     assert "No controller integrates" in section(result)["result"]
 
 
-def test_the_position_integral_moves_a_small_step(tmp_path: Path) -> None:
+def test_the_position_integral_moves_a_small_step(tmp_path) -> None:
     """T (A0/A - 1) with the position's integral time; no error stays, and the words say who integrates."""
     result = friction_effects(_design(tmp_path, 'integral_time = "0.4 s"'))
     assert result.integrator == "position"
-    waits = result.points[0].threshold.waiting  # type: ignore[union-attr]
+    waits = result.points[0].threshold.waiting
     assert len(waits) == 5
     for k, wait in enumerate(waits):
         assert wait.predicted_s == pytest.approx(0.4 * (1.0 / (0.2, 0.3, 0.5, 0.7, 0.9)[k] - 1.0))
@@ -237,12 +226,12 @@ def test_the_position_integral_moves_a_small_step(tmp_path: Path) -> None:
     assert "No controller" not in words
 
 
-def test_two_integrals_one_behind_the_other(tmp_path: Path) -> None:
+def test_two_integrals_one_behind_the_other(tmp_path) -> None:
     """Constant error: the torque grows as 1 + t/T + t/U + t^2/(2 T U), integrated here step by step."""
     result = friction_effects(_design(tmp_path, 'integral_time = "0.4 s"', 'integral_time = "80 ms"'))
     assert result.integrator == "speed"
-    for wait in result.points[0].threshold.waiting:  # type: ignore[union-attr]
-        ratio = result.points[0].threshold.static.forward_rad / wait.amplitude_rad  # type: ignore[union-attr]
+    for wait in result.points[0].threshold.waiting:
+        ratio = result.points[0].threshold.static.forward_rad / wait.amplitude_rad
         t, outer, inner, dt = 0.0, 0.0, 0.0, 1e-5
         while (1.0 + outer) + inner < ratio:
             inner += (1.0 + outer) * dt / 0.08

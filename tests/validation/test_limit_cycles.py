@@ -1,7 +1,5 @@
 """Limit cycles of play and quantisation: describing functions by quadrature, cycles by simulation."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from math import asin, pi
@@ -16,11 +14,7 @@ from actuator_lti.drive.operating import dead_zone
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.limit_cycles import limit_cycles
-from analyses.limit_cycles.describing import (
-    cycles_of_play,
-    cycles_of_quantisation,
-    without_nonlinearities,
-)
+from analyses.limit_cycles.describing import cycles_of_play, cycles_of_quantisation, without_nonlinearities
 from analyses.limit_cycles.run import confirm
 from nonlinear import commands, simulate
 from reports.cli.main import main
@@ -53,7 +47,6 @@ def test_friction_quiets_the_fin() -> None:
 
 def test_without_play_there_is_no_cycle_of_it() -> None:
     design = load_design("fin")
-    assert design.coupling is not None
     assert (
         cycles_of_play(replace(design, coupling=replace(design.coupling, play_rad=0.0)), friction=False) == ()
     )
@@ -87,7 +80,7 @@ def test_a_count_makes_a_cycle_at_the_gain_border_of_the_loop() -> None:
     assert seen == pytest.approx(cycle.output_rad, rel=0.15)
 
 
-def test_a_drive_with_too_much_gain_hunts_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_drive_with_too_much_gain_hunts_and_says_so(capsys) -> None:
     changes = ["--set", "control.position.gain=300 1/s"]
     assert main(["cycles", "fin", *changes, "--json"]) == 1
     told = json.loads(capsys.readouterr().out)

@@ -1,7 +1,5 @@
 """Analyses that look states of the linear drive up by name: an unknown one is refused, not skipped."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

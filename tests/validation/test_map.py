@@ -1,7 +1,5 @@
 """The map of large signals: its border against A_k(w), what acts, and what the output looks like."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -62,10 +60,8 @@ def test_onset_of_saturation_is_the_smallest_a_k(name: str) -> None:
     """Within 1 % at 14 frequencies, friction off, and the limiter foreseen is the one that acts."""
     design = load_design(name)
     border = check_border(design, assemble_loops(design))
-    assert border is not None
     assert len(border.frequency_hz) >= 12
     assert border.resolution < 1e-3
-    assert border.largest_error is not None
     assert border.largest_error < 0.002, border.ratio
     assert all(border.same_limiter)
     assert border.passed
@@ -81,7 +77,6 @@ def test_onset_of_saturation_is_the_smallest_a_k(name: str) -> None:
 def test_other_limiters_have_their_turn(amber: Design, values: dict[str, float], limiter: str) -> None:
     design = with_values(amber, values, check=False)
     border = check_border(design, assemble_loops(design))
-    assert border is not None
     assert limiter in border.simulated_limiter
     assert border.passed
 
@@ -90,7 +85,6 @@ def test_the_border_check_can_fail(amber: Design) -> None:
     """Judged by the loops of another drive the border lies elsewhere."""
     other = assemble_loops(with_values(amber, {"limits.peak_current": 11.6, "limits.speed": 912.0}))
     border = check_border(amber, other)
-    assert border is not None
     assert border.largest_error == pytest.approx(0.034, abs=0.004)
     assert not border.passed
 
@@ -100,7 +94,6 @@ def test_encoder_counts_are_no_part_of_the_border(amber: Design) -> None:
     design = replace(amber, encoder=encoder)
     assert design.encoder.counts_per_rev == 1024
     border = check_border(design, assemble_loops(design))
-    assert border is not None
     assert border.passed
 
 
@@ -116,7 +109,6 @@ def test_viscous_friction_by_direction_is_left_out_and_said() -> None:
     emps = load_design("emps")
     design = replace(emps, friction=replace(emps.friction, viscous_reverse_Nms_rad=240.0))
     border = check_border(design, assemble_loops(design), count=4)
-    assert border is not None
     assert border.passed is True
     assert "direction" in border.left_out
 
@@ -124,18 +116,15 @@ def test_viscous_friction_by_direction_is_left_out_and_said() -> None:
 def test_the_border_of_a_drive_with_play_is_judged_without_it() -> None:
     fin = load_design("fin")
     border = check_border(fin, assemble_loops(fin), count=4)
-    assert border is not None
     assert border.passed is True
     assert "play" in border.left_out
     halved = replace(fin, limits=replace(fin.limits, speed_rad_s=0.5 * fin.limits.speed_rad_s))
     wrong = check_border(fin, assemble_loops(halved), count=4)
-    assert wrong is not None
     assert wrong.passed is False
 
 
 def test_friction_shifts_the_border(amber: Design) -> None:
     border = check_border(amber, assemble_loops(amber), friction_on=True)
-    assert border is not None
     assert border.passed is None
     assert 0.01 < np.max(np.abs(border.ratio - 1.0)) < 0.1
     # at low frequency it is the speed command that limits, which friction hardly changes
@@ -214,7 +203,6 @@ def test_a_drive_without_limits_has_no_border(amber: Design) -> None:
     design = replace(amber, limits=limits)
     loops = assemble_loops(design)
     border = check_border(design, loops, count=3)
-    assert border is not None
     assert border.largest_error is None
     assert border.passed
     map_ = amplitude_map(design, loops, counts=(6, 4))
@@ -251,7 +239,6 @@ def test_every_start_has_a_state_of_the_linear_drive() -> None:
 def test_a_start_up_that_reaches_a_limit_moves_no_border(seed: int, frequency: int) -> None:
     design = full_drive(seed)
     border = check_border(design, assemble_loops(on_the_bench(design)))
-    assert border is not None
     assert border.passed
     assert border.ratio[frequency] == pytest.approx(1.0, abs=1e-3)
 
@@ -273,7 +260,7 @@ def test_two_limiters_reached_together_are_both_foreseen(apart: float, passed: b
 
 
 def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(
-    amber: Design, amber_map: AmplitudeMap, monkeypatch: pytest.MonkeyPatch
+    amber: Design, amber_map: AmplitudeMap, monkeypatch
 ) -> None:
     """Work is counted in ticks, so the same drive has the same map on every machine."""
     assert not amber_map.coarser

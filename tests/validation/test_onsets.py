@@ -1,7 +1,5 @@
 """The amplitude at which each limit first acts is judged by the running drive, exactly."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

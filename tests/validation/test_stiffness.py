@@ -1,7 +1,5 @@
 """Stiffness at the output: published digits, closed forms, and the same seen by the simulator."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 
@@ -94,14 +92,10 @@ def test_the_simulator_confirms_every_shipped_design(name: str) -> None:
 def test_lost_motion_is_read_at_3_percent_of_the_rated_moment(play: float, dry: float) -> None:
     """0.36 N m of 12: 2 b + 2 m/k as it moves the load; where friction is larger play is in the width."""
     design = load_design("fin")
-    assert design.coupling is not None
-    assert design.load.friction is not None
     assert design.load.moment_max_Nm == 12.0
     friction = replace(design.load.friction, dry_torque_Nm=dry)
     changed = replace(
-        design,
-        coupling=replace(design.coupling, play_rad=play),
-        load=replace(design.load, friction=friction),
+        design, coupling=replace(design.coupling, play_rad=play), load=replace(design.load, friction=friction)
     )
     expected = 2 * 0.36 / 800.0 + (play if dry < 0.36 else 0.0)
     assert lost_motion_rad(changed) == pytest.approx(expected, rel=1e-12)
@@ -124,7 +118,7 @@ def test_at_rest_dry_friction_holds_a_small_moment() -> None:
     assert result.seen_Nm_rad == complex(np.inf)
 
 
-def test_command_section_and_figure(capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_section_and_figure(capsys) -> None:
     assert main(["stiffness", "fin", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["passed"] is True
