@@ -1,7 +1,8 @@
-"""`actuator-lti export`: the running drive as C99 or as an FMU, the linear one as state spaces."""
+"""`actuator-lti export`: the running drive as C99 or an FMU, its controller for firmware, linear loops."""
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,7 +18,10 @@ if TYPE_CHECKING:
     from actuator_lti.design import Design
     from analyses.linear.code_check import CodeCheck
 
-app = typer.Typer(help="The drive outside of Python: C99, FMU, linear models.", no_args_is_help=True)
+app = typer.Typer(
+    help="The drive outside of Python: C99, FMU, controller for firmware, linear models.",
+    no_args_is_help=True,
+)
 app.command("linear")(linear)
 
 CheckOption = Annotated[
@@ -58,6 +62,41 @@ def c(
     write_together({out / name: text.encode() for name, text in texts.items()})
     about = {"files": [str(out / name) for name in texts]}
     _answer("export-c", about, f"{out}: {', '.join(texts)}", result, as_json)
+
+
+class NumberType(StrEnum):
+    """Types of a number in C."""
+
+    double = "double"
+    float = "float"
+
+
+@app.command("controller")
+def controller(
+    design: DesignArgument = DEFAULT_DESIGN,
+    changes: SetOption = None,
+    out: Annotated[
+        Path,
+        typer.Option("--out", metavar="DIR", help="Folder for the files.", callback=folder_for_results),
+    ] = Path("controller-c"),
+    number: Annotated[NumberType, typer.Option("--type", help="Type of a number.")] = NumberType.float,
+    prefix: Annotated[
+        str, typer.Option("--prefix", metavar="NAME_", help="In front of every symbol.")
+    ] = "drive_",
+    force: ForceOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Write the controller alone as C99 for firmware, with test vectors and a class for C++."""
+    from actuator_lti.files.atomic import write_together
+    from nonlinear.export import controller_export
+
+    drive = load_drive(design, changes)
+    texts = controller_export(drive, single_precision=number == NumberType.float, prefix=prefix)
+    for name in texts:
+        refuse_existing(out / name, force)
+    write_together({out / name: text.encode() for name, text in texts.items()})
+    about = {"type": str(number), "files": [str(out / name) for name in texts]}
+    _answer("export-controller", about, f"{out}: {', '.join(texts)}", None, as_json)
 
 
 def _checked(drive: Design) -> CodeCheck:
