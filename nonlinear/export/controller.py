@@ -66,7 +66,7 @@ def controller_export(
     }
     if single_precision:
         texts |= {name: single(texts[name]) for name in ("controller.h", "controller.c", "vectors.h")}
-    return {**texts, "README.md": _filled("controller.md", values)}
+    return {**texts, "README.md": _filled("controller_readme.txt", values)}
 
 
 def _filled(name: str, values: Mapping[str, str]) -> str:
