@@ -22,7 +22,7 @@ _LIBRARY = re.compile(r"\b(sqrt|floor|fabs|exp|log|sin|cos|tan)\(")
 
 
 def controller_export(
-    design: Design, *, single_precision: bool = True, prefix: str = "drive_"
+    design: Design, *, single_precision: bool = True, prefix: str = "drive_", vectors: bool = True
 ) -> dict[str, str]:
     """Files of the controller of a design, by name.
 
@@ -33,6 +33,8 @@ def controller_export(
         ``float`` in place of ``double``; coefficients are worked out in double precision all the same.
     prefix : str
         In front of every symbol, so that controllers of several designs fit into one program.
+    vectors : bool
+        With test vectors and the program that runs them.
 
     Raises
     ------
@@ -61,11 +63,13 @@ def controller_export(
         "controller.h": _filled("controller.h", values),
         "controller.c": source,
         "controller.hpp": _filled("controller.hpp", values),
-        "vectors.h": vectors_text(ours, prefix, single_precision=single_precision),
-        "main.c": _filled("controller_main.c", values),
     }
+    if vectors:
+        texts["vectors.h"] = vectors_text(ours, prefix, single_precision=single_precision)
+        texts["main.c"] = _filled("controller_main.c", values)
     if single_precision:
-        texts |= {name: single(texts[name]) for name in ("controller.h", "controller.c", "vectors.h")}
+        typed = {"controller.h", "controller.c", "vectors.h"} & set(texts)
+        texts |= {name: single(texts[name]) for name in typed}
     return {**texts, "README.md": _filled("controller_readme.txt", values)}
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import system_compiler
+from examples import firmware_controller as firmware
 from nonlinear.export import fmu_bytes
 
 pytestmark = pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
@@ -43,3 +44,24 @@ def test_the_lag_misses_what_friction_and_play_do_to_the_roll(tmp_path: Path) ->
     alone, with_drive, smooth = rms
     assert with_drive > 10.0 * max(alone, smooth)
     assert min(alone, smooth) > 0.0
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "fin", "joint", "ballscrew", "emps"])
+def test_the_controller_for_firmware_closes_the_loop_as_the_simulator_does(name: str) -> None:
+    """With friction, play and limits: double to the bit but for differences of counts; float to one count."""
+    design = load_design(name)
+    commands = firmware.random_commands(design, 800, 0.5 * design.validation.full_deflection_rad)
+    exact = firmware.closed(design, commands, "double").difference_rad
+    assert exact <= 1e-12 * design.validation.full_deflection_rad
+    single = firmware.closed(design, commands, "float").difference_rad
+    count = max(design.output_quantum_rad or 0.0, (design.angle_quantum_rad or 0.0) / design.total_ratio)
+    assert 0.0 < single < max(count, 1e-6 * design.validation.full_deflection_rad)
+
+
+def test_float_stays_within_the_bound_that_is_computed() -> None:
+    """Where the loop is linear; the bound is no more than a hundred times what is seen."""
+    design = firmware.smooth(load_design("ilr33-amber"))
+    commands = firmware.random_commands(design, 4000, 2e-3)
+    found = firmware.closed(design, commands, "float")
+    bound = firmware.bound_rad(design, commands, found)
+    assert found.difference_rad <= bound < 100.0 * found.difference_rad
