@@ -29,6 +29,25 @@ def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> N
     assert fly(design, path, 0.97 * limit, 0.6).growth < 1.0 < fly(design, path, 1.03 * limit, 0.6).growth
 
 
+def test_a_host_with_an_integrator_of_its_own_flies_the_same(tmp_path: Path) -> None:
+    """solve_ivp with the C inside, FMPy with the unit: 1e-7, a fourth at half the step; held: 2.6e-3."""
+    pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
+    from examples.autopilot_loop import fly, fly_inside, smooth
+
+    design = load_design("ilr33-amber")
+    path = tmp_path / "drive.fmu"
+    path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
+    inside = fly_inside(smooth(design), tmp_path, 2.0, 0.006).roll_rate_rad_s
+    far = [
+        np.abs(fly(design, path, 2.0, 0.006, parts=parts).roll_rate_rad_s - inside).max()
+        / np.abs(inside).max()
+        for parts in (1, 10, 20)
+    ]
+    assert far[1] < 2e-7
+    assert far[1] / far[2] == pytest.approx(4.0, rel=0.02)
+    assert far[0] > 1e-3
+
+
 @pytest.mark.filterwarnings("ignore")  # those of RocketPy and its libraries are not ours
 def test_the_lag_misses_what_friction_and_play_do_to_the_roll(tmp_path: Path) -> None:
     """With friction and play the roll hunts, tenfold; without them, and with the lag, it does not."""
