@@ -98,7 +98,7 @@ class _Shorter(ast.NodeTransformer):
         node.targets = [each for each in node.targets if self._is_read(each)]
         if node.targets:
             return node
-        return ast.Expr(node.value) if _calls(self.functions, node.value) else None
+        return ast.Expr(node.value) if _writing(self.functions, node.value) else None
 
     def _tuple(self, node: ast.Assign, target: ast.Tuple) -> ast.stmt:
         """Results of a call, those that nobody reads with a name that says so."""
@@ -110,9 +110,9 @@ class _Shorter(ast.NodeTransformer):
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt | None:
         return node if self._is_read(node.target) else None
 
-    def visit_Expr(self, node: ast.Expr) -> ast.stmt | None:
-        calls = _calls(self.functions, node.value)
-        return node if any(not _is_empty(self.functions[each.func.id]) for each in calls) else None  # type: ignore[attr-defined]
+    def visit_Expr(self, node: ast.Expr) -> list[ast.stmt]:
+        """Of a value that nobody reads the calls that write a row."""
+        return [ast.Expr(call) for call in _writing(self.functions, node.value)]
 
     def visit_If(self, node: ast.If) -> ast.stmt | None:
         self.generic_visit(node)
@@ -152,5 +152,13 @@ class _Shorter(ast.NodeTransformer):
         return False
 
 
-def _is_empty(left: Leftover) -> bool:
-    return all(isinstance(each, ast.Pass) for each in left.tree.body)
+def _writing(functions: dict[str, Leftover], tree: ast.AST) -> list[ast.Call]:
+    """Calls in a tree that write into a row, themselves or by what they call."""
+    return [call for call in _calls(functions, tree) if _writes(functions, functions[call.func.id].tree)]  # type: ignore[attr-defined]
+
+
+def _writes(functions: dict[str, Leftover], tree: ast.AST) -> bool:
+    stores = any(
+        isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store) for node in ast.walk(tree)
+    )
+    return stores or bool(_writing(functions, tree))

@@ -13,7 +13,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
-from nonlinear.export.c_files import exporter_version, plain
+from nonlinear.export.c_files import exported, exporter_version, plain
 from nonlinear.export.controller_cut import Controller, controller_of, member_words
 from nonlinear.export.controller_vectors import vectors_text
 from nonlinear.export.program import FLAGS, c_text, single, template
@@ -39,10 +39,13 @@ def controller_export(
     Raises
     ------
     InputError
-        For a prefix that no name in C begins with.
+        For a prefix that no name in C begins with, and for a law of one's own.
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*_", prefix):
         raise InputError(f"prefix = {prefix!r}: allowed: letters, digits and _, a letter first, _ last")
+    if exported(design).row[at.OWN_STAGE] > 0.0:
+        message = "control: a law of one's own is not exported alone; allowed: export c, export fmu"
+        raise InputError(message, where=design.origin or design.name)
     ours = controller_of(design, prefix, single_precision=single_precision)
     values = {
         "PREFIX": prefix.upper(), "prefix": prefix, "namespace": prefix.removesuffix("_"),
