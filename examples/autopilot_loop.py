@@ -5,6 +5,10 @@ angle.  The autopilot commands ``delta = -K p`` every tick.  The outer loop is c
 of `actuator_lti.assemble_loops`; its gain margin says at which K the roll oscillation stays.  With dry
 friction off (a parameter of the FMU) the FMU must decay just below that gain and grow just above it.
 
+A second host has an integrator of its own: scipy's ``solve_ivp`` goes from tick to tick, and asks the
+exported C for the fin angle wherever it looks within one.  The first comes to the same flight where it has
+several communication points in a tick and takes the mean of the fin angle at both ends of each step.
+
     python -m examples.autopilot_loop
 """
 
@@ -22,12 +26,18 @@ import numpy as np
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.model import Design
 from actuator_lti.margins import StabilityMargins, stability_margins
+from examples.exported_drive import ExportedDrive
 from nonlinear.export import fmu_bytes
 
 DAMPING_1_S = 2.0  # a
 EFFECTIVENESS_1_S2 = 60.0  # b
 GAIN_S = 0.5  # K of the autopilot
 NO_DRY_FRICTION = {"friction.dry_torque": 0.0, "friction.load_coefficient": 0.0}
+
+
+def smooth(design: Design) -> Design:
+    """The design without dry friction, which would hide the stability limit."""
+    return design.with_values(NO_DRY_FRICTION)
 
 
 def airframe(period_s: float) -> tuple[float, float]:
@@ -65,8 +75,14 @@ class Flight:
         return float(np.abs(late).max() / np.abs(before).max())
 
 
-def fly(design: Design, path: Path, gain_s: float, duration_s: float, start_rad_s: float = 1e-4) -> Flight:
-    """Fly with the FMU at ``path`` as the drive."""
+def fly(
+    design: Design, path: Path, gain_s: float, duration_s: float, start_rad_s: float = 1e-4, *, parts: int = 1
+) -> Flight:
+    """Fly with the FMU at ``path`` as the drive.
+
+    With several ``parts`` of a tick the fin angle goes on within it; with one it is held over the tick, as in
+    the loop of `margins`.
+    """
     from fmpy import extract, read_model_description
     from fmpy.fmi2 import FMU2Slave
 
@@ -84,17 +100,41 @@ def fly(design: Design, path: Path, gain_s: float, duration_s: float, start_rad_
     unit.enterInitializationMode()
     unit.exitInitializationMode()
     period = design.controller.period_s
-    A, B = airframe(period)
+    step = period / parts
+    A, B = airframe(step)
     rates = np.empty(round(duration_s / period))
     rate = start_rad_s
-    for k in range(rates.size):
-        rates[k] = rate
-        unit.setReal([place["command"]], [-gain_s * rate])
+    for k in range(rates.size * parts):
+        if k % parts == 0:
+            rates[k // parts] = rate
+            unit.setReal([place["command"]], [-gain_s * rate])
         angle = unit.getReal([place["output.angle"]])[0]
-        unit.doStep(k * period, period)
+        unit.doStep(k * step, step)
+        if parts > 1:
+            angle = 0.5 * (angle + unit.getReal([place["output.angle"]])[0])
         rate = A * rate + B * angle
     unit.terminate()
     unit.freeInstance()
+    return Flight(np.arange(rates.size) * period, rates)
+
+
+def fly_inside(
+    design: Design, folder: Path, gain_s: float, duration_s: float, start_rad_s: float = 1e-4
+) -> Flight:
+    """Fly with the exported C inside ``solve_ivp``: the ticks are the ends of its intervals."""
+    from scipy.integrate import solve_ivp
+
+    drive, period = ExportedDrive(design, folder), design.controller.period_s
+    rates = np.empty(round(duration_s / period))
+    rate = start_rad_s
+    for k in range(rates.size):
+        rates[k], command = rate, -gain_s * rate
+
+        def slope(t: float, p: np.ndarray, command: float = command) -> np.ndarray:
+            return -DAMPING_1_S * p + EFFECTIVENESS_1_S2 * drive.within(t, command)
+
+        rate = solve_ivp(slope, (0.0, period), [rate], rtol=1e-10, atol=1e-15).y[0, -1]
+        drive.step(command)
     return Flight(np.arange(rates.size) * period, rates)
 
 

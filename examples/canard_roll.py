@@ -8,6 +8,9 @@ canards move as
 - a first-order lag says, with the bandwidth of the drive's position loop (`margins`) and its speed limit,
 - the exported C of the drive says, tick by tick, under the hinge moment of the canards.
 
+The drive steps inside the flight step: RocketPy stops at every tick, the canards are held over it at the
+angle that they have at its beginning, and the tick takes the command and the hinge moment of that instant.
+
 The lag has the drive's bandwidth and its fastest rate, and the flight with it looks like that with an ideal
 actuator.  It knows neither dry friction nor play: with the real drive the roll never comes to rest, it hunts
 between sticking and slipping and through the play of the gears.  The same drive without the two of them
@@ -37,8 +40,8 @@ from examples.exported_drive import ExportedDrive
 from reports.charts.chart import Chart
 from reports.charts.svg import paper_svg
 
-DESIGN = "fin"
-RATE_HZ = 500.0
+DESIGN, TICKS = "fin", 10  # of the drive in a sample of the autopilot
+RATE_HZ = 500.0  # of the autopilot
 FREQUENCY_RAD_S, DAMPING, INTEGRAL_1_S = 70.0, 0.8, 6.0  # of the roll loop with an ideal actuator
 LARGEST_RAD = np.radians(6.0)  # of the canards
 FIN_CANT_DEG = 0.02  # what makes it roll
@@ -46,7 +49,7 @@ HINGE_NM_RAD_PA = 30.0 / 45e3  # the hinge moment of the design, at the highest 
 ROLL_INERTIA_KGM2 = 0.06
 CONTROL_FROM_S, SETTLED_S = 0.5, 1.5  # the canards are held at zero before
 
-Actuator = Callable[[float, float], float]  # command and hinge moment over a sample -> angle at its end
+Actuator = Callable[[float, float], float]  # command and hinge moment over a tick -> angle at its end
 
 
 def ideal(_design: Design) -> Actuator:
@@ -65,9 +68,8 @@ def lag(design: Design) -> Actuator:
 
     def advance(command: float, _moment: float) -> float:
         nonlocal angle
-        for _ in range(round(1.0 / (RATE_HZ * dt))):
-            step = (command - angle) * (1.0 - np.exp(-pole * dt))
-            angle += float(np.clip(step, -fastest * dt, fastest * dt))
+        step = (command - angle) * (1.0 - np.exp(-pole * dt))
+        angle += float(np.clip(step, -fastest * dt, fastest * dt))
         return angle
 
     return advance
@@ -75,20 +77,12 @@ def lag(design: Design) -> Actuator:
 
 def real(design: Design, folder: Path) -> Actuator:
     """The exported C, at its own tick."""
-    drive = ExportedDrive(design, folder)
-    ticks = round(1.0 / (RATE_HZ * design.controller.period_s))
-
-    def advance(command: float, moment: float) -> float:
-        for _ in range(ticks):
-            angle = drive.step(command, moment)
-        return angle
-
-    return advance
+    return ExportedDrive(design, folder).step
 
 
 @dataclass(frozen=True)
 class RollFlight:
-    """One flight at the autopilot's instants, shape (n,) each."""
+    """One flight at the ticks of the drive, shape (n,) each."""
 
     time_s: np.ndarray
     roll_rad: np.ndarray
@@ -114,21 +108,22 @@ class Autopilot:
 
     def __init__(self, canards: Any, actuator: Actuator) -> None:
         self.canards, self.actuator = canards, actuator
-        self.roll, self.integral, self.angle = 0.0, 0.0, 0.0
+        self.roll, self.integral, self.angle, self.command = 0.0, 0.0, 0.0, 0.0
         self.rows: list[tuple[float, ...]] = []
 
     def __call__(self, time, _rate, state, _history, _seen, _objects, _sensors, environment):  # type: ignore[no-untyped-def]
-        """What RocketPy calls at every sample."""
+        """What RocketPy calls at every tick: the canards are where the last one has brought them."""
         speed, rate = float(np.linalg.norm(state[3:6])), float(state[12])
         pressure = 0.5 * float(environment.density(state[2])) * speed**2
-        self.roll += rate / RATE_HZ
-        command = 0.0
-        if time >= CONTROL_FROM_S:
-            command = self._command(rate, pressure, speed / float(environment.speed_of_sound(state[2])))
-        moment = -HINGE_NM_RAD_PA * pressure * self.angle
-        self.rows.append((time, self.roll, rate, command, self.angle))
-        self.angle = self.actuator(command, moment)
+        if len(self.rows) % TICKS == 0:
+            self.roll += rate / RATE_HZ
+            if time >= CONTROL_FROM_S:
+                self.command = self._command(
+                    rate, pressure, speed / float(environment.speed_of_sound(state[2]))
+                )
+        self.rows.append((time, self.roll, rate, self.command, self.angle))
         self.canards.roll_parameters[2] = self.angle
+        self.angle = self.actuator(self.command, -HINGE_NM_RAD_PA * pressure * self.angle)
 
     def _command(self, rate: float, pressure: float, mach: float) -> float:
         surface = self.canards
@@ -166,7 +161,9 @@ def fly(actuator: Actuator, until_s: float = 4.0) -> RollFlight:
     autopilot = Autopilot(canards, actuator)
     # the public way to a controller is air brakes; this is what they use
     rocket._add_controllers(
-        _Controller(interactive_objects=[canards], controller_function=autopilot, sampling_rate=RATE_HZ)
+        _Controller(
+            interactive_objects=[canards], controller_function=autopilot, sampling_rate=TICKS * RATE_HZ
+        )
     )
     Flight(
         rocket=rocket, environment=Environment(latitude=0.0, longitude=0.0), rail_length=6.0,

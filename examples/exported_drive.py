@@ -60,9 +60,23 @@ class ExportedDrive:
         self._io[layout.IN_COMMAND], self._io[layout.IN_LOAD] = command, moment
         if self._c.drive_tick(_at(self._p), _at(self._s), _at(self._io)) != layout.OK:
             raise RuntimeError("the drive failed")
+        return self._output(self._s)
+
+    def within(self, time_s: float, command: float, moment: float = 0.0) -> float:
+        """The output at a time into the tick that comes next, which is not gone on from."""
+        if time_s <= 0.0:
+            return self._output(self._s)
+        q, s, io = self._p.copy(), self._s.copy(), self._io.copy()
+        io[layout.IN_COMMAND], io[layout.IN_LOAD] = command, moment
+        rows = (_at(row) for row in (self._p, q, s, io))
+        if self._c.drive_part_of_tick(*rows, ctypes.c_double(time_s)) != layout.OK:
+            raise RuntimeError("the drive failed")
+        return self._output(s)
+
+    def _output(self, s: np.ndarray) -> float:
         if self._p[layout.ELASTIC_DRIVE] > 0.0:
-            return float(self._s[layout.S_OUTPUT])
-        return float(self._s[layout.S_ANGLE] / self._p[layout.RATIO])
+            return float(s[layout.S_OUTPUT])
+        return float(s[layout.S_ANGLE] / self._p[layout.RATIO])
 
 
 def _length(header: str, name: str) -> int:

@@ -26,7 +26,7 @@ from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.asked import Asked as ValidationAsked
 from reports.design_files.keys import Asked as KeysAsked
 from reports.design_files.start import Asked as StartAsked
-from reports.exports.asked import AskedC, AskedFmu, AskedLinear
+from reports.exports.asked import AskedC, AskedController, AskedFmu, AskedLinear
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -403,6 +403,15 @@ ANALYSES = (
         words="Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README.",
     ),
     Analysis(
+        name="export controller",
+        group="Out of Python",
+        page=False,
+        request=AskedController,
+        function="reports.exports.run.export_controller",
+        shown="listing",
+        words="Write the controller alone as C99 for firmware, with test vectors and a class for C++.",
+    ),
+    Analysis(
         name="export fmu",
         group="Out of Python",
         page=False,
@@ -421,7 +430,7 @@ ANALYSES = (
         "margins.",
     ),
 )
-COMMANDS_IN = {"export": "The drive outside of Python: C99, FMU, linear models."}
+COMMANDS_IN = {"export": "The drive outside of Python: C99, FMU, controller for firmware, linear models."}
 """Words of a name that stands before others."""
 BY_NAME = {one.name: one for one in ANALYSES}
 FURTHER = tuple(one.name for one in ANALYSES if one.also)

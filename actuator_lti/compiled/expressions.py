@@ -18,7 +18,7 @@ Calls = Callable[[Any, list[Kind], ast.AST, Function], Function]
 
 _TESTS = ("isfinite", "isnan", "isinf")
 _MATH = set(FUNCTIONS.split()) - {*_TESTS, "abs", "floor"}
-_ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _BITS = {ast.BitAnd: "&", ast.BitOr: "|", ast.BitXor: "^", ast.LShift: "<<", ast.RShift: ">>"}
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 
@@ -215,7 +215,7 @@ class Expressions:
             if (a, b) != ("int", "int"):
                 raise self.function.error(node, "bits of what is no whole number")
             return f"({left} {_BITS[kind]} {right})", "int"
-        if kind not in _ARITHMETIC:
+        if kind not in ARITHMETIC:
             raise self.function.error(node, f"the operator {kind.__name__} is not in the subset")
         if "bool" in (a, b) or "row" in (a, b):
             raise self.function.error(node, f"arithmetic of {a} and {b}")
@@ -223,7 +223,7 @@ class Expressions:
         whole = (a, b) == ("int", "int") and kind is not ast.Div
         if not whole:
             left, right = widened(left, a), widened(right, b)
-        return f"({left} {_ARITHMETIC[kind]} {right})", "int" if whole else "float"
+        return f"({left} {ARITHMETIC[kind]} {right})", "int" if whole else "float"
 
     def _UnaryOp(self, node: ast.UnaryOp) -> Text:
         if isinstance(node.op, ast.Not):

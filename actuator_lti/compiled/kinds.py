@@ -6,10 +6,10 @@ import ast
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-# bytes: a row of small whole numbers that knows its length
-Kind = Literal["float", "int", "bool", "row", "bytes"]
+# bytes: a row of small whole numbers that knows its length; count: of an encoder, it goes round at 2**32
+Kind = Literal["float", "int", "bool", "row", "bytes", "count"]
 
-C_TYPES: dict[Kind, str] = {"float": "double", "int": "int", "bool": "bool"}
+C_TYPES: dict[Kind, str] = {"float": "double", "int": "int", "bool": "bool", "count": "int32_t"}
 
 # names that C, its standard headers or its compilers take
 _KEYWORDS = """

@@ -22,6 +22,7 @@ _BYTES = "typedef struct { unsigned short *at; int length; } @bytes;"
 _MINMAX = {
     "min": "static inline double @min(double a, double b) { return (b < a) ? b : a; }",
     "max": "static inline double @max(double a, double b) { return (b > a) ? b : a; }",
+    "abs": "static inline double @abs(double a) { return (a < 0.0) ? -a : a; }",
     "min_int": "static inline int @min_int(int a, int b) { return (b < a) ? b : a; }",
     "max_int": "static inline int @max_int(int a, int b) { return (b > a) ? b : a; }",
 }
@@ -104,10 +105,15 @@ def emit_c(
     EmitError
         At the first construct outside the subset, with its file and line.
     """
-    collector = _Collector(prefix)
+    collector = Collector(prefix)
     names = [collector.call(python, list(kinds), None, None).name for python, kinds in entries.items()]
+    return program_of(collector, names, [_Formed(collector, form) for form in forms])
+
+
+def program_of(collector: Collector, names: Sequence[str], second: Sequence[_Formed] = ()) -> Program:
+    """The program of the functions that a collector holds, those named with external linkage."""
+    prefix = collector.prefix
     texts, types, declarations = [], [], {}
-    second = [_Formed(collector, form) for form in forms]
     done = [*collector.done.values(), *(each for formed in second for each in formed.done.values())]
     for function, lines in done:
         head = collector.head(function)
@@ -118,12 +124,14 @@ def emit_c(
             types.append(_structure(function))
         inner = function.prefix != prefix and all(function is not formed.root for formed in second)
         linkage = "" if public else _INLINED if inner else "static "
-        texts.append(_definition(function, linkage + head, lines))
+        texts.append(collector.definition(function, linkage + head, lines))
     texts = [f"static {collector.head(formed.root)};" for formed in second] + texts
     return Program(collector.constants, "\n".join(types), "\n".join(texts), declarations, prefix)
 
 
-class _Collector:
+class Collector:
+    """The functions of a program, analysed as they are called."""
+
     def __init__(self, prefix: str, helpers: str = "", form: Form | None = None) -> None:
         self.prefix, self.helpers, self.form = prefix, helpers or prefix, form
         self.constants: dict[str, Constant] = {}
@@ -144,12 +152,24 @@ class _Collector:
             return known
         if name in self.open:
             raise EmitError(f"{name} calls itself: recursion is not in the subset")
-        function = _parsed(python, kinds, self.prefix)
+        function = self.parsed(python, kinds)
         self.open.append(name)
-        lines = Statements(function, self.call, self.constants, self.helpers, self.form).body()
+        lines = self.statements(function).body()
         self.open.pop()
         self.done[name] = (function, lines)
         return function
+
+    def parsed(self, python: Any, kinds: list[Kind]) -> Function:
+        """A function with its text."""
+        return _parsed(python, kinds, self.prefix)
+
+    def statements(self, function: Function) -> Statements:
+        """What translates its body."""
+        return Statements(function, self.call, self.constants, self.helpers, self.form)
+
+    def definition(self, function: Function, head: str, lines: list[str]) -> str:
+        """Its definition in C."""
+        return _definition(function, head, lines)
 
     def head(self, function: Function) -> str:
         """The C prototype without its semicolon."""
@@ -174,10 +194,10 @@ def _returned(function: Function) -> str:
 _INLINED = "static inline __attribute__((always_inline)) "
 
 
-class _Formed(_Collector):
+class _Formed(Collector):
     """The functions of a form; those marked `seldom` are those of the program."""
 
-    def __init__(self, program: _Collector, form: Form) -> None:
+    def __init__(self, program: Collector, form: Form) -> None:
         super().__init__(f"{program.prefix}{form.name}_", program.helpers, form)
         self.program, self.constants = program, program.constants
         self.chooser, lines = program.done[form.of]
@@ -210,24 +230,28 @@ def _structure(function: Function) -> str:
     return f"typedef struct {{ {fields} }} {result_type(function)};"
 
 
-_ZERO: dict[Kind, str] = {"float": "0.0", "int": "0", "bool": "false"}
+_ZERO: dict[Kind, str] = {"float": "0.0", "int": "0", "bool": "false", "count": "0"}
+
+
+def declared(function: Function) -> list[str]:
+    """The declarations of its variables in C."""
+    return [
+        f"{INDENT}{C_TYPES[kind]} {c_name(name)} = {_ZERO[kind]};"
+        for name, kind in function.variables.items()
+    ]
 
 
 def _definition(function: Function, head: str, lines: list[str]) -> str:
     about = _plain(ast.get_docstring(function.tree) or "")
     described = [f" * {line}".rstrip() for line in about.splitlines()]
     comment = ["/*", *described, f" * ({function.file}, line {function.first_line})", " */"]
-    declared = [
-        f"{INDENT}{C_TYPES[kind]} {c_name(name)} = {_ZERO[kind]};"
-        for name, kind in function.variables.items()
-    ]
     text = "\n".join(lines)
     unused = [
         f"{INDENT}(void){c_name(name)};"
         for name in function.arguments
         if not re.search(rf"\b{c_name(name)}\b", text)
     ]
-    return "\n".join([*comment, head, "{", *declared, *unused, *lines, "}", ""])
+    return "\n".join([*comment, head, "{", *declared(function), *unused, *lines, "}", ""])
 
 
 def _plain(text: str) -> str:

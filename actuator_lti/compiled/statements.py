@@ -29,7 +29,7 @@ class Statements:
 
     def body(self) -> list[str]:
         """The lines of the body, without the declarations of its variables."""
-        self._block(_without_docstring(self.function.tree.body))
+        self._block(without_docstring(self.function.tree.body))
         return self.lines
 
     def _put(self, text: str) -> None:
@@ -118,7 +118,7 @@ class Statements:
         if not isinstance(node.value, ast.Tuple) or len(node.value.elts) != len(targets.elts):
             raise self.function.error(node, "a tuple on the left wants one of the same length on the right")
         emitted = [self.expressions.emit(value) for value in node.value.elts]
-        if _overlap(targets, node.value):
+        if overlap(targets, node.value):
             emitted = [(self._temporary(kind, bare(text)), kind) for text, kind in emitted]
         for target, (text, kind) in zip(targets.elts, emitted, strict=True):
             self._store(target, bare(text), kind)
@@ -316,7 +316,7 @@ def _own_expressions(node: ast.stmt) -> list[ast.expr]:
     return [value] if isinstance(value, ast.expr) else []
 
 
-def _overlap(targets: ast.Tuple, values: ast.Tuple) -> bool:
+def overlap(targets: ast.Tuple, values: ast.Tuple) -> bool:
     """Whether a value on the right reads what an earlier target on the left has changed."""
     changed: set[str] = set()
     for target, value in zip(targets.elts, values.elts, strict=True):
@@ -338,7 +338,7 @@ def assigned_once(tree: ast.FunctionDef) -> frozenset[str]:
     return frozenset(name for name in names if names.count(name) == 1)
 
 
-def _without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
+def without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
     first = body[0]
     described = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
     return body[1:] if described else body

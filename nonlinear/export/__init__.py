@@ -5,6 +5,7 @@ put names, units, parameters and interfaces around it.
 """
 
 from nonlinear.export.c_files import c_export
+from nonlinear.export.controller import controller_export
 from nonlinear.export.fmu import PLATFORMS, fmu_bytes, refuse_unknown
 
-__all__ = ["PLATFORMS", "c_export", "fmu_bytes", "refuse_unknown"]
+__all__ = ["PLATFORMS", "c_export", "controller_export", "fmu_bytes", "refuse_unknown"]

@@ -115,7 +115,8 @@ def stage_words(design: Design) -> tuple[str, str]:
     return table[design.controller.outermost]
 
 
-def _version() -> str:
+def exporter_version() -> str:
+    """Version of the package that exports."""
     try:
         return version("actuator-lti")
     except PackageNotFoundError:
@@ -124,7 +125,7 @@ def _version() -> str:
 
 def _design_header(ours: ExportedDesign) -> str:
     return f"""/*
- * Parameters of the design {_plain(ours.design.name)}.
+ * Parameters of the design {plain(ours.design.name)}.
  */
 #ifndef DRIVE_DESIGN_H
 #define DRIVE_DESIGN_H
@@ -135,7 +136,7 @@ def _design_header(ours: ExportedDesign) -> str:
 #define DRIVE_DESIGN_REVISION {c_text(ours.design.revision or "")}
 #define DRIVE_DESIGN_HASH "{design_hash(ours.design)}" /* SHA-256 of its values */
 #define DRIVE_SOURCE_HASH "{source_hash()}" /* SHA-256 of drive.h and drive.c in double precision */
-#define DRIVE_EXPORTER_VERSION "{_version()}"
+#define DRIVE_EXPORTER_VERSION "{exporter_version()}"
 
 enum {{
     DRIVE_P_LENGTH = {ours.p_size}, /* of the row p of this design */
@@ -155,11 +156,11 @@ def _design_source(ours: ExportedDesign) -> str:
     lines = []
     for place, value in enumerate(ours.row):
         if value != 0.0 or place < at.COMMAND:  # signals, probes and chains only where they are set
-            lines.append(f"    p[{place}] = {c_float(float(value))}; /* {_plain(known[place])} */")
+            lines.append(f"    p[{place}] = {c_float(float(value))}; /* {plain(known[place])} */")
     body = "\n".join(lines)
     return f"""/*
- * Parameters of the design {_plain(ours.design.name)}, SI, motor side.
- * {_plain(ours.design.title)}
+ * Parameters of the design {plain(ours.design.name)}, SI, motor side.
+ * {plain(ours.design.title)}
  */
 #include "drive_design.h"
 
@@ -175,7 +176,7 @@ void drive_load_design(double *p)
 """
 
 
-def _plain(text: str) -> str:
+def plain(text: str) -> str:
     """A text as it may stand in a comment: it neither ends it nor begins one, nor turns the code round."""
     return _seen(text).replace("*/", "* /").replace("/*", "/ *").replace("\\", "/")
 

@@ -34,7 +34,7 @@ STATUS = {
     "NOT_FINITE": "the speed is not finite any more",
     "NO_ROOT": "no time was found for a zero crossing of the speed",
 }
-_FLAGS = {
+FLAGS = {
     **{(f"FLAG_{name.upper().replace('-', '_')}", bit): f"the {name} limit acted"
        for name, bit in zip(at.LIMITERS, at.LIMITER_BITS, strict=True)},
     ("FLAG_AT_REST", at.FLAG_STICK): "the rotor is held by friction",
@@ -73,7 +73,7 @@ def header_text() -> str:
         ("Inputs of a tick, in io", names_of(0, at.IN_PROBE, "IN_")),
         ("Outputs of a tick, in io: what was at its beginning", _outputs()),
         ("Status", [(name, getattr(at, name)) for name in STATUS]),
-        ("Bits of io[DRIVE_IO_FLAGS]", list(_FLAGS)),
+        ("Bits of io[DRIVE_IO_FLAGS]", list(FLAGS)),
     )
     blocks = "\n".join(_enum(title, items) for title, items in groups)
     heads = "\n".join(f"/* {_ABOUT[name]} */\n{text}" for name, text in program().declarations.items())
@@ -93,7 +93,7 @@ def _outputs() -> list[tuple[str, int]]:
 def _enum(title: str, items: list[tuple[str, int]]) -> str:
     lines = [f"/* {title} */", "enum {"]
     for name, value in items:
-        said = STATUS.get(name) or _FLAGS.get((name, value)) or words().get(name, "")
+        said = STATUS.get(name) or FLAGS.get((name, value)) or words().get(name, "")
         end = "," if (name, value) != items[-1] else ""
         lines.append(f"    DRIVE_{name} = {value}{end}" + (f" /* {_plain(said)} */" if said else ""))
     return "\n".join([*lines, "};", ""])

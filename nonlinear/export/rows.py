@@ -50,6 +50,11 @@ _OWN = (
 _UNIT_OF = {name: unit for unit, names in UNITS.items() for name in names.split()}
 
 
+def unit_of(name: str) -> str:
+    """Unit of a name of the layout, of a rotary drive; ``""``: none."""
+    return _UNIT_OF.get(name, "")
+
+
 @cache
 def words() -> dict[str, str]:
     """Unit and words of each name of the layout, ``""`` where it says no more than its name."""

@@ -28,6 +28,20 @@ class AskedC:
 
 
 @dataclass(frozen=True, kw_only=True)
+class AskedController:
+    """The controller alone."""
+
+    target: Annotated[
+        Path, Option(words="Folder for the files; controller-c.", metavar="DIR", flag="out")
+    ] = Path("controller-c")
+    number: Annotated[Literal["float", "double"], Option(words="Type of a number; float.", flag="type")] = (
+        "float"
+    )
+    prefix: Annotated[str, Option(words="In front of every symbol; drive_.", metavar="NAME_")] = "drive_"
+    force: Annotated[bool, FORCE] = False
+
+
+@dataclass(frozen=True, kw_only=True)
 class AskedFmu:
     """A unit for co-simulation."""
 

@@ -12,7 +12,7 @@ from reports.cli.targets import folder_for_results, refuse_existing
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.linear.code_check import CodeCheck
-    from reports.exports.asked import AskedC, AskedFmu, AskedLinear
+    from reports.exports.asked import AskedC, AskedController, AskedFmu, AskedLinear
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,26 @@ def export_c(design: Design, asked: AskedC) -> Exported:
     texts["README.md"] += "\n" + check_text(check, single_precision=asked.single)
     write_together({folder / name: text.encode() for name, text in texts.items()})
     return Exported(tuple(str(folder / name) for name in texts), f"{folder}: {', '.join(texts)}", check)
+
+
+def export_controller(design: Design, asked: AskedController) -> Exported:
+    """Write the controller alone as C99 for firmware, with test vectors and a class for C++.
+
+    Raises
+    ------
+    InputError
+        If there are such files already, or the prefix is no name.
+    """
+    from actuator_lti.files.atomic import write_together
+    from nonlinear.export import controller_export
+
+    folder = asked.target
+    folder_for_results(folder)
+    texts = controller_export(design, single_precision=asked.number == "float", prefix=asked.prefix)
+    for name in texts:
+        refuse_existing(folder / name, asked.force)
+    write_together({folder / name: text.encode() for name, text in texts.items()})
+    return Exported(tuple(str(folder / name) for name in texts), f"{folder}: {', '.join(texts)}")
 
 
 def export_fmu(design: Design, asked: AskedFmu) -> Exported:

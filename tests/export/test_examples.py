@@ -9,6 +9,7 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import system_compiler
+from examples import firmware_controller as firmware
 from nonlinear.export import fmu_bytes
 
 pytestmark = pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
@@ -28,6 +29,25 @@ def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> N
     assert fly(design, path, 0.97 * limit, 0.6).growth < 1.0 < fly(design, path, 1.03 * limit, 0.6).growth
 
 
+def test_a_host_with_an_integrator_of_its_own_flies_the_same(tmp_path: Path) -> None:
+    """solve_ivp with the C inside, FMPy with the unit: 1e-7, a fourth at half the step; held: 2.6e-3."""
+    pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
+    from examples.autopilot_loop import fly, fly_inside, smooth
+
+    design = load_design("ilr33-amber")
+    path = tmp_path / "drive.fmu"
+    path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
+    inside = fly_inside(smooth(design), tmp_path, 2.0, 0.006).roll_rate_rad_s
+    far = [
+        np.abs(fly(design, path, 2.0, 0.006, parts=parts).roll_rate_rad_s - inside).max()
+        / np.abs(inside).max()
+        for parts in (1, 10, 20)
+    ]
+    assert far[1] < 2e-7
+    assert far[1] / far[2] == pytest.approx(4.0, rel=0.02)
+    assert far[0] > 1e-3
+
+
 @pytest.mark.filterwarnings("ignore")  # those of RocketPy and its libraries are not ours
 def test_the_lag_misses_what_friction_and_play_do_to_the_roll(tmp_path: Path) -> None:
     """With friction and play the roll hunts, tenfold; without them, and with the lag, it does not."""
@@ -43,3 +63,24 @@ def test_the_lag_misses_what_friction_and_play_do_to_the_roll(tmp_path: Path) ->
     alone, with_drive, smooth = rms
     assert with_drive > 10.0 * max(alone, smooth)
     assert min(alone, smooth) > 0.0
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "fin", "joint", "ballscrew", "emps"])
+def test_the_controller_for_firmware_closes_the_loop_as_the_simulator_does(name: str) -> None:
+    """With friction, play and limits: double to the bit but for differences of counts; float to one count."""
+    design = load_design(name)
+    commands = firmware.random_commands(design, 800, 0.5 * design.validation.full_deflection_rad)
+    exact = firmware.closed(design, commands, "double").difference_rad
+    assert exact <= 1e-12 * design.validation.full_deflection_rad
+    single = firmware.closed(design, commands, "float").difference_rad
+    count = max(design.output_quantum_rad or 0.0, (design.angle_quantum_rad or 0.0) / design.total_ratio)
+    assert 0.0 < single < max(count, 1e-6 * design.validation.full_deflection_rad)
+
+
+def test_float_stays_within_the_bound_that_is_computed() -> None:
+    """Where the loop is linear; the bound is no more than a hundred times what is seen."""
+    design = firmware.smooth(load_design("ilr33-amber"))
+    commands = firmware.random_commands(design, 4000, 2e-3)
+    found = firmware.closed(design, commands, "float")
+    bound = firmware.bound_rad(design, commands, found)
+    assert found.difference_rad <= bound < 100.0 * found.difference_rad

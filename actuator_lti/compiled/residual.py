@@ -1,0 +1,338 @@
+"""What is left of kernels where rows are known: numbers in their places, branches and short loops worked out.
+
+Each call is followed with what is known of its arguments, so that one kernel may leave several functions.
+The arithmetic is the kernel's; only a known zero added, or multiplied by, and a limit at infinity go.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+import operator
+import textwrap
+from collections.abc import Callable, Mapping
+from copy import deepcopy
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Any
+
+from actuator_lti.compiled.form import value_of
+from actuator_lti.compiled.kernel import is_kernel
+from actuator_lti.compiled.statements import assigned_once, overlap, without_docstring
+
+SHORT = 16  # rounds of a loop that is written out
+_FOLD: dict[type, Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+}  # fmt: skip
+_BUILT_IN: dict[str, Callable[..., Any]] = {"abs": abs, "min": min, "max": max, "int": int, "float": float}
+Replaced = Callable[[list[ast.expr], "Leftover"], ast.expr | None]
+
+
+@dataclass
+class Leftover:
+    """One function that is left.
+
+    Attributes
+    ----------
+    name : str
+    python : callable
+        The kernel.
+    tree : ast.FunctionDef
+        What is left of it.
+    arguments : tuple of str
+        Those that its text still uses.
+    """
+
+    name: str
+    python: Any
+    tree: ast.FunctionDef
+    arguments: tuple[str, ...] = ()
+    known: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass
+class Residual:
+    """Follows kernels; what it leaves is in ``functions``, callees first.
+
+    Parameters
+    ----------
+    look : callable
+        The number at a place of a row, by the row's argument, which is called alike in every function; None
+        where it is not known.
+    replaced : mapping of kernel to callable
+        What stands for a call of a kernel, of its arguments and the function that calls it; None: the call.
+    constants : mapping of str to float
+        Named constants that have another value here.
+    """
+
+    look: Callable[[str, int], float | None]
+    replaced: Mapping[Any, Replaced] = field(default_factory=dict)
+    constants: Mapping[str, float] = field(default_factory=dict)
+    functions: dict[str, Leftover] = field(default_factory=dict)
+    _done: dict[tuple[Any, ...], Leftover] = field(default_factory=dict)
+
+    def follow(self, python: Any, known: Mapping[str, Any] | None = None) -> Leftover:
+        """What is left of a kernel where some arguments are known."""
+        known = dict(known or {})
+        key = (python, *((name, repr(value)) for name, value in sorted(known.items())))
+        if key not in self._done:
+            tree = _tree(python)
+            names = [argument.arg for argument in tree.args.args]
+            left = Leftover(python.__name__, python, tree, tuple(names), known)
+            body = _Body(self, left).block(without_docstring(tree.body))
+            tree.body = body or [ast.Pass()]
+            used = {node.id for each in body for node in ast.walk(each) if isinstance(node, ast.Name)}
+            left.arguments = tuple(name for name in names if name in used)
+            self._done[key] = self._named(left)
+        return self._done[key]
+
+    def _named(self, left: Leftover) -> Leftover:
+        """The function under a name of its own, or one that is the same."""
+        others = [each for each in self.functions.values() if each.python is left.python]
+        text = ast.unparse(left.tree.body)  # type: ignore[arg-type]
+        for other in others:
+            if ast.unparse(other.tree.body) == text:  # type: ignore[arg-type]
+                return other
+        left.name += f"_{len(others) + 1}" if others else ""
+        self.functions[left.name] = left
+        return left
+
+
+def _tree(python: Any) -> ast.FunctionDef:
+    tree = ast.parse(textwrap.dedent(inspect.getsource(python))).body[0]
+    assert isinstance(tree, ast.FunctionDef)
+    return tree
+
+
+class _Body(ast.NodeTransformer):
+    """The statements of one function, with what is known in them."""
+
+    def __init__(self, residual: Residual, left: Leftover) -> None:
+        self.residual, self.left = residual, left
+        self.scope = left.python.__globals__
+        stored = {
+            n.id for n in ast.walk(left.tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+        }
+        self.local = stored | set(left.arguments)
+        self.once = assigned_once(left.tree) - set(left.arguments)
+        self.known: dict[str, Any] = {k: v for k, v in left.known.items() if k not in stored}
+
+    def block(self, nodes: list[ast.stmt]) -> list[ast.stmt]:
+        """Statements that are left; none behind a return."""
+        result: list[ast.stmt] = []
+        for node in nodes:
+            left = self.visit(node)
+            result += left if isinstance(left, list) else [left]
+            if result and isinstance(result[-1], ast.Return):
+                break
+        return [ast.fix_missing_locations(each) for each in result]
+
+    # --- statements --------------------------------------------------------------------------------
+
+    def visit_Assign(self, node: ast.Assign) -> list[ast.stmt]:
+        target, value = node.targets[0], self.visit(node.value)
+        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and not overlap(target, value):
+            pairs = zip(target.elts, value.elts, strict=True)
+            return [ast.Assign([self.visit(t)], v, lineno=0) for t, v in pairs if not self._told(t, v)]
+        if len(node.targets) == 1 and self._told(target, value):
+            return []
+        return [ast.Assign([self.visit(each) for each in node.targets], value, lineno=0)]
+
+    def _told(self, target: ast.expr, value: ast.expr) -> bool:
+        """Note a variable that is assigned here alone, and known."""
+        if not (isinstance(target, ast.Name) and target.id in self.once and isinstance(value, ast.Constant)):
+            return False
+        self.known[target.id] = value.value
+        return True
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:
+        value = self.visit(node.value)
+        if isinstance(node.op, ast.Add | ast.Sub) and _is(value, 0.0):
+            return []
+        return [ast.AugAssign(self.visit(node.target), node.op, value)]
+
+    def visit_If(self, node: ast.If) -> list[ast.stmt]:
+        test = self.visit(node.test)
+        if isinstance(test, ast.Constant):
+            return self.block(node.body if test.value else node.orelse)
+        body, orelse = self.block(node.body), self.block(node.orelse)
+        if not body and not orelse:
+            return []
+        if not body:
+            return [ast.If(self.visit(ast.UnaryOp(ast.Not(), test)), orelse, [])]
+        return [ast.If(test, body, orelse)]
+
+    def visit_For(self, node: ast.For) -> list[ast.stmt]:
+        assert isinstance(node.iter, ast.Call)
+        assert isinstance(node.target, ast.Name)
+        bounds = [self.visit(each) for each in node.iter.args]
+        if not all(isinstance(each, ast.Constant) for each in bounds):
+            return self._loop(node, bounds)
+        rounds = range(*(each.value for each in bounds))
+        if len(rounds) > SHORT:
+            return self._loop(node, bounds)
+        result = []
+        for value in rounds:
+            self.known[node.target.id] = value
+            result += self.block(deepcopy(node.body))
+        self.known.pop(node.target.id, None)
+        return result
+
+    def _loop(self, node: ast.For, bounds: list[ast.expr]) -> list[ast.stmt]:
+        assert isinstance(node.iter, ast.Call)
+        body = self.block(node.body)
+        return [ast.For(node.target, ast.Call(node.iter.func, bounds, []), body, [])] if body else []
+
+    def visit_Expr(self, node: ast.Expr) -> list[ast.stmt]:
+        value = self.visit(node.value)
+        return [ast.Expr(value)] if isinstance(value, ast.Call) else []
+
+    def visit_Pass(self, _node: ast.Pass) -> list[ast.stmt]:
+        return []
+
+    # --- expressions -------------------------------------------------------------------------------
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        if isinstance(node.ctx, ast.Store):
+            self.known.pop(node.id, None)
+            return node
+        if node.id in self.known:
+            return _constant(self.known[node.id])
+        if node.id in self.local:
+            return node
+        value = self.residual.constants.get(node.id, self.scope.get(node.id))
+        return _constant(value) if type(value) in (int, float) else node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        module = self.scope.get(node.value.id) if isinstance(node.value, ast.Name) else None
+        value = getattr(module, node.attr, None) if isinstance(module, ModuleType) else None
+        return _constant(value) if type(value) in (int, float) else node
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        place = self.visit(node.slice)
+        row = node.value.id if isinstance(node.value, ast.Name) else ""
+        if isinstance(node.ctx, ast.Load) and isinstance(place, ast.Constant):
+            value = self.residual.look(row, number(place))
+            if value is not None:
+                return _constant(value)
+        return ast.Subscript(node.value, place, node.ctx)
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        left, right, kind = self.visit(node.left), self.visit(node.right), type(node.op)
+        if isinstance(left, ast.Constant) and isinstance(right, ast.Constant) and kind in _FOLD:
+            return _constant(_FOLD[kind](left.value, right.value))
+        return _shorter(left, kind, right) or ast.BinOp(left, node.op, right)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
+        inner = self.visit(node.operand)
+        if isinstance(inner, ast.Constant):
+            return _constant(not inner.value if isinstance(node.op, ast.Not) else -number(inner))
+        return ast.UnaryOp(node.op, inner)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
+        ends = isinstance(node.op, ast.Or)
+        values = [self.visit(each) for each in node.values]
+        if any(isinstance(each, ast.Constant) and bool(each.value) is ends for each in values):
+            return _constant(ends)
+        rest = [each for each in values if not isinstance(each, ast.Constant)]
+        return ast.BoolOp(node.op, rest) if len(rest) > 1 else rest[0] if rest else _constant(not ends)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.expr:
+        left, rights = self.visit(node.left), [self.visit(each) for each in node.comparators]
+        result = ast.Compare(left, node.ops, rights)
+        value = value_of(result, lambda _node: None)
+        return result if value is None else _constant(value)
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        test = self.visit(node.test)
+        if isinstance(test, ast.Constant):
+            chosen: ast.expr = self.visit(node.body if test.value else node.orelse)
+            return chosen
+        return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        arguments = [self.visit(each) for each in node.args]
+        target = self._target(node.func)
+        if not is_kernel(target):
+            if callable(target) and all(isinstance(each, ast.Constant) for each in arguments):
+                return _constant(target(*(each.value for each in arguments)))
+            return _unlimited(node.func, arguments) or ast.Call(node.func, arguments, [])
+        if target in self.residual.replaced:
+            instead = self.residual.replaced[target](arguments, self.left)
+            if instead is not None:
+                return instead
+        return self._followed(target, arguments)
+
+    def _target(self, node: ast.expr) -> Any:
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            return getattr(self.scope.get(node.value.id), node.attr, None)
+        return self.scope.get(node.id, _BUILT_IN.get(node.id)) if isinstance(node, ast.Name) else None
+
+    def _followed(self, target: Any, arguments: list[ast.expr]) -> ast.expr:
+        names = list(inspect.signature(target).parameters)
+        given = dict(zip(names, arguments, strict=True))
+        known = {name: each.value for name, each in given.items() if isinstance(each, ast.Constant)}
+        left = self.residual.follow(target, known)
+        body = left.tree.body
+        if len(body) == 1 and isinstance(body[0], ast.Return) and _is_brief(body[0].value, left):
+            assert body[0].value is not None
+            result: ast.expr = _Placed(given).visit(deepcopy(body[0].value))
+            return result
+        if isinstance(body[0], ast.Pass):
+            return _constant(None)
+        return ast.Call(ast.Name(left.name, ast.Load()), [given[name] for name in left.arguments], [])
+
+
+class _Placed(ast.NodeTransformer):
+    """Arguments in the place of their names."""
+
+    def __init__(self, given: Mapping[str, ast.expr]) -> None:
+        self.given = given
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        return self.given.get(node.id, node)
+
+
+def _is_brief(value: ast.expr | None, left: Leftover) -> bool:
+    """Whether an expression may stand for its call: one value, each argument once, no row."""
+    if value is None or isinstance(value, ast.Tuple):
+        return False
+    names = [node.id for node in ast.walk(value) if isinstance(node, ast.Name) and node.id in left.arguments]
+    rows = any(isinstance(node, ast.Subscript | ast.IfExp) for node in ast.walk(value))
+    return len(names) == len(set(names)) and not rows
+
+
+def number(node: ast.Constant) -> Any:
+    """The number that a constant is."""
+    return node.value
+
+
+def _constant(value: Any) -> ast.expr:
+    return ast.Constant(value)
+
+
+def _is(node: ast.expr, value: float) -> bool:
+    return isinstance(node, ast.Constant) and bool(node.value == value) and node.value is not False
+
+
+def _shorter(left: ast.expr, kind: type, right: ast.expr) -> ast.expr | None:
+    """A sum or product with a known 0 or 1."""
+    if kind is ast.Mult and (_is(left, 0.0) or _is(right, 0.0)):
+        return left if _is(left, 0.0) else right
+    if kind is ast.Add and _is(left, 0.0):
+        return right
+    if kind in (ast.Add, ast.Sub) and _is(right, 0.0):
+        return left
+    if kind is ast.Mult and _is(left, 1.0):
+        return right
+    return left if kind in (ast.Mult, ast.Div) and _is(right, 1.0) else None
+
+
+def _unlimited(function: ast.expr, arguments: list[ast.expr]) -> ast.expr | None:
+    """What a minimum or maximum with an infinite number leaves."""
+    beyond = {"min": math.inf, "max": -math.inf}.get(getattr(function, "id", ""))
+    if beyond is None:
+        return None
+    rest = [each for each in arguments if not _is(each, beyond)]
+    return rest[0] if len(rest) == 1 else None

@@ -1,0 +1,164 @@
+"""What nobody reads in functions left of kernels goes: stores, variables, arguments, empty functions."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable
+
+from actuator_lti.compiled.residual import Leftover
+
+Place = Callable[[str, ast.expr], object]  # what an element of a row belongs to; None: always read
+
+
+def without_unread(
+    functions: dict[str, Leftover], entries: Iterable[str], place: Place
+) -> dict[str, Leftover]:
+    """The functions that the entries reach, without what none of them reads."""
+    before = ""
+    while before != (text := _text(functions)):
+        before = text
+        trees = [left.tree for left in functions.values()]
+        read = {_owner(node, place) for tree in trees for node in ast.walk(tree) if _is_load(node)}
+        for left in functions.values():
+            left.tree = _Shorter(functions, left, read, place).visit(left.tree)
+        functions = _reached(functions, entries)
+        for name, left in functions.items():
+            if name not in entries:
+                _narrow(functions, left)
+    return functions
+
+
+def _text(functions: dict[str, Leftover]) -> str:
+    return "".join(ast.unparse(left.tree) + ",".join(left.arguments) for left in functions.values())
+
+
+def _is_load(node: ast.AST) -> bool:
+    return isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Load)
+
+
+def _owner(node: ast.AST, place: Place) -> object:
+    assert isinstance(node, ast.Subscript)
+    assert isinstance(node.value, ast.Name)
+    return place(node.value.id, node.slice)
+
+
+def _reached(functions: dict[str, Leftover], entries: Iterable[str]) -> dict[str, Leftover]:
+    found, wanted = set(), list(entries)
+    while wanted:
+        name = wanted.pop()
+        if name not in found:
+            found.add(name)
+            wanted += [call.func.id for call in _calls(functions, functions[name].tree)]  # type: ignore[attr-defined]
+    return {name: left for name, left in functions.items() if name in found}
+
+
+def _calls(functions: dict[str, Leftover], tree: ast.AST) -> list[ast.Call]:
+    return [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in functions
+    ]
+
+
+def _narrow(functions: dict[str, Leftover], left: Leftover) -> None:
+    """Take the arguments that a function does not use from it and its calls."""
+    used = {node.id for node in ast.walk(left.tree) if isinstance(node, ast.Name)}
+    stay = [k for k, name in enumerate(left.arguments) if name in used]
+    if len(stay) == len(left.arguments):
+        return
+    left.arguments = tuple(left.arguments[k] for k in stay)
+    for other in functions.values():
+        for call in _calls({left.name: left}, other.tree):
+            call.args = [call.args[k] for k in stay]
+
+
+class _Shorter(ast.NodeTransformer):
+    """A function without stores that are not read."""
+
+    def __init__(
+        self, functions: dict[str, Leftover], left: Leftover, read: set[object], place: Place
+    ) -> None:
+        self.functions, self.read, self.place = functions, read, place
+        self.loaded = {
+            node.id
+            for node in ast.walk(left.tree)
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
+        }
+
+    def _is_read(self, target: ast.expr) -> bool:
+        if isinstance(target, ast.Subscript):
+            owner = _owner(target, self.place)
+            return owner is None or owner in self.read
+        return not isinstance(target, ast.Name) or target.id in self.loaded
+
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt | None:
+        target = node.targets[0]
+        if isinstance(target, ast.Tuple):
+            return self._tuple(node, target)
+        node.targets = [each for each in node.targets if self._is_read(each)]
+        if node.targets:
+            return node
+        return ast.Expr(node.value) if _writing(self.functions, node.value) else None
+
+    def _tuple(self, node: ast.Assign, target: ast.Tuple) -> ast.stmt:
+        """Results of a call, those that nobody reads with a name that says so."""
+        for each in target.elts:
+            if isinstance(each, ast.Name) and not self._is_read(each):
+                each.id = "_" + each.id.lstrip("_")
+        return node
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.stmt | None:
+        return node if self._is_read(node.target) else None
+
+    def visit_Expr(self, node: ast.Expr) -> list[ast.stmt]:
+        """Of a value that nobody reads the calls that write a row."""
+        return [ast.Expr(call) for call in _writing(self.functions, node.value)]
+
+    def visit_If(self, node: ast.If) -> ast.stmt | None:
+        self.generic_visit(node)
+        node.body, node.orelse = self._full(node.body), self._full(node.orelse)
+        if not node.body and node.orelse:
+            return ast.If(ast.UnaryOp(ast.Not(), node.test), node.orelse, [])
+        return node if node.body else None
+
+    def visit_For(self, node: ast.For) -> ast.stmt | None:
+        self.generic_visit(node)
+        return node if self._full(node.body) else None
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.stmt:
+        self.generic_visit(node)
+        node.body = self._full(node.body) or [ast.Pass()]
+        return ast.fix_missing_locations(node)
+
+    def _full(self, body: list[ast.stmt]) -> list[ast.stmt]:
+        """Statements that do something: not values that the next assignment writes over unread."""
+        rest = [each for each in body if not isinstance(each, ast.Pass)]
+        return [each for k, each in enumerate(rest) if not self._is_written_over(each, rest[k + 1 :])]
+
+    def _is_written_over(self, node: ast.stmt, behind: list[ast.stmt]) -> bool:
+        if not (
+            isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and len(node.targets) == 1
+        ):
+            return False
+        name = node.targets[0].id
+        for other in behind:
+            uses = [each for each in ast.walk(other) if isinstance(each, ast.Name) and each.id == name]
+            if any(isinstance(each.ctx, ast.Load) for each in uses) or (
+                isinstance(other, ast.AugAssign) and uses
+            ):
+                return False
+            if isinstance(other, ast.Assign) and uses:
+                return not _calls(self.functions, node.value)
+        return False
+
+
+def _writing(functions: dict[str, Leftover], tree: ast.AST) -> list[ast.Call]:
+    """Calls in a tree that write into a row, themselves or by what they call."""
+    return [call for call in _calls(functions, tree) if _writes(functions, functions[call.func.id].tree)]  # type: ignore[attr-defined]
+
+
+def _writes(functions: dict[str, Leftover], tree: ast.AST) -> bool:
+    stores = any(
+        isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store) for node in ast.walk(tree)
+    )
+    return stores or bool(_writing(functions, tree))

@@ -1,0 +1,34 @@
+"""The controller in float against the simulator over a long run: the difference, and its bound."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from actuator_lti import load_design
+from benchmarks.row import Row
+from examples import firmware_controller as firmware
+
+TICKS = 300_000  # half a minute of the drive
+
+
+def rows() -> Iterator[Row]:
+    """Linear, with its bound; with all effects in both types."""
+    design = load_design("ilr33-amber")
+    linear, small = firmware.smooth(design), firmware.random_commands(design, TICKS, 2e-3)
+    large = firmware.random_commands(design, TICKS, 0.2)
+    found = firmware.closed(linear, small, "float")
+    bound = firmware.bound_rad(linear, small, found)
+    about = f"{TICKS} ticks of random commands"
+    yield Row(
+        group="firmware",
+        name=f"float, linear, {about}",
+        measured=found.difference_rad,
+        unit="rad",
+        target=bound,
+    )
+    exact = firmware.closed(design, large, "double").difference_rad
+    yield Row(
+        group="firmware", name=f"double, all effects, {about}", measured=exact, unit="rad", target=1e-12
+    )
+    single = firmware.closed(design, large, "float").difference_rad
+    yield Row(group="firmware", name=f"float, all effects, {about}", measured=single, unit="rad")

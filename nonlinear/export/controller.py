@@ -1,0 +1,146 @@
+"""`actuator-lti export controller`: the controller alone for firmware, with test vectors of the simulator."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+
+from actuator_lti.compiled.kinds import c_float
+from actuator_lti.compiled.program import Program
+from actuator_lti.compiled.structs import struct_text
+from actuator_lti.design.model import Design
+from actuator_lti.design.writing import design_hash
+from actuator_lti.errors import InputError
+from nonlinear._kernels import layout as at
+from nonlinear.export.c_files import exported, exporter_version, plain
+from nonlinear.export.controller_cut import Controller, controller_of, member_words
+from nonlinear.export.controller_vectors import vectors_text
+from nonlinear.export.program import FLAGS, c_text, single, template
+
+_LIBRARY = re.compile(r"\b(sqrt|floor|fabs|exp|log|sin|cos|tan)\(")
+
+
+def controller_export(
+    design: Design, *, single_precision: bool = True, prefix: str = "drive_", vectors: bool = True
+) -> dict[str, str]:
+    """Files of the controller of a design, by name.
+
+    Parameters
+    ----------
+    design : Design
+    single_precision : bool
+        ``float`` in place of ``double``; coefficients are worked out in double precision all the same.
+    prefix : str
+        In front of every symbol, so that controllers of several designs fit into one program.
+    vectors : bool
+        With test vectors and the program that runs them.
+
+    Raises
+    ------
+    InputError
+        For a prefix that no name in C begins with, and for a law of one's own.
+    """
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*_", prefix):
+        raise InputError(f"prefix = {prefix!r}: allowed: letters, digits and _, a letter first, _ last")
+    if exported(design).row[at.OWN_STAGE] > 0.0:
+        message = "control: a law of one's own is not exported alone; allowed: export c, export fmu"
+        raise InputError(message, where=design.origin or design.name)
+    ours = controller_of(design, prefix, single_precision=single_precision)
+    values = {
+        "PREFIX": prefix.upper(), "prefix": prefix, "namespace": prefix.removesuffix("_"),
+        "NAME": plain(design.name), "TITLE": plain(design.title), "VERSION": exporter_version(),
+        "C_NAME": c_text(design.name), "C_REVISION": c_text(design.revision or ""),
+        "DESIGN_HASH": design_hash(design), "REAL": "float" if single_precision else "double",
+        "PRECISION": "single" if single_precision else "double",
+        "CONSTANTS": _constants(ours, prefix.upper()), "FLAGS": _flags(prefix.upper()),
+        "STRUCTS": "\n\n".join(
+            struct_text(each, member_words(ours)) for each in (ours.state, ours.measured, ours.out)
+        ),
+        "DECLARATIONS": _declarations(ours.program),
+    }  # fmt: skip
+    source = _source(ours.program, prefix)
+    values["SOURCE_HASH"] = hashlib.sha256(source.encode()).hexdigest()
+    values["SIZES"], values["LIBRARY"] = _sizes(ours, single_precision), _library(source)
+    texts = {
+        "controller.h": _filled("controller.h", values),
+        "controller.c": source,
+        "controller.hpp": _filled("controller.hpp", values),
+    }
+    if vectors:
+        texts["vectors.h"] = vectors_text(ours, prefix, single_precision=single_precision)
+        texts["main.c"] = _filled("controller_main.c", values)
+    if single_precision:
+        typed = {"controller.h", "controller.c", "vectors.h"} & set(texts)
+        texts |= {name: single(texts[name]) for name in typed}
+    return {**texts, "README.md": _filled("controller_readme.txt", values)}
+
+
+def _filled(name: str, values: Mapping[str, str]) -> str:
+    text = template(name)
+    for key, value in values.items():
+        text = text.replace(f"@{key}@", value)
+    return text
+
+
+def _source(program: Program, prefix: str) -> str:
+    """``controller.c``: no library but mathematical functions, and these where they are called."""
+    upper = prefix.upper()
+    body = "\n".join([*program.helpers, "", program.types, "", program.functions])
+    head = ['#include "controller.h"', ""]
+    if _LIBRARY.search(body):
+        head += ["#include <math.h>", ""]
+    if re.search(r"\bbool\b", body):
+        head += ["#include <stdbool.h>", ""]
+    words = {
+        "DESIGN": "actuator-lti controller ",
+        "REVISION": " revision ",
+        "DESIGN_HASH": " ",
+        "SOURCE_HASH": " ",
+    }
+    parts = " ".join(f'"{word}" {upper}CONTROLLER_{name}' for name, word in words.items())
+    return "\n".join([*head, f"const char {prefix}controller_version[] = {parts};", "", body])
+
+
+def _library(source: str) -> str:
+    names = sorted(set(_LIBRARY.findall(source)))
+    return f"`{'`, `'.join(names)}` of the mathematical library" if names else "no function of any library"
+
+
+def _declarations(program: Program) -> str:
+    about = {
+        "controller_start": "State before the first tick: at rest at the measured angle.",
+        "controller_step": "One tick: measured values in, voltage out.  Call it every period.",
+    }
+    return "\n\n".join(f"/* {about[name]} */\n{text}" for name, text in program.declarations.items())
+
+
+def _flags(upper: str) -> str:
+    items = [(name, bit, words) for (name, bit), words in FLAGS.items() if bit != at.FLAG_STICK]
+    return "\n".join(
+        f"    {upper}CONTROLLER_{name} = {bit}{',' if bit != items[-1][1] else ''} /* {words} */"
+        for name, bit, words in items
+    )
+
+
+def _constants(ours: Controller, upper: str) -> str:
+    """Numbers of the configuration that the program around the controller wants."""
+    p, names = ours.p, {each.name for each in ours.measured.members}
+    values = {"PERIOD_S": (at.PERIOD, "of a step, s")}
+    if "motor_counts" in names or "output_counts" in names:
+        values["COUNTS_PER_RAD"] = (at.COUNTS_PER_RAD, "of the angle that the speed is made of, motor side")
+    if p[at.POSITION_COUNTS] > 0.0:
+        values["OUTPUT_COUNTS_PER_RAD"] = (at.POSITION_COUNTS, "of the output's sensor")
+    return "\n".join(
+        f"#define {upper}CONTROLLER_{name} {c_float(float(p[place]))} /* {words} */"
+        for name, (place, words) in values.items()
+    )
+
+
+def _sizes(ours: Controller, single_precision: bool) -> str:
+    real = 4 if single_precision else 8
+    counted = [
+        (text, sum(max(each.length, 1) * (real if each.kind == "float" else 4) for each in struct.members))
+        for text, struct in (("state", ours.state), ("input", ours.measured), ("output", ours.out))
+    ]
+    return ", ".join(f"{text} {size} bytes" for text, size in counted)

@@ -1,0 +1,301 @@
+"""The controller cut out of the tick of one design: what the kernels leave where its parameters are known."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+
+from actuator_lti.compiled.kernel import kernel
+from actuator_lti.compiled.kinds import Kind
+from actuator_lti.compiled.program import Program
+from actuator_lti.compiled.residual import Leftover, Residual, number
+from actuator_lti.compiled.structs import Member, Rows, Struct, emit_structs, split_index
+from actuator_lti.compiled.unread import without_unread
+from actuator_lti.design.model import Design
+from nonlinear._kernels import layout
+from nonlinear._kernels.control import control
+from nonlinear._kernels.estimate import counted
+from nonlinear._kernels.position import position_feedback
+from nonlinear._kernels.state_kinds import COUNTER, state_kinds
+from nonlinear._kernels.tick import init_command, init_controller, init_estimate
+from nonlinear.export.c_files import exported, stage_words
+from nonlinear.export.rows import unit_of, words
+
+Floats = npt.NDArray[np.float64]
+MOTOR_COUNTS, OUTPUT_COUNTS = layout.IO_SIZE, layout.IO_SIZE + 1  # places of inputs that are whole numbers
+_SINGLE = {"STANDING": 1e-6}  # what is no change of a reference but rounding, in single precision
+_STAGES = ("position", "velocity", "current", "voltage")
+_UNITS = dict(zip(_STAGES, ("rad", "rad/s", "A", "V"), strict=True))
+_BEHIND = {  # numbers in the unit of what a stage commands
+    "velocity": ("S_VELOCITY_INTEGRATOR", "S_TORQUE_FEEDFORWARD", "S_TORQUE_CHAIN"),
+    "position": ("S_POSITION_INTEGRATOR",),
+}
+_COMMAND = ("S_PROFILE", "S_PROFILE_COMMAND", "AT_AVERAGE", "S_AVERAGE_SUM", "S_COMMAND_CHAIN", "IN_COMMAND")
+_ANGLES = ("S_REFERENCE", "S_REFERENCE_BEFORE", "S_ERROR", "AT_ANGLES", "ANGLE_START")
+_SPEEDS = ("S_ERROR_RATE", "S_SPEED_CHAIN", "IN_OUTPUT_SPEED")
+_NAMES = {  # inputs and outputs
+    "IN_COMMAND": "command", "IN_CURRENT": "motor_current", "IN_SPEED": "motor_speed",
+    "IN_ANGLE": "motor_angle", "ANGLE_START": "motor_angle", "IN_OUTPUT": "output_angle",
+    "IN_OUTPUT_SPEED": "output_speed", "IN_BUS": "bus_voltage", "IO_VOLTAGE": "voltage",
+    "IO_CURRENT_COMMAND": "current_command", "IO_SPEED_COMMAND": "speed_command", "IO_FLAGS": "flags",
+}  # fmt: skip
+
+
+@kernel
+def controller_step(p, s, io, to):  # type: ignore[no-untyped-def]
+    """One tick of the controller: measured values in, voltage out; call it every period."""
+    if p[layout.SUPPLY] > 0.0:
+        s[layout.S_VOLTAGE_LIMIT] = io[layout.IN_BUS]
+    control(p, s, io, io[layout.IN_CURRENT], io[layout.IN_SPEED], io[layout.IN_ANGLE])
+    to[layout.IO_VOLTAGE] = s[layout.S_VOLTAGE]
+    if p[layout.HAS_CURRENT] > 0.0:
+        to[layout.IO_CURRENT_COMMAND] = s[layout.S_CURRENT_REFERENCE]
+    if p[layout.HAS_VELOCITY] > 0.0:
+        to[layout.IO_SPEED_COMMAND] = s[layout.S_SPEED_REFERENCE]
+    to[layout.IO_FLAGS] = s[layout.S_FLAGS_OUTER] + s[layout.S_FLAGS_VELOCITY] + s[layout.S_FLAGS_CURRENT]
+
+
+@kernel
+def controller_start(p, s):  # type: ignore[no-untyped-def]
+    """State before the first tick: at rest at the measured angle."""
+    init_controller(p, s)
+    init_estimate(p, s)
+    init_command(p, s)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Controller:
+    """The controller of a design as C in double precision.
+
+    Attributes
+    ----------
+    p : ndarray
+        The parameters of the design with all that is derived from them.
+    program : Program
+    state, measured, out : Struct
+        What it remembers, is given and gives.
+    """
+
+    design: Design
+    p: Floats
+    program: Program
+    state: Struct
+    measured: Struct
+    out: Struct
+
+
+def controller_of(design: Design, prefix: str, *, single_precision: bool = False) -> Controller:
+    """Cut the controller out of the tick."""
+    p = exported(design).derived
+    functions = _followed(p, single_precision)
+    structs = _structs(design, p, prefix, functions.values())
+    rows = Rows(structs, float(p[layout.COUNTS_PER_RAD]))
+    _zeroed(functions["controller_start"], structs["s"])
+    entries = {
+        name: ["row"] * len(functions[name].arguments) for name in ("controller_start", "controller_step")
+    }
+    program = emit_structs(functions, entries, prefix, rows)  # type: ignore[arg-type]
+    measured = {each.name: each for row in ("p", "io") for each in structs[row].members}
+    structs["io"] = replace(structs["io"], members=tuple(measured.values()))
+    return Controller(
+        design=design, p=p, program=program, state=structs["s"], measured=structs["io"], out=structs["to"]
+    )
+
+
+def _followed(p: Floats, single_precision: bool) -> dict[str, Leftover]:
+    """What is left of step and start, with the numbers of the state that never change in their places."""
+    bounds = _begins(p)
+    constant: dict[int, float] = {}
+    while True:
+        residual = Residual(
+            partial(_look, p, constant),
+            {counted: partial(_counts, p)},
+            _SINGLE if single_precision else {},
+        )
+        for entry, arguments in ((controller_step, ("s", "io", "to")), (controller_start, ("s", "p"))):
+            residual.follow(entry).arguments = arguments
+        functions = without_unread(
+            residual.functions, ("controller_step", "controller_start"), partial(_owner, bounds)
+        )
+        found = constant | _never_changed(functions, bounds)
+        if found == constant:
+            return functions
+        constant = found
+
+
+def _look(p: Floats, constant: dict[int, float], row: str, place: int) -> float | None:
+    if row == "s":
+        return constant.get(place)
+    return float(p[place]) if row == "p" and place != layout.ANGLE_START else None
+
+
+def _counts(p: Floats, arguments: list[ast.expr], caller: Leftover) -> ast.expr | None:
+    """The count that stands for an angle as counted."""
+    scale = arguments[1]
+    if not isinstance(scale, ast.Constant) or number(scale) <= 0.0:
+        return None
+    speed = caller.python is not position_feedback
+    place = OUTPUT_COUNTS if not speed or p[layout.SPEED_SENSOR] > 0.0 else MOTOR_COUNTS
+    row = ast.Name("io" if "io" in caller.arguments else "p", ast.Load())
+    count = ast.Subscript(row, ast.Constant(place), ast.Load())
+    if speed:
+        return count
+    return ast.BinOp(ast.Call(ast.Name("float", ast.Load()), [count], []), ast.Div(), scale)
+
+
+def _begins(p: Floats) -> dict[int, str]:
+    """Name of each part of the state by its first place."""
+    result = {
+        value: name for name, value in vars(layout).items() if name.startswith("S_") and type(value) is int
+    }
+    result |= {int(p[getattr(layout, name)]): name for name in vars(layout) if name.startswith("AT_")}
+    return dict(sorted(result.items()))
+
+
+def _owner(bounds: dict[int, str], row: str, index: ast.expr) -> object:
+    """The part of the state that an element belongs to; None in other rows."""
+    return _part(bounds, _begin(index)) if row == "s" else None
+
+
+def _begin(index: ast.expr) -> int:
+    """The known part of an index."""
+    return split_index(index)[0]
+
+
+def _part(bounds: dict[int, str], place: int) -> str:
+    return bounds[max(begin for begin in bounds if begin <= place)]
+
+
+def _elements(functions: Iterable[Leftover], row: str) -> list[ast.Subscript]:
+    return [
+        node
+        for left in functions
+        for node in ast.walk(left.tree)
+        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == row
+    ]
+
+
+def _never_changed(functions: dict[str, Leftover], bounds: dict[int, str]) -> dict[int, float]:
+    """Single numbers of the state that only the start writes, as a constant, or nobody."""
+    start = {"controller_start", *(name for name in functions if name.startswith(("init_", "settle")))}
+    changed = {
+        _part(bounds, _begin(node.slice))
+        for node in _elements((left for name, left in functions.items() if name not in start), "s")
+        if isinstance(node.ctx, ast.Store)
+    }
+    begun: dict[int, float | None] = {}
+    for name in start & set(functions):
+        for node in ast.walk(functions[name].tree):
+            if isinstance(node, ast.Assign):
+                value = float(number(node.value)) if isinstance(node.value, ast.Constant) else None
+                begun |= {_begin(t.slice): value for t in node.targets if isinstance(t, ast.Subscript)}
+    read = {
+        _begin(node.slice)
+        for node in _elements(functions.values(), "s")
+        if isinstance(node.slice, ast.Constant)
+    }
+    values = {place: begun.get(place, 0.0) for place in read if _part(bounds, place) not in changed}
+    return {place: value for place, value in values.items() if value is not None}
+
+
+def _structs(design: Design, p: Floats, prefix: str, functions: Iterable[Leftover]) -> dict[str, Struct]:
+    functions = list(functions)
+    state = Struct(f"{prefix}controller_state", "state", tuple(_state(design, p, functions)))
+    ours = {row: tuple(_members(design, functions, row)) for row in ("p", "io", "to")}
+    names = {"p": "input", "io": "input", "to": "output"}
+    result = {
+        row: Struct(f"{prefix}controller_{names[row]}", "out" if row == "to" else "in", members)
+        for row, members in ours.items()
+    }
+    return {"s": state, **result}
+
+
+def _state(design: Design, p: Floats, functions: list[Leftover]) -> Iterable[Member]:
+    bounds = _begins(p)
+    ends = dict(zip(bounds, [*list(bounds)[1:], int(p[layout.STATE_SIZE])], strict=True))
+    kinds = state_kinds(p)
+    nodes = _elements(functions, "s")
+    for begin, name in bounds.items():
+        ours = [node.slice for node in nodes if _part(bounds, _begin(node.slice)) == name]
+        if not ours:
+            continue
+        places = [_begin(index) for index in ours]
+        whole = all(isinstance(index, ast.Constant) for index in ours)
+        length = (max(places) + 1 if whole else ends[begin]) - begin
+        count = name == "AT_ANGLES" and p[layout.COUNTS_PER_RAD] > 0.0
+        is_int = kinds[begin] == COUNTER or name.startswith("S_FLAGS_")
+        text = name.removeprefix("S_").removeprefix("AT_").lower()
+        kind: Kind = "count" if count else "int" if is_int else "float"
+        several = ends[begin] - begin > 1
+        yield Member(_named(design, name, text, counts=count), begin, length if several else 0, kind)
+
+
+def _members(design: Design, functions: list[Leftover], row: str) -> Iterable[Member]:
+    """Inputs or outputs that are used."""
+    used = {_begin(node.slice) for node in _elements(functions, row)}
+    known = {getattr(layout, name): name for name in _NAMES}
+    for place in sorted(used):
+        if place in (MOTOR_COUNTS, OUTPUT_COUNTS):
+            yield Member("motor_counts" if place == MOTOR_COUNTS else "output_counts", place, 0, "count")
+        else:
+            name = known[place]
+            yield Member(
+                _named(design, name, _NAMES[name]), place, 0, "int" if name == "IO_FLAGS" else "float"
+            )
+
+
+def _named(design: Design, name: str, text: str, *, counts: bool = False) -> str:
+    """A member's name with its unit."""
+    unit = "counts" if counts else _unit(design, name)
+    if design.axis == "linear":
+        unit = unit.replace("rad", "m")
+    return f"{text}_{unit.replace('/', '_')}" if unit else text
+
+
+def _unit(design: Design, name: str) -> str:
+    stages = [
+        stage for stage in _STAGES if stage == "voltage" or getattr(design.controller, stage) is not None
+    ]
+    if name in _COMMAND:
+        return (
+            stage_words(design)[1].replace("m", "rad") if design.axis == "linear" else stage_words(design)[1]
+        )
+    if name == "S_PROFILE_SPEED":
+        return f"{_UNITS[stages[0]]}/s".replace("/s/s", "/s2")
+    for stage, names in _BEHIND.items():
+        if name in names:
+            behind = [each for each in stages if _STAGES.index(each) > _STAGES.index(stage)]
+            return _UNITS[behind[0]]
+    if name in _ANGLES:
+        return "rad"
+    return "rad/s" if name in _SPEEDS else unit_of(name)
+
+
+def member_words(controller: Controller) -> dict[str, str]:
+    """What each member is, as the layout of the kernels says it."""
+    said = words()
+    bounds = _begins(controller.p)
+    result = {each.name: said.get(bounds[each.first], "") for each in controller.state.members}
+    places = {getattr(layout, name): name for name in _NAMES}
+    for each in (*controller.measured.members, *controller.out.members):
+        result[each.name] = said.get(
+            places.get(each.first, ""), "count of the encoder; it may go round at 2**32"
+        )
+    return {name: text.partition(" [")[0] for name, text in result.items()}
+
+
+def _zeroed(start: Leftover, state: Struct) -> None:
+    """Begin with zero in what the start itself leaves."""
+    lines: list[ast.stmt] = []
+    for each in state.members:
+        if each.length:
+            text = f"for j in range({each.length}): s[{each.first} + j] = 0.0"
+        else:
+            text = f"s[{each.first}] = 0.0"
+        lines += ast.parse(text).body
+    start.tree.body = lines + start.tree.body

@@ -1,0 +1,200 @@
+"""The controller cut out of the tick for firmware: the simulator's numbers, no library, no warning."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from random_drives import random_drive, random_elastic_drive
+from typer.testing import CliRunner
+
+from actuator_lti import load_design
+from actuator_lti.design import design_hash
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from nonlinear._kernels import layout as at
+from nonlinear.export import controller_export
+from reports.cli.app import build
+
+STRICT = (
+    "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror", "-Wdouble-promotion",
+    "-Wfloat-conversion",
+)  # fmt: skip
+MATHEMATICS = {"sqrt", "floor", "sqrtf", "floorf"}  # of a profile with limited acceleration
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+
+
+def gcc(folder: Path, *arguments: str, compiler: str = "gcc") -> None:
+    done = subprocess.run([compiler, *arguments], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[:2000]
+
+
+def written(folder: Path, design: Design, *, single: bool, prefix: str = "drive_") -> Path:
+    for name, text in controller_export(design, single_precision=single, prefix=prefix).items():
+        (folder / name).write_text(text)
+    return folder
+
+
+def worst_of(folder: Path) -> dict[str, tuple[float, float]]:
+    """Runs the vectors; difference and bound of each signal."""
+    gcc(
+        folder,
+        "-std=c99",
+        "-O1",
+        "-ffp-contract=off",
+        *STRICT[:6],
+        "main.c",
+        "controller.c",
+        "-lm",
+        "-o",
+        "run",
+    )
+    done = subprocess.run([str(folder / "run")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+    rows = [line.split(",") for line in done.stdout.splitlines()[2:-1]]
+    assert int(done.stdout.splitlines()[-1].split()[0]) > 20
+    return {f"{name}{k}": (float(a), float(b)) for k, (name, a, b) in enumerate(rows)}
+
+
+def without_library(folder: Path) -> set[str]:
+    """Compiles for a machine without any; the functions that it calls all the same."""
+    gcc(folder, "-std=c99", "-O2", "-ffreestanding", "-nostdlib", *STRICT, "-c", "controller.c")
+    done = subprocess.run(
+        ["nm", "-u", "controller.o"], cwd=folder, capture_output=True, text=True, check=True
+    )
+    return {word for word in done.stdout.split() if word != "U"}
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("name", ["ilr33-amber-multirate", "emps", "joint", "ballscrew", "fin"])
+def test_vectors_of_the_simulator_hold_and_no_library_is_called(
+    name: str, single: bool, tmp_path: Path
+) -> None:
+    folder = written(tmp_path, load_design(name), single=single)
+    assert without_library(folder) <= (MATHEMATICS if name in ("joint", "ballscrew") else set())
+    worst = worst_of(folder)
+    assert all(difference <= bound for difference, bound in worst.values())
+    moved = max(difference for difference, _ in worst.values())
+    assert (moved > 0.0) if single else (moved < 1e-10)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 6, 12])
+@pytest.mark.parametrize("make", [random_drive, random_elastic_drive])
+def test_vectors_hold_for_random_drives(make: object, seed: int, tmp_path: Path) -> None:
+    design = make(np.random.default_rng(seed))  # type: ignore[operator]
+    folder = written(tmp_path, design, single=bool(seed % 2))
+    assert without_library(folder) <= MATHEMATICS
+    worst_of(folder)
+
+
+def test_a_coefficient_that_is_off_is_seen(tmp_path: Path) -> None:
+    folder = written(tmp_path, load_design("ilr33-amber"), single=False)
+    source = (folder / "controller.c").read_text()
+    assert "0.0008 *" in source  # of the velocity integral
+    (folder / "controller.c").write_text(source.replace("0.0008 *", "0.000800000001 *"))
+    gcc(folder, "-std=c99", "main.c", "controller.c", "-o", "run")
+    done = subprocess.run([str(folder / "run")], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert re.search(r"\b[1-9]\d* outside of the bound", done.stdout)
+
+
+HOST = """#include "one/controller.hpp"
+#include "two/controller.hpp"
+#include <cstdio>
+int main()
+{
+    const one::Controller::Input at_rest = one::Controller::Input();
+    one::Controller first(at_rest), second(at_rest);
+    two::Controller other((two::Controller::Input()));
+    one::Controller::Input in = at_rest;
+    in.command_rad = 0.1f;
+    for (int k = 0; k < 50; k += 1) { (void)first.step(in); }
+    second.restore(first.state());
+    const bool same = first.step(in).voltage_V == second.step(in).voltage_V;
+    std::printf("%d|%d|%s|%s", (int)same, ONE_CONTROLLER_FLAG_VOLTAGE, ONE_CONTROLLER_DESIGN_HASH,
+                TWO_CONTROLLER_DESIGN);
+    return other.step(two::Controller::Input()).flags;
+}
+"""
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no g++ on this machine")
+def test_two_designs_in_one_program_of_cpp_by_their_prefixes(tmp_path: Path) -> None:
+    for prefix, name in (("one_", "ilr33-amber"), ("two_", "emps")):
+        folder = tmp_path / prefix.removesuffix("_")
+        folder.mkdir()
+        written(folder, load_design(name), single=True, prefix=prefix)
+        gcc(folder, "-std=c99", *STRICT, "-c", "controller.c")
+        done = subprocess.run(
+            ["nm", "-g", "controller.o"], cwd=folder, capture_output=True, text=True, check=True
+        )
+        symbols = [line.split()[-1] for line in done.stdout.splitlines()]
+        assert len(symbols) == 3
+        assert all(symbol.startswith(prefix) for symbol in symbols)
+    (tmp_path / "host.cpp").write_text(HOST)
+    call = ("-std=c++11", "-Wall", "-Wextra", "-Werror", "host.cpp", "one/controller.o", "two/controller.o")
+    gcc(tmp_path, *call, "-o", "host", compiler="g++")
+    said = subprocess.run([str(tmp_path / "host")], capture_output=True, text=True, check=True).stdout
+    assert said == f"1|{at.FLAG_VOLTAGE}|{design_hash(load_design('ilr33-amber'))}|emps"
+
+
+ROUND = """#include "controller.h"
+#include <stdio.h>
+int main(void)
+{
+    drive_controller_state states[2];
+    drive_controller_output out[2];
+    for (int k = 0; k < 400; k += 1) {
+        const uint32_t begin[2] = {0U, 0x7ffff000U}; /* the second goes round after 4096 counts */
+        for (int n = 0; n < 2; n += 1) {
+            drive_controller_input in = {0};
+            in.command_rad = 0.3f;
+            in.motor_angle_rad = (float)k * 0.05f;
+            in.motor_counts = (int32_t)(begin[n] + 33U * (uint32_t)k);
+            if (k == 0) {
+                drive_controller_start(&states[n], &in);
+            }
+            drive_controller_step(&states[n], &in, &out[n]);
+        }
+        if (out[0].voltage_V != out[1].voltage_V || out[0].flags != out[1].flags) {
+            (void)printf("tick %d: %g, %g", k, (double)out[0].voltage_V, (double)out[1].voltage_V);
+            return 1;
+        }
+    }
+    return (out[0].voltage_V == 0.0f) ? 2 : 0;
+}
+"""
+
+
+def test_counts_of_the_encoder_go_round(tmp_path: Path) -> None:
+    """A turning drive from two counts, one of which passes the largest on the way, has the same bits."""
+    changes = {
+        "encoder.counts_per_rev": "4096",
+        "encoder.speed": "difference",
+        "encoder.difference_samples": 3,
+    }
+    written(tmp_path, load_design("ilr33-amber").with_values(changes), single=True)
+    (tmp_path / "round.c").write_text(ROUND)
+    gcc(tmp_path, "-std=c99", *STRICT[:6], "round.c", "controller.c", "-o", "round")
+    done = subprocess.run([str(tmp_path / "round")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+def test_command_writes_the_files_and_refuses_a_prefix_that_is_no_name(tmp_path: Path) -> None:
+    runner, app = CliRunner(), build()
+    out = tmp_path / "controller"
+    assert runner.invoke(app, ["export", "controller", "emps", "--out", str(out)]).exit_code == 0
+    assert {path.name for path in out.iterdir()} == {
+        "controller.h", "controller.c", "controller.hpp", "vectors.h", "main.c", "README.md",
+    }  # fmt: skip
+    assert "float voltage_V;" in (out / "controller.h").read_text()
+    wrong = runner.invoke(
+        app, ["export", "controller", "emps", "--prefix", "4fin", "--out", str(tmp_path / "b")]
+    )
+    assert isinstance(wrong.exception, InputError)
+    assert "allowed: letters" in str(wrong.exception)
+    assert not (tmp_path / "b").exists()

@@ -1,0 +1,94 @@
+"""The hosts of docs/hosts.md, each run as it stands there."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from actuator_lti import load_design
+from nonlinear import commands, loads, simulate
+from nonlinear._kernels import layout as at
+from nonlinear.drive import Drive
+
+PAGE = (Path(__file__).parents[2] / "docs" / "hosts.md").read_text(encoding="utf-8")
+PARTS = dict(re.findall(r"(?ms)^## ([^\n]+)\n(.*?)(?=^## |\Z)", PAGE))
+CC = shutil.which("gcc") or shutil.which("clang")
+needs_compiler = pytest.mark.skipif(CC is None, reason="no C compiler on this machine")
+
+
+def block(title: str, language: str, number: int = 0) -> str:
+    """A block of code of the page."""
+    return re.findall(rf"(?ms)^```{language}\n(.*?)^```", PARTS[title])[number]
+
+
+def said(folder: Path, *call: str) -> str:
+    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return done.stdout
+
+
+def exported(folder: Path, title: str) -> None:
+    """Runs the command of a section."""
+    words = block(title, "sh").split()
+    assert words[0] == "actuator-lti"
+    said(folder, sys.executable, "-m", "reports.cli", *words[1:])
+
+
+def python(folder: Path, text: str) -> str:
+    return said(folder, sys.executable, "-c", text)
+
+
+def compiled(folder: Path, title: str, *files: str) -> str:
+    (folder / "host.c").write_text(block(title, "c"))
+    call = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "host.c", *files)
+    said(folder, str(CC), *call, "-lm", "-o", "host")
+    return said(folder, str(folder / "host"))
+
+
+@pytest.fixture(scope="module")
+def truth() -> float:
+    design = load_design("ilr33-amber")
+    run = simulate(design, commands.step(0.01), 1001 * design.controller.period_s, loads.constant(0.0))
+    assert design.controller.period_s == 1e-4
+    return float(run.output_angle_rad[1000])
+
+
+@needs_compiler
+def test_the_host_in_c_has_the_bits_of_the_simulator(truth: float, tmp_path: Path) -> None:
+    exported(tmp_path, "C")
+    assert float(compiled(tmp_path, "C", "drive.c", "drive_design.c")) == truth
+
+
+@needs_compiler
+def test_the_host_of_the_unit(truth: float, tmp_path: Path) -> None:
+    pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
+    exported(tmp_path, "The unit")
+    assert float(python(tmp_path, block("The unit", "python"))) == pytest.approx(truth, rel=1e-9)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
+def test_the_host_in_javascript(truth: float, tmp_path: Path) -> None:
+    python(tmp_path, block("WebAssembly", "python"))
+    (tmp_path / "host.mjs").write_text(block("WebAssembly", "javascript"))
+    assert float(said(tmp_path, "node", "host.mjs")) == pytest.approx(truth, rel=1e-9)
+    assert at.IO_OUTPUT == 14  # the page says so
+
+
+def test_the_host_of_the_module_in_python(truth: float, tmp_path: Path) -> None:
+    pytest.importorskip("wasmtime", reason="wasmtime is not installed")
+    python(tmp_path, block("WebAssembly", "python"))
+    assert float(python(tmp_path, block("WebAssembly", "python", 1))) == pytest.approx(truth, rel=1e-9)
+
+
+@needs_compiler
+def test_the_controller_s_first_step(tmp_path: Path) -> None:
+    exported(tmp_path, "The controller alone")
+    voltage, at_limit = compiled(tmp_path, "The controller alone", "controller.c").split()
+    drive = Drive(load_design("ilr33-amber"))
+    assert float(voltage) == drive.control(0.01, 0.0, 0.0, 0.0)
+    assert int(at_limit) == int(drive.value("flags_outer")) & at.FLAG_SPEED == 1
