@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 from actuator_lti.asked.quantities import (
     DRIVE_QUANTITIES,
@@ -20,6 +20,7 @@ from analyses.large_signal.grid import LEAST_UPDATES
 from analyses.monte_carlo.judging import in_populations
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported
+from nonlinear.export.relations import relation_statements
 from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
@@ -30,6 +31,7 @@ from reports.live_schema import (
     MapData,
     NotFollowed,
     Refused,
+    SliderKey,
     StepData,
 )
 from reports.sections.amplitude_map import COLOURS, WORDS
@@ -43,7 +45,7 @@ LONGEST_TICKS = 20_000  # before a cell is looked at
 POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
 
 
-def live_model(design: Design, held: Collection[str] = ()) -> LiveData | Refused:
+def live_model(design: Design, held: Collection[str] = (), source: str | None = None) -> LiveData | Refused:
     """Give the page's data, or why there is none under ``refused``.
 
     Requirements on the loops of ``held``, which the report judges held (`analyses.linear.held_loops`), are
@@ -56,7 +58,7 @@ def live_model(design: Design, held: Collection[str] = ()) -> LiveData | Refused
     except InputError as refused:
         return {"refused": f"{refused}."}
     result = followed(design, _figures(design))
-    text, places = patches(design, result.free)
+    text, places = patches(design, result.free, source)
     return {
         "name": design.name,
         "axis": design.axis,
@@ -72,7 +74,7 @@ def live_model(design: Design, held: Collection[str] = ()) -> LiveData | Refused
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
         "point": _point(design, held),
-        "multiples": [list(pair) for pair in _multiples(design)],
+        "relations": _relations(design, result.free),
         "limiters": [list(limiter) for limiter in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
         "figures": [_followed(each) for each in LOOP_QUANTITIES.values() if each.followed],
@@ -83,7 +85,7 @@ def live_model(design: Design, held: Collection[str] = ()) -> LiveData | Refused
         "borders": list(BORDERS),
         "map": _map(design),
         "text": text,
-        "patches": places,
+        "patches": [list(place) for place in places],
     }
 
 
@@ -108,12 +110,10 @@ def _point(design: Design, held: Collection[str]) -> str:
     return " ".join(words)
 
 
-def _multiples(design: Design) -> list[tuple[str, str]]:
-    """Give the keys that must stay multiples of another."""
-    control = design.controller
-    if control.position is None or control.velocity is None:
-        return []
-    return [("control.position.every", "control.velocity.every")]
+def _relations(design: Design, keys: Sequence[SliderKey]) -> list[list[list[str | float]]]:
+    """Give what refuses keys that contradict each other: the checks of a design file, as statements."""
+    checks = relation_statements(design, {key["path"]: key["value"] for key in keys})
+    return [[statement.data for statement in check] for check in checks]
 
 
 def _limit(item: Requirement) -> FollowedLimit:

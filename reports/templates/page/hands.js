@@ -4,10 +4,11 @@ import { border, borderStart, drawBorder } from "./border.js";
 import { curvesOf, designed, draw, frame, kept } from "./curves.js";
 import { LOOP_NAMES, chart, data, desk, find, root, tell } from "./desk.js";
 import { holdCurves, marginMarks, stepGain } from "./drag.js";
-import { changedText, copy, save, sheet } from "./file.js";
+import { changedText, copy, save, savePatch, sheet } from "./file.js";
 import { fragment, fromFragment, keys, past, redo, reset, start, undo } from "./history.js";
 import { borderOf, compute, load, slow, stepOf } from "./module.js";
 import { take } from "./record.js";
+import { refusalOf } from "./relations.js";
 import { state } from "./requirements.js";
 import { makePanel, show } from "./sliders.js";
 import { table } from "./table.js";
@@ -15,11 +16,6 @@ import { drawRun, misfit, runKeys, runStart, trial, tried, unitOf } from "./tria
 import { all, digits, html } from "./words.js";
 
 let lastGood = start.slice();
-const unfit = (wanted) => { // why values do not go together; empty where they do
-  const at = (path) => wanted[keys.findIndex((key) => key.path === path)];
-  for (const [path, of] of data.multiples) if (at(path) % at(of) > 0) return `${path} = ${at(path)} is no multiple of ${of} = ${at(of)}: nothing follows until it is one.`;
-  return "";
-};
 const drawLoop = (name) => {
   const own = desk.now.loops[name], seen = kept[name];
   if (!own.figures || !seen) return;
@@ -31,7 +27,7 @@ const drawLoop = (name) => {
 const update = () => {
   const began = performance.now();
   let refused = "";
-  const apart = unfit(past.values), found = apart ? null : compute(past.values);
+  const why = refusalOf(past.values), apart = why && `Refused, nothing follows: ${why}.`, found = apart ? null : compute(past.values);
   if (found && data.loops.every((name) => found.loops[name].n !== 0)) { desk.now = found; lastGood = past.values; } else {
     refused = apart || "The last value needs another structure of the drive: save the file and make a new report.";
     desk.now = { ...desk.now, ...compute(keys.map((key, k) => lastGood[k])) };
@@ -93,7 +89,7 @@ const begin = () => {
   choose(desk.shown);
   const acts = {
     undo, redo, reset,
-    save, file: () => sheet(changedText()), link: () => sheet(location.href.split("#")[0] + fragment()),
+    save, patch: savePatch, file: () => sheet(changedText()), link: () => sheet((location.protocol === "file:" ? location.pathname.split("/").pop() : location.href.split("#")[0]) + fragment()),
     copy, close: () => { find(".sheet").hidden = true; },
   };
   root.addEventListener("click", (/** @type {any} */ event) => {

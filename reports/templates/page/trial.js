@@ -60,22 +60,25 @@ export const misfit = (part) => {
 
 export const runKeys = () => {
   const box = find(".run-keys"), { unit, factor } = data.step;
-  const make = (words, value, apply) => {
+  const make = (words, value, zero, apply) => {
     const label = html("label", "", words + " "), field = html("input", "field");
     field.type = "text";
     field.inputMode = "decimal";
     field.value = digits(value, 4);
+    const wrong = html("span", "wrong");
     field.addEventListener("change", () => {
-      const typed = Number(field.value.replace(",", "."));
-      if (!Number.isFinite(typed)) return;
+      const typed = Number(field.value.replace(",", ".").replace("−", "-")), fits = field.value.trim() !== "" && Number.isFinite(typed) && (zero || typed !== 0);
+      wrong.textContent = fits ? "" : `"${field.value}": a number${zero ? "" : " that is not 0"}`;
+      field.setAttribute("aria-invalid", String(!fits));
+      if (!fits) return;
       apply(typed);
       compute(start);
       runStart();
       desk.follow();
     });
-    label.append(field);
+    label.append(field, " ", wrong);
     box.append(label);
   };
-  make(`Command, ${unit}:`, trial.size / factor, (value) => { if (value !== 0) trial.size = value * factor; });
-  if (data.step.of === "output") make(data.axis === "linear" ? "Load force, N:" : "Load torque, N m:", 0, (value) => { trial.moment = value; });
+  make(`Command, ${unit}:`, trial.size / factor, false, (value) => { trial.size = value * factor; });
+  if (data.step.of === "output") make(data.axis === "linear" ? "Load force, N:" : "Load torque, N m:", 0, true, (value) => { trial.moment = value; });
 };
