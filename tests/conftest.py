@@ -1,6 +1,8 @@
 """The browser of all tests that look at a page; which tests are slow; a processor that is not at hand.
 
 ``OTHER_PROCESSOR=SEED``: every result of linear algebra a few ulp beside what it was (`machines.beside`).
+Examples that hypothesis draws are the same in every run and are not timed; ``--hypothesis-profile=search``
+draws new ones.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -20,6 +23,10 @@ if os.environ.get("OTHER_PROCESSOR"):
     from tests.machines import beside
 
     beside.install(int(os.environ["OTHER_PROCESSOR"]))
+
+settings.register_profile("search", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile("same", settings.get_profile("search"), derandomize=True, database=None)
+settings.load_profile("same")
 
 SLOW = Path(__file__).with_name("slow.txt")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")

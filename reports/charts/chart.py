@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, Discriminator, PlainValidator
+from pydantic import AfterValidator, Discriminator, Field, PlainValidator
 
 from actuator_lti.files.reading import shown
 from reports.charts.axis import Axis
@@ -40,6 +40,8 @@ def _read_colour(name: str) -> str:
 
 Numbers = Annotated[np.ndarray, PlainValidator(_read_numbers)]
 Colour = Annotated[str, AfterValidator(_read_colour)]  # a pen writes it as it stands
+Length = Annotated[float, Field(gt=0.0, le=10_000.0)]  # ticks are as many as have room
+Share = Annotated[float, Field(gt=0.0, le=1000.0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,8 +199,8 @@ class Column:
     """Panels one below the other; their x axes are one unless said otherwise."""
 
     panels: list[Panel]
-    heights: Sequence[float]
-    width: float = 1.0
+    heights: Sequence[Share]
+    width: Share = 1.0
     title: str = ""
     shared: bool = True
 
@@ -207,8 +209,8 @@ class Column:
 class Chart:
     """Columns side by side, in the units of the view box (a page shows about one pixel for each)."""
 
-    width: float = 420.0
-    height: float = 300.0
+    width: Length = 420.0
+    height: Length = 300.0
     columns: list[Column] = field(default_factory=list)
     title: str = ""
     legend: bool | None = None

@@ -16,7 +16,7 @@ from actuator_lti.design.settings_xml import read_settings_xml, write_settings_x
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
 
-MANY = settings(deadline=None, max_examples=100, suppress_health_check=list(HealthCheck))
+MANY = settings(max_examples=100, suppress_health_check=list(HealthCheck))
 AMBER = design_text("ilr33-amber")
 SETTINGS = '[objects]\n"0x2342.01" = 20\n"0x2344.01" = { value = 120000, name = "x" }\n"0x3000.01" = -4\n'
 SCALARS = st.one_of(

@@ -168,7 +168,7 @@ def any_objects(draw: st.DrawFn) -> ControllerObjects:
     return ControllerObjects(velocity_gain_factor=draw(st.sampled_from([1.0, PER_RPM])), values=tuple(order))
 
 
-@settings(deadline=None, max_examples=100)
+@settings(max_examples=100)
 @given(any_objects())
 def test_settings_survive_design_toml_and_xml(given_set: ControllerObjects) -> None:
     factor = given_set.velocity_gain_factor

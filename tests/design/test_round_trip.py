@@ -18,7 +18,7 @@ from actuator_lti.design import (
     write_design,
 )
 
-RELAXED = settings(deadline=None, max_examples=60, suppress_health_check=list(HealthCheck))
+RELAXED = settings(max_examples=60, suppress_health_check=list(HealthCheck))
 
 
 @pytest.mark.parametrize("name", shipped_designs())

@@ -88,10 +88,18 @@ def test_names_of_records_may_hold_anything(name, tmp_path, monkeypatch) -> None
 def test_a_line_on_standard_error_is_one_that_can_be_read(capsys) -> None:
     from reports.cli.main import main
 
-    for words in (["init", "9" * 5000], ["margins", "--load", "9" * 5000], ["keys", "--x" + "y" * 9000]):
+    obeyed = "\x1b[31m\u202e\x85"
+    for words in (
+        ["init", "9" * 5000],
+        ["margins", "--load", "9" * 5000],
+        ["keys", "--x" + "y" * 9000],
+        ["margins", "no" + obeyed],
+        ["keys", "--no" + obeyed],
+    ):
         assert main(words) == 2
         said = capsys.readouterr().err
-        assert said.count("\n") == 1
+        assert said.endswith("\n")
+        assert said[:-1].isprintable()
         assert len(said) < 1100
 
 

@@ -61,7 +61,7 @@ def _read(content: bytes, spec: RecordSpec) -> None:
     assert counts.lines == lines == counts.comments + counts.blanks + counts.header + counts.rows_in
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(
     rows=ROWS, layout=FORMATS, policy=st.sampled_from(["error", "drop"]), end=st.sampled_from(["\n", "\r\n"])
 )
@@ -72,13 +72,13 @@ def test_tables_of_odd_cells(rows: list[list[str]], layout: CsvFormat, policy: s
     _read(text.encode(), _spec(layout, policy))
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(content=st.binary(max_size=300), head=st.sampled_from([b"", b"t,x\n", b"t,x\n0,1\n1,2\n"]))
 def test_any_bytes_as_csv(content: bytes, head: bytes) -> None:
     _read(head + content, _spec(CsvFormat(), "drop"))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(content=st.binary(max_size=400), place=st.integers(0, 600), head=st.booleans())
 def test_any_bytes_as_mat(content: bytes, place: int, head: bool) -> None:
     spec = RecordSpec(time=TimeColumn(column="t"), signals=(SignalColumn(name="x", column="x"),))
@@ -94,7 +94,7 @@ def test_any_bytes_as_mat(content: bytes, place: int, head: bool) -> None:
     assert record.counts.rows_in == record.counts.rows_out + sum(record.counts.dropped.values())
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(text=st.one_of(st.text(max_size=200), st.binary(max_size=100).map(lambda b: b.decode("latin-1"))))
 def test_any_text_as_campaign(text: str) -> None:
     with tempfile.TemporaryDirectory() as folder:

@@ -13,7 +13,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.loops.delay_budget import delay_budget
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(designs(), st.floats(0.01, 0.8))
 def test_items_sum_to_the_phase_of_the_exact_loop(design: Design, fraction: float) -> None:
     loops = assemble_loops(design)

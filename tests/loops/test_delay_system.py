@@ -42,7 +42,7 @@ def test_series_parallel_feedback_are_exact() -> None:
         np.testing.assert_allclose(system(S), expected, rtol=1e-11)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.tuples(st.floats(0.1, 5), st.floats(0, 0.3)), min_size=1, max_size=5))
 def test_any_nest_of_delayed_loops(stages: list[tuple[float, float]]) -> None:
     system, expected = DelaySystem.from_system(1.0), np.ones(len(S), dtype=complex)

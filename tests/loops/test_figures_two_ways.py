@@ -36,7 +36,7 @@ def wider_designs(draw: st.DrawFn) -> Design:
     return replace(design, friction=friction, load=load, name="any")
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(wider_designs(), st.sampled_from([0.0, 3.0, -20.0]))
 def test_drive_figures(design: Design, load_Nm: float) -> None:
     """Speed, current, acceleration, torque margin, stiffness, lost motion."""
@@ -49,7 +49,7 @@ def test_drive_figures(design: Design, load_Nm: float) -> None:
         assert drive_figures(many, name, load_Nm) == pytest.approx([truth] * 2, rel=1e-9, nan_ok=True), name
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(wider_designs())
 def test_loop_figures(design: Design) -> None:
     """The margins of every loop; where one of the two withholds them it has no say."""

@@ -356,7 +356,7 @@ def test_stiffness_of_a_back_drivable_load() -> None:
     np.testing.assert_array_equal(held.open_loop.A, plain.open_loop.A)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(designs())
 def test_sensitivities_sum_to_one_in_every_form(design: Design) -> None:
     omega = np.geomspace(1, 0.9 * np.pi / (design.controller.position.every * 1e-4), 12)

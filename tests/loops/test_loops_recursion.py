@@ -55,7 +55,7 @@ def test_force_source_on_a_linear_axis() -> None:
     agree(emps(delay_s=5e-4), 4000, 1e-10, torque=-20.0)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(designs())
 def test_any_design(design: Design) -> None:
     agree(design, 120, 1e-9)

@@ -150,7 +150,7 @@ def wide_designs(draw: st.DrawFn) -> Design:
     )  # fmt: skip
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(wide_designs())
 def test_any_wide_design(design: Design) -> None:
     agree(design, 90, 1e-9)

@@ -58,7 +58,7 @@ def closed_loop_at(loop: control.TransferFunction, factor: complex, delay_s: flo
         return float(abs(above + below) / (abs(above) + abs(below)))
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(loops())
 def test_each_margin_brings_a_pole_to_the_border(loop: control.TransferFunction) -> None:
     m = stability_margins(loop)
@@ -73,7 +73,7 @@ def test_each_margin_brings_a_pole_to_the_border(loop: control.TransferFunction)
         assert closed_loop_at(loop, 1.0, delay.seconds, delay.frequency_rad_s) < 1e-6
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(loops())
 def test_a_gain_just_inside_keeps_the_verdict_and_just_outside_changes_it(
     loop: control.TransferFunction,
@@ -92,7 +92,7 @@ def test_a_gain_just_inside_keeps_the_verdict_and_just_outside_changes_it(
     assert tangent or outside.stable is not True
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(loops(sampled=False), st.floats(-2, 2, **finite))
 def test_scaling_time_scales_every_frequency(loop: control.TransferFunction, decade: float) -> None:
     k = 2.0 ** round(3.3 * decade)  # exact in binary
@@ -112,7 +112,7 @@ def test_scaling_time_scales_every_frequency(loop: control.TransferFunction, dec
         assert b.modulus_margin == pytest.approx(a.modulus_margin, rel=1e-6)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(loops(), st.floats(-1, 1, **finite))
 def test_scaling_gain_moves_gain_margins_and_leaves_their_frequencies(
     loop: control.TransferFunction, decade: float
@@ -131,7 +131,7 @@ def test_scaling_gain_moves_gain_margins_and_leaves_their_frequencies(
     assert [g.frequency_rad_s for g in after] == pytest.approx([g.frequency_rad_s for g in before], rel=1e-6)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(loops(), st.integers(0, 2**31))
 def test_smallest_distances_are_not_undercut_on_a_grid(loop: control.TransferFunction, seed: int) -> None:
     m = stability_margins(loop)
@@ -160,7 +160,7 @@ def wound(loop: control.TransferFunction, delay_s: float, crossovers: list[float
     return -round(float(np.angle(f[1:] / f[:-1]).sum()) / math.pi)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(loops(sampled=False), st.floats(0.02, 0.98, **finite))
 def test_delays_below_the_margin_keep_stability_and_above_it_end_it(
     loop: control.TransferFunction, part: float

@@ -70,7 +70,7 @@ def test_inner_delays_against_numpy_on_a_fine_grid() -> None:
     assert unwrapped_phase_deg(loop, omega[pick]) == pytest.approx(fine[pick], abs=1e-6)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.lists(st.floats(1e-2, 1e4), min_size=1, max_size=6), st.floats(0, 0.1))
 def test_grid_and_order_do_not_matter(omega: list[float], delay_s: float) -> None:
     loop = control.ss(1e5 * (s - 3) / (s * (s + 1) * (s**2 + 0.5 * s + 400)))

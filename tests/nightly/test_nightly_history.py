@@ -37,7 +37,7 @@ def add(history: History, values: Values | None, day: int = 1, unit: str = "dB",
         st.none() | st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=8,
     )
 )  # fmt: skip
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_every_figure_comes_back_to_the_last_bit(tmp_path_factory, values) -> None:
     state = tmp_path_factory.mktemp("h")
     with open_history(state) as history:

@@ -134,7 +134,7 @@ def test_markdown_has_no_links_and_no_html_of_a_name(hostile_site) -> None:
 
 
 @given(name=st.text(max_size=60), loop=st.text(max_size=30))
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_text_at_all_makes_a_whole_site(tmp_path_factory, name: str, loop: str) -> None:
     site = tmp_path_factory.mktemp("any") / "site"
     name = name if one_line(name) else "-"
@@ -146,7 +146,7 @@ def test_any_text_at_all_makes_a_whole_site(tmp_path_factory, name: str, loop: s
 
 
 @given(title=st.text(max_size=40))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_chart_is_well_formed_whatever_it_is_called(title: str) -> None:
     import numpy as np
 
@@ -182,7 +182,7 @@ STUDY_PARTS = st.recursive(
         max_size=4,
     )
 )
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60)
 def test_any_study_file_is_read_or_refused_in_one_line(tmp_path_factory, tree) -> None:
     import tomli_w
 

@@ -141,7 +141,7 @@ def test_hostile_words_are_typeset_as_they_are(words: str) -> None:
 
 
 @given(st.text(max_size=40))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_any_text_can_be_typeset(words: str) -> None:
     assert len(read(pdf_bytes(rich_document(words or "-"))).pages) >= 2
 

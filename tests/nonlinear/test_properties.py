@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuator_lti import load_design
@@ -76,7 +76,7 @@ def drives(draw: st.DrawFn) -> Design:
     return replace(BASE, motor=motor, friction=friction, controller=controller, encoder=encoder, load=load)
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=120)
 @given(
     design=drives(),
     amplitude=factor(2.0),

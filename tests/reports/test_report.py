@@ -249,7 +249,14 @@ def test_names_in_a_figure_stay_text(on_page: bool) -> None:
 
 @pytest.mark.parametrize(
     ("path", "value"),
-    [("width", "wide"), ("columns", [{"panels": 3}]), ("items", [{"kind": "pie"}]), ("x", [{}])],
+    [
+        ("width", "wide"),
+        ("width", 1e300),
+        ("height", 0.0),
+        ("columns", [{"panels": 3}]),
+        ("items", [{"kind": "pie"}]),
+        ("x", [{}]),
+    ],
 )
 def test_what_is_no_chart_is_refused_with_its_place(path: str, value: Any) -> None:
     chart = Chart()

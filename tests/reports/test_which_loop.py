@@ -113,7 +113,7 @@ def test_the_profile_acts_from_its_closed_form_on(screw: Design, hz: float) -> N
         assert bool(((run.limit_flags & 128) != 0).any()) is acts
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(samples=st.integers(2, 900))
 def test_the_bandwidth_behind_a_mean_is_that_of_a_dense_grid(samples: int) -> None:
     response = assemble_loops(load_design("ilr33-amber")).plain_response

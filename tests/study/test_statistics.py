@@ -61,7 +61,7 @@ def test_of_more_values_a_quantile_is_that_of_a_narrow_bin(values):
     cuts=st.lists(st.integers(1, 59), max_size=6),
     seed=st.integers(0, 99),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_sketches_of_parts_are_that_of_the_whole_in_any_order(values, cuts, seed):
     """Also where bits are dropped: at most 16 bins here."""
     column = np.array(values)
