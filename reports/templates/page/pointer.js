@@ -52,6 +52,7 @@ export const listen = (chart, picture) => {
     chart.hide();
     chart.root.dispatchEvent(new CustomEvent("chart:at", { detail: { hertz: null } }));
   });
+  svg.addEventListener("mousedown", (event) => { if (event.detail > 1) event.preventDefault(); }); // no text is selected
   svg.addEventListener("dblclick", (event) => {
     const found = placeOf(picture, event);
     if (found) chart.zoom(found.panel, found.x, found.y, 2);
