@@ -110,6 +110,7 @@ class LiveData(TypedDict):
     points: dict[str, int]
     point: str
     relations: list[list[list[str | float]]]
+    electrical: bool
     limiters: list[list[object]]
     quantities: list[str]
     figures: list[FollowedFigure]

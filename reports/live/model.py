@@ -14,6 +14,7 @@ from actuator_lti.asked.quantities import (
     judged_loops,
 )
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.grid import LEAST_UPDATES
@@ -75,7 +76,8 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
         "points": POINTS,
         "point": _point(design, held),
         "relations": _relations(design, result.free),
-        "limiters": [list(limiter) for limiter in page.LIMITERS],
+        "electrical": design.motor.has_electrical_dynamics,
+        "limiters": [[name, bit, LIMITERS[name].words, LIMITERS[name].signal] for name, bit in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
         "figures": [_followed(each) for each in LOOP_QUANTITIES.values() if each.followed],
         "requirements": [*_on_loops(design, held), *_on_drive(design, result.figures)],

@@ -12,6 +12,7 @@ globalThis.document = { getElementById: (name) => page[name] ?? null };
 
 const { Axis } = await import("../../reports/templates/page/axis.js");
 const { recordOf } = await import("../../reports/templates/page/columns.js");
+const { commandOf, lengthOf, spansOf } = await import("../../reports/templates/page/commands.js");
 const { unified } = await import("../../reports/templates/page/diff.js");
 const { checkOf, general } = await import("../../reports/templates/page/relations.js");
 const { rowOf, statementOf } = await import("../../reports/templates/page/row.js");
@@ -113,4 +114,16 @@ test("a patch makes of the one text the other", () => {
     execFileSync("git", ["apply", "-"], { cwd: folder, input: patch, env: { ...process.env, GIT_DIR: join(folder, "none"), GIT_CEILING_DIRECTORIES: folder } });
     assert.equal(readFileSync(file, "utf8"), after);
   }
+});
+
+test("commands go where they are told, in the time that is said", () => {
+  near(commandOf({ kind: "sine", size: 2, hertz: 5 })(0.05), 2);
+  for (const size of [3, -3]) {
+    const ramp = commandOf({ kind: "ramp", size, rate: 6 }), back = commandOf({ kind: "back", size, rate: 6 });
+    assert.deepEqual([0, 0.25, 0.5, 2].map((t) => ramp(t) + 0), [0, size / 2, size, size]);
+    assert.deepEqual([0, 0.25, 0.5, 1, 1.25, 1.5, 9].map((t) => Math.abs(back(t))), [0, 1.5, 3, 3, 1.5, 0, 0]);
+    near(lengthOf({ kind: "back", size, rate: 6 }, 0.5), 2);
+  }
+  assert.deepEqual(spansOf([0, 1, 1, 0, 3, 0, 0, 0, 1], 1, 1), [[1, 5], [8, 9]]);
+  assert.deepEqual(spansOf([0, 1, 1, 0, 3], 2, 1), [[4, 5]]);
 });

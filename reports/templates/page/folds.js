@@ -1,21 +1,21 @@
 // Folds that open where a link leads, and wide tables that say so.
-import { all } from "./words.js";
+import { all, unfold } from "./words.js";
 
-const unfold = (target) => {
-  for (let node = target; node; node = node.parentElement) if (node.tagName === "DETAILS") node.open = true;
+const open = (target) => {
+  unfold(target);
   const own = target?.querySelector(":scope > details");
   if (own) own.open = true;
 };
 const follow = () => {
   let name = location.hash.slice(1);
   try { name = decodeURIComponent(name); } catch { /* no text of ours */ }
-  if (name) unfold(document.getElementById(name));
+  if (name) open(document.getElementById(name));
 };
 addEventListener("hashchange", follow);
 // a link to where one is already is no change of the address
 document.addEventListener("click", (event) => {
   const link = event.target instanceof Element && event.target.closest('a[href^="#"]');
-  if (link) unfold(document.getElementById(decodeURIComponent(link.getAttribute("href").slice(1))));
+  if (link) open(document.getElementById(decodeURIComponent(link.getAttribute("href").slice(1))));
 });
 follow();
 if (matchMedia("(max-width: 68rem)").matches) all(".toc details").forEach((d) => (d.open = false));

@@ -12,7 +12,7 @@ import { refusalOf } from "./relations.js";
 import { state } from "./requirements.js";
 import { makePanel, show } from "./sliders.js";
 import { table } from "./table.js";
-import { drawRun, misfit, runKeys, runStart, trial, tried, unitOf } from "./trial.js";
+import { drawRuns, misfit, playSine, runKeys, runStart, trial, tried } from "./trial.js";
 import { all, digits, html } from "./words.js";
 
 let lastGood = start.slice();
@@ -38,8 +38,8 @@ const update = () => {
   drawLoop(desk.shown);
   drawBorder("as changed", borderOf(desk.now.row, border.grid));
   const part = tried(desk.now.row);
-  drawRun("as changed", part, unitOf()[0]);
-  const acting = data.limiters.filter(([, bit]) => desk.acted & bit).map(([name]) => name);
+  drawRuns(part);
+  const acting = data.limiters.filter(([, bit]) => desk.acted & bit).map(([, , words]) => words);
   find(".acting").textContent = acting.length ? `Limits that act as changed: ${acting.join(", ")}.` : "No limit acts as changed.";
   if (desk.record && part.y) find(".record").textContent = `${desk.record.name}: ${desk.record.time.length} samples. Model as changed: ${digits(misfit(part), 3)} % rms of the largest command; as designed: ${digits(misfit(trial.designed), 3)} %.`;
   root.dataset.ms = (performance.now() - began).toFixed(1);
@@ -83,6 +83,7 @@ const begin = () => {
   for (const name of ["bode", "nyquist", "sensitivity"]) chart(name).addEventListener("chart:at", (/** @type {any} */ event) => {
     for (const other of ["bode", "nyquist", "sensitivity"]) if (other !== name) tell(other, "chart:show", event.detail);
   });
+  chart("border").addEventListener("chart:click", (/** @type {any} */ { detail }) => playSine(detail.x, detail.y));
   runKeys();
   runStart();
   borderStart();

@@ -45,6 +45,10 @@ export const listen = (chart, picture) => {
     const pinned = chart.pinned;
     chart.hide();
     if (read(chart, picture, event) && !pinned) chart.pinned = true;
+    const found = placeOf(picture, event);
+    if (!found) return;
+    const [px, py] = found.panel.back(found.x, found.y);
+    chart.root.dispatchEvent(new CustomEvent("chart:click", { detail: { x: found.panel.x.value(px), y: found.panel.y.value(py) } }));
   };
   for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, release);
   svg.addEventListener("pointerleave", () => {
