@@ -42,6 +42,7 @@ def ask(page: Page, kind: str, **values: float) -> dict[str, float]:
 
 
 def last(page: Page) -> dict[str, float]:
+    page.wait_for_selector("#hands-on[data-behind=done]")
     found: dict[str, float] = json.loads(page.get_attribute(".hands-run", "data-last") or "{}")
     return found
 

@@ -207,11 +207,13 @@ def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path: Path) -> 
         document.querySelector("#hands-on").dispatchEvent(drop);
     }"""
     settled(page, lambda: page.evaluate(drop, text))
+    page.wait_for_selector("#hands-on[data-behind=done]")
     words = page.inner_text(".record")
     assert "bench.csv" in words
     off = float(words.split("as changed: ")[1].split(" %")[0].replace("×10", "e"))
     assert off > 0.5
     type_value(page, "control.position.gain", 80.0)
+    page.wait_for_selector("#hands-on[data-behind=done]")
     words = page.inner_text(".record")
     fits = words.split("as changed: ")[1].split(" %")[0].replace("−", "-")
     assert float(fits) < 1e-6

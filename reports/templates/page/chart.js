@@ -44,6 +44,7 @@ export class Chart {
     root.addEventListener("chart:axes", (event) => this.rescale(event.detail));
   }
   legend() {
+    for (const list of this.root.querySelectorAll(".keys ul")) list.setAttribute("role", "presentation"); // its items are switches
     for (const item of this.root.querySelectorAll(".keys li")) {
       const key = item.dataset.k;
       this.labels[key] = item.textContent;

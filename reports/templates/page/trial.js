@@ -1,7 +1,7 @@
 // The run with limits and friction: a step, a sine, a ramp, or the command of a record.
 import { KINDS, commandOf, lengthOf, spansOf } from "./commands.js";
 import { thinned } from "./curves.js";
-import { data, desk, find, tell } from "./desk.js";
+import { PLACE, data, desk, find, outer, tell } from "./desk.js";
 import { start } from "./history.js";
 import { compute, run, view, x } from "./module.js";
 import { digits, html } from "./words.js";
@@ -34,7 +34,7 @@ const measure = () => { // how long the run takes: that of a step, as designed, 
   const y = run(Math.min(Math.ceil(6 / T), 6000), () => trial.size, trial.size, trial.moment)?.y || [];
   let last = 0;
   for (let k = 0; k < y.length; k++) if (Math.abs(y[k] - 1) > 0.02) last = k;
-  trial.length = lengthOf(trial, Math.max(1.4 * last, 60) * T);
+  trial.length = Math.min(lengthOf(trial, Math.max(1.4 * last, 60) * T), MOST * T);
 };
 /** @type {() => [number, string]} */
 export const unitOf = () => (trial.length < 2 ? [1e3, "ms"] : [1, "s"]);
@@ -127,6 +127,8 @@ export const runKeys = () => {
   choice.append(kinds);
   box.append(choice);
   trial.rate = Math.abs(trial.size) * 5;
+  const band = desk.before.loops[outer].figures?.[PLACE.bandwidth];
+  if (band > 0 && Number.isFinite(band)) trial.hertz = Number((band / 3).toPrecision(2));
   const make = (name, words, over, fits) => {
     const label = html("label", "", words + " "), field = html("input", "field"), wrong = html("span", "wrong");
     field.type = "text";
