@@ -34,7 +34,7 @@ class Option:
         ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without;
         ``"command"``: of the command of the outermost loop, with or without.
     argument : bool
-        Whether it stands by its place, without a flag, and has to be given.
+        Whether it stands by its place, without a flag; it has to be given where it has no default.
     """
 
     words: str
@@ -82,6 +82,9 @@ POINT = Option(
     "load's share of the friction) and gap (in the play); sliding.",
     metavar="POINT",
 )
+
+
+FORCE = Option(words="Overwrite files that exist.")
 
 
 @dataclass(frozen=True, kw_only=True)

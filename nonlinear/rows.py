@@ -29,10 +29,10 @@ from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.row.parameters import design_rows
 from nonlinear.runs.batch import Progress, run_rows
 from nonlinear.runs.reduced import COLUMNS, BatchResult
+from nonlinear.runs.running import Running
 from nonlinear.runs.setup import Tables
 from nonlinear.runs.simulation import run_row
 from nonlinear.runs.trajectory import Trajectory
-from nonlinear.settling.running import Running
 
 Floats = npt.NDArray[np.float64]
 LIMITERS = at.LIMITERS

@@ -24,6 +24,9 @@ from analyses.motion.asked import Asked as MotionAsked
 from analyses.studies.study_asked import Asked as StudyAsked
 from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.asked import Asked as ValidationAsked
+from reports.design_files.keys import Asked as KeysAsked
+from reports.design_files.start import Asked as StartAsked
+from reports.exports.asked import AskedC, AskedFmu, AskedLinear
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -55,6 +58,10 @@ class Analysis:
         Whether a report has the section where it is asked for (``--also``).
     doing : str
         What the bar says while the function works, which then takes ``progress``.
+    alone : bool
+        Whether it is asked of no design; it has no page then.
+    page : bool
+        Whether it has a page (``--out``).
     study : bool
         Whether it is asked of a study (a file, or a design with variants), not of a design.
     written : str
@@ -79,6 +86,8 @@ class Analysis:
     shown: str = ""
     also: bool = False
     doing: str = ""
+    alone: bool = False
+    page: bool = True
     study: bool = False
     keeps: bool = False
     written: str = ""
@@ -98,7 +107,8 @@ class Analysis:
     def run(self, design: Design | Study | None, *asked: Any, **more: Any) -> Any:
         """Ask."""
         package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
-        return getattr(import_module(package), name)(design, *asked, **more)
+        of = () if self.alone else (design,)
+        return getattr(import_module(package), name)(*of, *asked, **more)
 
     def sections(self, result: Any) -> list[Section]:
         """Show: ``section(result)`` of the section's module, one or several."""
@@ -132,6 +142,37 @@ class Analysis:
 
 
 ANALYSES = (
+    Analysis(
+        name="designs",
+        group="Designs",
+        alone=True,
+        function="reports.design_files.catalogue.catalogue",
+        shown="listing",
+        words="List the shipped designs: name, title, and the stages that each drive has.",
+    ),
+    Analysis(
+        name="init",
+        group="Designs",
+        alone=True,
+        request=StartAsked,
+        function="reports.design_files.start.start",
+        shown="listing",
+        words="Write a commented design file to start one's own drive from.",
+    ),
+    Analysis(
+        name="keys",
+        group="Designs",
+        alone=True,
+        request=KeysAsked,
+        function="reports.design_files.keys.keys",
+        shown="listing",
+        words="""
+        List the keys of a design file: unit, default, allowed range, meaning, example.
+
+        A repeated table stands as gear.* (by name), friction.point.* and control.velocity.filter.* (by
+        number). Try: actuator-lti keys notch, or actuator-lti keys --explain my.toml
+        """,
+    ),
     Analysis(
         name="margins",
         group="Linear loops",
@@ -198,7 +239,8 @@ ANALYSES = (
 
         The duty is a sine under a load, for a share of the time; what is not given comes from
         \\[duty]. The temperature needs thermal_resistance and thermal_time in \\[temperature], the
-        protection limits.peak_time. The exit status is 1 where the drive cannot do the duty for ever.
+        protection limits.peak_time. The exit status is 1 where the duty is beyond the continuous rating, or
+        where none is stated.
         """,
     ),
     Analysis(
@@ -353,7 +395,38 @@ ANALYSES = (
         cannot be met.
         """,
     ),
+    Analysis(
+        name="export c",
+        group="Out of Python",
+        page=False,
+        request=AskedC,
+        function="reports.exports.run.export_c",
+        shown="listing",
+        words="Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README.",
+    ),
+    Analysis(
+        name="export fmu",
+        group="Out of Python",
+        page=False,
+        request=AskedFmu,
+        function="reports.exports.run.export_fmu",
+        shown="listing",
+        words="Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a "
+        "parameter.",
+    ),
+    Analysis(
+        name="export linear",
+        group="Out of Python",
+        page=False,
+        request=AskedLinear,
+        function="reports.exports.run.export_linear",
+        shown="listing",
+        words="Write every loop, break point, command and load response as state space, with units and "
+        "margins.",
+    ),
 )
+COMMANDS_IN = {"export": "The drive outside of Python: C99, FMU, linear models."}
+"""Words of a name that stands before others."""
 BY_NAME = {one.name: one for one in ANALYSES}
 FURTHER = tuple(one.name for one in ANALYSES if one.also)
 """Sections that a report has only where they are asked for, as they take their time."""

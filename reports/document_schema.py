@@ -137,7 +137,10 @@ class FactsBlock(TypedDict):
 
 @_strict
 class VerdictItem(TypedDict):
-    """One verdict; ``waiver`` says by what one that is not proven is waived, else it is empty."""
+    """One verdict; ``waiver`` says by what one that is not proven is waived, else it is empty.
+
+    ``gathers`` counts the checks that it stands for, where these are several.
+    """
 
     id: str
     label: str
@@ -152,6 +155,7 @@ class VerdictItem(TypedDict):
     reason: str
     loop: NotRequired[str | None]
     quantity: NotRequired[str]
+    gathers: NotRequired[Counts]
 
 
 @_strict

@@ -63,7 +63,7 @@ def linear_models(design: Design) -> Tree:
 
     about = {"name": design.name, "revision": design.revision or "", "hash": design_hash(design)}
     tree: Tree = {"schema": SCHEMA, "version": 1, "design": about}
-    for form in FORMS:
+    for form in FORMS[:1] if design.controller.sampled_only else FORMS:
         tree[form] = _form(assemble_loops(design, form))
     return tree
 

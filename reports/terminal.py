@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from actuator_lti.asked.verdict import Verdict
-from reports.cli.output import console
+from reports.cli.output import console, printable
 from reports.html import show_signed
 from reports.numbers import show
 from reports.verdict_summary import role, why
@@ -59,14 +59,14 @@ def print_verdict(passed: bool | Verdict, words: str, *, failed: str = "FAIL") -
     verdict = passed if isinstance(passed, Verdict) else Verdict.of(passed)
     head = failed if passed is False else HEADS[verdict]
     line = Text().append(head, style=COLOURS[verdict.role()])
-    console().print(line.append(f"  {words}"), soft_wrap=True)
+    console().print(line.append(f"  {printable(words)}"), soft_wrap=True)
 
 
 def print_section(section: Mapping[str, Any], passed: bool | Verdict | None, name: str = "") -> None:
     """Print a section: verdict or result first (of ``name``), then how it was found, then its tables."""
     words = f"{name}: {section['result']}" if name else section["result"]
     if passed is None:
-        console().print(Text(words), soft_wrap=True)
+        console().print(Text(printable(words)), soft_wrap=True)
     else:
         print_verdict(passed, words)
     if section["intro"]:

@@ -23,8 +23,14 @@ _SECTIONS: tuple[tuple[str, str, Role], ...] = (
 
 def tally(items: Iterable[Mapping[str, Any]]) -> Tally:
     """Count items of `reports.document.verdicts`."""
-    every = list(items)
-    return Tally.of((Verdict(item["verdict"]) for item in every), (bool(item["waiver"]) for item in every))
+    return sum((_counted(item) for item in items), Tally())
+
+
+def _counted(item: Mapping[str, Any]) -> Tally:
+    """One item, or the checks that it gathers."""
+    if (gathered := item.get("gathers")) is not None:
+        return Tally(**gathered)
+    return Tally.of([Verdict(item["verdict"])], [bool(item["waiver"])])
 
 
 def role(item: Mapping[str, Any]) -> Role:

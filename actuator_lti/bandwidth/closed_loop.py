@@ -3,32 +3,30 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, overload
 
 import flint
-import numpy as np
-from scipy.optimize import brentq
 
 from actuator_lti.bandwidth.exact_gain import exact_gain
 from actuator_lti.bandwidth.measured import measured_bandwidth
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
 from actuator_lti.errors import InputError
-from actuator_lti.margins.delay_distance import delayed_extreme
-from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, delay_form, from_rational
-from actuator_lti.margins.delay_setting import low_frequency
-from actuator_lti.margins.delayed import delayed_gain_crossings
-from actuator_lti.margins.distances import complementary, inverse, modulus
-from actuator_lti.margins.exact_extremes import complementary_margin, modulus_margin
-from actuator_lti.margins.exact_loop import exact_loop
-from actuator_lti.margins.given import Given, given_of
-from actuator_lti.margins.loop import Mask, RationalLoop, rational_loop
+from actuator_lti.margins.delay_form import delay_form, in_series
+from actuator_lti.margins.delay_response import DelayResponse
+from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS
+from actuator_lti.margins.exact_extremes import smallest
+from actuator_lti.margins.exact_loop import exact_loop, exact_polynomials
+from actuator_lti.margins.given import Given, given_of, whole_samples
+from actuator_lti.margins.late_response import first_turn, nearest_behind_delay
+from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
 from actuator_lti.margins.measured_data import is_measured
-from actuator_lti.margins.sweep import subdivided, variation
 from actuator_lti.systems.exact_fraction import Fraction, dc_noise, double, exact_fraction, shown
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.rest_mode import without_rest_mode
 
 _FLOOR = 1e-6  # of the gain at zero frequency: the phase is followed down to it
+_PEAKS = (MODULUS, COMPLEMENTARY)
 _TAKEN = flint.fmpq(1, 1000)
 _POLE = "the response has a pole at zero frequency: it is no closed loop with a bandwidth"
 _NO_GAIN = "DC gain is 0: no -3 dB bandwidth (the response is zero at zero frequency)"
@@ -72,15 +70,18 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     gain = exact_gain(seen, loop.in_z)
     if gain is None:
         raise InputError(_POLE)
-    if seen is not fraction and _taken(fraction, gain.dc, 1 if loop.in_z else 0):
-        raise InputError(_NO_GAIN)
+    if seen is not fraction:
+        at = 1 if loop.in_z else 0
+        if _taken(fraction, gain.dc, at):
+            raise InputError(_NO_GAIN)
+        if _told(given_of(system), gain.dc, at):
+            gain = exact_gain(fraction, loop.in_z) or gain
     if abs(double(gain.dc)) <= dc_noise(loop):
         raise InputError(_NO_GAIN)
     peak, place = gain.largest()
     turn = _unwarped(gain.first_turn(_FLOOR**2), loop)
     if delay_s:
-        turn = _first_turn(from_rational(loop, delay_s), double(gain.dc))
-        turn = None if turn is None else loop.frequency(turn) if loop.in_z else turn
+        turn = first_turn(loop, delay_s, _FLOOR * abs(double(gain.dc)))
     crossings = [_unwarped(w, loop) for w in gain.crossings(SQUARES[level])]
     return _bandwidth(crossings, turn, 20.0 * math.log10(peak) if peak < math.inf else peak,
                       _unwarped(place, loop), double(gain.dc), level)  # fmt: skip
@@ -90,6 +91,16 @@ def _taken(fraction: Fraction, dc: flint.fmpq, at: int) -> bool:
     """Whether a mode seen at zero frequency alone takes the gain away there: a spring, however weak."""
     below = fraction.den(at)
     return bool(below != 0 and abs(fraction.num(at) / below) < _TAKEN * abs(dc))
+
+
+def _told(given: Given, dc: flint.fmpq, at: int) -> bool:
+    """Whether 8 ulp of the entries leave the gain at zero frequency what it is, apart from that given."""
+    values = []
+    for num, den in map(exact_polynomials, (given, *given.neighbours())):
+        if den(at) == 0:
+            return False
+        values.append(flint.fmpq(num(at), den(at)))
+    return all(abs(value - values[0]) < abs(values[0] - dc) / 100 for value in values[1:])
 
 
 def _without_rest_mode(system: Any) -> Any:
@@ -127,12 +138,16 @@ def _unwarped(w: float | None, loop: RationalLoop | Given) -> float | None:
 
 
 def _of_delays(system: Any, delay_s: float, level: Level) -> Bandwidth:
-    form = delay_form(system, delay_s)
-    dc = _dc(form)
-    falls = delayed_gain_crossings(form.without_series(), abs(dc) * math.sqrt(SQUARES[level]))
-    least, place = delayed_extreme(form.without_series(), inverse)
+    response = DelayResponse.of(delay_form(system, delay_s))
+    if response.order > 0:
+        raise InputError(_POLE)
+    if response.order:
+        raise InputError(_NO_GAIN)
+    dc = response.lead
+    falls = response.crossings(abs(dc) * math.sqrt(SQUARES[level]))
+    least, place = response.smallest(INVERSE)
     peak_db = -20.0 * math.log10(least * abs(dc)) if least > 0.0 else math.inf
-    return _bandwidth(list(falls), _first_turn(form, dc), peak_db, place, dc, level)
+    return _bandwidth(falls, response.first_turn(_FLOOR * abs(dc)), peak_db, place, dc, level)
 
 
 def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
@@ -150,93 +165,21 @@ def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
             "measured data: the peak of S is 1 over stability_margins(L).modulus_margin, in its range"
         )
     inner = hasattr(system, "delays_s") and system.delays_s.size > 0
-    if inner or delay_s:
-        form = (
-            delay_form(system, delay_s)
-            if hasattr(system, "delays_s")
-            else from_rational(rational_loop(system), delay_s)
-        )
-        result = [delayed_extreme(form, distance) for distance in (modulus, complementary)]
-        unit = 1.0 if form.period_s is None else 1.0 / form.period_s
+    given = None if inner else given_of(system.to_state_space() if hasattr(system, "delays_s") else system)
+    whole = whole_samples(delay_s / given.period_s) if given is not None and given.period_s else 0
+    if given is None or (delay_s and given.period_s is None):
+        form = delay_form(system, delay_s) if given is None else in_series(loop_of(given), delay_s)
+        response = DelayResponse.of(form)
+        result = [response.smallest(distance) for distance in _PEAKS]
+    elif whole is None:
+        result = nearest_behind_delay(loop_of(given, warp=True), delay_s, _PEAKS)
     else:
-        given = given_of(system.to_state_space() if hasattr(system, "delays_s") else system)
-        loop = exact_loop(given)
-        result = [
-            (value, _unwarped(w, given)) for value, w in (modulus_margin(loop), complementary_margin(loop))
-        ]
-        unit = 1.0
+        loop = exact_loop(replace(given, samples=whole))
+        result = [smallest(loop, distance) for distance in _PEAKS]
+        result = [(value, _unwarped(w, given)) for value, w in result]
     (s_value, s_place), (t_value, t_place) = result
-    return Peaks(_db(s_value), s_place * unit, _db(t_value), t_place * unit)
+    return Peaks(_db(s_value), s_place, _db(t_value), t_place)
 
 
 def _db(inverse: float) -> float:
     return 0.0 - 20.0 * math.log10(inverse) if inverse > 0.0 else math.inf
-
-
-def _dc(form: DelayForm) -> float:
-    low, order = low_frequency(form)
-    if order:
-        raise InputError(_POLE)
-    value = _value_at_rest(form.without_series(), low)
-    reference = float(np.abs(border_values(form.without_series(), np.array([low * 1e3])))[0])
-    if abs(value) <= 1e-12 * reference:
-        raise InputError(_NO_GAIN)
-    return value
-
-
-def _value_at_rest(form: DelayForm, low: float) -> float:
-    """L(0), exact where a mode at rest that L does not show leaves 0/0; at ``low`` where none is."""
-    if not form.sampled and form.delays.size:
-        from actuator_lti.margins.exact_delay import singular_at_rest, value_at_rest  # flint if needed
-
-        if singular_at_rest(form) and (exact := value_at_rest(form)) is not None:
-            return exact
-    try:
-        value = float(border_values(form, np.zeros(1))[0].real)
-    except np.linalg.LinAlgError:
-        value = math.nan
-    return value if math.isfinite(value) else float(border_values(form, np.array([low]))[0].real)
-
-
-def _first_turn(form: DelayForm, dc: float) -> float | None:
-    """First x at which the phase, followed from zero frequency, falls below -90 deg.
-
-    The phase is followed as long as the gain is above 1e-6 of its value at zero frequency.
-    """
-    low, _ = low_frequency(form)
-    high = math.pi if form.sampled else low * 10.0
-    floor = _FLOOR * abs(dc)
-
-    def resolved(intervals: Intervals) -> Mask:
-        size, R = np.abs(intervals.L), variation(form, intervals)
-        return (0.3 * size > R) | (size + R < floor)
-
-    x0, L0 = low, complex(border_values(form, np.array([low]))[0]) * float(np.sign(dc))
-    phase0 = float(np.angle(L0))
-    for _ in range(1 if form.sampled else 20):
-        intervals = subdivided(form, np.geomspace(x0, high, 12), resolved)
-        L = np.concatenate(([L0], intervals.L * np.sign(dc)))
-        x = np.concatenate(([x0], intervals.x))
-        phase = phase0 + np.concatenate(([0.0], np.cumsum(np.angle(L[1:] * L[:-1].conj()))))
-        low_gain = np.abs(L) < floor
-        below = np.flatnonzero((phase < -0.5 * np.pi) & ~np.maximum.accumulate(low_gain))
-        if below.size and below[0] > 0:
-            k = int(below[0])
-            return _turn_between(
-                form, (float(x[k - 1]), float(x[k])), complex(L[k - 1]), float(phase[k - 1]), dc
-            )
-        if low_gain.any():
-            return None
-        x0, L0, phase0 = float(x[-1]), complex(L[-1]), float(phase[-1])
-        high *= 10.0
-    return None
-
-
-def _turn_between(
-    form: DelayForm, bracket: tuple[float, float], L_before: complex, phase_before: float, dc: float
-) -> float:
-    def excess(x: float) -> float:
-        L = complex(border_values(form, np.array([x]))[0]) * float(np.sign(dc))
-        return phase_before + float(np.angle(L * L_before.conjugate())) + 0.5 * np.pi
-
-    return float(brentq(excess, *bracket, xtol=1e-300, rtol=1e-14))

@@ -317,9 +317,17 @@ def _command_path(wired: Drive) -> tuple[Any, Block | None]:
     With a P controller that feeds back the output itself, T (1 + lead (1 - 1/z)) is that response.
     """
     law, T = wired.design.controller.position_loop, wired.period_s("position")
-    plain = law.integral_time_s is None and not any(
-        present(each)
-        for each in (law.derivative_time_s, law.acceleration_feedforward, wired.design.command.filter_time_s)
+    plain = (
+        law.law is None
+        and law.integral_time_s is None
+        and not any(
+            present(each)
+            for each in (
+                law.derivative_time_s,
+                law.acceleration_feedforward,
+                wired.design.command.filter_time_s,
+            )
+        )
     )
     if plain and (wired.design.coupling is None or law.sensor == "output"):
         return law.feedforward / (law.gain * T), None

@@ -26,12 +26,13 @@ def paths_of(design: Design) -> tuple[str, ...]:
         for section, path, part in parts_of(design)
         if not (section.rare and part == section.kind())
         for field in fields_in(section.template)
-        if field.kind in ("quantity", "integer") and _has_value(getattr(part, field.attribute))
+        if field.kind in ("quantity", "integer") and _has_value(field, getattr(part, field.attribute))
     )
 
 
-def _has_value(value: float | None) -> bool:
-    return value is not None and value != inf
+def _has_value(field: Field, value: float | None) -> bool:
+    """Whether a key is there; the gain of a stage with a law of one's own is 0, which no gain may be."""
+    return value is not None and value != inf and (value != 0.0 or field.accepts(value))
 
 
 def located(design: Design, path: str) -> tuple[Field, Any]:

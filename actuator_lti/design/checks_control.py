@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import fields as part_fields
 from math import inf, pi
 
 from actuator_lti.design.control import stable_pair
 from actuator_lti.design.fields import fields_in
+from actuator_lti.design.law import MOST_STATES, Law
 from actuator_lti.design.mistakes import Refusal
 from actuator_lti.design.model import FILTER_KEYS, Design, Filter
 
@@ -174,6 +176,63 @@ def _written(design: Design, key: str, value: float) -> str:
     return f"{value:.6g} {_unit(design, key)}" if parameter is None else parameter.text
 
 
+def _law(design: Design) -> Iterator[Refusal]:
+    """A law of one's own: one in the drive, of matrices that fit, beside none of what it replaces."""
+    control = design.controller
+    laws = [stage for stage in control.stages if getattr(control, stage).law is not None]
+    for stage in laws[1:]:
+        yield f"control.{stage}.law", "a table", f"allowed: at one stage; control.{laws[0]} has one"
+    for stage in laws:
+        yield from _replaced(design, stage)
+        yield from _matrices(getattr(control, stage).law, f"control.{stage}.law")
+    if not laws:
+        return
+    law, path = getattr(control, laws[0]).law, f"control.{laws[0]}.law"
+    period = control.period_s * getattr(getattr(control, laws[0]), "every", 1)
+    if law.period_s is not None and abs(law.period_s - period) > 1e-9 * period:
+        allowed = f"allowed: {period:.9g} s, that of its stage; a law is not resampled"
+        yield f"{path}.period", f"{law.period_s:.9g} s", allowed
+    if "current" in law.inputs and not design.motor.has_electrical_dynamics:
+        yield f"{path}.inputs", "current", "not allowed with motor.source_gain, which has no current"
+    filtered = design.encoder.filter_time_s > 0.0 or (
+        control.velocity and control.velocity.filters_on("speed")
+    )
+    if filtered and ("speed" in law.inputs or laws[0] == "velocity"):
+        yield f"{path}.inputs", "speed", "allowed: without encoder.filter_time and filters of the speed"
+
+
+def _replaced(design: Design, stage: str) -> Iterator[Refusal]:
+    """Keys of the stage that its law takes the place of."""
+    part, kept = getattr(design.controller, stage), ("every", "sensor", *_FED)
+    for field in fields_in(f"control.{stage}"):
+        fresh = next(item.default for item in part_fields(part) if item.name == field.attribute)
+        if field.key not in kept and getattr(part, field.attribute) != fresh:
+            value = f"{getattr(part, field.attribute)}"
+            yield f"control.{stage}.{field.key}", value, f"not allowed beside control.{stage}.law"
+    if getattr(part, "filters", ()):
+        yield (
+            f"control.{stage}.filter",
+            "a table",
+            f"not allowed beside control.{stage}.law, which may have it",
+        )
+
+
+def _matrices(law: Law, path: str) -> Iterator[Refusal]:
+    """Shapes of a law's matrices."""
+    m = len(law.inputs)
+    if len(law.A) > MOST_STATES:
+        yield f"{path}.A", f"{len(law.A)} states", f"allowed: at most {MOST_STATES}"
+    for place, part in (("", law), (".continuous", law.continuous)):
+        for key, (shape, fits) in ({} if part is None else part.sizes(m)).items():
+            if not fits:
+                yield f"{path}{place}.{key}", "other sizes", f"allowed: {shape}"
+    if len(law.L) not in (0, len(law.A)):
+        yield f"{path}.L", f"{len(law.L)} numbers", f"allowed: {len(law.A)}, one a state"
+
+
+_FED = ("back_emf_feedforward", "resistance_feedforward")
+
+
 def _gravity(design: Design) -> Iterator[Refusal]:
     if design.load.gravity is not None and design.axis == "linear":
         yield "load.gravity", "a table", "allowed on a rotary axis; a linear one takes a constant load"
@@ -209,6 +268,6 @@ def _instruments(design: Design) -> Iterator[Refusal]:
 
 CONTROL_CHECKS = (
     _filters, _speed_sensor, _anti_windup, _position, _overload, _supply, _temperature, _command,
-    _gravity, _friction_map, _instruments,
+    _law, _gravity, _friction_map, _instruments,
 )  # fmt: skip
 """Each gives the settings that contradict each other: key, value, what is allowed."""

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from actuator_lti.design.field import BIG, choice, flag, integer, not_negative, positive, quantities, quantity
+from actuator_lti.design.law import Law
 from actuator_lti.errors import InputError
 
 # fmt: off
@@ -28,6 +29,8 @@ FILTER_KEYS: dict[FilterKind, tuple[set[str], set[str]]] = {
 FilterPlace = Literal["torque", "speed"]
 Overload = Literal["thermal", "excess"]
 Stage = Literal["position", "velocity", "current", "voltage"]
+ABSENT = 0.0
+"""Gain of a stage that has a law of one's own in its place."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -172,7 +175,8 @@ class CurrentLoop:
     The shares of back-EMF and resistance voltage that are fed forward, kE w_meas and R i_ref, are 0 to 1.
     """
 
-    gain_V_A: Annotated[float, positive("gain", "V/A", "Kp_i", "gain of the current PI", example="20 mohm")]
+    gain_V_A: Annotated[float, positive(
+        "gain", "V/A", "Kp_i", "gain of the current PI", example="20 mohm", required=True)] = ABSENT
     integral_time_s: Annotated[float | None, positive(
         "integral_time", "s", "Tn_i", "integral time of the current PI; without it a P controller",
         example="150 us")] = None
@@ -187,6 +191,7 @@ class CurrentLoop:
     tracking_time_s: Annotated[float | None, positive(
         "tracking_time", "s", "Tt", "time constant of back-calculation; default the integral time",
         example="10 ms")] = None
+    law: Law | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,7 +202,8 @@ class VelocityLoop:
     """
 
     gain: Annotated[float, positive(
-        "gain", "{drive}*s/{angle}", "Kp_w", "gain of the velocity PI", example="0.12 A*s/rad")]
+        "gain", "{drive}*s/{angle}", "Kp_w", "gain of the velocity PI", example="0.12 A*s/rad",
+        required=True)] = ABSENT
     integral_time_s: Annotated[float | None, positive(
         "integral_time", "s", "Tn_w", "integral time of the velocity PI; without it a P controller",
         example="15 ms")] = None
@@ -209,6 +215,7 @@ class VelocityLoop:
         "tracking_time", "s", "Tt", "time constant of back-calculation; default the integral time",
         example="10 ms")] = None
     filters: tuple[Filter, ...] = ()
+    law: Law | None = None
 
     def filters_on(self, place: FilterPlace) -> tuple[Filter, ...]:
         """The filters of the measured speed or of the torque command, in order."""
@@ -225,7 +232,8 @@ class PositionLoop:
     """
 
     gain: Annotated[float, positive(
-        "gain", "{drive}/{angle}", "Kv", "gain of the position P controller", example="120 1/s")]
+        "gain", "{drive}/{angle}", "Kv", "gain of the position P controller", example="120 1/s",
+        required=True)] = ABSENT
     every: Annotated[int, integer(
         "every", 10000, "n_p",
         "the position loop runs every so many ticks, a multiple of control.velocity.every")] = 1
@@ -248,6 +256,7 @@ class PositionLoop:
     friction_feedforward: Annotated[float, not_negative(
         "friction_feedforward", "{drive}", "i_fr",
         "added to the torque command in the direction of the command's motion", example="0.4 A")] = 0.0
+    law: Law | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -289,6 +298,17 @@ class Controller:
         """The loops that there are, outermost first; empty for an open-loop voltage drive."""
         names: tuple[Stage, ...] = ("position", "velocity", "current")
         return tuple(name for name in names if getattr(self, name) is not None)
+
+    @property
+    def own_law(self) -> tuple[Stage, Law] | None:
+        """The stage that has a law of one's own, and the law; None where no stage has."""
+        laws = ((stage, getattr(self, stage).law) for stage in self.stages)
+        return next(((stage, law) for stage, law in laws if law is not None), None)
+
+    @property
+    def sampled_only(self) -> bool:
+        """Whether a law of one's own leaves the forms in continuous time out."""
+        return self.own_law is not None and self.own_law[1].continuous is None
 
     @property
     def position_loop(self) -> PositionLoop:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Design
@@ -22,10 +23,10 @@ class Explained:
         As the equations have it: symbol and value, of the equivalent DC motor at its temperature.
     """
 
-    path: str
-    written: str
-    read: str
-    model: str
+    path: Annotated[str, "Key"]
+    written: Annotated[str, "Written"]
+    read: Annotated[str, "Read as"]
+    model: Annotated[str, "In the model as"]
 
 
 def explained(design: Design) -> tuple[Explained, ...]:

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
 Axis = Literal["rotary", "linear"]
-Kind = Literal["quantity", "integer", "quantities", "choice", "flag", "text", "label", "day", "limit"]
+Kind = Literal[
+    "quantity", "integer", "quantities", "matrix", "choice", "names", "flag", "text", "label", "day", "limit"
+]  # fmt: skip
 
 BIG = 1e12
 SMALL = 1e-18
@@ -144,6 +146,16 @@ def degrees(key: str, words: str, example: str) -> Field:
 def quantities(key: str, unit: str, words: str, **more: Any) -> Field:
     """A list of numbers."""
     return Field(path=key, kind="quantities", unit_template=unit, description=words, **more)
+
+
+def matrix(key: str, words: str) -> Field:
+    """Rows of as many numbers each."""
+    return Field(path=key, kind="matrix", description=words, low=-BIG, high=BIG)
+
+
+def names(key: str, words: str) -> Field:
+    """Some words, those of the attribute's type, each once."""
+    return Field(path=key, kind="names", description=words)
 
 
 def integer(key: str, high: int, symbol: str, words: str, low: int = 1) -> Field:

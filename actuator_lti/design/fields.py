@@ -23,13 +23,13 @@ def _declared(kind: type, template: str) -> Iterator[Field]:
                 field,
                 path=f"{template}.{field.path or item.name}",
                 attribute=item.name,
-                required=item.default is MISSING and item.default_factory is MISSING,
-                choices=field.choices or (_words(annotated) if field.kind == "choice" else ()),
+                required=field.required or (item.default is MISSING and item.default_factory is MISSING),
+                choices=field.choices or (_words(annotated) if field.kind in ("choice", "names") else ()),
             )
 
 
 def _words(kind: Any) -> tuple[str, ...]:
-    """Those of a Literal, which may be optional."""
+    """Those of a Literal, which may be optional or repeated."""
     parts = get_args(kind)
     return parts if all(isinstance(part, str) for part in parts) else get_args(parts[0])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import MISSING, dataclass, fields
 from math import inf
+from typing import Annotated
 
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import ALL_FIELDS
@@ -15,16 +16,16 @@ from actuator_lti.design.sections import SECTIONS
 class KeyEntry:
     """One key: dotted path, unit, default and range as text, meaning and example."""
 
-    path: str
+    path: Annotated[str, "Key"]
     section: str
     key: str
     symbol: str
-    unit: str
-    default: str
-    allowed: str
-    required: bool
-    description: str
-    example: str
+    unit: Annotated[str, "Unit"]
+    default: Annotated[str, "Default"]
+    allowed: Annotated[str, "Allowed"]
+    required: Annotated[bool, "Required"]
+    description: Annotated[str, "Meaning"]
+    example: Annotated[str, "Example"]
 
 
 def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
@@ -67,7 +68,7 @@ def _default(field: Field, kind: type | None, unit: str) -> str:
 def _allowed(field: Field, unit: str) -> str:
     if field.kind in ("text", "label"):
         return ""
-    if field.kind in ("quantity", "quantities") and field.low == -BIG and field.high == BIG:
+    if field.kind in ("quantity", "quantities", "matrix") and field.low == -BIG and field.high == BIG:
         return ""
     if field.high == BIG:
         return "above 0" if field.low > 0 else "0 or more"

@@ -5,7 +5,7 @@ All values are in SI units on the motor side unless a name says otherwise.  For 
 does not have is ``None``; a limit that it does not have is ``inf``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import pi, prod, sqrt
 from typing import Annotated, Any
@@ -47,6 +47,7 @@ from actuator_lti.design.control import (
     VelocityLoop,
 )
 from actuator_lti.design.field import Axis, choice, label, text
+from actuator_lti.design.law import Law, StateSpace
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.plant import (
     Coupling,
@@ -158,6 +159,42 @@ class Design:
         from actuator_lti.design.writing import with_filter
 
         return with_filter(self, stage, keys)
+
+    def with_law(
+        self, stage: str, system: Any, inputs: Sequence[str] | None = None, **settings: Any
+    ) -> "Design":
+        """A copy with a law of one's own in place of a stage's gains and filters (model.md section 10).
+
+        Parameters
+        ----------
+        stage : {"current", "velocity", "position"}
+        system
+            A sampled state space or transfer function of python-control or scipy.signal, or
+            ``(A, B, C, D, dt)``; its period must be that of the stage.
+        inputs : sequence of str, optional
+            The signals that it takes, in order: ``command``, ``error``, ``speed``, ``angle``, ``current``,
+            ``output_angle``, ``output_speed``; by default the system's own input labels.
+        **settings
+            ``L``: anti-windup, n numbers; ``gain``: factor on the law; ``every``: ticks of the stage;
+            ``method``: ``"tustin"`` or ``"zoh"``, by which a continuous system is sampled; ``continuous``:
+            the same law in continuous time, for the forms without samples.
+
+        Raises
+        ------
+        InputError
+            For a system of another period or shape, and as `with_values`.
+
+        Examples
+        --------
+        >>> from actuator_lti import load_design
+        >>> design = load_design("ilr33-amber")
+        >>> mine = design.with_law("position", ([], [], [], [[60.0]], design.controller.period_s), ["error"])
+        >>> mine.controller.position.law.D
+        (60.0,)
+        """
+        from actuator_lti.design.with_law import with_law
+
+        return with_law(self, stage, system, inputs, **settings)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

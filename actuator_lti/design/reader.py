@@ -10,11 +10,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 from datetime import date
 from math import pi, sqrt
+from pathlib import Path
 from typing import Any
 
 from actuator_lti.design import model
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
+from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import Findings, nearest
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.quantities import QUANTITIES, parse_limit
@@ -113,7 +115,7 @@ class Reader:
             where = f"{path}.{field.key}"
             if field.key in table:
                 values[field.attribute] = self.value(field, table, where)
-            elif field.required and field.key not in meant:
+            elif field.required and field.key not in meant and not (field.key == "gain" and "law" in table):
                 self.missing(where, field)
         return values
 
@@ -126,13 +128,28 @@ class Reader:
             return self.entry(field, raw, path) if field.path in FIELDS else self.number(field, raw, path)
         if field.kind == "quantities":
             return self.numbers(field, raw, path)
+        if field.kind == "matrix":
+            return self.rows(field, raw, path)
         raw = raw.isoformat() if field.kind == "day" and isinstance(raw, date) else raw
+        if field.kind == "names":
+            return self.words(field, raw, path)
         if not _fits(field, raw):
             hint = (
                 nearest(raw, field.choices).strip() + "; " if field.choices and isinstance(raw, str) else ""
             )
             self.refuse(path, raw, f"{hint.removeprefix('; ')}allowed: {field.allowed('1')}")
         return raw
+
+    def words(self, field: Field, raw: Any, path: str) -> tuple[str, ...]:
+        """Some of the words that a key may have, each once."""
+        known = raw if isinstance(raw, list) and all(isinstance(word, str) for word in raw) else []
+        for word in known:
+            if word not in field.choices:
+                hint = nearest(word, field.choices)
+                self.refuse(path, word, f"unknown{hint}; allowed: {', '.join(field.choices)}")
+        if not known or len({*known}) != len(known):
+            self.refuse(path, raw, f"allowed: a list of {', '.join(field.choices)}, each at most once")
+        return tuple(known)
 
     def entry(self, field: Field, raw: Any, path: str) -> float | int | None:
         """A value with its pedigree, which is kept."""
@@ -180,6 +197,13 @@ class Reader:
         if not 0 < len(raw) <= MAX_LIST:
             self.findings.note(path, "", f"allowed: 1 to {MAX_LIST} items")
         return tuple(self.number(field, one, f"{path}[{k}]") for k, one in enumerate(raw[:MAX_LIST], 1))
+
+    def rows(self, field: Field, raw: Any, path: str) -> tuple[tuple[float | None, ...], ...]:
+        """A list of rows of numbers."""
+        if not isinstance(raw, list) or not all(isinstance(row, list) for row in raw):
+            self.refuse(path, raw, "allowed: a list of rows, each a list of numbers")
+            return ()
+        return tuple(self.numbers(field, row, f"{path}[{k}]") for k, row in enumerate(raw[:MAX_LIST], 1))
 
     def number(self, field: Field, raw: Any, path: str) -> float | int | None:
         """A number in SI; None where it is refused."""
@@ -248,6 +272,7 @@ class Reader:
     def part(self, section: Section, raw: Any, path: str) -> Any:
         """What one table becomes, with the tables inside it; None once there are mistakes."""
         inner = children(section.path)
+        raw = self.law(raw, path) if section.kind is model.Law else raw
         names = [*(item.key for item in inner), *(["name"] if section.many == "named" else [])]
         values = {**self.values(section.template, raw, path, names), **self.tables(section.path, raw)}
         if self.findings.found:
@@ -257,6 +282,25 @@ class Reader:
         if section.kind is model.Requirement:
             values["unit"] = QUANTITIES[raw["quantity"]].unit_for(self.structure.axis)
         return section.kind(**values)
+
+    def law(self, raw: Any, path: str) -> Any:
+        """The table of a law, with what stands in its file."""
+        if not isinstance(raw, dict):
+            return raw
+        flat = {key: raw[key] for key in ("C", "D", "L") if _one_row(raw.get(key))}
+        raw = {**raw, **{key: [each for row in value for each in row] for key, value in flat.items()}}
+        if "file" not in raw:
+            return raw
+        file, rest = raw["file"], {key: value for key, value in raw.items() if key != "file"}
+        twice = [key for key in (*PARTS, "L", "period") if key in rest]
+        if not isinstance(file, str) or twice:
+            self.refuse(f"{path}.file", file, f"allowed: a file's name, without {', '.join(twice) or 'more'}")
+            return rest
+        try:
+            return {**read_law(Path(self.findings.where).parent / file), **rest}
+        except InputError as error:
+            self.refuse(f"{path}.file", file, error.message)
+        return rest
 
     def tables(self, path: str, table: Any, meant: Iterable[str] = ()) -> Tree:
         """The parts of the tables that lie in a table (``""``: in the file), where they are written."""
@@ -323,6 +367,12 @@ class Reader:
             return model.Screw(lead_m=parse_quantity(lead, _FIELD_OF_LEAD.unit(self.structure))).travel_m_rad
         except (InputError, TypeError):
             return None  # told where the lead itself is read
+
+
+def _one_row(value: Any) -> bool:
+    """Whether a list is one row or one column of numbers, written as a matrix."""
+    rows = isinstance(value, list) and value and all(isinstance(row, list) for row in value)
+    return bool(rows) and (len(value) == 1 or all(len(row) == 1 for row in value))
 
 
 def _fits(field: Field, raw: Any) -> bool:

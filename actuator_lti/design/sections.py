@@ -95,6 +95,11 @@ SECTIONS: tuple[Section, ...] = (
     Section("control.velocity", "controller.velocity", model.VelocityLoop),
     Section("control.velocity.filter", "controller.velocity.filters", model.Filter, many="numbered"),
     Section("control.position", "controller.position", model.PositionLoop),
+    *(
+        Section(f"control.{stage}.law{part}", f"controller.{stage}.law{part}", kind)
+        for stage in ("current", "velocity", "position")
+        for part, kind in (("", model.Law), (".continuous", model.StateSpace))
+    ),
     Section("validation", "validation", model.Validation),
     Section("failure", "failure", model.Failure, asked=True),
     Section("duty", "duty", model.DutyCycle, asked=True),

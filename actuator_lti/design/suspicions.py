@@ -64,7 +64,8 @@ def estimated_crossovers(design: Design) -> dict[str, float]:
         result["velocity"] = control.velocity.gain * (torque or 0.0) / design.inertia_kgm2
         if control.position is not None:
             result["position"] = control.position.gain
-    return result
+    own = control.own_law  # has no crossover that a gain tells
+    return {stage: value for stage, value in result.items() if own is None or stage != own[0]}
 
 
 def _crossovers(design: Design) -> Iterator[str]:

@@ -199,15 +199,14 @@ def parse_unit(unit: str) -> UnitValue:
         raise ValueError(f"{shown(unit)} is not a unit") from None
     if tokens:
         raise ValueError(f"{shown(unit)} is not a unit")
-    minutes = powers.pop(_MINUTE, 0)
-    dimension = tuple(sorted((name, power) for name, power in powers.items() if power))
+    dimension = tuple(sorted((name, n) for name, n in powers.items() if n and name != _MINUTE))
     try:
         size = float(factor)
     except OverflowError:
         size = 0.0
     if size == 0.0:
         raise ValueError(f"{shown(unit)} is beyond the range of floats")
-    return UnitValue(size, dimension, minutes)
+    return UnitValue(size, dimension, powers[_MINUTE])
 
 
 def _unknown(name: str, units: Units) -> str:

@@ -42,7 +42,7 @@ _BARE = Design(
 )
 
 
-_WHICH = ("rotor", "to", "locking_gear")  # which of several is meant: mostly not said
+_WHICH = ("rotor", "to", "locking_gear", "law", "continuous")  # mostly not said
 
 
 def write_design(design: Design) -> str:

@@ -17,6 +17,7 @@ from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:
+    from actuator_lti.design.law import Law
     from actuator_lti.design.model import Design
 
 NOTHING, SPEED_LIMIT, FORCE, VOLTAGE = range(4)
@@ -75,12 +76,17 @@ def circuit_resistance_ohm(design: Design) -> Any:
     return resistance if design.supply is None else resistance + design.supply.resistance_ohm
 
 
+def stage_gain(gain: Any, law: Law | None) -> Any:
+    """Gain of a stage on a command at rest: of a law of one's own at zero frequency, inf if it integrates."""
+    return gain if law is None else law.steady("command")
+
+
 def torque_gain_Nm_rad(design: Design) -> Any:
     """Motor torque per position error at the output: rotor at rest, current settled, no speed integral."""
     control, motor = design.controller, design.effective_motor
-    gain = control.position_loop.gain * design.total_ratio
+    gain = stage_gain(control.position_loop.gain, control.position_loop.law) * design.total_ratio
     if control.velocity is not None:
-        gain = gain * control.velocity.gain
+        gain = gain * stage_gain(control.velocity.gain, control.velocity.law)
         for item in control.velocity.filters_on("torque"):
             gain = gain * steady_gain(item)
     if motor.source_gain_Nm_V is not None:
@@ -90,6 +96,12 @@ def torque_gain_Nm_rad(design: Design) -> Any:
     if control.current is None:
         return gain * motor.torque_constant_Nm_A / motor.resistance_ohm
     gain = gain * motor.torque_constant_Nm_A
+    law = control.current.law
+    if law is not None:
+        if law.integrates:
+            return gain
+        fed = law.steady("command") + control.current.resistance_feedforward * motor.resistance_ohm
+        return gain * fed / (motor.resistance_ohm + law.steady("error") - law.steady("current"))
     if control.current.integral_time_s is None:
         kp, fed = control.current.gain_V_A, control.current.resistance_feedforward * motor.resistance_ohm
         gain = gain * (kp + fed) / (kp + motor.resistance_ohm)

@@ -37,6 +37,11 @@ class CommandMean:
         """By how much a slow command comes later: (n - 1) T/2, at every frequency below the first zero."""
         return 0.5 * (self.samples - 1) * self.period_s
 
+    @property
+    def first_zero_rad_s(self) -> float:
+        """Where its gain is zero first."""
+        return 2.0 * pi / (self.samples * self.period_s)
+
     def response(self, omega_rad_s: np.ndarray) -> np.ndarray:
         """``sin(n w T/2)/(n sin(w T/2)) exp(-j w (n - 1) T/2)``."""
         half = 0.5 * np.asarray(omega_rad_s, dtype=float) * self.period_s

@@ -76,6 +76,16 @@ class Drive:
         """N, motor angle over output angle."""
         return self.design.total_ratio
 
+    def has_own_law(self, stage: str) -> bool:
+        """Whether a stage has a law of one's own, so that its loop is cut at what it drives."""
+        own = self.design.controller.own_law
+        return own is not None and own[0] == stage
+
+    def around(self, stage: str) -> tuple[str, str]:
+        """Signals behind and in front of the place where the loop of a stage is broken."""
+        point = self.target[stage]
+        return (point, f"{point}_returned") if self.has_own_law(stage) else (ERRORS[stage], MEASURED[stage])
+
     def period_s(self, stage: str) -> Any:
         """Period T of a stage in s."""
         return self.interval[stage] * self.tick_s

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -16,10 +17,14 @@ from scipy.optimize import brentq
 
 from actuator_lti.bandwidth import Bandwidth, closed_loop_bandwidth
 from actuator_lti.drive.profile import CommandMean
-from actuator_lti.margins.delay_form import DelayForm, Intervals, border_values, delay_form, from_rational
-from actuator_lti.margins.delay_setting import low_frequency
-from actuator_lti.margins.loop import Mask, rational_loop
-from actuator_lti.margins.sweep import subdivided, variation
+from actuator_lti.margins.delay_form import delay_form
+from actuator_lti.margins.delay_response import DelayResponse
+from actuator_lti.margins.distances import INVERSE
+from actuator_lti.margins.factored import Response, factored
+from actuator_lti.margins.factors_on_axis import Intervals
+from actuator_lti.margins.given import given_of
+from actuator_lti.margins.loop import Mask, Real, loop_of, rational_loop
+from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step import StepFigures
 
 _NARROW = 1e-6  # of the frequency: what is decided by a sign at both ends of so small an interval
@@ -47,16 +52,25 @@ def commanded_bandwidth(response: Any, mean: CommandMean) -> Bandwidth:
         As `closed_loop_bandwidth`.
     """
     own = closed_loop_bandwidth(response, mean.delay_s)
-    gain = _Gain(response, mean, abs(own.dc_gain))
-    crossings = gain.crossings(math.sqrt(0.5))
-    turn = own.minus90deg_rad_s
-    peak, place = gain.largest(own)
+    zero_rad_s, turn = mean.first_zero_rad_s, own.minus90deg_rad_s
+    end = zero_rad_s
+    if own.resonance_peak_db > 13.0:  # the lobes behind the zero are 13.26 dB down: only then they matter
+        end = max(end, 2.0 * own.resonance_rad_s)
+    if hasattr(response, "delays_s") and response.delays_s.size:
+        late = DelayResponse.of(delay_form(response)).behind_mean(mean.samples, mean.period_s)
+        crossings = late.crossings(abs(own.dc_gain) * math.sqrt(0.5), zero_rad_s)
+        least, place = late.smallest(INVERSE, end)
+        peak = 1.0 / (least * abs(own.dc_gain))
+    else:
+        gain = _Gain(response, mean, abs(own.dc_gain))
+        crossings = gain.crossings(math.sqrt(0.5))
+        peak, place = gain.largest(end)
     peak_db = 20.0 * math.log10(peak)
     return replace(
         own,
         minus3db_rad_s=crossings[0],
         crossings_rad_s=tuple(crossings),
-        minus90deg_rad_s=gain.zero_rad_s if turn is None else min(turn, gain.zero_rad_s),
+        minus90deg_rad_s=zero_rad_s if turn is None else min(turn, zero_rad_s),
         resonance_peak_db=peak_db if peak_db > 1e-9 else 0.0,
         resonance_rad_s=place if peak_db > 1e-9 else 0.0,
     )
@@ -66,69 +80,67 @@ class _Gain:
     """The gain behind the mean over its value at zero frequency, bounded over intervals of frequency."""
 
     def __init__(self, response: Any, mean: CommandMean, dc: float) -> None:
-        if hasattr(response, "delays_s") and not response.delays_s.size:
+        if hasattr(response, "delays_s"):
             response = response.to_state_space()
-        delayed = hasattr(response, "delays_s")
-        form = delay_form(response) if delayed else from_rational(rational_loop(response), 0.0)
-        self.form: DelayForm = form
+        loop = loop_of(given_of(response), warp=True)
+        self._response = Response(loop)
+        self.factors = factored(self._response, sorted_poles(loop.A, loop.in_z))
         self.mean, self.dc = mean, dc
-        self.unit = 1.0 if form.period_s is None else 1.0 / form.period_s
-        self.zero_rad_s = 2.0 * math.pi / (mean.samples * mean.period_s)
 
-    def at(self, x: float) -> float:
-        """The gain at x (rad/s over `unit`)."""
-        own = abs(complex(border_values(self.form, np.array([x]))[0]))
-        return own / self.dc * abs(complex(self.mean.response(np.array([x * self.unit]))[0]))
+    def w(self, omega: float) -> float:
+        """The argument of the factors."""
+        period = self._response.loop.period_s
+        return omega if period is None else math.tan(min(0.5 * omega * period, 0.5 * math.pi))
 
-    def bounds(self, intervals: Intervals) -> tuple[np.ndarray, np.ndarray]:
+    def omega(self, w: Real) -> Real:
+        """Angular frequency, rad/s."""
+        period = self._response.loop.period_s
+        return w if period is None else 2.0 * np.arctan(w) / period
+
+    def at(self, w: float) -> float:
+        """The gain."""
+        own = abs(complex(self._response.at(np.array([w]))[0]))
+        return own / self.dc * abs(complex(self.mean.response(self.omega(np.array([w])))[0]))
+
+    def bounds(self, here: Intervals) -> tuple[Real, Real]:
         """No less and no more than this inside each interval: the mean falls up to its first zero."""
-        size, R = np.abs(intervals.L), variation(self.form, intervals)
-        low, high = (intervals.x + side * intervals.half for side in (-1.0, 1.0))
-        before = high * self.unit <= self.zero_rad_s
-        least = np.where(before, np.abs(self.mean.response(high * self.unit)), 0.0)
-        half = 0.5 * low * self.unit * self.mean.period_s
+        own = np.exp(np.array([bound[0] for bound in here.bounds])) / self.dc
+        low, high = self.omega(here.low), self.omega(here.high)
+        before = high <= self.mean.first_zero_rad_s
+        least = np.where(before, np.abs(self.mean.response(high)), 0.0)
+        half = 0.5 * low * self.mean.period_s
         with np.errstate(divide="ignore"):
             lobe = 1.0 / (self.mean.samples * np.abs(np.sin(np.minimum(half, 0.5 * math.pi))))
-        most = np.where(before, np.abs(self.mean.response(low * self.unit)), np.minimum(lobe, 1.0))
-        return np.maximum(size - R, 0.0) / self.dc * least, (size + R) / self.dc * most
+        most = np.where(before, np.abs(self.mean.response(low)), np.minimum(lobe, 1.0))
+        return own[0] * least, own[1] * most
 
     def _split(self, end: float, resolved: Any) -> Intervals:
-        low, _ = low_frequency(self.form)
+        def narrow_or(here: Intervals) -> Mask:
+            return np.asarray(resolved(*self.bounds(here)) | (here.high - here.low < _NARROW * here.high))
 
-        def narrow_or(intervals: Intervals) -> Mask:
-            return np.asarray(resolved(*self.bounds(intervals)) | (intervals.half < _NARROW * intervals.x))
-
-        return subdivided(self.form, np.geomspace(min(low, 1e-3 * end), end, 12), narrow_or)
+        return self.factors.covered([0.0, self.w(end)], narrow_or)
 
     def crossings(self, level: float) -> list[float]:
         """Where the gain passes a level, rad/s, up to the first zero of the mean; at least one."""
-        end = self.zero_rad_s / self.unit
-        intervals = self._split(end, lambda least, most: (least > level) | (most < level))
-        edges = [float(intervals.x[0] - intervals.half[0]), *(intervals.x + intervals.half).tolist()]
-        signs = [self.at(x) > level for x in edges]
-        pairs = [k for k in range(len(edges) - 1) if signs[k] != signs[k + 1]]
-        found = [
-            brentq(lambda x: self.at(x) - level, edges[k], edges[k + 1], xtol=1e-300, rtol=1e-14)
-            for k in pairs
-        ]
-        return [float(x) * self.unit for x in found]
+        known = self._split(self.mean.first_zero_rad_s, lambda least, most: (least > level) | (most < level))
+        edges = [0.0, *known.high.tolist()]
+        pairs = [(a, b) for a, b in pairwise(edges) if (self.at(a) > level) != (self.at(b) > level)]
+        found = [brentq(lambda w: self.at(w) - level, *pair, xtol=1e-300, rtol=1e-14) for pair in pairs]
+        return self.omega(np.array(found)).tolist()
 
-    def largest(self, own: Bandwidth) -> tuple[float, float]:
-        """The largest gain and where, rad/s; (1, 0) where it only falls."""
-        end = self.zero_rad_s / self.unit
-        if own.resonance_peak_db > 13.0:  # the lobes behind the zero are 13.26 dB down: only then they matter
-            end = math.pi if self.form.sampled else max(end, 2.0 * own.resonance_rad_s)
+    def largest(self, end: float) -> tuple[float, float]:
+        """The largest gain up to there and where, rad/s; (1, 0) where it only falls."""
         best = [1.0]
 
-        def beaten(least: np.ndarray, most: np.ndarray) -> Mask:
+        def beaten(least: Real, most: Real) -> Mask:
             best[0] = max(best[0], float(least.max(initial=0.0)))
             return np.asarray(most <= best[0])
 
-        intervals = self._split(end, beaten)
-        _, most = self.bounds(intervals)
-        near = intervals.x[most >= best[0]]
-        x = max(near.tolist(), key=self.at, default=0.0)
-        return (self.at(x), x * self.unit) if x and self.at(x) > 1.0 else (1.0, 0.0)
+        known = self._split(end, beaten)
+        _, most = self.bounds(known)
+        near = 0.5 * (known.low + known.high)[most >= best[0]]
+        w = max(near.tolist(), key=self.at, default=0.0)
+        return (self.at(w), float(self.omega(np.array(w)))) if w and self.at(w) > 1.0 else (1.0, 0.0)
 
 
 def commanded_step(response: Any, own: StepFigures, mean: CommandMean) -> StepFigures:

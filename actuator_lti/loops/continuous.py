@@ -107,6 +107,10 @@ def stage_system(
     wired: Drive, stage: str, delays: frozenset[str], opened: tuple[str, ...] = ()
 ) -> PlainDelaySystem:
     """The open loop of a stage at its own error, inner loops closed (unless opened), outer ones absent."""
+    if wired.has_own_law(stage):
+        point = wired.target[stage]
+        flow = FlowProgram(wired, stage, point, opened, delays).flow()
+        return joined(systems(flow, "cut", point, scale=-1.0))
     flow = FlowProgram(wired, stage, ERRORS[stage], opened, delays).flow()
     measured = "output" if stage == "position" else MEASURED[stage]
     return joined(systems(flow, "cut", measured, wired.ratio if stage == "position" else 1.0))
@@ -115,7 +119,7 @@ def stage_system(
 def stage_loop(wired: Drive, stage: str, delays: frozenset[str], opened: tuple[str, ...] = ()) -> Loop:
     """The loop of a stage, see `stage_system`."""
     loop = stage_system(wired, stage, delays, opened)
-    return _loop(wired, loop, stage, wired.target[stage], (ERRORS[stage], MEASURED[stage]))
+    return _loop(wired, loop, stage, wired.target[stage], wired.around(stage))
 
 
 def point_loop(wired: Drive, point: str, delays: frozenset[str]) -> Loop:

@@ -112,6 +112,11 @@ def delay_budget(
     wired = wire(design, Operating(point=operating_point, load_Nm=load_Nm))
     if loop_name not in wired.stages:
         raise InputError(f"loop {loop_name!r}: one of {', '.join(wired.stages)}")
+    if design.controller.own_law is not None:
+        stage = design.controller.own_law[0]
+        raise InputError(
+            f"control.{stage}.law: a delay budget is of gains and filters; allowed: without a law"
+        )
     nyquist = np.pi / wired.period_s(loop_name)
     if not 0 < frequency_rad_s < nyquist:
         raise InputError(f"frequency_rad_s = {frequency_rad_s}: between 0 and Nyquist, {nyquist:g} rad/s")

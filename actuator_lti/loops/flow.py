@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.law import Law, Matrices
 from actuator_lti.drive.blocks import Block
 from actuator_lti.errors import InputError
 from actuator_lti.loops.rows import Row, table, total
@@ -97,6 +98,17 @@ class FlowWalk(Walk):
             delay += self.drive.tick_s / 2 if "hold" in self.delays else 0.0
             delay += self.control.computing_delay_s if "computing" in self.delays else 0.0
         return self.late(name, value, delay)
+
+    def own_matrices(self, law: Law) -> Matrices:
+        """Those that the design gives for continuous time."""
+        if law.continuous is None:
+            given = "sampled, or the law's continuous = {A, B, C, D} in the design as well"
+            raise InputError(f"form: control.*.law is a sampled one; allowed: {given}")
+        return law.continuous.matrices(len(law.inputs))
+
+    def moves(self, name: str, value: Row) -> None:
+        """Its derivative."""
+        self.rate[name] = value
 
     def apply(self, name: str, block: Block, value: Row) -> Row:
         """The continuous realisation."""

@@ -1,7 +1,8 @@
 """What the linear model says about its own limits (model.md section 5).
 
 In front of each limiter k stands a signal with the closed-loop response T_k from the command at the output
-shaft. A sinusoidal command of amplitude A reaches the limiter at A_k(w) = limit_k/|T_k(jw)|.
+shaft: an angle or, of a speed drive, a speed there; of a torque or voltage drive its current or voltage. A
+sinusoidal command of amplitude A reaches the limiter at A_k(w) = limit_k/|T_k(jw)|.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ class LimiterPath:
         return rows[0] if len(rows) == 1 else np.max(np.abs(rows), axis=0).astype(complex)
 
     def onset_amplitude_rad(self, omega_rad_s: Any, bias: float = 0.0) -> np.ndarray:
-        """Command amplitude A_k(w) at the output shaft (peak, rad) at which the limit is reached.
+        """Command amplitude A_k(w) (peak; rad, rad/s, A or V, see the module) at which the limit is reached.
 
         Parameters
         ----------
@@ -105,7 +106,8 @@ class Onset:
     ----------
     omega_rad_s : ndarray, shape (K,)
     amplitude_rad : ndarray, shape (K,)
-        Peak command amplitude at the output shaft; ``inf`` where nothing limits.
+        Peak command amplitude; rad, of other drives rad/s, A or V (see the module). ``inf`` where nothing
+        limits.
     active : tuple of str
         Name of the limiter reached first at each frequency; ``""`` where nothing limits.
     each_rad : mapping of str to ndarray
@@ -201,13 +203,21 @@ def limiter_paths(
 ) -> dict[str, LimiterPath]:
     """All limiter paths; ``evaluate(signals, every, rate)`` gives the function of frequency."""
     time = wired.design.limits.overload_time_s
+    geared = (
+        wired.design.total_ratio if wired.outermost == "velocity" else 1.0
+    )  # its reference is the motor's
+
+    def from_output(place: Place) -> Callable[[np.ndarray], np.ndarray]:
+        response = evaluate(place.signals, place.every, place.limiter.kind == "rate")
+        return lambda omega: geared * response(omega)
+
     return {
         place.limiter.name: LimiterPath(
             place.limiter.name,
             place.limit,
             place.unit,
             nyquist_rad_s,
-            evaluate(place.signals, place.every, place.limiter.kind == "rate"),
+            from_output(place),
             time if place.limiter.kind == "rms" else None,
         )
         for place in limiter_places(wired)

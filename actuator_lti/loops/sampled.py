@@ -39,8 +39,14 @@ def _loop(
 def stage_blocks(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> list[Block]:
     """The loop of a stage broken at its own error, inner loops closed (unless opened), outer ones absent.
 
+    With a law of one's own it is broken at what the stage drives: one loop, whatever the law takes.
     One block, or several where a slower speed measurement is fed forward inside (then it is periodic).
     """
+    if wired.has_own_law(stage):
+        point = wired.target[stage]
+        return phase_blocks(
+            TickProgram(wired, stage, point, opened), wired.interval[stage], "cut", point, -1.0
+        )
     program = TickProgram(wired, stage, ERRORS[stage], opened)
     measured = "output" if stage == "position" else MEASURED[stage]
     scale = wired.ratio if stage == "position" else 1.0
@@ -50,8 +56,7 @@ def stage_blocks(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> list
 def stage_loop(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> Loop:
     """The loop of a stage, see `stage_blocks`."""
     blocks = stage_blocks(wired, stage, opened)
-    names = (ERRORS[stage], MEASURED[stage])
-    return _loop(wired, fundamental(blocks), stage, wired.target[stage], names, len(blocks) > 1)
+    return _loop(wired, fundamental(blocks), stage, wired.target[stage], wired.around(stage), len(blocks) > 1)
 
 
 def point_loop(wired: Drive, point: str) -> Loop:

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.law import Law, Matrices
 from actuator_lti.drive.blocks import Block, Realisation
 from actuator_lti.loops.rows import Row, table, total
 from actuator_lti.loops.walk import INPUTS, Program, Walk
@@ -101,6 +102,14 @@ class TickWalk(Walk):
         self.next[f"hold_{name}"] = value
         return value
 
+    def own_matrices(self, law: Law) -> Matrices:
+        """Those that run."""
+        return law.sampled
+
+    def moves(self, name: str, value: Row) -> None:
+        """At the next update."""
+        self.next[name] = value
+
     def apply(self, name: str, block: Block, value: Row) -> Row:
         """The sampled realisation."""
         return self.realisation(name, block.states, block.sampled, value)
@@ -128,7 +137,7 @@ class TickWalk(Walk):
 
     def sensed_angle(self) -> Row | None:
         """The angle whose gain is counted in every tick, also where nothing is estimated now."""
-        if self.angle is None and self.program.measures_speed | self.program.feeds_back_emf:
+        if self.angle is None and self.program.measures_speed | self.program.shares_speed:
             if self.design.encoder.speed == "ideal":
                 return None
             velocity = self.control.velocity

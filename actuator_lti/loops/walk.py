@@ -12,16 +12,20 @@ points ``u``, ``i_ref``, ``w_ref``. The friction feed-forward has a step in it a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from actuator_lti.design.law import Law, Matrices
 from actuator_lti.drive import blocks
 from actuator_lti.drive.blocks import Block
 from actuator_lti.drive.wiring import ERRORS, Drive, present
 from actuator_lti.loops.rows import Row, total
 
 INPUTS = ("ref", "torque", "moment", "cut")
+OWN_SIGNALS = {"current": "i", "angle": "th", "output_angle": "output_angle"}
+"""What a law of one's own takes of the plant as it is."""
 
 
 @dataclass(frozen=True)
@@ -66,10 +70,20 @@ class Program:
         return present(current.back_emf_feedforward)
 
     @property
+    def shares_speed(self) -> bool:
+        """Whether another stage than the velocity's own takes the measured speed."""
+        own = self.drive.design.controller.own_law
+        if own is None or self.drive.operating.rotor == "locked":
+            return self.feeds_back_emf
+        stage, law = own
+        takes = "speed" in law.inputs and stage in self.stages and stage not in self.opened
+        return self.feeds_back_emf or (takes and stage != "velocity")
+
+    @property
     def ticks(self) -> int:
         """Ticks after which the program repeats."""
         every = self.drive.interval
-        return max([every[s] for s in self.stages] + ([every["speed"]] if self.feeds_back_emf else [1]))
+        return max([every[s] for s in self.stages] + ([every["speed"]] if self.shares_speed else [1]))
 
 
 class Walk(ABC):
@@ -98,6 +112,14 @@ class Walk(ABC):
     @abstractmethod
     def apply(self, name: str, block: Block, value: Row) -> Row:
         """A block's output, its states named after its place."""
+
+    @abstractmethod
+    def own_matrices(self, law: Law) -> Matrices:
+        """Matrices of a law of one's own, and in ``moves`` what they give of its states."""
+
+    @abstractmethod
+    def moves(self, name: str, value: Row) -> None:
+        """What a state of such a law becomes, or its derivative."""
 
     @abstractmethod
     def derivative(self, name: str, value: Row, period_s: Any) -> Row:
@@ -163,7 +185,12 @@ class Walk(ABC):
         command = N * reference
         sensed = self.signals["output_angle" if law.sensor == "output" else "th"]
         own = sensed if law.sensor == "output" else sensed / N
-        error = self.at_cut("e_th", command - N * self.at_cut("output", own))
+        own = self.at_cut("output", own)
+        error = self.at_cut("e_th", command - N * own)
+        if law.law is not None:
+            seen = {"output_angle": own} if law.sensor == "output" else {"angle": N * own}
+            self.signals["w_cmd"] = self.own_law("position", law.law, command, error, seen)
+            return self.signals["w_cmd"]
         value = self.apply("position", self.drive.law("position"), error)
         if present(law.derivative_time_s):
             slope = self.derivative("e_th", error, T)
@@ -185,6 +212,8 @@ class Walk(ABC):
 
     def measured_speed(self) -> Row:
         """The speed as the drive knows it, every velocity period."""
+        if "w_meas" in self.signals:
+            return self.signals["w_meas"]
         velocity, encoder, T = self.control.velocity, self.design.encoder, self.drive.period_s("speed")
         behind = velocity is not None and velocity.sensor == "output"
         speed = self.signals["load_speed" if behind else "w"]
@@ -203,9 +232,13 @@ class Walk(ABC):
         """PI on the speed, the feed-forward of acceleration, and the torque filters."""
         error = reference - self.measured_speed() if self.program.measures_speed else reference
         error = self.at_cut(ERRORS["velocity"], error)
-        value, law = self.apply("velocity", self.drive.law("velocity"), error), self.control.velocity
+        law = self.control.velocity
         assert law is not None
-        self.signals["velocity_integral"] = value - law.gain * error
+        if law.law is not None:
+            value = self.own_law("velocity", law.law, reference, error)
+        else:
+            value = self.apply("velocity", self.drive.law("velocity"), error)
+            self.signals["velocity_integral"] = value - law.gain * error
         if "position" in self.program.stages and present(self.control.position_loop.acceleration_feedforward):
             every = self.drive.interval
             made = self.extra if self.updates(every["position"]) else None
@@ -223,19 +256,56 @@ class Walk(ABC):
         assert motor.resistance_ohm is not None
         error = reference if "current" in self.program.opened else reference - self.signals["i"]
         error = self.at_cut(ERRORS["current"], error)
-        value = self.apply("current", self.drive.law("current"), error)
-        self.signals["current_integral"] = value - law.gain_V_A * error
+        if law.law is not None:
+            value = self.own_law("current", law.law, reference, error)
+        else:
+            value = self.apply("current", self.drive.law("current"), error)
+            self.signals["current_integral"] = value - law.gain_V_A * error
         if self.program.feeds_back_emf:
             gain = law.back_emf_feedforward * motor.back_emf_constant_Vs_rad
-            value = value + gain * self.speed_for_voltage()
+            value = value + gain * self.speed_in_use("current")
         if present(law.resistance_feedforward):
             value = value + law.resistance_feedforward * motor.resistance_ohm * reference
         return value
 
-    def speed_for_voltage(self) -> Row:
-        """The measured speed as the current stage has it."""
+    def own_law(
+        self, stage: str, law: Law, command: Row, error: Row, seen: Mapping[str, Row] | None = None
+    ) -> Row:
+        """What a law of one's own makes of the signals that it takes (model.md section 10).
+
+        ``seen`` are those that the stage has cut. With its feedback taken away it knows the command alone.
+        """
+        e = {"command": command, "error": error}
+        if stage not in self.program.opened:
+            e |= {name: self.signals.get(signal, Row()) for name, signal in OWN_SIGNALS.items()}
+            e |= seen or {}
+            e["output_speed"] = self.output_speed()
+            if "speed" in law.inputs:
+                e["speed"] = self.speed_in_use(stage)
+        inputs = [e.get(name, Row()) for name in law.inputs]
+        matrices, names = self.own_matrices(law), [f"{stage}.x{k}" for k in range(1, len(law.A) + 1)]
+        x = [self.state(name) for name in names]
+        for name, row, driven in zip(names, matrices.A, matrices.B, strict=True):
+            self.moves(name, _sum(row, x) + _sum(driven, inputs))
+        return law.gain * (_sum(matrices.C, x) + _sum(matrices.D, inputs))
+
+    def output_speed(self) -> Row:
+        """Speed of the output shaft; none where the rotor is locked."""
+        if "load_speed" in self.signals:
+            return self.signals["load_speed"] / self.drive.ratio
+        return self.signals.get("w", Row()) / self.drive.ratio
+
+    def speed_in_use(self, stage: str) -> Row:
+        """The measured speed as a stage has it."""
+        if self.drive.operating.rotor == "locked":
+            return Row()
         every = self.drive.interval["speed"]
         value = None
         if self.updates(every):
-            value = self.signals["w_meas"] if "w_meas" in self.signals else self.measured_speed()
-        return self.held("w_meas", value, every, 1)
+            value = self.measured_speed()
+        return self.held("w_meas", value, every, self.drive.interval[stage])
+
+
+def _sum(gains: Iterable[Any], rows: Iterable[Row]) -> Row:
+    """A product of a row of gains and signals."""
+    return total(float(gain) * row for gain, row in zip(gains, rows, strict=True))

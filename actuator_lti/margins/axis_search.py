@@ -63,22 +63,17 @@ def search(loop: Factored, low: float, high: float, listed_to: float = math.inf)
     return _read(loop, known, low == 0.0, listed_to)
 
 
-def last_above(loop: Factored, low: float, high: float, level: float) -> float:
-    """The last w up to ``high`` at which the log gain is above a level; ``low`` where it never is."""
+def passages(loop: Factored, low: float, high: float, level: float, kind: int = 0) -> Real:
+    """Every w between two at which the log gain (0) or the phase (1) passes a level, in order."""
 
     def clear(here: Intervals) -> Mask:
-        one_way = (here.least[2] > 0.0) | (here.most[2] < 0.0)
+        one_way = (here.least[kind + 2] > 0.0) | (here.most[kind + 2] < 0.0)
         least, most = here.bounds
-        return np.asarray(one_way | (least[0] > level) | (most[0] < level))
+        return np.asarray(one_way | (least[kind] > level) | (most[kind] < level))
 
     known = loop.covered([low, high], clear)
-    above = np.flatnonzero((known.first[0] >= level) | (known.last[0] >= level))
-    if not above.size:
-        return low
-    at = above[-1:]
-    if known.last[0, at] >= level:
-        return float(known.high[at[0]])
-    return float(_roots(loop, np.zeros(1, dtype=int), known, at, np.full(1, level))[0])
+    hit = np.flatnonzero((known.first[kind] > level) != (known.last[kind] > level))
+    return _roots(loop, np.full(hit.size, kind), known, hit, np.full(hit.size, level))
 
 
 def _clear(here: Intervals, listed_to: float, slack: float) -> Mask:

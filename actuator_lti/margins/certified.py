@@ -8,7 +8,8 @@ from dataclasses import replace
 from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
 from actuator_lti.margins.determined import FAR_DB, Settled, settled
-from actuator_lti.margins.exact_extremes import disk_alpha, modulus_margin
+from actuator_lti.margins.distances import DISK, MODULUS
+from actuator_lti.margins.exact_extremes import smallest
 from actuator_lti.margins.exact_findings import Crossing, Findings
 from actuator_lti.margins.exact_loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.given import ULP, Given
@@ -63,7 +64,7 @@ def _margins(given: Given, base: Findings, result: Settled) -> StabilityMargins:
 
     figures = None
     if result.problem is None:
-        modulus, disk = modulus_margin(base.loop), disk_alpha(base.loop)
+        modulus, disk = (smallest(base.loop, distance) for distance in (MODULUS, DISK))
         figures = Figures(
             tuple(gain_margin(c) for c in result.reals if not out_of_sight(c.L)),
             tuple(map(phase_margin, result.gains)),

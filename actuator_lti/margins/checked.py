@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, out_of_sight, within
-from actuator_lti.margins.axis_search import FAR_LOG, Found, last_above, search
+from actuator_lti.margins.axis_parts import axis_ends, axis_parts, distances_over, merged
+from actuator_lti.margins.axis_search import FAR_LOG
 from actuator_lti.margins.collocation import closed_loop_matrix, points_for
 from actuator_lti.margins.delay_form import in_series
+from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.factored import Response, factored
 from actuator_lti.margins.factors_on_axis import Factored
-from actuator_lti.margins.loop import Complex, Mask, RationalLoop, Real
-from actuator_lti.margins.nearest import nearest
-from actuator_lti.margins.nyquist import angle_about, angle_between
+from actuator_lti.margins.loop import Complex, RationalLoop, Real
+from actuator_lti.margins.nyquist import half_turns_about
 from actuator_lti.margins.poles import SortedPoles, polynomial_roots, sorted_poles
 from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
 from actuator_lti.margins.trust import MOST_ERROR, Doubtful, error_bound, hardly_placed
@@ -26,11 +25,6 @@ _METHOD = "factors of the loop, bounded over whole intervals of frequency; cross
 _WIDEST = 1e6  # ratio of poles and zeros up to which double precision is asked
 _NEAR_ONE = 1e-6
 _LEAST = math.exp(-FAR_LOG)
-_HARDLY = 1e-12  # rad
-_FLOORS = (0.01, 0.1, 0.5, 0.9)  # gain below which, behind a delay, no crossing of the real axis is listed
-_LEAST_GAIN = 1e-8
-_MOST_TURNS = 100_000  # of the delay that are listed, about a second's work
-_LOW, _HIGH = 1e-3, 1e3  # of the smallest and largest root: where the ends of the axis begin
 
 
 def checked_margins(
@@ -48,13 +42,9 @@ def checked_margins(
     try:
         with np.errstate(all="ignore"):
             return _margins(loop, delay_s, band_rad_s)
-    except (Doubtful, InputError, NumericalError):
+    except (InputError, NumericalError):
         raise
-    except (
-        ArithmeticError,
-        ValueError,
-        RuntimeError,
-    ) as error:  # LinAlgError, overflow, a search without end
+    except (ArithmeticError, ValueError, RuntimeError) as error:  # LinAlgError, overflow, no end of a search
         raise Doubtful(str(error)) from error
 
 
@@ -67,13 +57,15 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
         closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
     _trust_poles(loop, poles, closed)
     factors = factored(response, poles)
-    parts, listed_to, floor = _parts(factors, band)
-    ends = _ends(factors, response)
-    gain_w, real_w, rising, far = _merged(parts)
+    if np.unique(factors.weights[factors.roots == 0.0]).size > 1:
+        raise Doubtful("poles and zeros at zero frequency")
+    parts, listed_to, floor = axis_parts(factors, band)
+    ends = axis_ends(factors, response)
+    gain_w, real_w, rising, far = merged(parts)
     gain_x, gain_L = response.polished(gain_w, gain=True)
     real_x, real_L = response.polished(real_w, gain=False)
     _trust_crossings(loop, gain_x, real_x, ends)
-    count = poles.unstable - _half_turns_about(factors, response, parts, ends, real_L, rising)
+    count = poles.unstable - half_turns_about(factors, response, parts, ends, real_L, rising)
     second = _poles_behind_delay(loop, delay_s, gain_x) if closed is None else closed.unstable
     if second is not None and count != second:
         raise Doubtful("poles and Nyquist count disagree")
@@ -87,7 +79,7 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
             PhaseMargin(float(deg) if deg > -180.0 else 180.0, loop.frequency(x))
             for deg, x in zip(np.degrees(np.angle(-gain_L)), gain_x, strict=True)
         ),
-        *_distances(factors, response, parts, ends),
+        *distances_over(factors, response, parts, ends, (MODULUS, DISK)),
     )
     top = listed_to if math.isfinite(listed_to) else None
     result = assembled(
@@ -153,9 +145,9 @@ def _reason(real_L: Complex, twice: bool, sure: bool) -> str:
 
 def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | None) -> None:
     """Poles that are clear of the border, but for exact ones at zero frequency."""
-    if poles.doubtful or (closed is not None and (closed.border_count or closed.doubtful)):
+    if poles.doubtful or (closed is not None and (closed.border or closed.doubtful)):
         raise Doubtful("a pole may lie on either side of the border")
-    if poles.border_count != poles.at_dc:
+    if poles.border != poles.at_dc:
         raise Doubtful("poles on the border")
     if hardly_placed(loop, poles.values, False):
         raise Doubtful("rounding of the coefficients moves a pole over the border")
@@ -167,158 +159,6 @@ def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | N
     size = size[size > 0.0]
     if size.size and float(size.max()) > _WIDEST * float(size.min()):
         raise Doubtful("poles and zeros over too many decades")
-
-
-@dataclass(frozen=True)
-class _Part:
-    """A part of the axis: up to the middle, or from there on as 1/w."""
-
-    factors: Factored
-    found: Found
-    beyond: bool
-
-
-def _parts(factors: Factored, band: tuple[float, float] | None) -> tuple[list[_Part], float, float]:
-    """The axis in one part where the gain falls off or turns for ever, else in two: infinity is zero of 1/w.
-
-    With them, up to where crossings of the real axis are listed, and above which gain.
-    """
-    size = np.abs(factors.roots[factors.roots != 0.0])
-    scale = 1.0 / factors.delay if factors.delay else 1.0
-    least, most = (float(size.min()), float(size.max())) if size.size else (scale, scale)
-    low = _start(factors, _LOW * min(least, scale if factors.delay else least))
-    if factors.delay:
-        most_turned = 2.0 * math.pi * _MOST_TURNS / factors.delay
-        high, listed_to, floor = _turning_stop(factors, low, most, most_turned)
-        if band is not None:
-            listed_to, high = float(band[1]), max(high, 2.0 * float(band[1]))
-        if listed_to > most_turned:
-            turns = factors.delay * listed_to / (2.0 * math.pi)
-            raise NumericalError(
-                f"the delay turns the loop {turns:.1e} times where margins are listed; "
-                "shorten the delay, or ask for a narrower band_rad_s"
-            )
-        return [_Part(factors, search(factors, low, high, listed_to), False)], listed_to, floor
-    if factors.at_infinity:
-        return [_Part(factors, search(factors, low, _stop(factors, _HIGH * most)), False)], math.inf, 0.0
-    middle, mirrored = 2.0 * most, factors.reciprocal()
-    return (
-        [
-            _Part(factors, search(factors, low, middle), False),
-            _Part(mirrored, search(mirrored, _start(mirrored, _LOW / most), 1.0 / middle), True),
-        ],
-        math.inf,
-        0.0,
-    )
-
-
-def _turning_stop(
-    factors: Factored, low: float, most: float, most_turned: float
-) -> tuple[float, float, float]:
-    """Under a delay: a frequency above which |L| is next to nothing, and up to where crossings are listed.
-
-    With them the gain above which they are: the lowest of `_FLOORS` that does not list too many turns.
-    """
-    slope, high = factors.at_infinity, _HIGH * most
-    if not slope:
-        listed_to = 10.0 * most + 8.0 * math.pi / factors.delay
-        return 10.0 * max(high, listed_to), listed_to, 0.0
-    top = max(high, high * math.exp((math.log(_LEAST_GAIN) - factors.log_at(high)[0]) / slope))
-    for floor in _FLOORS:
-        listed_to = last_above(factors, low, top, math.log(floor))
-        if listed_to <= most_turned:
-            break
-    return top, listed_to, floor
-
-
-def _stop(factors: Factored, high: float) -> float:
-    """A frequency above which gain and phase follow the slope at infinity."""
-    slope = factors.at_infinity
-    high = max(high, 10.0 * high * math.exp(-factors.log_at(high)[0] / slope))
-    if not high < 1e150:
-        raise Doubtful("too wide a range")
-    if slope % 2 == 0 and abs(math.sin(factors.log_at(high)[1])) < _HARDLY:
-        raise Doubtful("the phase hardly leaves the real axis at an end of the axis")
-    return high
-
-
-def _start(factors: Factored, low: float) -> float:
-    """Zero, or a frequency below which gain and phase follow the roots at zero."""
-    order = factors.at_zero
-    if not order:
-        if abs(factors.log_at(0.0)[0]) < _NEAR_ONE:
-            raise Doubtful("the gain is one at an end of the axis")
-        return 0.0
-    low = min(low, 0.1 * low * math.exp(-factors.log_at(low)[0] / order))
-    if not 1e-150 < low < 1e150:
-        raise Doubtful("too wide a range")
-    if order % 2 == 0 and abs(math.sin(factors.log_at(low)[1])) < _HARDLY:
-        raise Doubtful("the phase hardly leaves the real axis at an end of the axis")
-    return low
-
-
-def _ends(factors: Factored, response: Response) -> tuple[complex, complex]:
-    """L at both ends of the axis: infinity where it has a pole, exactly 0 where it has a zero."""
-    first = response.at_rest() if not factors.at_zero else complex(math.inf if factors.at_zero < 0.0 else 0.0)
-    return first, response.at_end()
-
-
-def _merged(parts: list[_Part]) -> tuple[Real, Real, Mask, int]:
-    """All crossings in order of w."""
-
-    def whole(name: str) -> Any:
-        return np.concatenate([getattr(part.found, name)[:: -1 if part.beyond else 1] for part in parts])
-
-    beyond = [part.beyond for part in parts]
-
-    def in_w(name: str) -> Real:
-        late = np.repeat(beyond, [getattr(part.found, name).size for part in parts])
-        values = whole(name)
-        return np.asarray(np.where(late, 1.0 / values, values))
-
-    return in_w("gain_w"), in_w("real_w"), whole("rising"), sum(part.found.far for part in parts)
-
-
-def _half_turns_about(
-    factors: Factored,
-    response: Response,
-    parts: list[_Part],
-    ends: tuple[complex, complex],
-    real_L: Complex,
-    rising: Mask,
-) -> int:
-    """Turns of 1 + L about the origin from zero frequency to the end of the axis, in half turns."""
-    around = np.abs(real_L) > 1.0
-    cut = int(np.count_nonzero(rising & around)) - int(np.count_nonzero(~rising & around))
-    cut += sum(part.found.turns for part in parts)
-    angle, first = _from_zero(factors, response, parts[0].found, ends[0])
-    more, last = _to_end(response, parts[-1], ends[1])
-    return round((angle + last - first + more) / math.pi) + 2 * cut
-
-
-def _from_zero(factors: Factored, response: Response, found: Found, dc: complex) -> tuple[float, float]:
-    """The turn of 1 + L up to just above zero frequency, and its angle there."""
-    if not factors.at_zero < 0.0:
-        return 0.0, _leaving(1.0 + dc.real, found)
-    low = float(found.known.low[0])
-    on_real, on_axis = response.real_point(low), complex(response.at(np.array([low]))[0])
-    turned = angle_about(1.0 + on_real, 1.0 + on_axis, 0.5 * np.pi * factors.at_zero)
-    return turned, float(np.angle(1.0 + on_axis))
-
-
-def _leaving(F: float, found: Found) -> float:
-    """The angle of 1 + L beside an end of the axis, where it is F."""
-    if F >= 0.0:
-        return 0.0
-    return -math.pi if found.known.first[3, 0] > 0.0 else math.pi
-
-
-def _to_end(response: Response, part: _Part, end: complex) -> tuple[float, float]:
-    """The turn of 1 + L onto the real axis at the end, and its angle before."""
-    F = 1.0 + end
-    if response.delay:
-        return angle_between(F, complex(F.real)), float(np.angle(F))
-    return 0.0, -_leaving(F.real, part.found)
 
 
 def _trust_crossings(loop: RationalLoop, gain_x: Real, real_x: Real, ends: tuple[complex, complex]) -> None:
@@ -346,36 +186,3 @@ def _gain_margins(
         else at_end(response.onto_axis(ends[1]), loop.frequency(loop.end))
     )
     return (*at_end(ends[0], 0.0), *crossed, *last)
-
-
-def _distances(
-    factors: Factored, response: Response, parts: list[_Part], ends: tuple[complex, complex]
-) -> list[tuple[float, float]]:
-    """Modulus margin and disk margin, each with its frequency."""
-    nearest_ends = (ends[0], complex(-abs(ends[1])) if factors.delay else ends[1])
-    at_ends = [
-        min((float(_at_end(value, disk)), w) for value, w in zip(nearest_ends, (0.0, math.inf), strict=True))
-        for disk in (False, True)
-    ]
-    best = (at_ends[0], at_ends[1])
-    for part in parts:
-        modulus, disk = nearest(part.factors, part.found.known, (best[0], best[1]))
-        found = [
-            (v, 1.0 / w if part.beyond else w) if v < b[0] else b
-            for (v, w), b in zip((modulus, disk), best, strict=True)
-        ]
-        best = (found[0], found[1])
-    inside = [w if 0.0 < w < math.inf else 1.0 for _, w in best]
-    L = response.at(np.array(inside))
-    return [
-        (_at_end(complex(L[k]), bool(k)) if w == inside[k] else value, response.frequency(w))
-        for k, (value, w) in enumerate(best)
-    ]
-
-
-def _at_end(L: complex, disk: bool) -> float:
-    if not math.isfinite(abs(L)):
-        return 2.0 if disk else math.inf
-    if not disk:
-        return abs(1.0 + L)
-    return math.inf if L == 1.0 else abs(2.0 * (1.0 + L) / (1.0 - L))

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.assemble import assembled, within
 from actuator_lti.margins.checked import checked_margins
 from actuator_lti.margins.delay_form import DelayForm, delay_form
-from actuator_lti.margins.delayed import delayed_margins
-from actuator_lti.margins.given import Given, given_of
+from actuator_lti.margins.given import Given, given_of, whole_samples
 from actuator_lti.margins.loop import loop_of
 from actuator_lti.margins.measured import measured_margins
 from actuator_lti.margins.results import Agreement, StabilityMargins
 from actuator_lti.margins.series_delay import in_series
 from actuator_lti.margins.trust import Doubtful
-
-if TYPE_CHECKING:
-    from actuator_lti.margins.exact_delay import ExactDelayLoop
-
-_MOST_SAMPLES = 100
 
 
 def stability_margins(
@@ -38,9 +30,9 @@ def stability_margins(
     A rational loop, alone or behind a delay, is taken as its factors: the change of each over an interval of
     frequency is known, and intervals are split until the loop stays off the unit circle and the negative real
     axis in each, or moves over them one way; no crossing is left out. Stability is found twice where it can
-    be, from closed-loop poles (with delays, by collocation) and from the Nyquist curve. With delays inside, a
-    bound on the change of L takes the place of the factors. What double precision cannot check in this way is
-    worked out in exact arithmetic; ``.evidence`` says how the answer is known. Quoted are, see
+    be, from closed-loop poles (with delays, by collocation) and from the Nyquist curve. Delays inside, and
+    what double precision cannot check in this way, are worked out in exact arithmetic; ``.evidence`` says how
+    the answer is known. Quoted are, see
     `StabilityMargins`: the gain margin nearest to 0 dB, the phase margin nearest to 0 deg with its sign, the
     smallest delay margin (0 for an unstable loop), the smallest distance to -1.
 
@@ -94,7 +86,7 @@ def stability_margins(
             form = delay_form(system, delay_s)  # refuses what is no loop
             plain = in_series(system)
             if plain is None:
-                return _delayed(form, band_rad_s, certify)
+                return _inside_delays(form, band_rad_s)
             given, inside_s = plain
             late = _behind_delay(given, inside_s + delay_s, band_rad_s, certify)
             return replace(late, delay_s=delay_s)
@@ -128,7 +120,7 @@ def _rational(given: Given, certify: bool) -> StabilityMargins:
 def _behind_delay(
     given: Given, delay_s: float, band: tuple[float, float] | None, certify: bool
 ) -> StabilityMargins:
-    """A rational loop behind a delay, which may be part of a sample."""
+    """A rational loop behind a delay, which may be part of a sample: by its factors, else certified."""
     margins, doubt = None, ""
     try:
         margins = checked_margins(loop_of(given, warp=True), delay_s, band)
@@ -137,52 +129,32 @@ def _behind_delay(
     if margins is not None and (given.period_s is not None or not certify):
         return margins
     if given.period_s is not None:
-        return assembled(
-            given.period_s, Agreement(None, None), None, method="factors of the loop", notes=(),
-            evidence="withheld", reason=doubt, delay_s=delay_s,
-        )  # fmt: skip
-    from actuator_lti.margins.exact_delay import exact_behind_delay  # python-flint only where it is needed
-
-    return _certified_delayed(partial(exact_behind_delay, given, delay_s), delay_s, margins, band, doubt)
-
-
-def _delayed(form: DelayForm, band: tuple[float, float] | None, certify: bool) -> StabilityMargins:
-    """In double precision, and by certified intervals where the two ways to stability do not both tell."""
-    from actuator_lti.margins.exact_delay import exact_inside_delays  # python-flint only where it is needed
-
-    margins, doubt = None, ""
-    try:
-        margins = delayed_margins(form, band)
-    except NumericalError as error:
-        doubt = str(error)
-    if margins is not None and not certify and margins.agreement.told_twice:
-        return margins
-    return _certified_delayed(partial(exact_inside_delays, form), form.series_s, margins, band, doubt)
-
-
-def _certified_delayed(
-    loops: Callable[[], tuple[ExactDelayLoop, ...]],
-    delay_s: float,
-    margins: StabilityMargins | None,
-    band: tuple[float, float] | None,
-    doubt: str,
-) -> StabilityMargins:
-    """By certified intervals; what they do not tell is withheld, or stays as it is."""
-    from actuator_lti.margins.certified_delay import certified_delayed_margins
+        return _withheld(given.period_s, delay_s, "factors of the loop", doubt)
+    from actuator_lti.margins.certified_delay import certified_delayed_margins  # python-flint if needed
+    from actuator_lti.margins.exact_delay import exact_behind_delay
 
     try:
-        return certified_delayed_margins(loops(), delay_s, band, margins)
+        return certified_delayed_margins(exact_behind_delay(given, delay_s), delay_s, band, margins)
     except (NumericalError, InputError) as error:
-        if margins is not None and margins.agreement.agree:
+        if margins is not None:
             return replace(margins, evidence_reason=f"{margins.evidence_reason}; not certified: {error}")
-        doubt = doubt or "poles and Nyquist count disagree"
-        return assembled(
-            None, Agreement(None, None), None, method="certified intervals", notes=(), evidence="withheld",
-            reason=f"{doubt}; {error}", delay_s=delay_s,
-        )  # fmt: skip
+        return _withheld(None, delay_s, "certified intervals", f"{doubt}; {error}")
 
 
-def whole_samples(samples: float) -> int | None:
-    """The number of samples, where it is a whole one and becomes states."""
-    whole = round(samples)
-    return whole if abs(samples - whole) <= 1e-9 * max(samples, 1.0) and whole <= _MOST_SAMPLES else None
+def _inside_delays(form: DelayForm, band: tuple[float, float] | None) -> StabilityMargins:
+    """By certified intervals."""
+    from actuator_lti.margins.certified_delay import certified_delayed_margins  # python-flint if needed
+    from actuator_lti.margins.exact_delay import exact_inside_delays
+
+    loops = exact_inside_delays(form)
+    try:
+        return certified_delayed_margins(loops, form.series_s, band)
+    except NumericalError as error:
+        return _withheld(None, form.series_s, "certified intervals", str(error))
+
+
+def _withheld(period_s: float | None, delay_s: float, method: str, reason: str) -> StabilityMargins:
+    return assembled(
+        period_s, Agreement(None, None), None, method=method, notes=(), evidence="withheld",
+        reason=reason, delay_s=delay_s,
+    )  # fmt: skip

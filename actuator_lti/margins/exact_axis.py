@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
-from flint import acb, arb, fmpq_poly
+from flint import acb, arb, fmpq, fmpq_poly
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.exact_delay import ExactDelayLoop, Quasi, at
+from actuator_lti.margins.exact_delay import HIGHEST_ORDER, ExactDelayLoop, Quasi, at
 
 _MOST_INTERVALS = 60_000
 _NARROWEST = 1e-13
 _NEWTON_STEPS = 60
 _PER_DECADE = 5
-_HIGHEST_ORDER = 16
 _ODD = 0.9137236158
 J = acb(0, 1)
 _MIRROR = fmpq_poly([0, -1])
@@ -84,14 +84,38 @@ def _derivatives(f: Quasi) -> tuple[Quasi, Quasi, Quasi]:
 
 @dataclass(frozen=True)
 class Form:
-    """A real function q = Re(u N conj N + v N conj D + w D conj D) of the loop.
+    """A real function q = u |N|^2 + v Re(N conj D) + w |D|^2 of the loop, or with Im where it is turned.
 
-    (1, 0, -1) is |L| - 1; (0, -j, 0) the imaginary part of L; (1, 2, 1 - m^2) is |1 + L| - m.
+    (1, 0, -1) is |L| - 1; (0, 1, 0) the real part of L; (1, 2, 1 - m^2) is |1 + L| - m.
     """
 
-    u: arb
-    v: acb
-    w: arb
+    exact_u: fmpq
+    exact_v: fmpq
+    exact_w: fmpq
+    turned: bool = False
+
+    @cached_property
+    def u(self) -> arb:
+        """The weight of |N|^2."""
+        return arb(self.exact_u)
+
+    @cached_property
+    def v(self) -> acb:
+        """The weight of N conj D."""
+        return acb(arb(self.exact_v)) * (-J if self.turned else 1)
+
+    @cached_property
+    def w(self) -> arb:
+        """The weight of |D|^2."""
+        return arb(self.exact_w)
+
+    def order(self, loop: ExactDelayLoop) -> int:
+        """Multiplicity of its zero at x = 0; 0: it is none."""
+        N, D = loop.at_rest
+        cross = self.exact_v * N * D(_MIRROR)
+        if self.turned:
+            return _order(cross, 1)
+        return _order(self.exact_u * N * N(_MIRROR) + cross + self.exact_w * D * D(_MIRROR), 0)
 
     def at(self, N: acb, D: acb) -> arb:
         """The value."""
@@ -113,19 +137,18 @@ class Form:
         return self.u * own[0] + (self.v * both).real + self.w * own[1]
 
 
+GAIN = Form(fmpq(1), fmpq(0), fmpq(-1))
+REAL, IMAGINARY = (Form(fmpq(0), fmpq(1), fmpq(0), turned) for turned in (False, True))
+
+
 def _over(f: Taylor, half: arb) -> Taylor:
     """Taylor coefficients in the middle made one over the interval."""
     slope = f[1] + f[2] * half
     return f[0] + f[1] * half + f[2] * (half * half) / 2, slope, f[2]
 
 
-def zeros(axis: Axis, q: Form, edges: list[float], order_at_zero: int = 0) -> list[arb]:
-    """Every zero of q with 0 < x < edges[-1], each alone in its interval.
-
-    Parameters
-    ----------
-    order_at_zero : int
-        Multiplicity of the zero of q at x = 0, which is not listed.
+def zeros(axis: Axis, q: Form, edges: list[float]) -> list[arb]:
+    """Every zero of q between the edges, each alone in its interval; one at x = 0 is not listed.
 
     Raises
     ------
@@ -134,7 +157,7 @@ def zeros(axis: Axis, q: Form, edges: list[float], order_at_zero: int = 0) -> li
     """
     result: list[arb] = []
     stack = [(a, b) for a, b in pairwise(edges)][::-1]
-    count = 0
+    count, order_at_zero = 0, 0 if edges[0] else q.order(axis.loop)
     while stack:
         low, high = stack.pop()
         count += 1
@@ -197,20 +220,9 @@ def _root(axis: Axis, q: Form, low: float, high: float) -> list[arb]:
     raise NumericalError(f"a crossing near {x:.10g} rad/s did not settle")
 
 
-def gain_order(loop: ExactDelayLoop) -> int:
-    """Multiplicity of the zero of |N|^2 - |D|^2 at x = 0; 0: the gain is not one there."""
-    N, D = loop.N.series(_HIGHEST_ORDER), loop.D.series(_HIGHEST_ORDER)
-    return _order(N * N(_MIRROR) - D * D(_MIRROR), 0)
-
-
-def phase_order(loop: ExactDelayLoop) -> int:
-    """Multiplicity of the zero of Im(N conj D) at x = 0."""
-    return _order(loop.N.series(_HIGHEST_ORDER) * loop.D.series(_HIGHEST_ORDER)(_MIRROR), 1)
-
-
 def _order(series: fmpq_poly, first: int) -> int:
     """The first power, counted in twos, whose coefficient is not zero."""
-    for k in range(first, _HIGHEST_ORDER, 2):
+    for k in range(first, HIGHEST_ORDER, 2):
         if series[k] != 0:
             return k
     raise NumericalError("the loop does not leave the line at zero frequency")

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_poly
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.certified_roots import NOTHING_HIDDEN, HalfPlanes, half_planes
 from actuator_lti.margins.delay_form import DelayForm
 from actuator_lti.margins.exact_loop import exact_loop, neighbours
 from actuator_lti.margins.given import ULP, Given
 
-_MOST_DELAYS = 5
-_MOST_AT_REST = 6
+_MOST_DELAYS = 8
+HIGHEST_ORDER = 16
 Terms = tuple[tuple[fmpq_poly, fmpq], ...]
 
 
@@ -36,6 +37,10 @@ class Quasi:
     def late(self, delay: fmpq) -> Quasi:
         """Behind one more delay."""
         return Quasi(tuple((p, tau + delay) for p, tau in self.terms))
+
+    def times(self, factor: int) -> Quasi:
+        """A multiple."""
+        return Quasi(tuple((factor * p, tau) for p, tau in self.terms))
 
     def series(self, order: int) -> fmpq_poly:
         """Its Taylor series at s = 0 below ``order``, exact."""
@@ -70,6 +75,60 @@ class ExactDelayLoop:
     degree: int
     hidden: HalfPlanes = NOTHING_HIDDEN
 
+    @cached_property
+    def at_rest(self) -> tuple[fmpq_poly, fmpq_poly]:
+        """Taylor series of N and D at s = 0."""
+        return self.N.series(HIGHEST_ORDER), self.D.series(HIGHEST_ORDER)
+
+    @property
+    def lead(self) -> arb:
+        """The coefficient of the highest power of s in D."""
+        return arb(self.D.terms[0][0][self.degree])
+
+    @cached_property
+    def lowest(self) -> float:
+        """A frequency below the smallest root of any of the polynomials, and the turn of any delay."""
+        sizes = [1.0]
+        for p, tau in (*self.D.terms, *self.N.terms):
+            c = [abs(float(arb(x).mid())) for x in p.coeffs()]
+            first = next(k for k, x in enumerate(c) if x)
+            if len(c) > first + 1:
+                sizes.append(
+                    min((c[first] / x) ** (1.0 / (k - first)) for k, x in enumerate(c) if k > first and x)
+                )
+            if tau != 0:
+                sizes.append(1.0 / float(arb(tau).mid()))
+        return 0.1 * min(sizes[1:] or sizes)
+
+    def beyond(self, gain: float) -> float:
+        """A frequency above which |L| < gain: the leading power against all other coefficients together.
+
+        Raises
+        ------
+        NumericalError
+            There is none.
+        """
+
+        def holds(x: float) -> bool:
+            above = sum((_size(p, x) for p, _ in self.N.terms), arb(0))
+            rest = sum((_size(p, x) for p, _ in self.D.terms), arb(0))
+            return bool(above < gain * (2 * abs(self.lead) * arb(x) ** self.degree - rest))
+
+        x = max(self.lowest, 1e-300)
+        while not holds(x):
+            x *= 2.0
+            if x > 1e300:
+                raise NumericalError("the gain of the loop does not fall off")
+        return x
+
+
+def _size(p: fmpq_poly, x: float) -> arb:
+    total, power = arb(0), arb(1)
+    for c in p.coeffs():
+        total += abs(arb(c)) * power
+        power = power * x
+    return total
+
 
 def neighbour(form: DelayForm, way: float) -> DelayForm:
     """The same with every entry and delay 8 ulp away, see `Given.neighbours`."""
@@ -101,17 +160,18 @@ def exact_behind_delay(given: Given, delay_s: float) -> tuple[ExactDelayLoop, ..
     return tuple(out)
 
 
-def exact_inside_delays(form: DelayForm) -> tuple[ExactDelayLoop, ...]:
+def exact_inside_delays(form: DelayForm, *, reduced: bool = True) -> tuple[ExactDelayLoop, ...]:
     """A loop with delays inside, and its neighbours."""
-    return tuple(exact_delay_loop(f) for f in (form, neighbour(form, 1.0), neighbour(form, -1.0)))
+    every = (form, neighbour(form, 1.0), neighbour(form, -1.0))
+    return tuple(exact_delay_loop(each, reduced=reduced) for each in every)
 
 
-def exact_delay_loop(form: DelayForm) -> ExactDelayLoop:
+def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop:
     r"""Expand the determinants, affine in each exp(-s tau_k): one polynomial for each subset of delays.
 
     D = det [sI - A, -B2 E; -C2, I - D22 E] and N the same bordered by (-B1, -D21; C1, D12 E, D11), with
     E = diag exp(-s tau_k); a column without its delay is a unit vector, which takes its row away. A power of
-    s in every term of both is cancelled.
+    s in every term of both is cancelled where the loop is to be ``reduced``.
 
     Raises
     ------
@@ -137,7 +197,9 @@ def exact_delay_loop(form: DelayForm) -> ExactDelayLoop:
         raise InputError(
             "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
         )
-    N, D, n = _without_common_s(_present(above), _present(below), n)
+    N, D = _present(above), _present(below)
+    if reduced:
+        N, D, n = _without_common_s(N, D, n)
     return ExactDelayLoop(Quasi(N).late(_exact(form.series_s)), Quasi(D), n)
 
 
@@ -183,66 +245,3 @@ def _newton(values: list[fmpq]) -> fmpq_poly:
     for k in range(len(values) - 2, -1, -1):
         out = out * fmpq_poly([-k, 1]) + differences[k]
     return out
-
-
-def singular_at_rest(form: DelayForm) -> bool:
-    """Whether the open loop has a pole at zero frequency exactly, by its entries."""
-    inner = np.block([[form.A, form.B2], [form.C2, form.D22 - np.eye(form.delays.size)]])
-    m = inner.shape[0]
-    entries = [fmpq(*float(x).as_integer_ratio()) for x in inner.ravel()]
-    return bool(fmpq_mat(m, m, entries).det() == 0)
-
-
-def shown_at_rest(form: DelayForm) -> bool:
-    """Whether L shows a pole at zero frequency: N(0) is not zero, and stays what it is for the neighbours.
-
-    The slope of L cannot tell: behind a weak spring the residue may be 1e-6 of what hides it.
-    """
-    values = [_numerator_at_rest(near) for near in (form, neighbour(form, 1.0), neighbour(form, -1.0))]
-    return values[0] != 0 and all(abs(v / values[0] - 1) < fmpq(1, 100) for v in values[1:])
-
-
-def _numerator_at_rest(form: DelayForm) -> fmpq:
-    whole = np.block(
-        [
-            [-form.A, -form.B2, -form.B1[:, None]],
-            [-form.C2, np.eye(form.delays.size) - form.D22, -form.D21[:, None]],
-            [form.C1[None], form.D12[None], np.array([[form.D11]])],
-        ]
-    )
-    m = whole.shape[0]
-    return fmpq_mat(m, m, [_exact(x) for x in whole.ravel()]).det()
-
-
-def poles_at_rest(form: DelayForm) -> int | None:
-    """Multiplicity of the open loop's pole at zero frequency; ``None`` where rounding decides about it.
-
-    Eigenvalues cannot tell a double one from one at zero beside a slow one (a weak spring that drives).
-    """
-    series = [_denominator_at_rest(near) for near in (form, neighbour(form, 1.0), neighbour(form, -1.0))]
-    first = next((k for k, c in enumerate(series[0]) if c != 0), None)
-    if first is None or any(any(near[:first]) for near in series[1:]):
-        return None
-    steady = all(abs(near[first] / series[0][first] - 1) < fmpq(1, 100) for near in series[1:])
-    return first if steady else None
-
-
-def _denominator_at_rest(form: DelayForm) -> list[fmpq]:
-    """The first Taylor coefficients of D at zero, no power of s cancelled."""
-    n, total = form.B1.size, fmpq_poly()
-    for size in range(form.delays.size + 1):
-        for chosen in combinations(range(form.delays.size), size):
-            S = list(chosen)
-            core = np.block([[-form.A, -form.B2[:, S]], [-form.C2[S], -form.D22[np.ix_(S, S)]]])
-            tau = sum((_exact(form.delays[k]) for k in chosen), fmpq(0))
-            total += Quasi(((_determinant(core, n), tau),)).series(_MOST_AT_REST)
-    return [total[k] for k in range(_MOST_AT_REST)]
-
-
-def value_at_rest(form: DelayForm) -> float | None:
-    """L(0) with the power of s that N and D share cancelled; ``None`` where that leaves a pole."""
-    if form.delays.size > _MOST_DELAYS:
-        return None
-    loop = exact_delay_loop(form)
-    above, below = loop.N.series(1)[0], loop.D.series(1)[0]
-    return None if below == 0 else float((above / below).p) / float((above / below).q)

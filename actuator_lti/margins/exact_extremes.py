@@ -8,25 +8,17 @@ from flint import arb, ctx, fmpz_poly
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.certified_roots import all_roots, positive_roots, split
+from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact_loop import ExactLoop
 
 _FIRST_BITS, _MOST_BITS = 96, 1 << 14
 _ZERO = 1e-18
 
 
-def modulus_margin(loop: ExactLoop) -> tuple[float, float]:
-    """Smallest |1 + L| and its w."""
-    return _smallest(split(loop.closed).square, split(loop.D).square)
-
-
-def complementary_margin(loop: ExactLoop) -> tuple[float, float]:
-    """Smallest |(1 + L)/L|, one over the peak of T, and its w."""
-    return _smallest(split(loop.closed).square, split(loop.N).square)
-
-
-def disk_alpha(loop: ExactLoop) -> tuple[float, float]:
-    """Smallest |2 (1 + L)/(1 - L)| and its w."""
-    return _smallest(4 * split(loop.closed).square, split(loop.D - loop.N).square)
+def smallest(loop: ExactLoop, distance: Distance) -> tuple[float, float]:
+    """Smallest value of a distance and its w."""
+    above, below = distance.over(loop.N, loop.D)
+    return _smallest(split(above).square, split(below).square)
 
 
 def _smallest(above: fmpz_poly, below: fmpz_poly) -> tuple[float, float]:

@@ -152,8 +152,6 @@ def factored(response: Response, poles: SortedPoles) -> Factored:
     loop = response.loop
     below = _in_s(loop, _exact_zero(poles, loop.in_z))
     above = _zeros(loop, below)
-    if (above == 0.0).any() and (below == 0.0).any():
-        raise Doubtful("poles and zeros at zero frequency")
     roots = np.concatenate((above, below))
     weights = np.concatenate((np.ones(above.size), -np.ones(below.size)))
     delay = response.delay

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from actuator_lti.errors import InputError
 
 Real = NDArray[np.floating[Any]]
+_MOST_SAMPLES = 100
 ULP = 8  # by how much the entries may be wrong: what this changes the data do not determine
 
 
@@ -109,3 +110,9 @@ def _period(dt: Any) -> float | None:
     if dt is None or (dt == 0 and dt is not True):
         return None
     return 1.0 if dt is True else float(dt)
+
+
+def whole_samples(samples: float) -> int | None:
+    """The number of samples, where it is a whole one and becomes states."""
+    whole = round(samples)
+    return whole if abs(samples - whole) <= 1e-9 * max(samples, 1.0) and whole <= _MOST_SAMPLES else None

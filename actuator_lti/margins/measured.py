@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import delay_margins
-from actuator_lti.margins.distances import disk
+from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.measured_bounds import Bounds, Strip, bounds
 from actuator_lti.margins.measured_data import MeasuredResponse, measured_response
@@ -49,7 +49,7 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
     L = L * np.exp(-1j * omega * delay_s)
     phase_margins, grazed = _phase_margins(omega, result)
     gain_margins, touched = _gain_margins(omega, result)
-    distance, alpha = np.abs(1.0 + L), disk(L)
+    distance, alpha = MODULUS.of(L), DISK.of(L)
     k, j = int(distance.argmin()), int(alpha.argmin())
     modulus_range, alpha_range = distance_ranges(L, radius, result)
     noise = f"noise: {response.source}" if radius.any() else "noise: none, the ranges leave it out"

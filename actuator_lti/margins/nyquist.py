@@ -1,53 +1,62 @@
-"""Angles along the Nyquist curve, and its start at a pole at zero frequency."""
+"""Turns of 1 + L about the origin along the axis, from the crossings of the negative real axis."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import cmath
+import math
 
 import numpy as np
 
-from actuator_lti.errors import InputError
-from actuator_lti.margins.loop import Complex, Real
+from actuator_lti.margins.axis_parts import Part
+from actuator_lti.margins.axis_search import Found
+from actuator_lti.margins.factored import Response
+from actuator_lti.margins.factors_on_axis import Factored
+from actuator_lti.margins.loop import Complex, Mask
 
 
-def slope_at_dc(response: Callable[[Real], Complex], start: float, most: int) -> tuple[int, complex]:
-    """Order of the pole of L at zero frequency, from the steepest whole slope below ``start``, and L there.
-
-    Parameters
-    ----------
-    response : callable
-        L on the border of stability.
-    start : float
-        Below every other pole.
-    most : int
-        Poles that there are.
-
-    Raises
-    ------
-    InputError
-        No slope is a whole number: the pole is all but cancelled.
-    """
-    x = start * 10.0 ** (-0.5 * np.arange(20))
-    L = response(x)
-    with np.errstate(divide="ignore", invalid="ignore"):  # where L is 0 there is no slope
-        slope = 2.0 * np.log10(np.abs(L[1:]) / np.abs(L[:-1]))
-        whole = np.flatnonzero((np.abs(slope - np.round(slope)) < 0.01) & (np.round(slope) <= most))
-    if not whole.size:
-        raise InputError(
-            "a pole at zero frequency is cancelled, all but completely: cancel it in the loop first"
-        )
-    order = int(np.round(slope[whole]).max())
-    steepest = whole[np.round(slope[whole]) == order]
-    k = int(steepest[steepest.size // 2])
-    return max(order, 0), complex(L[k + 1])
+def half_turns_about(
+    factors: Factored,
+    response: Response,
+    parts: list[Part],
+    ends: tuple[complex, complex],
+    real_L: Complex,
+    rising: Mask,
+) -> int:
+    """Turns of 1 + L about the origin from zero frequency to the end of the axis, in half turns."""
+    around = np.abs(real_L) > 1.0
+    cut = int(np.count_nonzero(rising & around)) - int(np.count_nonzero(~rising & around))
+    cut += sum(part.found.turns for part in parts)
+    angle, first = _from_zero(factors, response, parts[0].found, ends[0])
+    more, last = _to_end(response, parts[-1], ends[1])
+    return round((angle + last - first + more) / math.pi) + 2 * cut
 
 
-def angle_between(start: complex, stop: complex) -> float:
-    """Angle from one point to another of the same closed half plane, rad."""
-    return float(np.angle(stop * np.conj(start)))
+def _from_zero(factors: Factored, response: Response, found: Found, dc: complex) -> tuple[float, float]:
+    """The turn of 1 + L up to just above zero frequency, and its angle there."""
+    if not factors.at_zero < 0.0:
+        return 0.0, _leaving(1.0 + dc.real, found)
+    low = float(found.known.low[0])
+    on_real, on_axis = response.real_point(low), complex(response.at(np.array([low]))[0])
+    turn, about = _angle_between(1.0 + on_real, 1.0 + on_axis), 0.5 * math.pi * factors.at_zero
+    turn += 2.0 * math.pi * round((about - turn) / (2.0 * math.pi))
+    return turn, cmath.phase(1.0 + on_axis)
 
 
-def angle_about(start: complex, stop: complex, about: float) -> float:
-    """The angle from start to stop that is nearest to ``about``."""
-    turn = angle_between(start, stop)
-    return turn + 2.0 * np.pi * round((about - turn) / (2.0 * np.pi))
+def _angle_between(start: complex, stop: complex) -> float:
+    """Angle from one point to another of the same closed half plane."""
+    return cmath.phase(stop * start.conjugate())
+
+
+def _leaving(F: float, found: Found) -> float:
+    """The angle of 1 + L beside an end of the axis, where it is F."""
+    if F >= 0.0:
+        return 0.0
+    return -math.pi if found.known.first[3, 0] > 0.0 else math.pi
+
+
+def _to_end(response: Response, part: Part, end: complex) -> tuple[float, float]:
+    """The turn of 1 + L onto the real axis at the end, and its angle before."""
+    F = 1.0 + end
+    if response.delay:
+        return _angle_between(F, complex(F.real)), cmath.phase(F)
+    return 0.0, -_leaving(F.real, part.found)

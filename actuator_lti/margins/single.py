@@ -183,11 +183,6 @@ class Agreement:
             return True
         return self.unstable_poles == self.unstable_nyquist
 
-    @property
-    def told_twice(self) -> bool:
-        """Whether both ways apply, and agree."""
-        return self.agree and None not in (self.unstable_poles, self.unstable_nyquist)
-
     def __str__(self) -> str:
         if self.border_poles:
             return f"{self.border_poles} closed-loop pole(s) on the border"

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_lti.errors import NumericalError
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import Complex, RationalLoop, Real, horner
 
@@ -15,7 +16,7 @@ TOUCH = 1e-9  # how near to one (gain) or to the axis (rad) a touching curve cou
 MOST_ERROR = 1e-10  # relative bound of the error of L at a crossing
 
 
-class Doubtful(ArithmeticError):
+class Doubtful(NumericalError):
     """Double precision cannot check the answer; the message says what it lacks."""
 
 

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 from actuator_lti.errors import InputError
 from actuator_lti.margins.collocation import open_loop_matrix
 from actuator_lti.margins.delay_form import DelayForm, border_values, characteristic, delay_form
-from actuator_lti.margins.delay_setting import low_frequency
+from actuator_lti.margins.delay_response import DelayResponse
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import Motion
@@ -46,11 +46,11 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
         Not stable, a final value of zero, or a response that would take too many points.
     """
     form = delay_form(system)
-    low, order = low_frequency(form)
-    poles = sorted_poles(open_loop_matrix(form, _POINTS), False)
-    if order or poles.unstable or poles.border_count > 1:
+    poles, at_rest = sorted_poles(open_loop_matrix(form, _POINTS), False), DelayResponse.of(form)
+    if at_rest.order > 0 or poles.unstable or poles.border > 1:
         raise InputError(UNSTABLE)
-    final = _final_value(form, low if poles.border_count else 0.0, poles.values)
+    final = 0.0 if at_rest.order else at_rest.lead
+    _refuse_no_final(form, final, poles.values)
     head = _FIRST * float(form.delays.max())
     while True:
         h = _grid_step(form.delays, head)
@@ -64,13 +64,11 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
         head *= 2.0
 
 
-def _final_value(form: DelayForm, x: float, poles: Complex) -> float:
-    final = float(border_values(form, np.array([x]))[0].real)
+def _refuse_no_final(form: DelayForm, final: float, poles: Complex) -> None:
     around = np.abs(poles[np.abs(poles) > 0.0])
     largest = float(np.abs(border_values(form, around)).max(initial=0.0))
     if abs(final) <= _ZERO * largest:
         raise InputError(NO_FINAL)
-    return final
 
 
 def _modes(form: DelayForm, poles: Complex, start: float) -> tuple[Complex, Complex]:

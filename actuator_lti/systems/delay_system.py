@@ -21,6 +21,7 @@ import numpy as np
 from control.iosys import InputOutputSystem
 
 from actuator_lti.errors import InputError
+from actuator_lti.margins.loop import rational_loop
 from actuator_lti.systems.control_face import ControlFace
 from actuator_lti.systems.plain_delays import PlainDelaySystem, descriptor, in_parallel, in_series, response
 
@@ -123,8 +124,11 @@ class DelaySystem(ControlFace):
             )
         if not system.isctime():
             raise InputError(f"a sampled system (dt = {system.dt}) cannot be joined to a continuous one")
-        ss = control.ss(system)
         labels = {"inputs": system.input_labels, "outputs": system.output_labels} | names
+        if isinstance(system, control.TransferFunction) and system.issiso():
+            own = rational_loop(system)  # control.ss drops what is below 1e-14 of the numerator
+            return cls(own.A, own.b, [], own.c, [], own.d, [], [], [], [], **labels)
+        ss = control.ss(system)
         return cls(ss.A, ss.B, [], ss.C, [], ss.D, [], [], [], [], **labels)
 
     @classmethod

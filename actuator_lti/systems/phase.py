@@ -9,23 +9,29 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
-from actuator_lti.margins.delay_form import DelayForm, border_values, delay_form
-from actuator_lti.margins.delay_setting import low_frequency
-from actuator_lti.margins.factors import factor_phase, poles, zeros
-from actuator_lti.margins.loop import RationalLoop, Real, rational_loop
+from actuator_lti.margins.certified_roots import half_planes
+from actuator_lti.margins.delay_form import delay_form
+from actuator_lti.margins.delay_response import DelayResponse
+from actuator_lti.margins.exact_loop import exact_loop
+from actuator_lti.margins.factored import Response, factored
+from actuator_lti.margins.factors_on_axis import Factored, half_turn
+from actuator_lti.margins.given import Given, given_of
+from actuator_lti.margins.loop import Real, loop_of
 from actuator_lti.margins.measured import measured_points
 from actuator_lti.margins.measured_bounds import bounds
 from actuator_lti.margins.measured_data import is_measured, measured_response
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.margins.sweep import subdivided, variation
+from actuator_lti.margins.trust import Doubtful
+
+_ON_AXIS = 1e-30  # relative: what certified roots leave of an undamped one
 
 
 def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.0) -> Real:
     """Phase of a system over frequency, in deg, without jumps of 360 deg whatever the grid.
 
     The phase of a rational system is the sum of the phases of its poles and zeros, that of a delay is
-    -omega delay; a system with inner delays is followed from low frequency in steps that a bound keeps
-    below a quarter turn. At zero frequency the phase is -90 deg for each integrator (1/s^3 starts at -270),
+    -omega delay; that of a system with inner delays is counted from where it meets the negative real axis. At
+    zero frequency the phase is -90 deg for each integrator (1/s^3 starts at -270),
     and 180 deg less for a negative gain. An undamped resonance turns by -180 deg, as a damped one does.
 
     Parameters
@@ -65,16 +71,15 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
         return np.degrees(_measured_phase(system, flat, delay_s)).reshape(omega.shape)
     if hasattr(system, "delays_s"):
         if system.delays_s.size:
-            phase = _followed(delay_form(system), flat)
+            phase = DelayResponse.of(delay_form(system)).phase(flat)
             return np.degrees(phase - flat * delay_s).reshape(omega.shape)
         system = system.to_state_space()
-    loop = rational_loop(system)
-    x = flat if loop.period_s is None else flat * loop.period_s
-    if loop.in_z and (x > math.pi * (1.0 + 1e-12)).any():
-        raise InputError(
-            f"omega_rad_s: up to the Nyquist frequency {math.pi / (loop.period_s or 1.0):.6g} rad/s"
-        )
-    return np.degrees(rational_phase(loop, x) - flat * delay_s).reshape(omega.shape)
+    given = given_of(system)
+    period = given.period_s
+    if period is not None and (flat * period > math.pi * (1.0 + 1e-12)).any():
+        raise InputError(f"omega_rad_s: up to the Nyquist frequency {math.pi / period:.6g} rad/s")
+    w = flat if period is None else np.tan(np.minimum(0.5 * flat * period, 0.5 * math.pi))
+    return np.degrees(_rational_phase(given, w) - flat * delay_s).reshape(omega.shape)
 
 
 def _measured_phase(data: Any, omega: Real, delay_s: float) -> Real:
@@ -93,44 +98,28 @@ def _measured_phase(data: Any, omega: Real, delay_s: float) -> Real:
     return np.interp(np.log(omega), np.log(at), result.phase.middle)
 
 
-def rational_phase(loop: RationalLoop, x: Real) -> Real:
-    """Unwrapped phase of a rational loop in rad; x as in `RationalLoop`."""
-    roots, p = zeros(loop), poles(loop)
-    at_dc = 1.0 + 0j if loop.in_z else 0j
-    border = [pole for pole in sorted_poles(loop.A, loop.in_z).border if pole.x == 0.0]
-    if border:  # a cluster of eigenvalues about the exact multiple pole
-        nearest = np.argsort(np.abs(p - at_dc))[: border[0].multiplicity]
-        p = p.copy()
-        p[nearest] = at_dc
-    near = np.abs(np.concatenate((roots, p)) - at_dc)
-    size = float(near.max()) if near.size else 1.0
-    first = 1e-3 * float(min(near[near > 1e-7 * size].min(initial=1.0 if loop.in_z else size or 1.0), 1e300))
-    everywhere = np.append(x, first)
-    factors = factor_phase(roots, everywhere, loop.in_z) - factor_phase(p, everywhere, loop.in_z)
-    exact = np.angle(loop.response(everywhere))
-    sign = -np.pi if abs(_wrapped(exact[-1:] - factors[-1:])[0]) > 0.5 * np.pi else 0.0
-    factors = factors + sign
-    correction = _wrapped(exact - factors)
-    return (factors + np.where(np.isfinite(correction), correction, 0.0))[
-        :-1
-    ]  # on a pole: between both sides
+def _rational_phase(given: Given, w: Real) -> Real:
+    """Of a rational loop, rad, over w of the s-plane."""
+    loop = loop_of(given, warp=True)
+    response = Response(loop)
+    try:
+        factors = factored(response, sorted_poles(loop.A, loop.in_z))
+    except Doubtful:
+        factors = _exact_factors(given)
+    first = 1e-3 * float(np.abs(factors.roots[factors.roots != 0.0]).min(initial=1.0))
+    phase = factors.log_value(np.append(w, first))[1]
+    start = float(np.angle(response.at(np.array([first]))[0]))
+    phase += half_turn(start - phase[-1])
+    half_turns = round(float(phase[-1] / np.pi - 0.5 * factors.at_zero))  # odd: a negative gain
+    phase = phase[:-1] - np.pi * (half_turns + half_turns % 2)
+    correction = np.angle(response.at(w) * np.exp(-1j * phase))
+    return phase + np.where(np.isfinite(correction), correction, 0.0)  # on a pole: between both sides
 
 
-def _wrapped(angle: Real) -> Real:
-    return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
-
-
-def _followed(form: DelayForm, omega: Real) -> Real:
-    """Unwrapped phase of a system with inner delays, rad."""
-    low, order = low_frequency(form)
-    edges = np.geomspace(low, max(float(omega.max()), 2.0 * low) * 1.001, 60)
-    intervals = subdivided(form, edges, lambda c: variation(form, c) < 0.5 * np.abs(c.L))
-    start = -0.5 * np.pi * order
-    first = float(np.angle(intervals.L[0]) - start)
-    first -= 2.0 * np.pi * np.round(first / (2.0 * np.pi))
-    if first > 0.5 * np.pi:
-        first -= 2.0 * np.pi  # a negative gain counts as -180 deg
-    steps = np.angle(intervals.L[1:] * intervals.L[:-1].conj())
-    phase = start + first + np.concatenate(([0.0], np.cumsum(steps)))
-    nearest = np.clip(np.searchsorted(intervals.x + intervals.half, omega), 0, intervals.x.size - 1)
-    return phase[nearest] + np.angle(border_values(form, omega) * intervals.L[nearest].conj())
+def _exact_factors(given: Given) -> Factored:
+    """From the roots of the exact polynomials, but for their constant."""
+    loop = exact_loop(given)
+    above, below = (np.array(half_planes(p).values, dtype=complex) for p in (loop.N, loop.D))
+    roots, weights = np.append(above, below), np.append(np.ones(above.size), -np.ones(below.size))
+    roots.real[np.abs(roots.real) < _ON_AXIS * np.abs(roots.imag)] = 0.0
+    return Factored(roots, weights, 0.0)

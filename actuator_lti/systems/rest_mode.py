@@ -13,6 +13,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from actuator_lti.systems.resolvent import balanced
+
 System = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 LEAST = (1e-9, 1e-12, 1e-15)  # of the largest: a state of less is zero, if the equations then hold as well
@@ -61,29 +63,32 @@ def without_common_rest_mode(
     systems : list of (A, B, C)
     kept : ndarray of bool, shape (n,)
     """
-    n = systems[0][0].shape[0]
-    As, Bs, Cs = (np.stack(part) for part in zip(*systems, strict=True))
-    finite = all(np.isfinite(part).all() for part in (As, Bs, Cs))
-    own = (np.diagonal(As, axis1=1, axis2=2) == at).all(axis=0) if finite else np.zeros(n, dtype=bool)
-    integrators = np.flatnonzero(own) if n > 1 else np.empty(0, dtype=int)
-    entries = (As != 0.0).any(axis=0)
-    for j in sorted(integrators, key=lambda j: np.count_nonzero(entries[j])):
-        v = _at_rest(As, Cs, at, int(j), alone)
-        if v is not None:
-            o = np.arange(n) != j
-            return [
-                (A[np.ix_(o, o)] - v[o, None] * A[j, o], B[o] - v[o, None] * B[j], C[:, o])
-                for A, B, C in systems
-            ], o
-    for j in sorted(integrators, key=lambda j: np.count_nonzero(entries[:, j])):
-        w = _at_rest(As.transpose(0, 2, 1), Bs.transpose(0, 2, 1), at, int(j), alone)
-        if w is not None:
-            o = np.arange(n) != j
-            return [
-                (A[np.ix_(o, o)] - A[o, j][:, None] * w[o], B[o], C[:, o] - C[:, [j]] * w[o])
-                for A, B, C in systems
-            ], o
-    return list(systems), np.ones(n, dtype=bool)
+    for turned in (False, True):  # not seen; not driven: the same of the transposed systems
+        tried = [(A.T, C.T, B.T) for A, B, C in systems] if turned else list(systems)
+        found = _own(tried, at, alone)
+        if found is not None:
+            j, v = found
+            o = np.arange(len(v)) != j
+            left = [(A[np.ix_(o, o)] - np.outer(v[o], A[j, o]), B[o] - np.outer(v[o], B[j]), C[:, o])
+                    for A, B, C in tried]  # fmt: skip
+            return [(A.T, C.T, B.T) for A, B, C in left] if turned else left, o
+    return list(systems), np.ones(len(systems[0][0]), dtype=bool)
+
+
+def _own(systems: Sequence[System], at: float, alone: bool) -> tuple[int, np.ndarray] | None:
+    """An integrator and the mode at rest that it is the largest part of; ``None`` where there is none.
+
+    One that takes part by 1e-10 only would leave the difference of large numbers.
+    """
+    As, Cs = (np.stack([each[k] for each in systems]) for k in (0, 2))
+    if As.shape[1] < 2 or not (np.isfinite(As).all() and np.isfinite(Cs).all()):
+        return None
+    integrators = np.flatnonzero((np.diagonal(As, axis1=1, axis2=2) == at).all(axis=0))
+    modes = [(int(j), v) for j in integrators if (v := _at_rest(As, Cs, at, int(j), alone)) is not None]
+    if len(modes) < 2:
+        return modes[0] if modes else None
+    scale = balanced(As[0])[1]
+    return min(modes, key=lambda mode: np.max(np.abs(mode[1]) / scale) * scale[mode[0]])
 
 
 def _at_rest(As: np.ndarray, Cs: np.ndarray, at: float, j: int, alone: bool) -> np.ndarray | None:
@@ -109,6 +114,6 @@ def _at_rest(As: np.ndarray, Cs: np.ndarray, at: float, j: int, alone: bool) -> 
         u = np.where(np.abs(v) > least * np.abs(v).max(), v, 0.0)
         at_rest = (np.abs(rows @ u) <= ROUNDED * (allowed @ np.abs(u))).all()
         unseen = (np.abs(c @ u) <= ROUNDED * (np.abs(c) @ np.abs(u))).all()
-        if at_rest and unseen and (alone or u[o].any()):
+        if at_rest and unseen and u[j] and (alone or u[o].any()):  # without j it is another's mode
             return u
     return None

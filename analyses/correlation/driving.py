@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from math import isfinite
 from typing import TYPE_CHECKING
 
@@ -38,6 +39,7 @@ COMMANDS: Mapping[tuple[str, str], tuple[str, ...]] = {
 """The signals that command a drive, by its axis and the stage that they go into."""
 IN_MOTION = 0.02
 FIRST_ROWS = 5
+LEAST_FOR_A_SPLINE = 9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,10 +130,9 @@ def _from(controller: Controller, stage: str) -> Controller:
 def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
     """Times and values of the command at the drive's ticks.
 
-    Through the samples goes a smooth curve (modified Akima: its slope is continuous, and stays within that of
-    the samples around), as a feed-forward takes the slope: straight lines would give it steps at the very
-    instants of the record. A jump between two stretches that stand still is a step of the command, and comes
-    with the later sample.
+    Through the samples goes a smooth curve, as a feed-forward takes the slope: straight lines would give it
+    steps at the very instants of the record. A jump between two stretches that stand still is a step of the
+    command, and comes with the later sample.
     """
     period = driven.design.controller.period_s
     ticks = np.asarray(np.arange(round(duration_s / period) + 1) * period, dtype=np.float64)
@@ -147,13 +148,26 @@ def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[Flo
 
 
 def _smooth(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
-    """A smooth curve through samples; before the first and after the last it stands still."""
-    from scipy.interpolate import Akima1DInterpolator
+    """A smooth curve through samples; before the first and after the last it stands still.
+
+    A cubic spline or a modified Akima curve: the one which, through every other sample, comes nearer to those
+    between.
+    """
+    from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
     inside = np.clip(at_s, time_s[0], time_s[-1])
     if len(values) < 3 or np.ptp(values) == 0.0:
         return np.interp(inside, time_s, values)
-    return np.asarray(Akima1DInterpolator(time_s, values, method="makima")(inside), dtype=np.float64)
+
+    curves = (partial(Akima1DInterpolator, method="makima"), CubicSpline)
+    if len(values) < LEAST_FOR_A_SPLINE:
+        return np.asarray(curves[0](time_s, values)(inside), dtype=np.float64)
+
+    def missed(curve: Callable[..., Callable[[FloatArray], FloatArray]]) -> float:
+        between = slice(1, len(values) - 1 + len(values) % 2, 2)
+        return float(np.linalg.norm(curve(time_s[::2], values[::2])(time_s[between]) - values[between]))
+
+    return np.asarray(min(curves, key=missed)(time_s, values)(inside), dtype=np.float64)
 
 
 def steps_of(values: FloatArray) -> NDArray[np.bool_]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
 from analyses.duty.asked import Asked
 
@@ -88,8 +90,11 @@ class Duty:
     heating: Heating | None
 
     @property
-    def passed(self) -> bool:
-        """Whether the drive does this for ever: current, protection and temperature."""
-        warm = self.heating is None or self.heating.final_degC <= self.heating.limit_degC
-        acts = self.overload is not None and self.overload.acts_after_s is not None
-        return self.rms_A <= self.continuous_A and not acts and warm
+    def verdict(self) -> Verdict:
+        """Whether the drive may do this for ever by what is stated: current, protection, temperature."""
+        stated = [self.rms_A <= self.continuous_A] if isfinite(self.continuous_A) else []
+        if self.heating is not None and isfinite(self.heating.limit_degC):
+            stated.append(self.heating.final_degC <= self.heating.limit_degC)
+        if self.overload is not None:
+            stated.append(self.overload.acts_after_s is None)
+        return Verdict.of(all(stated) if stated else None)

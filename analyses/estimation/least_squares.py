@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
+from scipy.signal import lfilter
 
 from actuator_lti.errors import InputError
 from analyses.estimation.fit import Fit
-from analyses.estimation.means import correlation_time
+from analyses.estimation.means import autocovariance
 
 FloatArray = NDArray[np.float64]
 
 LEAST_OWN_SHARE = 0.03
 """A column of which less than this is its own, beside those before it, is not told apart from them."""
-BLOCK_TIMES = 5.0
-MIN_BLOCKS = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,8 +98,7 @@ def solve(w: FloatArray, y: FloatArray, ends: Sequence[int] = ()) -> Solution:
     Notes
     -----
     ``white``: variance of the residual about its mean, over n - 1 rows, as in the published EMPS figures.
-    ``correlated``: the sums of ``w' e`` over blocks of five correlation times of the residual (at least eight
-    blocks) scatter as the blocks are; blocks are taken as independent.
+    ``correlated``: see `correlated_covariance`.
     """
     if len(y) <= w.shape[1]:
         raise InputError(
@@ -119,36 +118,58 @@ def solve(w: FloatArray, y: FloatArray, ends: Sequence[int] = ()) -> Solution:
 
 
 def correlated_covariance(w: FloatArray, residual: FloatArray, ends: Sequence[int] = ()) -> FloatArray:
-    """Covariance of least-squares values whose residuals are correlated in time, from sums over blocks.
+    """Covariance of least-squares values whose residuals are correlated in time as these are.
 
-    Nowhere below what white residuals would give: where few blocks come out lower by chance, the white
-    covariance takes their place, each deviation grown to the larger of the two.
+    ``(W'W)^-1 W' G W (W'W)^-1``, G the autocovariance of the residual's own autoregressive model: with
+    ``A(q) e = v`` white, ``W' G W = var(v) Z'Z``, Z the rows filtered backward by 1/A. No row of one record
+    is correlated with one of another.
     """
-    inverse = np.linalg.inv(w.T @ w)
-    white = np.asarray(np.var(residual, ddof=1) * inverse)
-    sums = _block_sums(w, residual, ends or (len(residual),))
-    few = len(sums) / max(len(sums) - w.shape[1], 1)
-    correlated = np.asarray(inverse @ (few * sums.T @ sums) @ inverse)
-    ratio = np.diag(correlated) / np.maximum(np.diag(white), 1e-300)
-    if np.all(ratio >= 1.0):
-        return correlated
-    grown = np.sqrt(np.maximum(ratio, 1.0))
-    return np.asarray(white * np.outer(grown, grown))
+    edges = (0, *(ends or (len(residual),)))
+    return covariance_of([(w[a:b], residual[a:b]) for a, b in pairwise(edges)])
 
 
-def _block_sums(w: FloatArray, residual: FloatArray, ends: Sequence[int]) -> FloatArray:
-    """Sums of w' e over blocks, shape (blocks, p)."""
-    sums, start = [], 0
-    for end in ends:
-        own = residual[start:end]
-        if len(own) > 1:
-            length = BLOCK_TIMES * correlation_time(own)
-            blocks = int(np.clip(len(own) / length, min(MIN_BLOCKS, len(own)), len(own)))
-            edges = np.linspace(start, end, blocks + 1).astype(int)
-            products = w[start:end] * own[:, None]
-            sums.append(np.add.reduceat(products, edges[:-1] - start, axis=0))
-        start = end
-    return np.concatenate(sums)
+def covariance_of(blocks: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """As `correlated_covariance`, of the rows of each record and (at least a part of) its noise.
+
+    Grown by rows over rows less all that was found of them: the values, and the coefficients of A.
+    """
+    inverse = np.linalg.inv(sum(w.T @ w for w, _ in blocks))
+    total = np.zeros_like(inverse)
+    rows, found = sum(len(w) for w, _ in blocks), len(inverse)
+    for w, noise in blocks:
+        a, variance = autoregressive(noise)
+        found += len(a) - 1
+        z = lfilter([1.0], a, w[::-1], axis=0)
+        total += variance * z.T @ z
+    return np.asarray(rows / max(rows - found, 1) * inverse @ total @ inverse)
+
+
+def autoregressive(values: FloatArray) -> tuple[FloatArray, float]:
+    """Coefficients of ``A(q) e = v`` and the variance of v, by Levinson's recursion.
+
+    The order is that of the lowest information criterion of Akaike, up to ``10 log10 n``.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(1)
+    >>> a, variance = autoregressive(lfilter([1.0], [1.0, -0.8], rng.standard_normal(20_000)))
+    >>> round(float(a[1]), 1), round(variance, 1)
+    (-0.8, 1.0)
+    """
+    n = len(values)
+    r = autocovariance(values, min(int(10.0 * np.log10(max(n, 1))), n // 4))
+    a, variance = np.ones(1), float(r[0])
+    best, lowest = (a, variance), n * np.log(max(variance, 1e-300))
+    for order in range(1, len(r)):
+        if not variance > 0.0:
+            break
+        reflection = -float(a @ r[order:0:-1]) / variance
+        wide = np.append(a, 0.0)
+        a, variance = wide + reflection * wide[::-1], variance * (1.0 - reflection**2)
+        criterion = n * np.log(max(variance, 1e-300)) + 2.0 * order
+        if criterion < lowest:
+            best, lowest = (a, variance), criterion
+    return best
 
 
 def between_records(values: Sequence[float], stds: Sequence[float]) -> float:

@@ -74,13 +74,18 @@ def correlation_time(values: FloatArray) -> float:
     power = float(x @ x)
     if power <= 1e-24 * n * max(1.0, float(values.mean() ** 2)):
         return 1.0
-    size = next_fast_len(2 * n, real=True)
-    spectrum = rfft(x, size)
-    rho = irfft(spectrum.real**2 + spectrum.imag**2, size)[: n // 2] / power
+    rho = autocovariance(x, n // 2 - 1) * n / power
     tau = 2.0 * np.cumsum(rho) - 1.0
     enough = np.arange(len(tau)) >= 5.0 * tau
     last = int(np.argmax(enough)) if enough.any() else len(tau) - 1
     return max(float(tau[last]), 1.0)
+
+
+def autocovariance(values: FloatArray, lags: int) -> FloatArray:
+    """Autocovariance about zero at the lags 0 to ``lags``, each the sum of products over n."""
+    size = next_fast_len(2 * len(values), real=True)
+    spectrum = rfft(values, size)
+    return np.asarray(irfft(spectrum.real**2 + spectrum.imag**2, size)[: lags + 1] / len(values))
 
 
 def best_lag(a: FloatArray, b: FloatArray) -> int:

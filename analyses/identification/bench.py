@@ -11,6 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.driving import command_of
 from analyses.estimation.parameters import parameter
+from analyses.identification.diagnosis import diagnosed
 from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
 from analyses.identification.following_error import following_item
 from analyses.identification.friction_map import LawChoice, fit_map
@@ -111,9 +112,17 @@ def identify_bench(
         electrical = fit_electrical(start, used)
         told = f"voltage equation of {', '.join(record.name for record in records)}"
         start = design_with_fit(start, electrical_values(start, electrical), told)
-    model, laws = _fitted(start, used, settings)
+    laws: tuple[LawChoice, ...] = ()
+
+    def fit(records: Sequence[Record]) -> tuple[JointModel, tuple[Record, ...]]:
+        nonlocal laws
+        model, laws = _fitted(start, records, settings)
+        return _unbiased(start, _with_commands(start, model, records), records, settings)
+
+    right = diagnosed(start, used, fit, _recipe(used[0], settings))
+    model, used, simulated = right.model, right.records, right.simulated
+    findings |= {name: (*findings[name], *more) for name, more in right.findings.items()}
     source = f"identified from {', '.join(record.name for record in records)}"
-    model, simulated = _unbiased(start, _with_commands(start, model, used), used, settings)
     sampled = tuple(item for record in used if (item := sampling_item(record)) is not None)
     lags = [following_item(start, *pair) for pair in zip(used, simulated, strict=bool(simulated))]
     items = (*_fit_items(design, findings, model, settings.residual_limit), *sampled, *filter(None, lags))
@@ -172,12 +181,12 @@ def _unbiased(
     start: Design, model: JointModel, used: Sequence[Record], settings: BenchSettings
 ) -> tuple[JointModel, tuple[Record, ...]]:
     """The model less its own bias, where a design can be made of it and simulated; the simulated records."""
-    try:
+
+    def make(model: JointModel) -> Design:
         values = joint_values(start, model, inertia_to=settings.inertia_to)
-        made = design_with_fit(with_structure(start, model), values, "")
-    except InputError:
-        return model, ()  # said where the design is made
-    return without_bias(start, made, model, used, _recipe(used[0], settings))
+        return design_with_fit(with_structure(start, model), values, "")
+
+    return without_bias(start, make, model, used, _recipe(used[0], settings))
 
 
 def _recipe(record: Record, settings: BenchSettings) -> Recipe | None:

@@ -66,6 +66,7 @@ def _errors(design: Design, record: Record, simulated: Record) -> tuple[FloatArr
     if not {command, place} <= set(record.signals) or place not in simulated.signals:
         return None
     factor = design.total_ratio if place == "angle" else 1.0
+    record = record.slice(0, len(simulated))  # of a long one the first part is simulated
     wanted = factor * record[command]
     own, model = wanted - record[place], wanted - simulated[place]
     steps = np.abs(np.diff(record[place]))

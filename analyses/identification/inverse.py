@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.least_squares import NotTold, Solution, by_record, solve, told_apart
+from analyses.estimation.least_squares import (
+    NotTold,
+    Solution,
+    by_record,
+    covariance_of,
+    solve,
+    told_apart,
+)
 from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, RecordFit, default_value
 from analyses.identification.rows import Rows, record_rows
@@ -121,8 +128,7 @@ def _fitted(
             for name in negative
         }
         return replace(model, fixed={**model.fixed, **said})
-    model = _model(blocks, free, fixed, form, solution, weights)
-    return replace(model, covariance=model.covariance + _of_fixed(design, free, fixed))
+    return _model(design, blocks, free, fixed, form, solution, weights)
 
 
 def _kept(one: NotTold) -> str:
@@ -186,8 +192,8 @@ def _weights(blocks: Sequence[Rows], solution: Solution, weights: FloatArray) ->
 
 def _singles(
     blocks: Sequence[Rows], free: tuple[str, ...], fixed: Mapping[str, Fixed], values: FloatArray
-) -> list[Fit]:
-    """Each record fitted alone: what it tells, the rest held at ``values``."""
+) -> list[tuple[Fit, FloatArray]]:
+    """Each record fitted alone, and its residual: what it tells, the rest held at ``values``."""
     out = []
     for block in blocks:
         columns = [block.names.index(name) for name in free]
@@ -199,11 +205,13 @@ def _singles(
             if name not in own
         }
         result = _joint([block], own, {**fixed, **rest}, np.ones(1))
-        out.append(Fit(names=own, values=result.values, covariance=result.correlated))
+        fit = Fit(names=own, values=result.values, covariance=result.correlated)
+        out.append((fit, result.residual))
     return out
 
 
 def _model(
+    design: Design,
     blocks: Sequence[Rows],
     free: tuple[str, ...],
     fixed: Mapping[str, Fixed],
@@ -211,45 +219,56 @@ def _model(
     solution: Solution,
     weights: FloatArray,
 ) -> JointModel:
-    covariance, between = solution.correlated, dict.fromkeys(free, 0.0)
-    singles: list[Fit] = []
-    if len(blocks) > 1:
-        singles = _singles(blocks, free, fixed, solution.values)
-        scatter = by_record(singles, free)
-        between = {name: scatter[name][0] for name in free}
-        extra = [scatter[name][1] ** 2 for name in free]
-        covariance = covariance + np.diag(extra)
+    singles = _singles(blocks, free, fixed, solution.values) if len(blocks) > 1 else []
     columns = [blocks[0].names.index(name) for name in free]
     rests = [_target(block, fixed) - block.w[:, columns] @ solution.values for block in blocks]
     residual = np.concatenate(rests)
     drive = np.concatenate([block.y for block in blocks])
-    return JointModel(
+    own = [rest for _, rest in singles] or rests
+    parts = tuple(
+        _part(block, block.w[:, columns], *pair) for block, *pair in zip(blocks, rests, own, strict=True)
+    )
+    scaled = [(g * part.w, g * part.own_residual) for g, part in zip(weights, parts, strict=True)]
+    model = JointModel(
         form=form,
         names=free,
         values=solution.values,
         white_errors=np.sqrt(np.diag(solution.white)),
-        covariance=covariance,
-        between=between,
+        covariance=covariance_of(scaled),
+        between=dict.fromkeys(free, 0.0),
         fixed=dict(fixed),
         relative_residual=float(np.linalg.norm(residual) / np.linalg.norm(drive)),
-        residual=residual,
-        records=tuple(_part(block, rest) for block, rest in zip(blocks, rests, strict=True)),
+        records=parts,
         recipe=blocks[0].recipe,
         condition=solution.condition,
         weights=tuple(weights.tolist()),
-        singles={name: tuple(one.get(name, np.nan) for one in singles) for name in free},
+        alone=tuple(fit for fit, _ in singles),
     )
+    return with_scatter(design, model)
 
 
-def _part(block: Rows, rest: FloatArray) -> RecordFit:
+def with_scatter(design: Design, model: JointModel) -> JointModel:
+    """The model with the scatter between its records, and the tolerances of what was kept, in its errors."""
+    scatter = by_record(model.alone, model.names) if model.alone else {}
+    between = {name: scatter[name][0] if scatter else 0.0 for name in model.names}
+    extra = np.diag([scatter[name][1] ** 2 if scatter else 0.0 for name in model.names])
+    kept = _of_fixed(design, model.names, model.fixed)
+    return replace(model, between=between, covariance=model.covariance + extra + kept)
+
+
+def _part(block: Rows, w: FloatArray, rest: FloatArray, own: FloatArray) -> RecordFit:
     return RecordFit(
         name=block.record,
         rows_in=block.rows_in,
         rows_used=len(block.y),
-        rows_at_rest=block.rows_at_rest,
+        rows_at_rest=int(np.count_nonzero(~block.keep)),
         relative_residual=float(np.linalg.norm(rest) / np.linalg.norm(block.y)),
         used=block.used,
         notes=block.notes,
+        w=w,
+        residual=rest,
+        own_residual=own,
+        keep=block.keep,
     )
 
 

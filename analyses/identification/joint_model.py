@@ -85,7 +85,11 @@ def linear_basis(speed: FloatArray, knots: Sequence[float]) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordFit:
-    """One record's part: rows, its relative residual under the joint model, what was used and noted."""
+    """One record's part: rows, its relative residual under the joint model, what was used and noted.
+
+    ``w`` (columns of the fitted names) and ``residual`` are of the rows used, ``keep`` marks these among all.
+    ``own_residual`` is that of the record fitted alone: what is left of it has no scatter between records.
+    """
 
     name: str
     rows_in: int
@@ -94,6 +98,10 @@ class RecordFit:
     relative_residual: float
     used: Mapping[str, str]
     notes: tuple[str, ...]
+    w: FloatArray = field(repr=False)
+    residual: FloatArray = field(repr=False)
+    own_residual: FloatArray = field(repr=False)
+    keep: NDArray[np.bool_] = field(repr=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,6 +123,8 @@ class JointModel(Fit):
         Norm of the residual over norm of the drive signal, after decimation, all records.
     weights : tuple of float
         Of the records.
+    alone : tuple of Fit
+        Each record fitted alone, where there are several.
     bias : mapping
         What was taken off each value as the fit's own bias; ``bias_told`` says how, or why not.
     """
@@ -123,15 +133,24 @@ class JointModel(Fit):
     white_errors: FloatArray
     between: Mapping[str, float]
     relative_residual: float
-    residual: FloatArray = field(repr=False)
     records: tuple[RecordFit, ...]
     recipe: Recipe
     condition: float
-    singles: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    alone: tuple[Fit, ...] = field(default=(), repr=False)
     knots_rad_s: tuple[float, ...] | None = None
     weights: tuple[float, ...] = ()
     bias: Mapping[str, float] = field(default_factory=dict)
     bias_told: str = ""
+
+    @property
+    def residual(self) -> FloatArray:
+        """Of all records, one after the other, in the unit of the drive signal."""
+        return np.concatenate([record.residual for record in self.records])
+
+    @property
+    def singles(self) -> dict[str, tuple[float, ...]]:
+        """The value of each record fitted alone, where there are several; NaN where it does not tell it."""
+        return {name: tuple(one.get(name, np.nan) for one in self.alone) for name in self.names}
 
     @property
     def rows_in(self) -> int:

@@ -30,8 +30,8 @@ SHORTEST_S = 0.2
 class Rows:
     """Regressors ``w`` by ``names`` and drive ``y`` after decimation, rows at rest left out.
 
-    ``sine`` and ``cosine`` of the output angle keep all rows. ``used`` tells what each signal was
-    used for.
+    ``sine`` and ``cosine`` of the output angle keep all rows, of which ``keep`` marks those used. ``used``
+    tells what each signal was used for.
     """
 
     record: str
@@ -40,8 +40,8 @@ class Rows:
     y: FloatArray
     sine: FloatArray
     cosine: FloatArray
+    keep: NDArray[np.bool_]
     rows_in: int
-    rows_at_rest: int
     recipe: Recipe
     used: Mapping[str, str]
     notes: tuple[str, ...]
@@ -221,6 +221,8 @@ def record_rows(
     sines = np.column_stack([np.sin(angle), np.cos(angle)])
     table = np.column_stack([columns, sines, np.sign(motion.velocity), known, drive])
     moving = ~_at_rest(motion.velocity, period_of(record))
+    if record.left_out is not None:
+        moving &= ~record.left_out
     used_part = slice(recipe.skip_samples, len(drive) - _end_skip(motion, recipe))
     table, moving = table[used_part], moving[used_part]
     rows = decimated(table, recipe.decimation)
@@ -242,7 +244,7 @@ def record_rows(
         sine=sine,
         cosine=cosine,
         rows_in=len(record),
-        rows_at_rest=int(np.count_nonzero(~keep)),
+        keep=keep,
         recipe=recipe,
         used=used,
         notes=(*record.notes, f"{place} and {told}"),

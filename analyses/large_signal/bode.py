@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from analyses.large_signal.classify import WAVEFORMS
 from analyses.large_signal.map import AmplitudeMap
+from analyses.large_signal.steady_start import linear_steady_state
 
+if TYPE_CHECKING:
+    from actuator_lti.loops import Loops
+
+FINE = 64  # points between two frequencies of the map, at which the linear response is known
 MINUS_3DB = 20.0 * math.log10(math.sqrt(0.5))
 
 
@@ -31,9 +37,10 @@ class AmplitudeBode:
     all_amplitude_rad : ndarray, shape (a,)
         Every amplitude of the map.
     minus3db_hz, minus90deg_hz : ndarray, shape (a,)
-        First crossing, interpolated on the logarithm of frequency; NaN where there is none in the range
+        First crossing; between two frequencies of the map the linear response, and what the simulated one is
+        off by, interpolated on the logarithm of frequency; NaN where there is none in the range
         (`below_from_start`: already below at the lowest frequency), and where it lies beside points that are
-        not steady: a missing point is no value.
+        not steady: a missing point is no value. -3 dB is 1/sqrt(2) of the linear gain at zero frequency.
     minus3db_range_hz : ndarray, shape (a, 2)
         Between which frequencies of the map the gain first falls through -3 dB, as far as steady points tell:
         from 0 where the first of them is below already, to inf where none is.
@@ -57,9 +64,10 @@ class AmplitudeBode:
     below_from_start: np.ndarray
     linear_minus3db_hz: float | None
     linear_minus90deg_hz: float | None
+    level_db: float = MINUS_3DB
 
 
-def amplitude_bode(design: Design, amplitude_map: AmplitudeMap) -> AmplitudeBode:
+def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) -> AmplitudeBode:
     """Read the responses at the design's amplitude fractions, and the bandwidths at all, from a map."""
     full = design.validation.full_deflection_rad
     fractions = tuple(sorted(design.validation.amplitude_fractions))
@@ -67,11 +75,20 @@ def amplitude_bode(design: Design, amplitude_map: AmplitudeMap) -> AmplitudeBode
     hz, unsteady = amplitude_map.frequency_hz, amplitude_map.waveform == WAVEFORMS.index("not steady")
     gain = np.where(unsteady, np.nan, amplitude_map.gain_db)
     phase = np.where(unsteady, np.nan, amplitude_map.phase_deg)
+    steps = np.arange(FINE * (hz.size - 1) + 1) / FINE
+    fine = np.exp(np.interp(steps, np.arange(hz.size), np.log(hz)))
     with np.errstate(divide="ignore"):  # the mean of a limited jerk has zeros
-        linear_db = 20.0 * np.log10(np.abs(amplitude_map.linear))
-    linear_deg = np.degrees(np.unwrap(np.angle(amplitude_map.linear)))
-    first_3 = np.array([_crossing(hz, row, MINUS_3DB) for row in gain])
-    first_90 = np.array([_crossing(hz, row, -90.0) for row in phase])
+        start, *curve = 20.0 * np.log10(np.abs(_linear(loops, np.array([1e-6 * hz[0], *fine]))))
+    level, fine_db = MINUS_3DB + start, np.array(curve)
+    fine_deg = np.degrees(np.unwrap(np.angle(_linear(loops, fine))))
+    linear_db, linear_deg = fine_db[::FINE], fine_deg[::FINE]
+
+    def between(values: np.ndarray, linear: np.ndarray) -> np.ndarray:
+        with np.errstate(invalid="ignore"):
+            return linear + np.interp(steps, np.arange(hz.size), values - linear[::FINE])
+
+    first_3 = np.array([_crossing(fine, between(row, fine_db), level) for row in gain])
+    first_90 = np.array([_crossing(fine, between(row, fine_deg), -90.0) for row in phase])
     return AmplitudeBode(
         load_Nm=amplitude_map.load_Nm,
         frequency_hz=hz,
@@ -84,11 +101,16 @@ def amplitude_bode(design: Design, amplitude_map: AmplitudeMap) -> AmplitudeBode
         all_amplitude_rad=amplitude_map.amplitude_rad,
         minus3db_hz=first_3,
         minus90deg_hz=first_90,
-        minus3db_range_hz=np.array([crossing_range(hz, row, MINUS_3DB) for row in gain]),
-        below_from_start=gain[:, 0] < MINUS_3DB,
-        linear_minus3db_hz=_number(_crossing(hz, linear_db, MINUS_3DB)),
-        linear_minus90deg_hz=_number(_crossing(hz, linear_deg, -90.0)),
+        minus3db_range_hz=np.array([crossing_range(hz, row, level) for row in gain]),
+        below_from_start=gain[:, 0] < level,
+        linear_minus3db_hz=_number(_crossing(fine, fine_db, level)),
+        linear_minus90deg_hz=_number(_crossing(fine, fine_deg, -90.0)),
+        level_db=level,
     )
+
+
+def _linear(loops: Loops, hz: np.ndarray) -> np.ndarray:
+    return linear_steady_state(loops, 2.0 * math.pi * hz).output
 
 
 def _crossing(hz: np.ndarray, values: np.ndarray, level: float) -> float:

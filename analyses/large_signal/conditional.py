@@ -16,13 +16,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import asin, isfinite, pi, sqrt
+from math import asin, inf, isfinite, pi, sqrt
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design, Instruments
+from actuator_lti.drive.facts import stage_gain
 from actuator_lti.errors import TooManyTicks
 from analyses.large_signal.settling_ticks import full_range
 from nonlinear import LIMITERS, Rows
@@ -358,7 +359,11 @@ def _limited(result: BatchResult) -> Floats:
 def _standing(design: Design) -> float:
     """Error (output, rad) that dry friction can hold up against a controller without integral."""
     control, friction, motor = design.controller, design.friction, design.effective_motor
-    gain = control.position_loop.gain * (control.velocity.gain if control.velocity else 1.0)
+    velocity = control.velocity
+    gain = abs(stage_gain(control.position_loop.gain, control.position_loop.law))
+    gain *= abs(stage_gain(velocity.gain, velocity.law)) if velocity else 1.0
+    if gain == 0.0:
+        return inf
     if control.velocity is not None and control.velocity.integral_time_s is not None:
         gain *= 10.0  # the integral brings it on in time
     per_unit = motor.source_gain_Nm_V or motor.torque_constant_Nm_A or 1.0

@@ -89,4 +89,4 @@ def large_signals(
     step(3)
     teeth = sawtooth(design)
     step(4)
-    return LargeSignals(design, map_, border, shifted, amplitude_bode(design, map_), teeth)
+    return LargeSignals(design, map_, border, shifted, amplitude_bode(design, loops, map_), teeth)

@@ -35,6 +35,7 @@ def full_range(design: Design) -> dict[str, float]:
     elif motor.source_gain_Nm_V is not None and design.friction.viscous() > 0.0:
         speed = min(speed, limits.voltage_V * motor.source_gain_Nm_V / design.friction.viscous())
     if not isfinite(speed):
-        place = design.controller.position
-        speed = design.validation.full_deflection_rad * design.total_ratio * (place.gain if place else 1.0)
+        place = design.controller.position  # a gain of 0: a law of one's own
+        gain = 1.0 if place is None or place.gain == 0.0 else place.gain
+        speed = design.validation.full_deflection_rad * design.total_ratio * gain
     return {"position": design.validation.full_deflection_rad, "velocity": speed, "current": current}

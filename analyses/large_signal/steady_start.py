@@ -31,7 +31,7 @@ ELASTIC = {"W": "load_speed_start", "twist": "twist_start"}  # in contact; with 
 LEFT_AT_REST = (
     r"W|twist|acc|u\d+",
     r"(?:speed\d*|estimate|torque\d+|command|position|derivative)\..+",
-    r"hold_\w+|\w+_prev",
+    r"hold_\w+|\w+_prev|(?:current|velocity)\.x\d+",
 )
 """States that a run begins at rest: rows have no word for them; the settling time counts their decay."""
 DECAY = math.log(1e9)  # what begins at rest is gone by then, so that small sines are the linear ones

@@ -40,7 +40,6 @@ SPEEDS = (0.05, 0.382, 1.382, 5.1)  # counts a sample: few, and so that no patte
 PART = 0.3  # of the drive's speed: no faster is looked at
 SAMPLES = 2000  # of a window at constant speed
 TRIED = np.array([0.1, 0.3, 1.0, 2.0, 4.0, 16.0, 64.0, 256.0])  # of the amplitude from which it is linear
-RESTS = 0.5  # of a count: an output that moves by more does not rest
 
 
 @dataclass(frozen=True)
@@ -62,9 +61,6 @@ class Counts:
         Largest ripple of the motor's speed (peak) that counts add at constant speed, and that speed.
     cycles : tuple of Confirmation
         Foreseen limit cycles, each with what the simulator says of it.
-    resting_rad : float
-        Half of what the output of the drive as it is still moves by after a step, where it does not without
-        counts; 0: it rests.
     linear_rad : float
         Amplitude at the sensor from which the gain of the counts is 1 within 5 %, about any bias.
     linear_seen_rad : float or None
@@ -83,7 +79,6 @@ class Counts:
     ripple_rad_s: float
     ripple_at_rad_s: float
     cycles: tuple[Confirmation, ...]
-    resting_rad: float
     linear_rad: float
     linear_seen_rad: float | None
     off: Floats
@@ -145,19 +140,17 @@ def _one(design: Design, loops: Loops, sensor: Sensor, settle_ticks: int) -> Cou
     other: Sensor = "output" if sensor == "motor" else "motor"
     alone, ideal = without_counts(design, other), without_counts(design, "motor", "output")
     ripple, at = _ripple(alone, ideal, sensor, quantum, settle_ticks)
-    standing, resting = _rest(alone, ideal, quantum / (design.total_ratio if sensor == "motor" else 1.0))
     off = _linearity(alone, ideal, loops, sensor, quantum, settle_ticks)
     good = np.logical_and.accumulate((off <= WITHIN)[::-1])[::-1]  # here and at all that is larger
     return Counts(
         sensor=sensor,
         quantum_rad=quantum,
         standing_rad=quantum if sensor == "output" else 0.0,
-        standing_seen_rad=standing,
+        standing_seen_rad=_standing(alone, ideal),
         speed_step_rad_s=_speed_step(design, sensor, quantum),
         ripple_rad_s=ripple,
         ripple_at_rad_s=at,
         cycles=tuple(confirm(design, one) for one in cycles_of_quantisation(design) if one.cause == cause),
-        resting_rad=resting,
         linear_rad=linear_ratio() * quantum,
         linear_seen_rad=float(TRIED[good][0]) * linear_ratio() * quantum if good.any() else None,
         off=off,
@@ -203,16 +196,15 @@ def _ripple(
     return max(float(added[k]), 0.0), float(speeds[k])
 
 
-def _rest(design: Design, ideal: Design, count_rad: float) -> tuple[float, float]:
-    """Error that counts leave after a step, and half of what the output still moves by because of them."""
+def _standing(design: Design, ideal: Design) -> float:
+    """Error that counts leave after a step."""
     size = np.array([min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad])
     ends = []
     for one in (design, ideal):
         result = step_rows(one, size, LONGEST_TICKS // 4).run()
         low, high = (float(x[0]) for x in result.span("output_angle_rad"))
-        ends.append((abs(0.5 * (low + high) - float(size[0])), 0.5 * (high - low)))
-    moves = ends[0][1] - ends[1][1]
-    return abs(ends[0][0] - ends[1][0]), moves if moves > 0.5 * RESTS * count_rad else 0.0
+        ends.append(abs(0.5 * (low + high) - float(size[0])))
+    return abs(ends[0] - ends[1])
 
 
 def _linearity(

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
-from analyses.motion.settling import Settling, largest_swing
+from analyses.motion.settling import Settling, noticed, verdict_of
 
 Cause = Literal["play", "quantisation", "motor-quantisation", "friction"]
-Verdict = Literal["confirmed", "refuted"]
+Seen = Literal["confirmed", "refuted"]
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class Confirmation:
     frequency_hz: float | None
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> Seen:
         """In one word."""
         return "refuted" if self.ratio is None else "confirmed"
 
@@ -78,7 +79,7 @@ class LimitCycles:
     confirmations : tuple of Confirmation
         Every predicted cycle.
     rests : tuple of Settling
-        Steps of two sizes at every load of the design, waited for.
+        Steps of several sizes, without load and at every load of the design, waited for.
     looked_for : tuple of str
         The causes that the design has.
     """
@@ -91,9 +92,9 @@ class LimitCycles:
     @property
     def hunting(self) -> Settling | None:
         """The largest motion of a step of the drive as it is that does not come to rest; None: all do."""
-        return largest_swing(self.rests)
+        return noticed(self.design, self.rests)
 
     @property
-    def passed(self) -> bool:
+    def verdict(self) -> Verdict:
         """Whether every step of the drive as it is ends at rest."""
-        return self.hunting is None
+        return verdict_of(self.hunting)

@@ -16,7 +16,7 @@ from analyses.limit_cycles.describing import (
     without_nonlinearities,
 )
 from analyses.limit_cycles.result import Cause, Confirmation, Cycle, LimitCycles
-from analyses.motion.settling import settle
+from analyses.motion.settling import settlings_of
 from nonlinear import Rows
 
 SCALES = np.geomspace(0.4, 2.5, 41)
@@ -46,16 +46,12 @@ def limit_cycles(design: Design) -> LimitCycles:
     has_play = design.coupling is not None and design.coupling.play_rad > 0.0
     predicted = [*cycles_of_play(design, friction=False), *cycles_of_play(design, friction=True)]
     predicted += cycles_of_quantisation(design)
-    full = design.validation.full_deflection_rad
-    rests = tuple(
-        settle(design, load, share * full)
-        for load in design.validation.loads_Nm
-        for share in (min(design.validation.amplitude_fractions), 1e-3)
-    )
     names: tuple[Cause, ...] = ("play", "quantisation", "motor-quantisation")
     there = (has_play, *(counts_matter(design, name) for name in names[1:]))
     looked_for = tuple(name for name, yes in zip(names, there, strict=True) if yes)
-    return LimitCycles(design, tuple(confirm(design, cycle) for cycle in predicted), rests, looked_for)
+    return LimitCycles(
+        design, tuple(confirm(design, cycle) for cycle in predicted), settlings_of(design), looked_for
+    )
 
 
 def confirm(design: Design, cycle: Cycle) -> Confirmation:

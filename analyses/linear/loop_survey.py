@@ -195,7 +195,7 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     forms: dict[str, Mapping[str, LoopFigures]] = {
         "sampled": all_loop_figures(loops, certify=True, locked=True)
     }
-    for form in FORMS[1:]:
+    for form in () if design.controller.sampled_only else FORMS[1:]:
         other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
         forms |= {} if other is None else {form: other}
     step(1)
@@ -299,7 +299,9 @@ def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, De
     """Give the delay budget at the lowest gain crossover of each loop."""
     from actuator_lti.loops.delay_budget import delay_budget
 
-    budgets = {}
+    budgets: dict[str, DelayBudget] = {}
+    if design.controller.own_law is not None:  # its parts are not told apart
+        return budgets
     for name, result in figures.items():
         crossovers = [m.frequency_rad_s for m in result.margins.phase_margins if m.frequency_rad_s > 0.0]
         if crossovers:

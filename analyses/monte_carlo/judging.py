@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_lti.asked.quantities import DRIVE_QUANTITIES, QUANTITIES, judged_loops
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES, judged_loops
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 
@@ -44,6 +44,16 @@ def loops_of(design: Design) -> tuple[str, ...]:
 def drive_column(quantity: str, load_Nm: float | None) -> str:
     """Name of the column of a static figure at a load torque."""
     return f"drive.{quantity}@{load_Nm or 0.0:g}"
+
+
+def by_loop(design: Design) -> list[Requirement]:
+    """The requirements of a design, once for every loop that each holds for: as all verdicts count them."""
+    made = []
+    for one in design.requirements:
+        named = one.quantity not in LOOP_QUANTITIES or one.loop not in (None, "every")
+        loops = () if named else loops_of(design)
+        made += [replace(one, id=f"{one.id}/{loop}", loop=loop) for loop in loops] or [one]
+    return made
 
 
 def in_populations(requirement: Requirement, design: Design) -> bool:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analyses.monte_carlo.judging import in_populations, judge
+from analyses.monte_carlo.judging import by_loop, in_populations, judge
 from analyses.monte_carlo.sketch import Sketch
 from analyses.studies.engine import Chunk
 
@@ -109,7 +109,7 @@ def unpacked(data: bytes) -> tuple[Reduction, list[Chunk]]:
 
 def judged(design: Design) -> list[Requirement]:
     """The requirements that are judged in every sample."""
-    return [r for r in design.requirements if in_populations(r, design)]
+    return [r for r in by_loop(design) if in_populations(r, design)]
 
 
 def reduced(task: SampleTask, block: Mapping[str, np.ndarray]) -> Reduction:

@@ -20,7 +20,7 @@ from actuator_lti.design import with_values, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
-from analyses.monte_carlo.judging import in_populations, judge, label, source_columns
+from analyses.monte_carlo.judging import by_loop, in_populations, judge, label, source_columns
 from analyses.monte_carlo.reduction import BLOCK, Reducing, Reduction, Tally, judged, reduced, unpacked
 from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
 from analyses.monte_carlo.sketch import MOST
@@ -277,9 +277,9 @@ def _left_out(design: Design) -> tuple[RequirementVerdict, ...]:
     """The requirements that figures of many designs do not tell: not proven."""
     return tuple(
         RequirementVerdict(
-            id=r.id, requirement=r, loop=None, value=None, distance=None, verdict=Verdict.NOT_PROVEN,
+            id=r.id, requirement=r, loop=r.loop, value=None, distance=None, verdict=Verdict.NOT_PROVEN,
             reason="not sampled, it takes a computation of one design", waiver=design.waiver_of(r.id),
         )
-        for r in design.requirements
+        for r in by_loop(design)
         if not in_populations(r, design)
     )  # fmt: skip

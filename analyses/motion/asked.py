@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from actuator_lti.errors import InputError
-from analyses.request import Option
+from analyses.request import LOAD, Option
 
 KINDS = "step, ramp, sine, stepped-sine, chirp, triangle, multisine, hold, recorded"
 PERIODIC = ("sine", "triangle", "stepped-sine")
@@ -45,13 +45,7 @@ class Asked:
     bias_rate: Annotated[
         float, Option(words="Ramp added underneath: the amplitude's unit per second; 0.")
     ] = 0.0
-    load: Annotated[
-        float,
-        Option(
-            words='Load torque at the output, such as "4 N*m" or 4 (N m; linear axis: N); 0.',
-            metavar="LOAD", kind="load",
-        ),
-    ] = 0.0  # fmt: skip
+    load: Annotated[float, LOAD] = 0.0
     load_slope: Annotated[
         float,
         Option(words="Load torque per rad of output angle, added to the design's; 0.", metavar="N_m/rad"),

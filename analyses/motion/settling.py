@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
 from nonlinear.rows import Rows
 from nonlinear.settling.rest import Rest, judge
+
+SMALL = 1e-3  # of full deflection: a step beside those that the design asks for
+NOTICED = 1e-6  # of full deflection: a smaller swing is listed, it fails nothing
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,25 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
     rest = judge(rows.running())
     assert rest is not None  # a step and a load that stay
     return Settling(step_rad, load_Nm, rest)
+
+
+def settlings_of(design: Design) -> tuple[Settling, ...]:
+    """What steps of the drive as it is end in, small to full, without load and at every named one."""
+    asked, full = design.validation, design.validation.full_deflection_rad
+    loads = dict.fromkeys((0.0, *asked.loads_Nm))
+    shares = sorted({SMALL, *asked.amplitude_fractions})
+    return tuple(settle(design, load, share * full) for load in loads for share in shares)
+
+
+def noticed(design: Design, settlings: Iterable[Settling]) -> Settling | None:
+    """The largest motion of the drive as it is that does not come to rest; None: it rests."""
+    least = NOTICED * design.validation.full_deflection_rad
+    return largest_swing(one for one in settlings if one.swing_rad >= least)
+
+
+def verdict_of(swing: Settling | None) -> Verdict:
+    """Whether a drive comes to rest; what still moves at the end of the work is not proven."""
+    return Verdict.of(True if swing is None else None if swing.rest.verdict == "still moving" else False)
 
 
 def largest_swing(settlings: Iterable[Settling]) -> Settling | None:

@@ -65,6 +65,7 @@ class Record:
     ``time_s`` increases strictly and may be irregular; ``signals`` hold arrays of the same length in SI,
     ``units`` their SI units. ``averaged`` tells how many rows of the file were averaged into one where the
     file was too long to be held (1: none). ``inputs`` accounts for every column of the file.
+    ``left_out`` marks rows that no fit is to use.
     """
 
     name: str
@@ -78,6 +79,7 @@ class Record:
     notes: tuple[str, ...] = ()
     inputs: tuple[InputColumn, ...] = ()
     resample_tolerance: float = RESAMPLE_TOLERANCE
+    left_out: NDArray[np.bool_] | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -102,7 +104,8 @@ class Record:
     def slice(self, start: int, stop: int) -> Record:
         """Rows ``start:stop``."""
         cut = {name: values[start:stop] for name, values in self.signals.items()}
-        return replace(self, time_s=self.time_s[start:stop], signals=MappingProxyType(cut))
+        left_out = None if self.left_out is None else self.left_out[start:stop]
+        return replace(self, time_s=self.time_s[start:stop], signals=MappingProxyType(cut), left_out=left_out)
 
     def resampled(self) -> Record:
         """The record on a regular grid by linear interpolation, with the fact and its error noted.

@@ -138,6 +138,11 @@ def rule_gains(design: Design) -> RuleGains:
     elif design.controller.position is not None:
         values["control.position.gain"] = _direct(design, small, torque)
         steps.append("position: no velocity loop; crossover of the drive at a tenth of 1/T_sigma or below")
+    own = design.controller.own_law
+    if own is not None:  # a law of one's own stays as it is; the others are tuned around it
+        values = {path: value for path, value in values.items() if not path.startswith(f"control.{own[0]}.")}
+        steps = [step for step in steps if not step.startswith(own[0])]
+        steps.append(f"{own[0]}: a law of one's own, left as it is")
     return RuleGains(values, tuple(steps))
 
 

@@ -14,9 +14,7 @@ import numpy.typing as npt
 
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import Place
-from nonlinear.bench.injection import RETURNED
 from nonlinear.bench.loop_setup import LoopSetup
-from nonlinear.bench.stepper import Stepper
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
@@ -74,15 +72,14 @@ def _sine(setup: LoopSetup, place: Place, part: float, angle: float, samples: in
     size = part * (setup.range if np.isfinite(setup.range) else 1.0)
     rows = setup.row()
     rows.sine(setup.point, size, angle / (2.0 * np.pi * place.tangent.hold_s), 0.5 * np.pi)
-    drive, calm = Stepper(rows), Stepper(setup.row())
+    drive, calm = rows.running(), setup.row().running()
     t = place.tangent
     updates = t.B.shape[1]
     turned = np.exp(1j * angle * updates) * np.eye(len(t.A)) - t.A
     held = np.exp(1j * angle * np.arange(updates))
     drive.s[t.places] += size * np.linalg.solve(turned, t.B @ held).real
-    back = np.empty(samples)
-    for k in range(samples):
-        drive.run(setup.hold_ticks)
-        calm.run(setup.hold_ticks)
-        back[k] = calm.s[RETURNED[setup.point]] - drive.s[RETURNED[setup.point]]
-    return back / size if drive.happened == calm.happened else None
+    back, steady = (
+        one.returned(one.advance(samples * setup.hold_ticks, setup.hold_ticks), setup.point)
+        for one in (drive, calm)
+    )
+    return (steady - back) / size if drive.happened == calm.happened else None

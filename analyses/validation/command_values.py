@@ -10,7 +10,6 @@ from analyses.validation.limit_values import FAR
 from analyses.validation.row import Row
 from analyses.validation.value_pair import Pair
 from nonlinear.bench.loop_setup import every
-from nonlinear.bench.stepper import Stepper
 from nonlinear.rows import Rows
 
 
@@ -42,7 +41,7 @@ def _profile(pair: Pair) -> Iterator[Row]:
         for column in columns:
             if column != columns[n + first]:
                 alone[column] = inf
-        drive = Stepper(alone)
+        drive = alone.running()
         drive.command(FAR * min(limit, there) * T)
         drive.begin()
         read = {
@@ -62,7 +61,7 @@ def _jerk(pair: Pair, rows: Rows, T: float) -> Row:
     model = pair.model.command
     for column in ("profile_range", "profile_rate", "profile_acceleration"):
         rows[column] = inf
-    drive = Stepper(rows)
+    drive = rows.running()
     drive.command(1.0)
     drive.begin()
     samples = pair.design.total_ratio / drive.value("REFERENCE")
@@ -79,7 +78,7 @@ def _feedforward(pair: Pair) -> Iterator[Row]:
     rows = pair.rows()
     rows["acceleration_feedforward"] = 0.0
     for side in (1.0, -1.0):
-        drive = Stepper(rows)
+        drive = rows.running()
         drive.command(side)
         drive.begin()
         unit = "V" if pair.design.controller.current is None else "A"
@@ -94,7 +93,7 @@ def _counts(pair: Pair) -> Iterator[Row]:
     position, velocity = design.controller.position, design.controller.velocity
     quantum, own = model.output_quantum_rad, design.output_quantum_rad
     if position is not None and position.sensor == "output" and quantum is not None and own is not None:
-        drive = Stepper(_turned(pair.rows(), 1.5 * quantum * N))
+        drive = _turned(pair.rows(), 1.5 * quantum * N).running()
         drive.begin()
         yield pair.judged("output_count", quantum, -drive.value("ERROR") / N, unit, "position loop")
     if velocity is None or design.encoder.speed == "ideal":
@@ -105,13 +104,13 @@ def _counts(pair: Pair) -> Iterator[Row]:
     if quantum is None or own is None:
         return
     rows = _turned(pair.rows(), 1.5 * quantum * scale)
-    drive = Stepper(rows)
+    drive = rows.running()
     name = "output_count" if behind else "count"
     if design.encoder.speed == "tracking":
         drive.begin()
         yield pair.judged(name, quantum, drive.value("TRACKED_ANGLE") / scale, unit, "measured speed")
         return
-    drive = Stepper(_turned(rows, 0.5 * quantum * scale))
+    drive = _turned(rows, 0.5 * quantum * scale).running()
     if behind and rows.value("elastic_drive"):
         drive.begin(OUTPUT=1.5 * quantum)
     else:

@@ -2,8 +2,9 @@
 
 The step is injected at the place on the operating motion; the simulated answer is held against the linear one
 at every sample.  Beside a gain margin K the drive is started on the critical mode of its own tangent, at
-K (1 - BESIDE) and K (1 + BESIDE): with v the mode and w its left eigenvector, ``w^H (s - s_calm)`` is
-multiplied by the predicted eigenvalue in every period, exactly.  No window is searched, nothing waited for.
+K (1 - BESIDE) and K (1 + BESIDE), multiplied at the place: with v the mode and w its left eigenvector,
+``w^H (s - s_calm)`` is multiplied by the predicted eigenvalue in every period, exactly.  No window is
+searched, nothing waited for.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.resolvent import balanced
 from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
-from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, pole_near
-from nonlinear import tangent
+from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, Place, nearest_pole
+from nonlinear import Rows
 from nonlinear.bench.injection import RETURNED
 from nonlinear.bench.loop_setup import LoopSetup
-from nonlinear.bench.stepper import Stepper
+from nonlinear.bench.probe import Probe, write_probe
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
@@ -35,7 +36,7 @@ MOST_SAMPLES = 4000  # of a step
 SETTLINGS = 1.2  # of the settling time that a step is shown for
 BESIDE = 0.01  # of a margin
 CHANGE = 3.0  # times which a run beside a margin grows or shrinks
-LONGEST, SHORTEST = 5000, 50  # periods of such a run
+LONGEST, SHORTEST = 5000, 50  # periods of such a run; as many are shown
 SIZES = 10.0 ** -np.arange(0.0, 13.0)  # of a large signal
 
 
@@ -58,23 +59,47 @@ class StepShown:
 
 
 @dataclass(frozen=True)
+class MarginRun:
+    """A run beside a gain margin, started on its critical mode.
+
+    Attributes
+    ----------
+    gain : float
+        Factor on the loop gain.
+    factor, found : float
+        What the mode is predicted to be multiplied by over the run; found over predicted.
+    error : float
+        Of ``found``, by what two sizes of the run differ in and the tangent's stated error.
+    time_s, amplitude : ndarray
+        Amplitude of the mode, from 1.
+    """
+
+    gain: float
+    factor: float
+    found: float
+    error: float
+    time_s: Floats
+    amplitude: Floats
+
+
+@dataclass(frozen=True)
 class MarginShown:
-    """Two runs beside a gain margin: amplitude of the critical mode over time, from 1.
+    """Two runs beside a gain margin.
 
     Attributes
     ----------
     place : str
     ratio, frequency_hz : float
         The margin.
-    inside, outside : tuple of (time_s, amplitude)
+    inside, outside : MarginRun
     rows : tuple of Row
     """
 
     place: str
     ratio: float
     frequency_hz: float
-    inside: tuple[Floats, Floats]
-    outside: tuple[Floats, Floats]
+    inside: MarginRun
+    outside: MarginRun
     rows: tuple[Row, Row]
 
 
@@ -139,70 +164,72 @@ def _step(setup: LoopSetup, samples: int, size: float) -> Floats | None:
     """What comes back, negated, from a step at the place; None after an event."""
     rows = setup.row()
     rows.step(setup.point, size, -1.0)
-    return _followed(Stepper(rows), samples, setup.hold_ticks, lambda s: -s[RETURNED[setup.point]])
+    drive = rows.running()
+    piece = drive.advance(samples * setup.hold_ticks, setup.hold_ticks)
+    return -drive.returned(piece, setup.point) if drive.happened == (0.0, 0.0) else None
 
 
-def _followed(drive: Stepper, count: int, ticks: int, read: Callable[[Floats], Numbers]) -> Numbers | None:
-    """What is read of the state after each so many ticks; None after an event."""
-    seen = []
-    for _ in range(count):
-        drive.run(ticks)
-        seen.append(read(drive.s))
-    return np.array(seen) if drive.happened == (0.0, 0.0) else None
-
-
-def margin_shown(bench: Bench, name: str) -> MarginShown | None:
+def margin_shown(bench: Bench, place: Place) -> MarginShown | None:
     """Runs on either side of the quoted gain margin of a stable loop; None as for a step."""
-    figures = bench.figures[name]
-    margin = figures.margins.gain_margin
+    name, margin = place.name, bench.figures[place.name].margins.gain_margin
     if margin is None or not 0.0 < margin.ratio < np.inf or not bench.setup(name).steady_start:
         return None
-    outward = 1.0 + BESIDE if margin.ratio > 1.0 else 1.0 / (1.0 + BESIDE)
-    runs = [_beside(bench, name, margin.ratio * x, margin.frequency_rad_s) for x in (1.0 / outward, outward)]
+    w, outward = margin.frequency_rad_s, 1.0 + BESIDE if margin.ratio > 1.0 else 1.0 / (1.0 + BESIDE)
+    inside, outside = (_beside(bench, place, margin.ratio * x, w) for x in (1.0 / outward, outward))
     rows = [
         judged(
-            f"{side}_the_margin", name, 1.0, found, max(WITHIN, own), unit="1",
-            because=f"{20.0 * log(gain, 10):.4g} dB: predicted to {'die out' if rate < 1.0 else 'grow'} "
-            f"{abs(size[-1]):.4g} times in {time_s[-1]:.3g} s; found over predicted",
-            condition=bench.setup(name).condition, resolved=own <= RESOLVED,
+            f"{side}_the_margin", name, 1.0, run.found, max(WITHIN, run.error), unit="1",
+            because=f"{20.0 * log(run.gain, 10):.4g} dB: predicted to become {run.factor:.4g} of what it was "
+            f"in {run.time_s[-1]:.3g} s; found over predicted",
+            condition=bench.setup(name).condition,
+            resolved=run.error <= RESOLVED * abs(log(run.factor)) / BESIDE,  # of the margin
         )
-        for side, (gain, rate, found, own, time_s, size) in zip(("inside", "outside"), runs, strict=True)
+        for side, run in (("inside", inside), ("outside", outside))
     ]  # fmt: skip
-    (inside, outside) = [(run[4], run[5]) for run in runs]
-    hertz = margin.frequency_rad_s / (2.0 * np.pi)
-    return MarginShown(name, margin.ratio, hertz, inside, outside, (rows[0], rows[1]))
+    return MarginShown(name, margin.ratio, w / (2.0 * np.pi), inside, outside, (rows[0], rows[1]))
 
 
-def _beside(
-    bench: Bench, name: str, gain: float, w: float
-) -> tuple[float, float, float, float, Floats, Floats]:
-    """A run at a gain: gain, predicted factor a period, found over predicted, its own error, course.
-
-    The signal at the place begins with a part of what would be a large one.
-    """
-    setup, plain = replace(bench.setup(name), gain=gain), bench.loop(name).plain_open
-    found = tangent(bench.drive, name, setup=setup)
-    predicted = pole_near(lambda z: 1.0 + gain * complex(plain(z)), np.exp(1j * w * found.hold_s))
-    left, right = _mode(found.A, predicted)
+def _beside(bench: Bench, place: Place, gain: float, w: float) -> MarginRun:
+    """A run at a gain; the signal at the place begins with a part of what would be a large one."""
+    setup, t, plain = bench.setup(place.name), place.tangent, bench.loop(place.name).plain_open
+    closed = plain.A - gain / (1.0 + gain * plain.D[0, 0]) * plain.B @ plain.C
+    predicted = nearest_pole(closed, np.exp(1j * w * t.hold_s))
+    left, right = _mode(t.at_gain(gain), predicted)
     rate = float(abs(predicted))
     periods = int(np.clip(ceil(log(CHANGE) / max(abs(log(rate)), 1e-9)), SHORTEST, LONGEST))
-    shown = float(np.max(np.abs(found.C @ right)))
-    if shown == 0.0:
+    stride = ceil(periods / SHORTEST)
+    count = periods // stride
+    returned = float(np.max(np.abs(t.C @ right)))
+    if returned == 0.0:
         raise NumericalError("the critical mode does not show at the place")
-    begins = complex(left @ right.real) / shown
-    rows = setup.row()
+    begins = complex(left @ right.real) / returned
+    rows = _at_gain(setup, gain)
 
     def course(size: float) -> Complexes | None:
-        drive = Stepper(rows)
-        drive.s[found.places] += size / shown * right.real
-        return _followed(drive, periods, setup.base_ticks, lambda s: left @ s[found.places])
+        drive = rows.running()
+        drive.s[t.places] += size / returned * right.real
+        seen = []
+        for _ in range(count):
+            drive.run(stride * setup.base_ticks)
+            seen.append(left @ drive.s[t.places])
+        return np.array(seen) if drive.happened == (0.0, 0.0) else None
 
-    last = rate**periods
+    last = rate ** (count * stride)
     seen, own = _agreed(course, setup, WITHIN / SURE**2 * abs(begins) * last)
-    seen = np.concatenate([[1.0], seen / begins])
-    blur = SURE * (own / abs(begins) / last + found.stated_error)
-    time_s: Floats = found.period_s * np.arange(periods + 1.0)
-    return gain, rate, float(np.abs(seen[-1])) / last, blur, time_s, seen.real
+    amplitude = np.abs(np.concatenate([[1.0], seen / begins]))
+    error = SURE * (own / abs(begins) / last + t.stated_error)
+    time_s: Floats = stride * t.period_s * np.arange(count + 1.0)
+    return MarginRun(gain, last, float(amplitude[-1]) / last, error, time_s, amplitude)
+
+
+def _at_gain(setup: LoopSetup, gain: float) -> Rows:
+    """The loop with its gain multiplied at the place, on the same operating motion."""
+    rows = setup.row()
+    calm = rows.running()
+    calm.run(1)
+    write_probe(Probe(point=setup.point, gain=gain), rows.values[0])  # type: ignore[arg-type]
+    rows.step(setup.point, (1.0 - gain) * calm.s[RETURNED[setup.point]], -1.0)
+    return rows
 
 
 def _mode(A: Floats, pole: complex) -> tuple[Complexes, Complexes]:

@@ -12,8 +12,8 @@ from actuator_lti.design.model import CurrentLoop, Design, VelocityLoop
 from analyses.validation.row import Row, judged
 from analyses.validation.value_pair import WITHIN, Pair, only
 from nonlinear.bench.loop_setup import every, producer, stages_of, target
-from nonlinear.bench.stepper import Stepper
 from nonlinear.rows import Rows
+from nonlinear.runs.running import Running
 
 FAR = 1e6  # times a limit: a command that nothing follows
 OVER = 3.0  # times a limit: what an integral is asked beyond it
@@ -33,11 +33,11 @@ CLAMPED = {"u": ("voltage_limit", "voltage_V", "V"), "i_ref": ("current_limit", 
            "w_ref": ("speed_limit", "speed_rad_s", "")}  # fmt: skip
 
 
-def _pushed(rows: Rows, pair: Pair, stage: str, size: float) -> Stepper:
+def _pushed(rows: Rows, pair: Pair, stage: str, size: float) -> Running:
     """One tick in which a stage is asked for ``size`` times its gain; 0 for the command of the drive."""
     if stage in ("velocity", "current"):
         rows.step("w_ref" if stage == "velocity" else "i_ref", size, -1.0)
-    drive = Stepper(rows)
+    drive = rows.running()
     if stage not in ("velocity", "current"):
         drive.command(size)
     drive.begin()
@@ -50,13 +50,17 @@ def _ask(pair: Pair, stage: str, limit: float) -> float:
     gains = {"velocity": control.velocity and control.velocity.gain,
              "current": control.current and control.current.gain_V_A,
              "position": control.position and control.position.gain * pair.design.total_ratio}  # fmt: skip
-    return FAR * limit / (gains.get(stage) or 1.0)
+    own = control.own_law
+    direct = own[1].direct if own is not None and own[0] == stage else gains.get(stage)
+    return FAR * limit / (direct or 1.0)
 
 
 def _driven(pair: Pair) -> list[tuple[str, str]]:
     """Stage and the signal that it drives; the command drives the innermost signal of a drive without one."""
     design = pair.design
-    stages = [(stage, target(design, stage)) for stage in stages_of(design)]
+    own = design.controller.own_law  # without a direct term it answers no command within one tick
+    late = own[0] if own is not None and own[1].direct == 0.0 else ""
+    stages = [(stage, target(design, stage)) for stage in stages_of(design) if stage != late]
     outermost = {"velocity": "w_ref", "current": "i_ref", "voltage": "u"}.get(design.controller.outermost)
     return stages if outermost is None else [*stages, ("", outermost)]
 

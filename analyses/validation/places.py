@@ -161,9 +161,10 @@ class Bench:
                     quantity=name if signal == signals[0] else f"{name}_integral",
                 )  # fmt: skip
 
-    def _last(self, path: LimiterPath, hold_s: float, k: int, z: Complexes) -> Complexes:
+    @staticmethod
+    def _last(path: LimiterPath, hold_s: float, k: int, z: Complexes) -> Complexes:
         """The row of a limiter's path at its last update."""
-        return np.asarray(self._geared * path.responses(np.angle(z) / hold_s)[k], dtype=complex)
+        return np.asarray(path.responses(np.angle(z) / hold_s)[k], dtype=complex)
 
     def _path(self, name: str, loops: Loops) -> tuple[Callable[[Complexes], Complexes], Complexes]:
         """Response of the output to command or load, and no poles: those of the loops are its own."""
@@ -173,12 +174,9 @@ class Bench:
             return loops.moment_system(), none
         plain = loops.plain_response
         assert plain is not None
-        return (lambda z: np.asarray(self._geared * plain(z), dtype=complex)), none
-
-    @property
-    def _geared(self) -> float:
-        """Reference of the linear writing over the simulator's command: that of a speed is the motor's."""
-        return self.linear.total_ratio if self.linear.controller.outermost == "velocity" else 1.0
+        # the reference of a speed drive is the motor's
+        geared = self.linear.total_ratio if self.linear.controller.outermost == "velocity" else 1.0
+        return (lambda z: np.asarray(geared * plain(z), dtype=complex)), none
 
     def _point(self, name: str, setup: LoopSetup, found: Tangent, loops: Loops) -> Place:
         """A break point with all loops closed."""

@@ -9,7 +9,6 @@ from actuator_lti.design.model import Instruments
 from analyses.validation.row import Row
 from analyses.validation.torque_values import edge
 from analyses.validation.value_pair import Pair, only
-from nonlinear.bench.stepper import Stepper
 
 
 def power_rows(pair: Pair) -> Iterator[Row]:
@@ -28,7 +27,7 @@ def _overload(pair: Pair) -> Iterator[Row]:
     Ts = pair.design.controller.period_s
     kept = {name: getattr(own, name) for name in
             ("peak_current_A", "continuous_current_A", "peak_time_s", "release", "overload")}  # fmt: skip
-    drive = Stepper(pair.rows(only(**kept)))
+    drive = pair.rows(only(**kept)).running()
     drive.begin(CURRENT=own.continuous_current_A)
     yield pair.judged("overload_time", float(tau), Ts / drive.value("OVERLOAD"), "s", "continuous current")
     drive.begin(OVERLOAD=2.0)
@@ -51,7 +50,7 @@ def _supply(pair: Pair) -> Iterator[Row]:
     Ts, U_s = pair.model.controller.period_s, pair.model.limits.voltage_V
     rows = pair.rows(only(voltage_V=pair.design.limits.voltage_V), supply=own)
     rows["brake_voltage"] = inf
-    drive = Stepper(rows)
+    drive = rows.running()
 
     def bus(current: float) -> float:
         drive.begin(TICK=1.0, VOLTAGE_LIMIT=U_s, VOLTAGE=U_s, CURRENT=current)
@@ -78,10 +77,11 @@ def _supply(pair: Pair) -> Iterator[Row]:
 def _resolution(pair: Pair) -> Iterator[Row]:
     """The step of the measured current: one and a half of it, held against no command, is told as two."""
     wanted, own = (one.instruments.current_resolution_A for one in (pair.model, pair.design))
-    if pair.design.controller.current is None or not (wanted and own):
+    current = pair.design.controller.current
+    if current is None or current.law is not None or not (wanted and own):
         return
     rows = pair.rows(instruments=Instruments(current_resolution_A=own))
-    drive = Stepper(rows)
+    drive = rows.running()
     drive.begin(CURRENT=1.6 * wanted)
     gain = rows.value("current_gain") + rows.value("current_integral")
     yield pair.judged(

@@ -15,7 +15,7 @@ from analyses.large_signal.by_amplitude import AmplitudeMargin
 from analyses.large_signal.conditional import Conditional
 from analyses.limit_cycles.counts import Counts
 from analyses.linear.loop_figures import LoopFigures
-from analyses.motion.settling import Settling, largest_swing, words
+from analyses.motion.settling import Settling, noticed, words
 from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.in_time import MarginShown, StepShown
 from analyses.validation.row import Row
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from analyses.friction_effects import FrictionEffects
     from analyses.large_signal import LargeSignals
     from analyses.specification import Specification
-
-NOTICED = 1e-6  # of full deflection
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,11 +100,9 @@ class Validation:
     def hunting(self) -> Settling | None:
         """The largest motion that a step of the drive as it is ends in; None: it comes to rest.
 
-        By its one judge (`analyses.motion.settling`), whatever keeps it going: counts, play, friction,
-        load. A swing of less than `NOTICED` of full deflection is listed, it fails nothing.
+        By its one judge (`analyses.motion.settling`), whatever keeps it going: counts, play, friction, load.
         """
-        least = NOTICED * self.design.validation.full_deflection_rad
-        return largest_swing(one for one in self.settlings if one.swing_rad >= least)
+        return noticed(self.design, self.settlings)
 
     @property
     def failures(self) -> tuple[str, ...]:

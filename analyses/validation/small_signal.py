@@ -3,7 +3,7 @@
 The tangent T of a place and the linear writing are two linear models of the same drive that share no code.
 Compared are the response at `GRID` and at every figure's own frequency, the poles, every gain and phase
 margin, the delay margin at the voltage, bandwidths and peaks.  What is allowed is 1e-6 of the response, or
-ten times the tangent's stated error; for a figure, what that does to it.
+ten times the tangent's stated error, each at its own frequency; for a figure, what that does to it.
 
 A gain margin is a gain K and a point on the unit circle where, with G the tangent over one base period,
 
@@ -29,7 +29,7 @@ from actuator_lti.systems.resolvent import balanced
 from analyses.linear.loop_figures import LoopFigures
 from analyses.validation.row import Row, judged
 from nonlinear import Tangent
-from nonlinear.bench.lifted import GRID, relative
+from nonlinear.bench.lifted import GRID, relative, sized
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins
@@ -40,6 +40,7 @@ WITHIN = 1e-6  # of a response, of a margin
 SURE = 10.0  # times the stated error
 RESOLVED = 1e-4  # of a response: a tangent that is worse proves nothing
 BESIDE = 1e-6  # of a margin: where the pole has to lie on either side of the circle
+DB = 20.0 / np.log(10.0)  # of a relative change
 ROUNDING = 1e-12  # of the norm of A, that an eigenvalue is computed with
 NEWTON_STEPS = 25
 MOST_LOG = 70.0  # of a gain
@@ -83,18 +84,27 @@ class Place:
     quantity: str = "response"
 
     @property
-    def allowed(self) -> float:
-        """Relative difference of the response that is agreement."""
+    def within(self) -> float:
+        """Relative difference that is agreement, by the error stated of the whole response."""
         return max(WITHIN, SURE * self.tangent.stated_error)
 
-    def judged(self, name: str, predicted: float | None, found: float | None, allowed: float, unit: str,
-               because: str = "") -> Row:  # fmt: skip
-        """A row of this place; not proven where the tangent is too coarse."""
-        proven = self.allowed <= RESOLVED
-        why = because if proven else f"stated error of the tangent {self.tangent.stated_error:.1e}"
+    def within_at(self, angle: float) -> float:
+        """The same of the response at an angle a sample: a faint or a sharp part is known less well.
+
+        At 0 and pi from beside it: there a mode at rest may stand.
+        """
+        z = np.exp(1j * np.array([abs(angle - GRID[0]) if _is_real(angle) else angle]))
+        size = float(np.abs(self.tangent.closed(z))[0])
+        return max(WITHIN, SURE * float(self.tangent.error_at(z)[0]) / max(size, 1e-300))
+
+    def judged(self, name: str, predicted: float | None, found: float | None, within: float, scale: float,
+               unit: str, because: str = "") -> Row:  # fmt: skip
+        """A row, ``scale`` times ``within`` allowed; not proven where the tangent is too coarse."""
+        proven = within <= RESOLVED
+        why = because if proven else f"{because}; stated error of the tangent there {within / SURE:.1e}"
         return judged(
-            name, self.name, predicted, found, allowed, unit=unit, because=why, condition=self.condition,
-            resolved=proven,
+            name, self.name, predicted, found, within * scale, unit=unit, because=why.lstrip("; "),
+            condition=self.condition, resolved=proven,
         )  # fmt: skip
 
 
@@ -117,9 +127,12 @@ def _response(place: Place) -> Row:
     z = np.exp(1j * angles)
     wanted = place.predicted(z)
     off = relative(place.tangent.closed(z), wanted)
-    k = int(np.argmax(off))
+    within = np.maximum(WITHIN, SURE * place.tangent.error_at(z) / sized(wanted))
+    k = int(np.argmax(off / within))
+    if off[k] <= within[k] and np.max(within) > RESOLVED:
+        k = int(np.argmax(within))
     where = f"worst at {angles[k] / (2.0 * pi * place.tangent.hold_s):.3g} Hz, of {angles.size} frequencies"
-    row = place.judged(place.quantity, 0.0, float(off[k]), place.allowed, "1", where)
+    row = place.judged(place.quantity, 0.0, float(off[k]), float(within[k]), 1.0, "1", where)
     return replace(row, predicted=None, found=None, error=float(off[k]))
 
 
@@ -161,7 +174,7 @@ def _poles(place: Place) -> Row:
     words = f"{resolved} of {place.poles.size} poles resolved in double precision"
     if worst:
         words += f"; worst at |z| = {size:.6g} over {place.tangent.period_s:.3g} s"
-    row = place.judged("poles", 0.0, worst, place.allowed, "1", words)
+    row = place.judged("poles", 0.0, worst, place.within, 1.0, "1", words)
     return replace(row, predicted=None, found=None, error=worst)
 
 
@@ -173,13 +186,13 @@ def _pole_equation(t: Tangent, gain: complex, point: complex) -> complex:
 
 def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | None:
     """Gain and angle of the closed-loop pole on the circle nearest to those given: its size by secants."""
-    if min(angle, abs(angle - pi)) < 1e-12:
+    if _is_real(angle):
         return _real_crossing(t, gain, 1.0 if angle < 1.0 else -1.0), angle
     point = complex(np.exp(1j * angle))
     before = log_gain = float(np.log(gain))
     last = 0.0
     for k in range(NEWTON_STEPS):
-        point = _nearest(t.at_gain(float(np.exp(log_gain))), point)
+        point = nearest_pole(t.at_gain(float(np.exp(log_gain))), point)
         size = float(np.log(np.abs(point)))
         if k and size == last:
             break
@@ -190,6 +203,11 @@ def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | No
         if abs(move) < 1e-14:
             break
     return float(np.exp(log_gain)), abs(float(np.angle(point)))
+
+
+def _is_real(angle: float) -> bool:
+    """Whether an angle is that of z = 1 or -1."""
+    return min(angle, abs(angle - pi)) < 1e-12
 
 
 def _real_crossing(t: Tangent, gain: float, end: float) -> float:
@@ -216,7 +234,7 @@ def pole_near(equation: Callable[[complex], complex], point: complex) -> complex
             break
         move = value / slope
         point -= move
-        if abs(move) < 1e-15 * abs(point):
+        if abs(move) < 1e-9 * abs(point):  # the slope is good to 1e-7: the next move would be below rounding
             break
     return complex(point)
 
@@ -227,10 +245,10 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
     ``outward``: 1 where the pole leaves the circle with rising gain, -1 with falling; None: not said.
     """
     t = place.tangent
-    allowed = place.allowed * _lever(ratio)
+    within, scale = place.within_at(angle / t.B.shape[1]), ratio * _lever(ratio)
     found = _crossing(t, ratio, angle)
     if found is None:
-        return place.judged(name, ratio, None, allowed * ratio, "1", "no closed-loop pole crosses there")
+        return place.judged(name, ratio, None, within, scale, "1", "no closed-loop pole crosses there")
     gain, turned = found
     start = np.exp(1j * turned) * (1.0 - ROUNDING)  # not on a mode at rest
     sides = [
@@ -239,7 +257,7 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
     ]
     hertz = turned / (2.0 * pi * t.period_s)
     words = f"{hertz:.6g} Hz; pole beside the circle by {sides[0]:+.1e}, {sides[1]:+.1e}"
-    row = place.judged(name, ratio, gain, allowed * ratio, "1", words)
+    row = place.judged(name, ratio, gain, within, scale, "1", words)
     crossed = sides[0] < 0.0 < sides[1] if outward == 1 else sides[1] < 0.0 < sides[0]
     if (
         outward is not None
@@ -280,14 +298,14 @@ def _delay_row(place: Place, delay_s: float) -> Row:
     critical = poles[int(np.argmax(np.abs(poles)))]
     inside, poles = place.delayed(delay_s * (1.0 - BESIDE))
     before = poles[int(np.argmin(np.abs(poles - critical)))]
-    sizes = [abs(_nearest(inside.A, before)), abs(_nearest(outside.A, critical))]
+    sizes = [abs(nearest_pole(inside.A, before)), abs(nearest_pole(outside.A, critical))]
     rates = np.log(sizes)
     found = delay_s * (1.0 - BESIDE + 2.0 * BESIDE * float(-rates[0] / (rates[1] - rates[0])))
     words = f"spectral radius beside it {sizes[0] - 1.0:+.1e}, {sizes[1] - 1.0:+.1e}"
-    return place.judged("delay_margin", delay_s, found, place.allowed * delay_s, "s", words)
+    return place.judged("delay_margin", delay_s, found, place.within, delay_s, "s", words)
 
 
-def _nearest(A: Floats, pole: complex) -> complex:
+def nearest_pole(A: Floats, pole: complex) -> complex:
     """The eigenvalue nearest to a pole."""
     poles = np.linalg.eigvals(balanced(A)[0])
     return complex(poles[int(np.argmin(np.abs(poles - pole)))])
@@ -304,9 +322,9 @@ def _loop_margins(place: Place, figures: LoopFigures) -> Iterator[Row]:
         turned = seen / -np.exp(1j * np.radians(phase.deg))
         off = degrees(float(np.angle(turned)))
         error = max(degrees(abs(abs(turned) - 1.0)), abs(off))
-        allowed = degrees(place.allowed * max(1.0, abs(1.0 + seen)))
+        within, scale = place.within_at(phase.frequency_rad_s * hold), degrees(max(1.0, abs(1.0 + seen)))
         words = f"{phase.frequency_rad_s / (2.0 * pi):.6g} Hz; |L| = 1 {abs(turned) - 1.0:+.1e}"
-        row = place.judged("phase_margin", 0.0, error, allowed, "deg", words)
+        row = place.judged("phase_margin", 0.0, error, within, scale, "deg", words)
         yield replace(row, predicted=phase.deg, found=phase.deg + off)
 
 
@@ -330,7 +348,7 @@ def _figures(place: Place, figures: LoopFigures) -> Iterator[Row]:
         T = t.closed(np.array([np.exp(1j * at * t.hold_s)]))
         seen = 20.0 * float(np.log10(np.abs(read(T))[0]))
         lever = float(np.abs(T)[0] / np.abs(read(T))[0])
-        yield place.judged(name, value, seen, 8.686 * place.allowed * max(lever, 1.0) + 1e-9, "dB")
+        yield place.judged(name, value, seen, place.within_at(at * t.hold_s), DB * max(lever, 1.0), "dB")
 
 
 def _fall(
@@ -347,6 +365,5 @@ def _fall(
     hertz = at / (2.0 * pi)
     if slope == 0.0:
         return
-    yield place.judged(
-        name, hertz, hertz * (1.0 - now / slope), hertz * place.allowed * (1.0 + 1.0 / abs(slope)), "Hz"
-    )
+    found, scale = hertz * (1.0 - now / slope), hertz * (1.0 + 1.0 / abs(slope))
+    yield place.judged(name, hertz, found, place.within_at(at * hold), scale, "Hz")

@@ -20,8 +20,8 @@ from actuator_lti.drive.operating import dry_torque
 from analyses.validation.row import Row, judged
 from analyses.validation.value_pair import WITHIN
 from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm, operating_motion_at
-from nonlinear.bench.stepper import Stepper
 from nonlinear.rows import Rows
+from nonlinear.runs.running import Running
 
 EXACT = 1e-9  # of an inertia; of the largest torque that takes part in a balance
 ULPS = 64.0  # of a speed, a twist: what the transition of a tick rounds to
@@ -93,7 +93,7 @@ def _inertias(design: Design, model: Design) -> Iterator[Row]:
     rows["coupling_damping"], rows["half_play"] = 0.0, 1e9
     torque = design.inertia_kgm2
     rows["load"] = design.load_side_inertia_kgm2 * design.ratio_behind_coupling if design.coupling else 0.0
-    drive = Stepper(rows)
+    drive = rows.running()
     drive.command(torque)
     drive.begin()
     Ts = design.controller.period_s
@@ -164,7 +164,7 @@ def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: flo
     elastic = design.coupling is not None
     rows["load"], rows["speed_start"], rows["load_speed_start"] = load, speed, speed / N_c
     rows["twist_start"], rows["angle_start"] = motion.twist_rad, N_c * motion.twist_rad
-    drive = Stepper(rows)
+    drive = rows.running()
     drive.command(wanted.torque_Nm)
     drive.begin()
     unit = torque_unit(design)
@@ -215,11 +215,11 @@ def _breakaways(design: Design, model: Design) -> Iterator[Row]:
             continue
         rows["load"], rows["twist_start"] = load, twist
         rows["angle_start"], rows["voltage_start"] = design.ratio_to_coupling * twist, middle
-        drive = Stepper(rows)
+        drive = rows.running()
         for side, held in ((1, ahead), (-1, back)):
             wanted = middle + side * held
 
-            def moves(torque: float, drive: Stepper = drive, side: int = side) -> bool:
+            def moves(torque: float, drive: Running = drive, side: int = side) -> bool:
                 drive.command(torque)
                 drive.begin()
                 turned = drive.value("ANGLE") - drive.start_value("ANGLE")  # it may stand again by now
@@ -258,7 +258,7 @@ def _load_breakaways(design: Design, model: Design) -> Iterator[Row]:
         return
     rows = Rows.of(mechanics(design))
     rows["voltage_start"] = design.friction.offset_torque_Nm
-    drive = Stepper(rows)
+    drive = rows.running()
     drive.command(design.friction.offset_torque_Nm)
     own, N_r = float(model.load.moment_Nm(0.0)), model.ratio_behind_coupling
     for side in (1, -1):
@@ -287,7 +287,7 @@ def _play(design: Design, model: Design) -> Iterator[Row]:
 
         def meets(twist: float, side: int = side) -> bool:
             rows["twist_start"] = side * twist
-            return Stepper(rows).value("CONTACT") == side
+            return rows.running().value("CONTACT") == side
 
         found = edge(meets, wanted, BESIDE * wanted, FAR * wanted)
         yield judged("half_play", "drive", wanted, found, WITHIN * wanted,

@@ -24,7 +24,7 @@ from analyses.large_signal.conditional import Conditional, conditional_stability
 from analyses.large_signal.settling_ticks import settling_ticks_of
 from analyses.limit_cycles.counts import Counts, counts_of
 from analyses.linear.loop_figures import LoopFigures, loop_figures
-from analyses.motion.settling import Settling, settle
+from analyses.motion.settling import Settling, settlings_of
 from analyses.validation.bench_sweep import bench_sweep
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.in_time import margin_shown, step_shown
@@ -106,7 +106,11 @@ class _Work:
         if self.design.controller.position is None:
             self.notes.append(NO_POSITION)
         steps = {name: self._shown("step", step_shown, name) for name in stable}
-        margins = {name: self._shown("runs beside the margin", margin_shown, name) for name in stable}
+        margins = {
+            name: self._shown("runs beside the margin", lambda b, n: margin_shown(b, places[n]), name)
+            for name in stable
+            if name in places
+        }
         rows += [shown.row for shown in steps.values() if shown is not None]
         rows += [row for shown in margins.values() if shown is not None for row in shown.rows]
         rows += self._part("numbers of the design", self._values, [])
@@ -195,9 +199,8 @@ class _Work:
 
     def _held_by_friction(self) -> tuple[str, ...]:
         """Loops that are not stable as they are tested, but are with the friction that is left out there."""
-
         bench, model = self.bench, on_the_bench(self.bench.model)
-        if bench.linear.friction == model.friction:
+        if bench.linear.friction == model.friction or all(own.stable for own in bench.figures.values()):
             return ()
         at = bench.setup(bench.names[0]).bias.operating(bench.drive)
         whole = assemble_loops(model, operating_point=at.point, speed_rad_s=at.speed_rad_s)
@@ -243,11 +246,7 @@ class _Work:
         return sweep_from_rest(design, asked, amplitude, self._settle(), described=dry)
 
     def _settlings(self) -> tuple[Settling, ...]:
-        """What steps of the drive as it is end in, without load and at every named one."""
-        asked, full = self.design.validation, self.design.validation.full_deflection_rad
-        loads = dict.fromkeys((0.0, *asked.loads_Nm))
-        sizes = [part * full for part in asked.amplitude_fractions]
-        return tuple(settle(self.design, load, size) for load in loads for size in sizes)
+        return settlings_of(self.design)
 
     def _conditional(self) -> Conditional:
         return conditional_stability(self.design, self._loops, self._settle())

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.estimate import measured_speed
+from nonlinear._kernels.estimate import counted, measured_speed
 from nonlinear._kernels.filters import chain
+from nonlinear._kernels.own_law import own_output, own_states
 from nonlinear._kernels.position import (
     limited,
     outer_rare,
@@ -68,14 +69,50 @@ def torque_path(p, s, e, limit):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def own_inner(p, s, io, th, command, measured, extra, limit):  # type: ignore[no-untyped-def]
+    """A law of one's own of the velocity or the current: its output, before and behind the clamp."""
+    angle = counted(th, p[layout.OWN_COUNTS])
+    output = counted(io[layout.IN_OUTPUT], p[layout.OWN_OUTPUT_COUNTS])
+    v = own_output(p, s, io, command, command - measured, angle, output) + extra
+    return v, clamp(v, limit)
+
+
+@kernel
+def own_velocity(p, s, io, th, measured, limit):  # type: ignore[no-untyped-def]
+    """Velocity stage with a law of one's own: its output behind clamp and slope limit."""
+    extra = s[layout.S_TORQUE_FEEDFORWARD]
+    v, out = own_inner(p, s, io, th, s[layout.S_SPEED_REFERENCE], measured, extra, limit)
+    stage = float(layout.FLAG_CURRENT if p[layout.HAS_CURRENT] > 0.0 else layout.FLAG_VOLTAGE)
+    s[layout.S_FLAGS_VELOCITY] = 0.0 if out == v else stage
+    if p[layout.HAS_CURRENT] > 0.0:
+        out, flag = sloped(p, s, out, p[layout.VELOCITY_PERIOD])
+        s[layout.S_FLAGS_VELOCITY] += flag
+    own_states(p, s, out - v)
+    return out
+
+
+@kernel
+def measure_first(p, s, io, w, th):  # type: ignore[no-untyped-def]
+    """Measure the speed before the outermost stage, which takes it too."""
+    if p[layout.HAS_VELOCITY] <= 0.0 or s[layout.S_UNTIL_VELOCITY] <= 0.0:
+        s[layout.S_MEASURED_SPEED] = measured_speed(p, s, io, w, th) if p[layout.RARE_SPEED] > 0.0 else w
+
+
+@kernel
 def velocity(p, s, io, w, th):  # type: ignore[no-untyped-def]
     """Update the velocity stage."""
-    measured = measured_speed(p, s, io, w, th) if p[layout.RARE_SPEED] > 0.0 else w
+    measured = w
+    if p[layout.OWN_MEASURES] > 0.0:
+        measured = s[layout.S_MEASURED_SPEED]
+    elif p[layout.RARE_SPEED] > 0.0:
+        measured = measured_speed(p, s, io, w, th)
     s[layout.S_MEASURED_SPEED] = measured
     e = s[layout.S_SPEED_REFERENCE] - measured
     cascaded = p[layout.HAS_CURRENT] > 0.0
     limit = s[layout.S_CURRENT_LIMIT] if cascaded else s[layout.S_VOLTAGE_LIMIT]
-    if p[layout.RARE_VELOCITY] > 0.0:
+    if p[layout.OWN_STAGE] == layout.OWN_VELOCITY:
+        out = own_velocity(p, s, io, th, measured, limit)
+    elif p[layout.RARE_VELOCITY] > 0.0:
         out = torque_path(p, s, e, limit)
         if cascaded:
             out, flag = sloped(p, s, out, p[layout.VELOCITY_PERIOD])
@@ -95,14 +132,21 @@ def velocity(p, s, io, w, th):  # type: ignore[no-untyped-def]
 def current_rare(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     """Current controller with feed-forward, another anti-windup or an overload limit; its output."""
     wanted = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
-    if p[layout.HAS_VELOCITY] <= 0.0 and p[layout.BACK_EMF_FEEDFORWARD] != 0.0:
+    fed = p[layout.BACK_EMF_FEEDFORWARD] != 0.0 and p[layout.OWN_MEASURES] <= 0.0
+    if p[layout.HAS_VELOCITY] <= 0.0 and fed:
         s[layout.S_MEASURED_SPEED] = measured_speed(p, s, io, w, th)
     extra = p[layout.BACK_EMF_FEEDFORWARD] * s[layout.S_MEASURED_SPEED]
     extra += p[layout.RESISTANCE_FEEDFORWARD] * wanted
-    out, integral, hit = regulator(
-        wanted - i, s[layout.S_CURRENT_INTEGRATOR], p[layout.CURRENT_GAIN], p[layout.CURRENT_INTEGRAL],
-        extra, s[layout.S_VOLTAGE_LIMIT], p[layout.CURRENT_WINDUP], p[layout.CURRENT_TRACKING],
-    )  # fmt: skip
+    limit, integral = s[layout.S_VOLTAGE_LIMIT], s[layout.S_CURRENT_INTEGRATOR]
+    if p[layout.OWN_STAGE] == layout.OWN_CURRENT:
+        v, out = own_inner(p, s, io, th, wanted, i, extra, limit)
+        hit = 0.0 if out == v else 1.0
+        own_states(p, s, out - v)
+    else:
+        out, integral, hit = regulator(
+            wanted - i, integral, p[layout.CURRENT_GAIN], p[layout.CURRENT_INTEGRAL],
+            extra, limit, p[layout.CURRENT_WINDUP], p[layout.CURRENT_TRACKING],
+        )  # fmt: skip
     s[layout.S_CURRENT_INTEGRATOR] = integral
     s[layout.S_FLAGS_CURRENT] = hit * float(layout.FLAG_VOLTAGE)
     if s[layout.S_OVERLOADED] > 0.0:
@@ -129,6 +173,8 @@ def control(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
     """One tick of the controller; leaves the voltage in the state."""
     if p[layout.OVERLOAD] > 0.0:
         overload(p, s, i)
+    if p[layout.OWN_MEASURES] > 0.0:
+        measure_first(p, s, io, w, th)
     if s[layout.S_UNTIL_OUTER] <= 0.0:
         s[layout.S_UNTIL_OUTER] = p[layout.OUTER_EVERY]
         outer(p, s, io, th)

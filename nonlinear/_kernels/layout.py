@@ -14,6 +14,7 @@ from __future__ import annotations
 from itertools import count
 from typing import Annotated
 
+from actuator_lti.design import law
 from actuator_lti.drive import signals
 
 # --- parameters of one run -------------------------------------------------------------------------
@@ -147,6 +148,12 @@ from actuator_lti.drive import signals
     LOAD_SPEED_START,  # W
     MAP_COUNT,  # points of the friction map for w > 0; 0: no map
     MAP_COUNT_REVERSE,
+    OWN_STAGE,  # that has a law of one's own: 1 current, 2 velocity, 3 position; 0: none
+    OWN_STATES,  # its order n
+    OWN_GAIN,  # factor on C x + D e
+    OWN_READS_SPEED,  # 1: it takes the measured speed
+    OWN_COUNTS,  # counts per rad of the motor's angle that it takes; 0: not quantised
+    OWN_OUTPUT_COUNTS,  # of the output's angle
     MOMENT_ORDER,
     MOMENT_PHASE,
     MOMENT_ORDER_2,
@@ -154,7 +161,7 @@ from actuator_lti.drive import signals
     TORQUE_ORDER,
     TORQUE_PHASE,
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(136)
+) = range(142)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
@@ -211,7 +218,17 @@ FLAG_OVERLOAD, FLAG_PROFILE, FLAG_STICK = FLAG["overload"], FLAG["profile"], 1 <
 LIMITER_BITS = tuple(FLAG.values())
 LIMITER_COUNT = len(LIMITERS)
 
-SIZE = LIMITS + LIMITER_COUNT - _NAMED  # what describes a run; what follows is derived from it
+# --- a law of one's own: rows of A and B one after the other, C, D, L, the states that it starts in ---------
+MOST_STATES, OWN_INPUTS = law.MOST_STATES, len(law.LAW_INPUTS)
+OWN_CURRENT, OWN_VELOCITY, OWN_POSITION = 1.0, 2.0, 3.0
+OWN_A = LIMITS + LIMITER_COUNT - _NAMED
+OWN_B = OWN_A + MOST_STATES * MOST_STATES
+OWN_C = OWN_B + MOST_STATES * OWN_INPUTS
+OWN_D = OWN_C + MOST_STATES
+OWN_L = OWN_D + OWN_INPUTS
+OWN_START = OWN_L + MOST_STATES
+
+SIZE = OWN_START + MOST_STATES  # what describes a run; what follows is derived from it
 
 # --- derived: one transition x+ = A x + b u + c T with x = (i, w, th), and one direction of slip ----------
 A11, A12, A21, A22, A31, A32, B1, B2, B3, C1, C2, C3 = range(12)
@@ -237,6 +254,7 @@ LENGTH = DECAY + 2  # of the two segments, s
     RARE_SPEED,  # 1: the measured speed is not w itself
     RARE_VELOCITY,  # 1: the velocity controller is more than a PI with conditional integration
     RARE_CURRENT,
+    OWN_MEASURES,  # 1: the speed is measured for the law of one's own, before all stages
     PROBING,  # 1: there is a probe
     NOTING,  # 1: more than the usual outputs are to be noted
     OUTER_EVERY,  # ticks between updates of the outermost stage
@@ -246,16 +264,17 @@ LENGTH = DECAY + 2  # of the two segments, s
     DELAY_LINE,  # q + 2 values
     AT_ANGLES,  # place in the state of the last m angles
     AT_AVERAGE,  # of the profile's moving average
+    AT_OWN,  # of the states of a law of one's own
     AT_PROBES,  # of the probes' rings
     PROBE_RING,  # length of one ring
     AT_WORK,  # of the work space
     STATE_SIZE,
     PARAMETER_SIZE,  # length of the row of parameters with all that is derived
-) = range(LENGTH + 2, LENGTH + 27)
+) = range(LENGTH + 2, LENGTH + 29)
 
 # integrals over a whole segment as forms of (i, w, u, T): of i (4), of i^2, i w and w^2 (10 each)
 FORM = 34
-FORMS = LENGTH + 27  # four: direction, segment
+FORMS = LENGTH + 29  # four: direction, segment
 P_SIZE = FORMS + 4 * FORM
 
 # --- behind that, either the block of an elastic drive train, as long as it needs ---------------------
@@ -363,7 +382,7 @@ ELASTIC_STATE = S_PROBE_PLACES + 4
 ELASTIC_STATE_SIZE = 179
 S_QUEUE: Continuous = (
     ELASTIC_STATE + ELASTIC_STATE_SIZE
-)  # delay line, oldest first; then angles, average, rings
+)  # delay line, oldest first; then angles, average, states of a law of one's own, rings
 WORK_SIZE = 4 * 49 + 24  # four matrices of 7 by 7, and what is made of them
 WORK_MORE = 4 * 49
 

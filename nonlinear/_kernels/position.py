@@ -6,6 +6,7 @@ from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.command import shape
 from nonlinear._kernels.estimate import counted
+from nonlinear._kernels.own_law import own_output, own_states
 from nonlinear._kernels.probes import PROBE_I, PROBE_U, PROBE_W, PROBE_Y, probe
 from nonlinear._kernels.regulator import clamp
 
@@ -133,10 +134,28 @@ def position_law(p, s, io, reference, th):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def own_position(p, s, io, reference, th):  # type: ignore[no-untyped-def]
+    """A law of one's own of the position; its own angle is the one that the probe has passed."""
+    angle = counted(th, p[layout.OWN_COUNTS])
+    output = counted(io[layout.IN_OUTPUT], p[layout.OWN_OUTPUT_COUNTS])
+    y = position_feedback(p, s, io, th)
+    if p[layout.OUTPUT_SENSOR] > 0.0:
+        output = y / p[layout.RATIO]
+    else:
+        angle = y
+    v = own_output(p, s, io, reference, reference - y, angle, output)
+    out, flags = limited(p, s, v)
+    own_states(p, s, out - v)
+    return out, flags
+
+
+@kernel
 def outer_rare(p, s, io, th):  # type: ignore[no-untyped-def]
     """Update the outermost stage, whichever it is."""
     r = shape(p, s, io[layout.IN_COMMAND])
-    if p[layout.HAS_POSITION] > 0.0:
+    if p[layout.HAS_POSITION] > 0.0 and p[layout.OWN_STAGE] == layout.OWN_POSITION:
+        out, flags = own_position(p, s, io, p[layout.RATIO] * r, th)
+    elif p[layout.HAS_POSITION] > 0.0:
         out, flags = position_law(p, s, io, p[layout.RATIO] * r, th)
     elif p[layout.HAS_VELOCITY] > 0.0:
         out, flags = limited(p, s, p[layout.RATIO] * r)

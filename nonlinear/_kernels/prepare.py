@@ -24,7 +24,8 @@ def prepare_run_sizes(p):  # type: ignore[no-untyped-def]
     p[layout.DELAY_LINE] = p[layout.DELAY_TICKS] + 2.0
     p[layout.AT_ANGLES] = layout.S_QUEUE + p[layout.DELAY_LINE]
     p[layout.AT_AVERAGE] = p[layout.AT_ANGLES] + p[layout.DIFFERENCE_SAMPLES]
-    p[layout.AT_PROBES] = p[layout.AT_AVERAGE] + p[layout.PROFILE_SAMPLES]
+    p[layout.AT_OWN] = p[layout.AT_AVERAGE] + p[layout.PROFILE_SAMPLES]
+    p[layout.AT_PROBES] = p[layout.AT_OWN] + p[layout.OWN_STATES]
     longest, probing = 0.0, 0.0
     for point in range(4):
         at = layout.PROBES + point * layout.PROBE_SIZE
@@ -75,7 +76,7 @@ def prepare_gates(p):  # type: ignore[no-untyped-def]
     more = any_of(p, layout.ACCELERATION_FEEDFORWARD, layout.PROFILED)
     more = max(more, any_of(p, layout.TORQUE_FILTERS, layout.TRACKING_ANGLE))
     p[layout.RARE_VELOCITY] = max(more, any_of(p, layout.VELOCITY_WINDUP, layout.VELOCITY_TRACKING))
-    for j in range(layout.LIMITS, layout.SIZE):
+    for j in range(layout.LIMITS, layout.OWN_A):
         if p[j] < math.inf:
             p[layout.RARE_VELOCITY] = 1.0
     more = max(any_of(p, layout.BACK_EMF_FEEDFORWARD, layout.SUPPLY), p[layout.OVERLOAD])
@@ -83,6 +84,24 @@ def prepare_gates(p):  # type: ignore[no-untyped-def]
     more = max(p[layout.SUPPLY], any_of(p, layout.OUTPUT_SENSOR, layout.POSITION_COUNTS))
     p[layout.RARE_SENSE] = max(more, any_of(p, layout.CURRENT_RESOLUTION, layout.SEED))
     p[layout.RARE_LOAD] = any_of(p, layout.LOAD_SLOPE, layout.SUPPLY_TABLE)
+    p[layout.OWN_MEASURES] = 0.0
+    if p[layout.OWN_STAGE] > 0.0:
+        prepare_own(p)
+
+
+@kernel
+def prepare_own(p):  # type: ignore[no-untyped-def]
+    """What a law of one's own needs besides: its stage's longer form, the sensors, perhaps the speed."""
+    stage = p[layout.OWN_STAGE]
+    p[layout.RARE_SENSE] = 1.0
+    if stage == layout.OWN_POSITION:
+        p[layout.RARE_COMMAND] = 1.0
+    elif stage == layout.OWN_VELOCITY:
+        p[layout.RARE_VELOCITY] = 1.0
+    else:
+        p[layout.RARE_CURRENT] = 1.0
+    if p[layout.OWN_READS_SPEED] > 0.0 and (p[layout.HAS_VELOCITY] <= 0.0 or stage == layout.OWN_POSITION):
+        p[layout.OWN_MEASURES] = 1.0
 
 
 @kernel

@@ -20,16 +20,25 @@ from nonlinear._kernels.sense import applied_voltage, sense
 
 
 @kernel
+def angle_seen(p):  # type: ignore[no-untyped-def]
+    """The angle that the position loop sees at t_0, motor side: a command that asks for no motion."""
+    if p[layout.OUTPUT_SENSOR] > 0.0:
+        return p[layout.ANGLE_START] - p[layout.RATIO_TO_COUPLING] * p[layout.TWIST_START]
+    return p[layout.ANGLE_START]
+
+
+@kernel
 def init_controller(p, s):  # type: ignore[no-untyped-def]
     """Start values of the controller, all histories those of rest or of constant speed."""
-    th = p[layout.ANGLE_START]
     s[layout.S_CURRENT_INTEGRATOR] = p[layout.CURRENT_INTEGRATOR_START]
     s[layout.S_VELOCITY_INTEGRATOR] = p[layout.VELOCITY_INTEGRATOR_START]
     s[layout.S_SPEED_COMMAND] = s[layout.S_SPEED_REFERENCE] = p[layout.SPEED_COMMAND_START]
     s[layout.S_CURRENT_BEFORE] = s[layout.S_CURRENT_REFERENCE] = p[layout.CURRENT_COMMAND_START]
     s[layout.S_VOLTAGE_BEFORE] = s[layout.S_VOLTAGE] = s[layout.S_HELD] = p[layout.VOLTAGE_START]
-    s[layout.S_REFERENCE] = s[layout.S_REFERENCE_BEFORE] = th
+    s[layout.S_REFERENCE] = s[layout.S_REFERENCE_BEFORE] = angle_seen(p)
     s[layout.S_CURRENT_LIMIT], s[layout.S_VOLTAGE_LIMIT] = p[layout.CURRENT_LIMIT], p[layout.VOLTAGE_LIMIT]
+    for j in range(int(p[layout.OWN_STATES])):
+        s[int(p[layout.AT_OWN]) + j] = p[layout.OWN_START + j]
     chain = layout.TORQUE_CHAIN
     settle(p, chain, int(p[layout.TORQUE_FILTERS]), s, layout.S_TORQUE_CHAIN, p[layout.CURRENT_COMMAND_START])
 
@@ -52,7 +61,7 @@ def init_estimate(p, s):  # type: ignore[no-untyped-def]
 @kernel
 def init_command(p, s):  # type: ignore[no-untyped-def]
     """Start values of profile and command filter: those of the outermost stage."""
-    r = p[layout.ANGLE_START] / p[layout.RATIO]
+    r = angle_seen(p) / p[layout.RATIO]
     if p[layout.HAS_POSITION] <= 0.0:
         r = p[layout.VOLTAGE_START]
         if p[layout.HAS_CURRENT] > 0.0:

@@ -27,10 +27,9 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.loader import as_design
-from actuator_lti.systems.resolvent import balanced
 from nonlinear.bench.differences import Differences
 from nonlinear.bench.injection import Watched
-from nonlinear.bench.lifted import Complexes, Floats, response
+from nonlinear.bench.lifted import Complexes, Floats, even, lifted, response, sensitivities
 from nonlinear.bench.loop_setup import LoopSetup, loop_setup
 
 if TYPE_CHECKING:
@@ -55,6 +54,8 @@ class Tangent:
         Names of the numbers of the state that the injection moves, as the layout has them.
     stated_error : float
         Largest error of the response, relative, by what two step sizes differ in.
+    entry_errors : ndarray, shape (n + M, n + M)
+        The same of the entries of A over C beside B over D; see `error_at`.
     places : ndarray of int, shape (n,)
         Where the states lie in the row of the state.
     """
@@ -68,7 +69,8 @@ class Tangent:
     hold_s: float
     states: tuple[str, ...]
     stated_error: float
-    places: npt.NDArray[np.intp] = field(repr=False, default_factory=lambda: np.empty(0, np.intp))
+    entry_errors: Floats = field(repr=False)
+    places: npt.NDArray[np.intp] = field(repr=False)
 
     @cached_property
     def system(self) -> Any:
@@ -86,7 +88,14 @@ class Tangent:
 
         That is what a sinusoid injected at the place brings back at its own frequency.
         """
-        return response(self.A, self.B, self.C, self.D, np.asarray(points, complex))
+        return response(*self._even, self.D, np.asarray(points, complex))
+
+    def error_at(self, points: npt.ArrayLike) -> Floats:
+        """Stated error of T at points z, of their shape: a sharp resonance feels errors of entries more."""
+        z = np.asarray(points, complex)
+        left, right = sensitivities(self.A, self.B, self.C, self.D, z.reshape(-1))
+        felt = np.einsum("zi,ik,zk->z", np.abs(left), self.entry_errors, np.abs(right))
+        return np.asarray(felt).reshape(z.shape)
 
     def open(self, points: npt.ArrayLike) -> Complexes:
         """L = T/(1 - T) at points z."""
@@ -95,9 +104,12 @@ class Tangent:
 
     def lifted(self, point: complex) -> Complexes:
         """The transfer matrix over a base period, shape (M, M), at a point z = exp(j w period_s)."""
-        A, scale = balanced(self.A)
-        inside = np.linalg.solve(point * np.eye(len(A)) - A, (self.B / scale[:, None]).astype(complex))
-        return np.asarray(self.C * scale @ inside + self.D)
+        return lifted(*self._even, self.D, np.array([point], complex))[0]
+
+    @cached_property
+    def _even(self) -> tuple[Floats, Floats, Floats]:
+        """A, B and C with states of like size."""
+        return even(self.A, self.B, self.C)
 
     def at_gain(self, gain: float) -> Floats:
         """A with the loop gain at the place multiplied: v = (gain - 1) times what comes back."""
@@ -165,7 +177,7 @@ def tangent(
     if setup is None:
         setup = loop_setup(as_design(design), place, limits_on=False, held=hold and place == "current")
     measured, tick_s = Differences(setup, place, watched), setup.design.controller.period_s
-    parts, stated_error = measured.parts()
+    parts, entry_errors, stated_error = measured.parts()
     return Tangent(
         place,
         *parts,
@@ -173,5 +185,6 @@ def tangent(
         hold_s=measured.hold * tick_s,
         states=measured.names,
         stated_error=stated_error,
+        entry_errors=entry_errors,
         places=measured.moved,
     )

@@ -19,9 +19,8 @@ from actuator_lti.errors import NumericalError
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.state_kinds import CONTINUOUS, COUNTER, FLAG, names_of, places_of
 from nonlinear.bench.injection import Injection, Watched
-from nonlinear.bench.lifted import GRID, Floats, response, sensitivities, sized
+from nonlinear.bench.lifted import GRID, Floats, even, response, sensitivities, sized
 from nonlinear.bench.loop_setup import LoopSetup
-from nonlinear.bench.stepper import Stepper
 
 Parts = tuple[Floats, Floats, Floats, Floats]
 DECADES, MOST_DECADES = 13, 40  # of steps; where events forbid the larger ones, or they bend
@@ -48,7 +47,7 @@ class Differences:
     def __init__(self, setup: LoopSetup, place: str, watched: Watched | None = None) -> None:
         self.where = f"{setup.design.name}: {place}"
         self.injected = Injection(setup, place, watched)
-        self.drive = Stepper(self.injected.rows)
+        self.drive = self.injected.rows.running()
         self.injected.prepare(self.drive.p)
         self.base, self.hold = setup.base_ticks, self.injected.hold_ticks
         self.updates, self.size = self.base // self.hold, self.drive.start.size
@@ -66,15 +65,15 @@ class Differences:
         """Of the numbers of the state that take part."""
         return names_of(self.moved)
 
-    def parts(self) -> tuple[Parts, float]:
-        """A, B, C and D, and the stated error: the largest of the response, relative."""
+    def parts(self) -> tuple[Parts, Floats, float]:
+        """A, B, C, D; stated errors of A over C beside B over D; the largest of the response, relative."""
         left, right = self._felt(self._estimate())
         sway = SWAY * self.kick * np.max(right, axis=0)
         tried = self._tried(np.maximum(sway, LEAST * np.abs(self.start[self.places])), left, right)
         for _ in range(2):  # what is felt of an error is known once the response is
             whole, off = tried.best(left, right)
             left, right = self._felt(whole)
-        return self._split(whole), float(np.max(np.einsum("zi,ik,zk->z", left, off, right)))
+        return self._split(whole), off, float(np.max(np.einsum("zi,ik,zk->z", left, off, right)))
 
     def _split(self, whole: Floats) -> Parts:
         n = self.moved.size
@@ -84,7 +83,7 @@ class Differences:
         """What errors of the entries do to the response, over its size, see `sensitivities`."""
         z, parts = np.exp(1j * GRID), self._split(whole)
         left, right = (np.abs(each) for each in sensitivities(*parts, z))
-        return left / sized(response(*parts, z))[:, None], right
+        return left / sized(response(*even(*parts[:3]), parts[3], z))[:, None], right
 
     def _runs(self, rows: Floats) -> tuple[Floats, Floats, Floats]:
         """States behind one base period, what came back at each update, and flags on the way."""

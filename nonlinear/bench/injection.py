@@ -9,7 +9,7 @@ from actuator_lti.drive.signals import Kind
 from nonlinear._kernels import layout as at
 from nonlinear.bench.lifted import Floats
 from nonlinear.bench.loop_setup import LoopSetup, every, target
-from nonlinear.bench.stepper import Stepper
+from nonlinear.runs.running import Running
 
 RETURNED = {
     "u": at.S_VOLTAGE_BEFORE, "i_ref": at.S_CURRENT_BEFORE, "w_ref": at.S_SPEED_COMMAND,
@@ -72,7 +72,7 @@ class Injection:
         if self.place == "load":
             p[at.RARE_LOAD] = 1.0
 
-    def run(self, drive: Stepper, states: Floats, values: Floats) -> Floats:
+    def run(self, drive: Running, states: Floats, values: Floats) -> Floats:
         """Run every state to the next update with its own value; what is read, one a state."""
         if self.watched is not None:
             return self._watch(drive, states, values, self.watched)
@@ -88,7 +88,7 @@ class Injection:
             return s[:, at.S_CURRENT if self.outermost == "current" else at.S_SPEED].copy()
         return s[:, at.S_OUTPUT].copy() if p[at.ELASTIC_DRIVE] > 0.0 else s[:, at.S_ANGLE] / self.ratio
 
-    def _watch(self, drive: Stepper, states: Floats, values: Floats, watched: Watched) -> Floats:
+    def _watch(self, drive: Running, states: Floats, values: Floats, watched: Watched) -> Floats:
         """What the signal is, or what it changed by, at its last update.
 
         What stands in front of the torque filters is no number of the state: that update is made once more

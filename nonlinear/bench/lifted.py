@@ -13,15 +13,29 @@ GRID = np.geomspace(1e-4, 0.98, 60) * np.pi  # rad a sample: where responses are
 FAINT = 1e-6  # of the dominant part of a response: below that it is judged by that part
 
 
+def even(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
+    """The same system with states of like size, which what follows is meant for."""
+    A, scale = balanced(A)
+    return A, B / scale[:, None], C * scale
+
+
+def lifted(A: Floats, B: Floats, C: Floats, D: Floats, points: Complexes) -> Complexes:
+    """C (p - A)^-1 B + D at points p = exp(j w period_s), shape (K, M, M).
+
+    Refined once: what is left where large terms cancel is right to the rounding of the entries, so that a
+    faint response has as many digits as they give it.
+    """
+    turned = points.reshape(-1, 1, 1) * np.eye(len(A)) - A
+    states = np.linalg.solve(turned, np.broadcast_to(B.astype(complex), (points.size, *B.shape)))
+    states += np.linalg.solve(turned, B - turned @ states)
+    return np.asarray(C @ states + D)
+
+
 def response(A: Floats, B: Floats, C: Floats, D: Floats, z: Complexes) -> Complexes:
     """The fundamental of a lifted system at points of the faster rate, shape of z."""
-    A, scale = balanced(A)
-    B, C = B / scale[:, None], C * scale
-    M, n = B.shape[1], len(A)
-    points = z.reshape(-1, 1, 1)
-    inside = np.linalg.solve(points**M * np.eye(n) - A, np.broadcast_to(B.astype(complex), (z.size, n, M)))
+    M = B.shape[1]
     turn = z.reshape(-1, 1) ** np.arange(M)
-    whole = C @ inside + D
+    whole = lifted(A, B, C, D, z.reshape(-1) ** M)
     return np.asarray(np.einsum("kj,kjm,km->k", 1.0 / turn, whole, turn) / M).reshape(z.shape)
 
 

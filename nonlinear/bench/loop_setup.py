@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from nonlinear._kernels import layout as at
 from nonlinear.bench.operating_motion import (
     OperatingMotion,
     current_state,
@@ -27,6 +28,7 @@ from nonlinear.bench.operating_motion import (
     standing,
     velocity_state,
 )
+from nonlinear.bench.own_law_start import own_start
 from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.rows import Rows
 
@@ -51,8 +53,6 @@ class LoopSetup:
     limits_on : bool
     held : bool
         Whether the rotor is held at its speed.
-    gain : float
-        Factor on the loop gain at the place.
     """
 
     design: Design
@@ -60,7 +60,6 @@ class LoopSetup:
     bias: OperatingMotion
     limits_on: bool = True
     held: bool = False
-    gain: float = 1.0
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
@@ -92,9 +91,11 @@ class LoopSetup:
     @cached_property
     def base_ticks(self) -> int:
         """Ticks after which everything repeats."""
-        current = self.design.controller.current
-        fed = current is not None and current.back_emf_feedforward != 0.0 and not self.held
-        stages = self._running + (("velocity",) if fed and "velocity" in self.stages else ())
+        current, own = self.design.controller.current, self.design.controller.own_law
+        fed = current is not None and current.back_emf_feedforward != 0.0
+        taken = fed or (own is not None and self._own is not None and "speed" in own[1].inputs)
+        measured = taken and not self.held and "velocity" in self.stages
+        stages = self._running + (("velocity",) if measured else ())
         return lcm(*(every(self.design, stage) for stage in stages))
 
     @property
@@ -107,10 +108,16 @@ class LoopSetup:
         return self.stages[: self.stages.index(self.outer) + 1] if self.stages else ()
 
     @property
+    def _own(self) -> str | None:
+        """The stage that has a law of one's own, if it runs."""
+        own = self.design.controller.own_law
+        return own[0] if own is not None and own[0] in self._running else None
+
+    @property
     def condition(self) -> str:
         """On which motion it is tested, in words."""
         if self.held:
-            return "rotor held" + (" at a constant speed" if self.bias.speed_rad_s else "")
+            return "rotor locked" + (" at a constant speed" if self.bias.speed_rad_s else "")
         if self.bias.speed_rad_s:
             pressed = ", coupling pressed by a constant moment" if self.bias.coupling_Nm else ""
             return f"on a constant speed{pressed}"
@@ -118,7 +125,7 @@ class LoopSetup:
 
     def row(self) -> Rows:
         """Parameters of a run that starts in the steady state of the operating motion; see `rows`."""
-        return self.rows(self.gain)
+        return self.rows()
 
     def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
         """Parameters of runs that start in the steady state of the operating motion, one a value.
@@ -134,7 +141,7 @@ class LoopSetup:
         rows = self._base.repeat(gains.size)
         for values, delay in zip(rows.values, delays, strict=True):
             write_probe(Probe(point=self.point, delay_samples=float(delay)), values)  # type: ignore[arg-type]
-        for place in GAINS[producer(self.design, self.point)]:
+        for place in gains_of(self.design, producer(self.design, self.point)):
             rows[place] *= gains
         self._start(rows)
         return rows
@@ -151,6 +158,8 @@ class LoopSetup:
                 row[name] = 0.0
         if self.outer == "current":
             row["velocity_gain"] = row["velocity_integral"] = 0.0
+        if self._own is None:
+            row["own_stage"] = 0.0
         if self.held:
             for name in ("inertia", "motor_inertia"):
                 row[name] *= HELD
@@ -181,6 +190,9 @@ class LoopSetup:
 
     def _current(self, row: Rows) -> Value:
         """The current controller in its steady state; returns the current command."""
+        if self._own == "current":
+            fed = row["back_emf_feedforward"] * self.bias.speed_rad_s
+            return self._own_start(row, self.bias.voltage_V, row["resistance_feedforward"], fed)
         steady = current_state(
             self.bias,
             row["current_gain"],
@@ -193,17 +205,38 @@ class LoopSetup:
 
     def _velocity(self, row: Rows, wanted: Value) -> Value:
         """The velocity controller in its steady state; returns the speed command."""
+        if self._own == "velocity":
+            row["current_command_start"] = wanted
+            return self._own_start(row, wanted)
         integral = row.value("velocity_integral") != 0.0
         steady = velocity_state(self.design, self.bias, wanted, row["velocity_gain"], integral)
         row["velocity_integrator_start"] = steady.integrator
         row["current_command_start"] = steady.output  # what the torque filters begin with
         return steady.command
 
+    def _own_start(self, row: Rows, wanted: Value, direct: Value = 0.0, fed: Value = 0.0) -> Value:
+        """A law of one's own in its steady state; returns the command of its stage."""
+        commands = np.zeros(len(row))
+        parts = np.broadcast_arrays(wanted, row["own_gain"], direct, fed, commands)
+        for k, values in enumerate(zip(*parts[:4], strict=True)):
+            start = own_start(self.design, self.bias, *map(float, values))
+            row.values[k, at.OWN_START : at.OWN_START + len(start.states)] = start.states
+            commands[k] = start.command
+        return commands
+
     def _position(self, row: Rows, wanted: Value) -> None:
         """Let the command run with the drive, ahead of the motor by what the controller needs.
 
         The motor starts at zero: a large angle would round what its derivative is made of.
         """
+        if self._own == "position":
+            command = self._own_start(row, wanted) / self.design.total_ratio
+            if self.bias.speed_rad_s == 0.0:
+                row.step("bias", command, -1.0)
+            else:
+                speed = self.bias.speed_rad_s / self.design.total_ratio
+                row.ramp("bias", speed, -command / speed)
+            return
         ahead = wanted / row["position_gain"]
         at_output = self.design.controller.position_loop.sensor == "output"
         seen = self.design.total_ratio * self.bias.output_rad(self.design) if at_output else 0.0
@@ -217,6 +250,8 @@ class LoopSetup:
     @property
     def steady_start(self) -> bool:
         """Whether the steady state is known that a run begins in; a ramp sets what a PI of position holds."""
+        if self._own is not None and not _steady_law(self.design, self.bias):
+            return False
         return not (self.outer == "position" and remembers(self.design) and self.bias.speed_rad_s != 0.0)
 
     @staticmethod
@@ -265,7 +300,8 @@ def loop_setup(design: Design, loop: str, *, limits_on: bool = True, held: bool 
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
     result = LoopSetup(design, loop, operating_motion(design), limits_on, held)
-    if result.outer == "position" and remembers(design) and may_stand(design):
+    unsteady = (result.outer == "position" and remembers(design)) or not result.steady_start
+    if unsteady and may_stand(design):
         return LoopSetup(design, loop, standing(design), limits_on, held)
     return result
 
@@ -274,6 +310,18 @@ def remembers(design: Design) -> bool:
     """Whether the position controller has a state that a ramp sets."""
     place = design.controller.position
     return place is not None and (place.integral_time_s is not None or place.derivative_time_s > 0.0)
+
+
+def gains_of(design: Design, stage: str) -> tuple[str, ...]:
+    """Columns of a row that are the gain of a stage."""
+    own = design.controller.own_law
+    return (*GAINS[stage], *(("own_gain",) if own is not None and own[0] == stage else ()))
+
+
+def _steady_law(design: Design, bias: OperatingMotion) -> bool:
+    """Whether a law of one's own has a steady state on an operating motion, whatever its stage gives."""
+    own = design.controller.own_law
+    return own is None or own_start(design, bias, 0.0, own[1].gain).steady
 
 
 def stages_of(design: Design) -> tuple[str, ...]:

@@ -214,10 +214,15 @@ def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | 
 
 
 def _commands_fit(design: Design, motion: OperatingMotion) -> bool:
-    """Whether commands leave room to the limits: a controller without an integral needs an error."""
+    """Whether commands leave room to the limits: a controller without an integral needs an error.
+
+    What a law of one's own needs is its own affair: it is tested with the limits lifted.
+    """
     control, limits = design.controller, design.limits
     wanted = motion.voltage_V
-    if control.current is not None:
+    if control.current is not None and control.current.law is not None:
+        wanted = motion.current_A
+    elif control.current is not None:
         loop = control.current
         state = current_state(
             motion,
@@ -229,7 +234,7 @@ def _commands_fit(design: Design, motion: OperatingMotion) -> bool:
         wanted = float(state.command)
         if abs(wanted) > COMMANDED * limits.peak_current_A:
             return False
-    if control.velocity is not None:
+    if control.velocity is not None and control.velocity.law is None:
         velocity = control.velocity
         integral = velocity.integral_time_s is not None
         wanted = float(velocity_state(design, motion, wanted, velocity.gain, integral).command)

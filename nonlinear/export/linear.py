@@ -51,6 +51,22 @@ def without_outer(q, stage):
 
 
 @kernel
+def cut_of(q, stage):
+    """Where the loop of a stage is cut: with a law of one's own at the break point that it drives."""
+    own = q[layout.OWN_STAGE]
+    if stage == CURRENT and own == layout.OWN_CURRENT:
+        return AT_VOLTAGE
+    if stage == POSITION and own == layout.OWN_POSITION and q[layout.HAS_VELOCITY] > 0.0:
+        return AT_SPEED
+    outer = (stage == VELOCITY and own == layout.OWN_VELOCITY) or (
+        stage == POSITION and own == layout.OWN_POSITION
+    )
+    if outer:
+        return AT_CURRENT if q[layout.HAS_CURRENT] > 0.0 else AT_VOLTAGE
+    return stage
+
+
+@kernel
 def cut_point(q, stage):
     """The probe that cuts the loop, or -1."""
     if stage == CURRENT and q[layout.HAS_VELOCITY] > 0.0:
@@ -66,8 +82,9 @@ def cut_point(q, stage):
 
 @kernel
 def feeds_speed(q):
-    """Whether the measured speed is fed forward to the voltage."""
-    return q[layout.HAS_CURRENT] > 0.0 and q[layout.BACK_EMF_FEEDFORWARD] != 0.0
+    """Whether the measured speed is fed forward to the voltage, or taken by a law of the current."""
+    taken = q[layout.OWN_STAGE] == layout.OWN_CURRENT and q[layout.OWN_READS_SPEED] > 0.0
+    return q[layout.HAS_CURRENT] > 0.0 and (q[layout.BACK_EMF_FEEDFORWARD] != 0.0 or taken)
 
 
 @kernel
@@ -137,6 +154,10 @@ def listed(q, places):
     for k in range(2 * int(q[layout.TORQUE_FILTERS])):
         if count < MOST:
             places[count] = float(layout.S_TORQUE_CHAIN + k)
+        count += 1
+    for k in range(int(q[layout.OWN_STATES])):
+        if count < MOST:
+            places[count] = q[layout.AT_OWN] + k
         count += 1
     for k in range(int(q[layout.DELAY_LINE])):
         if count < MOST:
@@ -296,13 +317,19 @@ def block(q, s, io, stage, first, every, places, n, angles, a, b, c, column):
 
 
 @kernel
-def prepared(q, s, stage):
-    """Make ``q`` the row of the linear drive with its loop cut, and derive it; 0 where it is too long."""
-    without_outer(q, stage)
-    point = cut_point(q, stage)
+def cut_here(q, point):
+    """Put a probe in that lets nothing through but what is injected; -1: none."""
     if point >= 0:
         q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_ON] = 1.0
         q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_GAIN] = 0.0
+
+
+@kernel
+def prepared(q, s, stage):
+    """Make ``q`` the row of the linear drive with its loop cut, and derive it; 0 where it is too long."""
+    without_outer(q, stage)
+    cut_here(q, cut_point(q, stage) if stage == CURRENT else -1)  # of a velocity stage that had to stay
+    cut_here(q, cut_point(q, cut_of(q, stage)))
     prepare_sizes(q)
     if too_long(q):
         return 0
@@ -334,10 +361,11 @@ def assembled(p, q, s, io, stage, a, b, c, places, column):
     n, angles = listed(q, places)
     if n > MOST:
         return TOO_LONG
-    done = block(q, s, io, stage, 0, every, places, n, angles, a, b, c, column)
+    cut = cut_of(q, stage)
+    done = block(q, s, io, cut, 0, every, places, n, angles, a, b, c, column)
     if done == 0:
         return LOST
-    if runs_closed(stage):
+    if runs_closed(cut):
         for i in range(n):
             for j in range(n):
                 a[i * n + j] += b[i] * c[j]
@@ -350,6 +378,8 @@ def lead_of(p):
     if p[layout.ELASTIC_DRIVE] > 0.0 and p[layout.RIGID] <= 0.0 and p[layout.OUTPUT_SENSOR] <= 0.0:
         return math.nan  # the loop feeds back another angle than the output's
     if p[layout.POSITION_INTEGRAL] != 0.0 or p[layout.DERIVATIVE] != 0.0:
+        return math.nan
+    if p[layout.OWN_STAGE] == layout.OWN_POSITION:
         return math.nan
     if p[layout.ACCELERATION_FEEDFORWARD] != 0.0 or p[layout.COMMAND_FILTERS] > 0.0:
         return math.nan

@@ -16,6 +16,7 @@ from nonlinear.export.linear import (
     NO_LOOP,
     TOO_LONG,
     block,
+    cut_of,
     interval,
     listed,
     prepared,
@@ -44,14 +45,15 @@ def phases_of(p, q, s, io, stage, blocks, places, column, a, b, c):
     n, angles = listed(q, places)
     if n > MOST:
         return TOO_LONG
+    cut = cut_of(q, stage)
     for m in range(int(whole / every)):
-        done = block(q, s, io, stage, m * every, every, places, n, angles, a, b, c, column)
+        done = block(q, s, io, cut, m * every, every, places, n, angles, a, b, c, column)
         if done == 0:
             return LOST
         at = m * BLOCK
         for i in range(n):
             for j in range(n):
-                closing = 0.0 if runs_closed(stage) else b[i] * c[j]
+                closing = 0.0 if runs_closed(cut) else b[i] * c[j]
                 blocks[at + i * n + j] = a[i * n + j] - closing
             blocks[at + n * n + i], blocks[at + n * n + n + i] = b[i], c[i]
     return n

@@ -26,7 +26,8 @@ CLEARED = np.array([
     layout.VELOCITY_INTEGRATOR_START, layout.SPEED_COMMAND_START, layout.CURRENT_COMMAND_START,
     layout.VOLTAGE_START, layout.LOAD_TABLE_LENGTH, layout.TORQUE_TABLE_LENGTH, layout.WITH_ENERGY,
     layout.HALF_PLAY, layout.LOAD_DRY, layout.LOAD_OFFSET, layout.TWIST_START, layout.LOAD_SPEED_START,
-    layout.MAP_COUNT, layout.MAP_COUNT_REVERSE,
+    layout.MAP_COUNT, layout.MAP_COUNT_REVERSE, layout.OWN_COUNTS, layout.OWN_OUTPUT_COUNTS,
+    *range(layout.OWN_START, layout.OWN_START + layout.MOST_STATES),
 ])  # fmt: skip
 UNLIMITED = np.array([
     place for name, place in layout.LIMIT.items()

@@ -41,8 +41,12 @@ UNITS = {
     "V/A": "CURRENT_GAIN CURRENT_INTEGRAL",
     "ohm (share times R)": "RESISTANCE_FEEDFORWARD",
     "F": "CAPACITANCE",
-    "1/rad": "COUNTS_PER_RAD POSITION_COUNTS",
+    "1/rad": "COUNTS_PER_RAD POSITION_COUNTS OWN_COUNTS OWN_OUTPUT_COUNTS",
 }
+_OWN = (
+    ("A, row by row,", at.OWN_A, at.OWN_B), ("B, row by row,", at.OWN_B, at.OWN_C), ("C", at.OWN_C, at.OWN_D),
+    ("D", at.OWN_D, at.OWN_L), ("L", at.OWN_L, at.OWN_START), ("start", at.OWN_START, at.SIZE),
+)  # fmt: skip
 _UNIT_OF = {name: unit for unit, names in UNITS.items() for name in names.split()}
 
 
@@ -90,6 +94,8 @@ def place_words() -> dict[int, str]:
     for place in range(at.MAP, at.LIMITS):
         point, number = divmod(place - at.MAP, 2)
         table[place] = f"friction map, {('speed', 'torque')[number]} {point + 1}"
+    for name, begin, end in _OWN:
+        table |= {place: f"law of one's own, {name} {place - begin + 1}" for place in range(begin, end)}
     for name, limiter in LIMITERS.items():
         if at.LIMIT[name] >= at.LIMITS:
             table[at.LIMIT[name]] = f"{limiter.words} [{limiter.unit()}]"

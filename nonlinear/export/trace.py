@@ -218,7 +218,7 @@ class KeyTrace:
 _FIXED = {
     at.PERIOD, at.EVERY_VELOCITY, at.EVERY_POSITION, at.DELAY_TICKS, at.DELAY_FRACTION, at.RATIO,
     at.RATIO_TO_COUPLING, at.DIFFERENCE_SAMPLES, at.PROFILE_SAMPLES, at.COUNTS_PER_RAD,
-    at.POSITION_COUNTS, at.SEED,
+    at.POSITION_COUNTS, at.OWN_COUNTS, at.OWN_OUTPUT_COUNTS, at.SEED,
 }  # fmt: skip
 LARGEST_INTEGER = 2**31 - 1  # of an integer variable
 # an input of the drive; what the units of a file were turned by when it was read

@@ -8,6 +8,7 @@ from typing import Any, get_args
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.design.law import LAW_INPUTS
 from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
 from actuator_lti.design.over_angle import OverAngle
 from actuator_lti.drive.signals import LIMITERS
@@ -24,6 +25,7 @@ LONGEST_AVERAGE = 100_000  # samples of the moving average that limits the jerk
 SEEDS = 2**31
 ANTI_WINDUP = get_args(AntiWindup)  # in the order of the kernel's numbers
 SPEED_SOURCES = get_args(SpeedSource)
+STAGES = ("current", "velocity", "position")  # in the order of the kernel's numbers
 
 
 def split_delay(delay_s: Any, period_s: Any) -> tuple[Any, Any]:
@@ -177,6 +179,35 @@ def _controllers(design: Design, row: Floats) -> None:
         row[at.BACK_EMF_FEEDFORWARD] = current.back_emf_feedforward * row[at.BACK_EMF]
         row[at.RESISTANCE_FEEDFORWARD] = current.resistance_feedforward * row[at.RESISTANCE]
     _position(design, row)
+    _own_law(design, row)
+
+
+def _own_law(design: Design, row: Floats) -> None:
+    """Matrices of a law of one's own, a column for each signal that there is."""
+    own = design.controller.own_law
+    if own is None:
+        return
+    stage, law = own
+    row[at.OWN_STAGE], row[at.OWN_STATES] = STAGES.index(stage) + 1, len(law.A)
+    row[at.OWN_GAIN], row[at.OWN_READS_SPEED] = law.gain, "speed" in law.inputs
+    for place, quantum in (
+        (at.OWN_COUNTS, design.angle_quantum_rad),
+        (at.OWN_OUTPUT_COUNTS, design.output_quantum_rad),
+    ):
+        row[place] = 0.0 if quantum is None else 1.0 / quantum
+    if stage == "position" and design.controller.position_loop.sensor == "motor":
+        row[at.POSITION_COUNTS] = row[at.OWN_COUNTS]
+    columns = [LAW_INPUTS.index(name) for name in law.inputs]
+    for k, (own_row, driven) in enumerate(zip(law.A, law.B, strict=True)):
+        for j, value in enumerate(own_row):
+            row[at.OWN_A + k * at.MOST_STATES + j] = value
+        for j, value in zip(columns, driven, strict=True):
+            row[at.OWN_B + k * at.OWN_INPUTS + j] = value
+    for place, values in ((at.OWN_C, law.C), (at.OWN_L, law.L)):
+        for k, value in enumerate(values):
+            row[place + k] = value
+    for j, value in zip(columns, law.D or (0.0,) * len(columns), strict=True):
+        row[at.OWN_D + j] = value
 
 
 def _regulator(

@@ -20,6 +20,7 @@ from nonlinear.bench.probe import Probe
 from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment, as_load
 from nonlinear.row.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE, design_row
+from nonlinear.runs.running import Running
 from nonlinear.runs.setup import (
     Tables,
     check_frequency,
@@ -34,7 +35,6 @@ from nonlinear.runs.setup import (
 from nonlinear.runs.trajectory import STATUS, LimitUse, State, Trajectory
 from nonlinear.runs.watch import watch
 from nonlinear.runs.wrap import wrap
-from nonlinear.settling.running import Running
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]

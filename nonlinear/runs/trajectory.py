@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-    from nonlinear.settling.running import Running
+    from nonlinear.runs.running import Running
 
 Floats = npt.NDArray[np.float64]
 COMMANDED: dict[Stage, str] = {

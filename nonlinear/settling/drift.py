@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from nonlinear._kernels import elastic_layout as ES
 from nonlinear._kernels import layout as at
-from nonlinear.settling.running import Piece, Running
+from nonlinear.runs.running import Piece, Running
 
 Floats = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]

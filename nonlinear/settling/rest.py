@@ -27,8 +27,8 @@ import numpy.typing as npt
 
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
+from nonlinear.runs.running import Piece, Running
 from nonlinear.settling.drift import DRIFT, MOST_LEAPS, STILL, change, even, eventless, leap, matter, small
-from nonlinear.settling.running import Piece, Running
 from nonlinear.settling.scales import Scales
 
 Floats = npt.NDArray[np.float64]

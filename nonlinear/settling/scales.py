@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from nonlinear._kernels import elastic_layout as ES
 from nonlinear._kernels import layout as at
-from nonlinear.settling.running import Piece, Running
+from nonlinear.runs.running import Piece, Running
 
 Floats = npt.NDArray[np.float64]
 _SPEED, _CURRENT, _VOLTAGE, _CURRENT_COMMAND, _SPEED_COMMAND = 2, 3, 4, 5, 6

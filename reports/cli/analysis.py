@@ -15,15 +15,13 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.request import OnMachines, Option, flag, options
 from analyses.studies.study_asked import study_with
 from reports.analyses import Analysis
-from reports.cli.drive import SetOption, load_drive, output_quantity, read_changes
+from reports.cli.drive import SetOption, load_drive, read_changes
 from reports.cli.options import (
     DEFAULT_DESIGN,
     DesignArgument,
     JsonOption,
     QuietOption,
-    command_quantity,
-    on_axis,
-    read_load,
+    read_quantity,
 )
 from reports.cli.targets import folder_for_results
 
@@ -55,12 +53,15 @@ VariantOption = Annotated[
 def command(one: Analysis) -> Callable[..., None]:
     """The function that typer makes a command of."""
 
-    def run(design: str | None, changes: list[str] | None, **given: Any) -> None:
+    def run(design: str | None = None, changes: list[str] | None = None, **given: Any) -> None:
         name = design or (usual(given) if usual else DEFAULT_DESIGN)
-        answer(one, _study(design, changes) if one.study else load_drive(name, changes), **given)
+        subject = None if one.alone else _study(design, changes) if one.study else load_drive(name, changes)
+        answer(one, subject, **given)
 
     usual = getattr(one.request, "design_of", None)  # then the design is an option
-    needed = any(option.argument for _, option in _options(one).values())  # then a design is, too
+    needed = any(  # then a design is, too
+        option.argument and not hasattr(one.request, name) for name, (_, option) in _options(one).items()
+    )
     subject: tuple[Any, Any] = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
     parameters = [
         _parameter("design", DesignOption, None)
@@ -76,6 +77,8 @@ def command(one: Analysis) -> Callable[..., None]:
         _parameter("quiet", QuietOption, False),
         *([_parameter("example", _example(one), False)] if one.example else []),
     ]
+    left_out = ("design", "changes") * one.alone + ("out", "quiet") * (one.alone or not one.page)
+    parameters = [each for each in parameters if each.name not in left_out]
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}
     run.__doc__ = cleandoc(one.words) + (f" In the report: --also {one.name}." if one.also else "")
@@ -99,9 +102,9 @@ def answer(
     one: Analysis,
     subject: Design | Study | None,
     *,
-    out: Path | None,
     as_json: bool,
-    quiet: bool,
+    out: Path | None = None,
+    quiet: bool = False,
     **chosen: Any,
 ) -> None:
     """Ask, then print the section or the result, and leave with the verdict."""
@@ -131,7 +134,8 @@ def answer(
         print_line(text)
         return
     parts = [*notices(missing, one.name), *one.sections(result)]
-    doc.waived(parts, drive)
+    if drive is not None:
+        doc.waived(parts, drive)
     passed = getattr(result, "verdict", getattr(result, "passed", None))
     files = one.write(result, out)
     if out is not None:
@@ -139,7 +143,7 @@ def answer(
     if as_json:
         print_json(one.data(result))
     else:
-        _print(one, drive.name, result, parts, passed)
+        _print(one, getattr(drive, "name", ""), result, parts, passed)
         for path in files:
             print_line(f"wrote {path}")
     leave_with(passed in (None, True, "met"))
@@ -183,23 +187,18 @@ def _options(one: Analysis) -> dict[str, tuple[Any, Option]]:
 
 def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, Any]:
     """A field as an option of typer; what is not given is None, and the request knows what then."""
-    text = {"plain": kind, "load": float}.get(option.kind, str)
-    more: dict[str, Any] = {"parser": read_load} if option.kind == "load" else {}
+    text = kind if option.kind == "plain" else str
     if option.argument:
-        return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], Parameter.empty
-    made = typer.Option(
-        f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words, **more
-    )
+        needed = Parameter.empty if default is None else default
+        return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], needed
+    made = typer.Option(f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words)
     return (Annotated[bool, made], default) if kind is bool else (Annotated[text | None, made], None)
 
 
 def _read(name: str, option: Option, value: Any, drive: Design) -> Any:
     """The value of an option in SI, once the drive is known."""
-    if option.kind == "command":
-        return command_quantity(f"--{option.flag or flag(name)}", value, drive)
-    if option.kind == "output":
-        return output_quantity(f"--{option.flag or flag(name)}", value, drive)
-    return on_axis(value, drive) if option.kind == "load" and value is not None else value
+    of = f"--{option.flag or flag(name)}"
+    return value if option.kind == "plain" else read_quantity(of, value, option.kind, drive)
 
 
 def _parameter(name: str, annotation: Any, default: Any) -> Parameter:

@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 
-from reports.analyses import ANALYSES, BY_NAME
+from reports.analyses import ANALYSES, COMMANDS_IN
 from reports.cli.analysis import command as declared
 from reports.cli.numbers import bounded
 
 
 def _declared(group: str) -> tuple[str, ...]:
-    return tuple(one.name for one in ANALYSES if one.group == group)
+    return tuple(dict.fromkeys(one.name.split()[0] for one in ANALYSES if one.group == group))
 
 
 # In the order in which the help lists them, by the panel that they stand in.
 PANELS: dict[str, tuple[str, ...]] = {
-    "Designs": ("designs", "init", "keys", "objects"),
+    "Designs": (*_declared("Designs"), "objects"),
     "Linear loops": (*_declared("Linear loops"), "report", "pdf"),
     "Nonlinear checks": _declared("Nonlinear checks"),
     "Bench records": _declared("Bench records"),
-    "Out of Python": ("export",),
+    "Out of Python": _declared("Out of Python"),
     "Variants and history": (*_declared("Variants and history"), "nightly"),
 }
 
@@ -96,14 +97,22 @@ def options_by_name() -> dict[str, str]:
 
 
 def _register(app: typer.Typer, command: str, panel: str) -> None:
-    """Add a command: the function of its name, or the typer application `app` where it has sub-commands."""
-    module = None if command in BY_NAME else import_module(f"reports.cli.{command}")
-    group = getattr(module, "app", None)
-    if isinstance(group, typer.Typer):
+    """Add a command: those declared, the function of its name, or the typer application `app` of it."""
+    own = [one for one in ANALYSES if one.name.split()[0] == command]
+    module = None if own else import_module(f"reports.cli.{command}")
+    group: typer.Typer | None = getattr(module, "app", None)
+    if command in COMMANDS_IN:
+        group = typer.Typer(help=COMMANDS_IN[command], no_args_is_help=True)
+        for one in own:
+            _add(group, one.name.split()[1], declared(one))
+    if group is not None:
         app.add_typer(group, name=command, rich_help_panel=panel)
     else:
-        function = declared(BY_NAME[command]) if module is None else getattr(module, command)
-        app.command(command, rich_help_panel=panel, help=flowed(function.__doc__ or ""))(function)
+        _add(app, command, declared(own[0]) if own else getattr(module, command), panel)
+
+
+def _add(app: typer.Typer, name: str, function: Callable[..., Any], panel: str | None = None) -> None:
+    app.command(name, rich_help_panel=panel, help=flowed(function.__doc__ or ""))(function)
 
 
 def flowed(text: str) -> str:

@@ -43,27 +43,6 @@ def load_drive(name_or_path: str, changes: Sequence[str] | None = None) -> Desig
     return with_overrides(design, read_changes(changes)) if changes else design
 
 
-def output_quantity(option: str, words: str | None, drive: Design) -> float | None:
-    """A position of the output as an option gives it, with its unit: rad, or m on a linear axis.
-
-    Raises
-    ------
-    InputError
-        For no number, another unit, or none.
-    """
-    from actuator_lti.design.units import parse_quantity
-    from actuator_lti.errors import InputError
-
-    if words is None:
-        return None
-    unit, example = ("m", "5 mm") if drive.axis == "linear" else ("rad", "2 deg")
-    try:
-        return parse_quantity(words, unit)
-    except InputError as error:
-        reason = error.message.partition("; allowed")[0]
-        raise InputError(f'{option} {words!r}: {reason}; allowed: a value such as "{example}"') from None
-
-
 def read_changes(changes: Sequence[str]) -> Tree:
     """Keys and values of ``KEY=VALUE`` texts; numbers, lists and tables as TOML has them, all else a text.
 

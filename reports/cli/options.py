@@ -12,6 +12,7 @@ from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
+    from analyses.request import Kind
     from analyses.studies.engine import Engine
 
 DEFAULT_DESIGN = "ilr33-amber"
@@ -27,54 +28,18 @@ OutOption = Annotated[
 ]
 
 
-class Load(float):
-    """A load as it was written: its value in SI, and the unit where one was given."""
+def read_quantity(option: str, words: str | None, kind: Kind, drive: Design) -> float | None:
+    """A number of the command line with its unit; of a load or of the command also without it.
 
-    unit: str = ""
-
-
-def on_axis(load: float, drive: Design) -> float:
-    """A load of the command line, once the drive is known.
-
-    Raises
-    ------
-    InputError
-        For a torque on a linear axis, or a force on a rotary one.
-    """
-    from actuator_lti.errors import InputError
-
-    linear, unit = drive.axis == "linear", getattr(load, "unit", "")
-    if unit and unit != ("N" if linear else "N*m"):
-        kind, wanted = ("force", '"40 N"') if linear else ("torque", '"4 N*m"')
-        raise InputError(
-            f"--load: {unit} does not fit the axis of {drive.name}; allowed: a {kind}, such as {wanted}"
-        )
-    return float(load)
-
-
-def read_load(text: str) -> float:
-    """A load with or without its unit: N m (linear axis: N) where it has none."""
-    from actuator_lti.design.units import parse_quantity
-    from actuator_lti.errors import InputError
-
-    try:
-        return float(text)
-    except ValueError:
-        pass
-    for unit in ("N*m", "N"):
-        try:
-            load = Load(parse_quantity(text, unit))
-        except InputError as error:
-            message = error.message
-        else:
-            load.unit = unit
-            return load
-    reason = message.partition("; allowed")[0]
-    raise typer.BadParameter(f'{reason}; allowed: a torque such as "4 N*m" (linear axis: a force, "40 N")')
-
-
-def command_quantity(option: str, words: str | None, drive: Design) -> float | None:
-    """An amount of the outermost loop's command in its usual unit: a plain number, or one with its unit.
+    Parameters
+    ----------
+    option : str
+        For the message.
+    words : str or None
+    kind : {"output", "load", "command"}
+        In SI: a position of the output, a load there; in its usual unit: the outermost loop's command.
+    drive : Design
+        Its axis and outermost loop say the unit.
 
     Raises
     ------
@@ -87,20 +52,25 @@ def command_quantity(option: str, words: str | None, drive: Design) -> float | N
 
     if words is None:
         return None
-    unit, per_SI = COMMAND_UNITS[drive.axis, drive.controller.outermost]
-    try:
-        value = float(words)
-    except ValueError:
-        pass
+    linear, factor = drive.axis == "linear", 1.0
+    if kind == "output":
+        unit, allowed = ("m", 'a value such as "5 mm"') if linear else ("rad", 'a value such as "2 deg"')
+    elif kind == "load":
+        unit, allowed = ("N", 'a force such as "40 N"') if linear else ("N*m", 'a torque such as "4 N*m"')
     else:
-        if not isfinite(value):
-            raise InputError(f"{option} {words}: must be a finite number")
-        return value
+        usual, factor = COMMAND_UNITS[drive.axis, drive.controller.outermost]
+        unit, allowed = usual.replace("deg", "rad").replace("mm", "m"), f'"5 {usual}", or 5 in {usual}'
     try:
-        return parse_quantity(words, unit.replace("deg", "rad").replace("mm", "m")) * per_SI
+        bare = None if kind == "output" else float(words)
+    except ValueError:
+        bare = None
+    if bare is not None and not isfinite(bare):
+        raise InputError(f"{option} {words}: must be a finite number")
+    try:
+        return factor * parse_quantity(words, unit) if bare is None else bare
     except InputError as error:
         reason = error.message.partition("; allowed")[0]
-        raise InputError(f'{option} {words!r}: {reason}; allowed: "5 {unit}", or 5 in {unit}') from None
+        raise InputError(f"{option} {words!r}: {reason}; allowed: {allowed}") from None
 
 
 SchedulerOption = Annotated[

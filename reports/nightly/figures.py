@@ -8,9 +8,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from actuator_lti.asked.quantities import reserve
+from actuator_lti.asked.verdict import Tally
 from actuator_lti.files.tree import Tree
 from reports.nightly.text import one_line
-from reports.verdict_summary import role, tally, verdict_words, why
+from reports.verdict_summary import role, verdict_words, why
 
 MAX_FIGURES = 5_000
 MAX_TABLE_ROWS = 200
@@ -61,7 +62,8 @@ class Verdict:
 def digest(document: Mapping[str, Any]) -> Tree:
     """What the nightly keeps of a report document: figures, verdicts, title, revision (plain JSON)."""
     verdicts = list(verdicts_of(document))
-    count = tally(asdict(v) for v in verdicts)
+    parts = document["verdict"]["parts"]
+    count = sum((Tally(**part) for part in parts.values()), Tally())
     figures = list(figures_of(document))
     design = document.get("design") or {}
     return {
@@ -69,7 +71,7 @@ def digest(document: Mapping[str, Any]) -> Tree:
         "revision": str(design.get("revision", "") or ""),
         "verdicts": [asdict(v) for v in verdicts],
         "figures": [asdict(f) for f in figures[:MAX_FIGURES]],
-        "words": verdict_words({"parts": document["verdict"]["parts"]}),
+        "words": verdict_words({"parts": parts}),
         "failed": count.not_met,
         "unproven": count.not_proven + len(document["verdict"].get("unproven_sections", ())),
         "total": count.total,

@@ -10,6 +10,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block
+from reports.sections.limits import words_of
 
 KINDS = {"gain": "loop gain, up", "delay": "delay at the loop"}
 NEXT_TO_NOTHING = 0.01  # of the linear margin
@@ -46,10 +47,11 @@ def remark(item: AmplitudeMargin) -> str:
     else:
         cause = f"if a delay of {value} or more is added"
     quiet = "" if item.friction_on else ", without dry friction,"
-    acting = f" The {item.limiter} limit acts." if item.limiter else ""
+    acting = f" The {words_of(item.limiter)} acts." if item.limiter else ""
     return (
         f"The {item.loop} loop{quiet} sustains an oscillation {cause} after release from "
-        f"{100.0 * item.part:.0f} % of full range; the linear {item.kind} margin is {linear}.{acting}"
+        f"{100.0 * item.part:.0f} % of full range; the linear {item.kind} margin on the validation's "
+        f"operating motion is {linear}.{acting}"
     )
 
 
@@ -99,7 +101,7 @@ def _table(items: Sequence[AmplitudeMargin]) -> Block:
         doc.of(lambda item: _shown(item.linear, item), "linear", "Linear margin", format="sig:4"),
         doc.of(lambda item: _shown(item.value, item), "value", "Oscillation lasts from", format="sig:3"),
         doc.of(_unit, "unit", "Unit"),
-        doc.of("limiter", "limiter", "Limit acting"),
+        doc.of(lambda item: words_of(item.limiter) if item.limiter else "", "limiter", "Limit acting"),
         doc.of(_remark, "remark", ""),
     ]
     made = doc.listing("Margins by amplitude", items, columns)

@@ -29,11 +29,7 @@ def section(motor: VoltageMotor, chirp_prediction: ChirpPrediction, record: str)
         doc.of(lambda band: band[0], "low", "From", "Hz", format="sig:3"),
         doc.of(lambda band: band[1], "high", "to", "Hz", format="sig:3"),
         doc.of(
-            lambda band: 100.0 * band[2].relative_error,
-            "error",
-            "Relative error of the speed",
-            "%",
-            format="fix:2",
+            lambda band: 100.0 * band[2].relative_error, "error", "Error of the speed", "%", format="fix:2"
         ),
         doc.of(lambda band: band[2].fit_percent, "fit", "Fit", "%", format="fix:2"),
     ]

@@ -16,9 +16,9 @@ from reports.as_json import as_json
 from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
 from reports.numbers import capital, significant
 from reports.sections import compare_best, compare_figures, compare_ledger, compare_many
-from reports.sections.compare_best import limit_words, number
+from reports.sections.compare_best import number
 from reports.sections.names import LOOPS
-from reports.sections.requirements import item, label
+from reports.sections.requirements import item, label, limit_words
 from reports.terminal import Brief
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 GROUPS = {**LOOPS, "drive": "Drive", "large": "Large signals"}
 COLUMNS = 4  # variants beside the base in one table: what reads on one screen
 _MOST_MOVERS = 3
-_MOST_NAMES = 12
 _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 
 
@@ -49,15 +48,7 @@ def text(comparison: Comparison | str) -> str | None:
 
 def brief(comparison: Comparison) -> Brief:
     """Which designs meet their requirements."""
-    counts = {one.variant.name: tally(one.verdicts) for one in comparison.all}
-    said = f"{comparison.tally.words('requirements')}, over {len(counts)} designs"
-    for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
-        names = [name for name, count in counts.items() if count.verdict == word]
-        said += f"; {word}: {_listed(names)}" if names else ""
-    refused = [variant.name for variant in comparison.refused]
-    said += f"; no design: {_listed(refused)}" if refused else ""
-    said += "; a prediction is not confirmed by the simulator" if comparison.unconfirmed else ""
-    return Brief(said, [overview(comparison)])
+    return Brief(result(comparison), [overview(comparison)])
 
 
 def data(comparison: Comparison) -> Tree:
@@ -74,24 +65,29 @@ def write(comparison: Comparison, folder: Path | None) -> list[str]:
     return [str(folder / compare_many.TABLE)]
 
 
-def _listed(names: list[str]) -> str:
-    """Names in one sentence, the first few of many."""
-    more = len(names) - _MOST_NAMES
-    return ", ".join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+def result(comparison: Comparison) -> str:
+    """Count the requirements of all designs, and name the first that is not met, or not proven."""
+    everything = comparison.everything
+    said = f"{comparison.tally.words('requirements')}, over {len(everything.all)} designs."
+    for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
+        of = [(one, v) for one in everything.all for v in one.verdicts if v.verdict == word and not v.waiver]
+        more = f", and {len(of) - 1} more" if len(of) > 1 else ""
+        said += f" {word.capitalize()}: {of[0][0].variant.name}, {label(of[0][1])}{more}." if of else ""
+    refused = [variant.name for variant in comparison.refused]
+    more = f", and {len(refused) - 1} more" if len(refused) > 1 else ""
+    said += f" No design: {refused[0]}{more}." if refused else ""
+    return said + " A prediction is not confirmed by the simulator." * comparison.unconfirmed
 
 
 def verdicts(comparison: Comparison) -> Section:
     """Verdicts of every design: a row a requirement, a column a design."""
-    wanted, everything = comparison.base.verdicts, comparison.everything
+    wanted = comparison.base.verdicts
     blocks: list[Block] = compare_many.worst(comparison)
     if wanted:
         note = "In brackets the difference from the base, in the unit of the requirement."
         for k, designs in enumerate(batches(comparison)):
-            columns = [
-                doc.column("what", "Requirement"),
-                doc.column("limit", "Limit"),
-                *design_columns(designs),
-            ]
+            first = doc.column("what", "Requirement"), doc.column("limit", "Limit")
+            columns = [*first, *design_columns(designs)]
             rows = [_verdict_row(verdict, designs) for verdict in wanted]
             title = "Requirements of every design" + ("" if k == 0 else f", part {k + 1}")
             blocks.append(doc.table(title, columns, rows, note if k == 0 else ""))
@@ -104,15 +100,9 @@ def verdicts(comparison: Comparison) -> Section:
         blocks.append(doc.text(f"{variant.name}: no design. {variant.error}"))
     if len(comparison.refused) > compare_many.MANY:
         blocks.append(doc.text(f"{len(comparison.refused) - compare_many.MANY} more have no design."))
-    count = comparison.tally
-    result = f"{count.words('requirements')}, over {len(everything.all)} designs."
-    for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
-        of = [(one, v) for one in everything.all for v in one.verdicts if v.verdict == word and not v.waiver]
-        if of:
-            more = f", and {len(of) - 1} more" if len(of) > 1 else ""
-            result += f" {word.capitalize()}: {of[0][0].variant.name}, {label(of[0][1])}{more}."
-    status: Status = "fail" if comparison.refused else count.role
-    return doc.section("verdicts", "Requirements side by side", blocks, result=result, status=status)
+    status: Status = "fail" if comparison.refused else comparison.tally.role
+    words = result(comparison)
+    return doc.section("verdicts", "Requirements side by side", blocks, result=words, status=status)
 
 
 def batches(comparison: Comparison) -> list[list[Compared]]:
@@ -151,7 +141,7 @@ def _named(one: Compared, verdict: RequirementVerdict) -> VerdictItem:
 
 
 def _verdict_row(wanted: RequirementVerdict, designs: Sequence[Compared]) -> Row:
-    row: Row = {"what": label(wanted), "limit": limit_words(wanted)}
+    row: Row = {"what": label(wanted), "limit": limit_words(wanted.requirement)}
     for k, one in enumerate(designs):
         verdict = next((v for v in one.verdicts if v.id == wanted.id), None)
         if verdict is None or verdict.value is None:

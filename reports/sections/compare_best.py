@@ -11,7 +11,7 @@ from analyses.specification.requirements import tally
 from reports import document as doc
 from reports.document_schema import Block, Section
 from reports.numbers import significant
-from reports.sections.requirements import label
+from reports.sections.requirements import label, limit_words
 
 if TYPE_CHECKING:
     from analyses.comparison.variants import Compared, Comparison
@@ -34,7 +34,7 @@ def section(comparison: Comparison) -> Section:
         "best", "Which variant for what", blocks, result=_result(everything, met),
         intro=(
             "Distance is what is left to the limit, as part of the limit; of a margin, as part of the "
-            "distance from -1 that the limit keeps. The smallest one is the weakest point."
+            "distance from -1 that the limit keeps."
         ),
         status="fail" if missed else "pass",
     )  # fmt: skip
@@ -79,7 +79,7 @@ def _designs(comparison: Comparison) -> Block:
     columns = [
         doc.of("variant.name", "design", "Design"),
         doc.of(met_words, "met", "Requirements met"),
-        doc.of(_weakest_words, "weakest", "Weakest point"),
+        doc.of(_weakest_words, "weakest", "Nearest to its limit"),
         doc.of(lambda o: "the base" if o is base else _changes(o, comparison, 1), "gains", "Gains most"),
         doc.of(lambda o: "" if o is base else _changes(o, comparison, -1), "gives", "Gives up most"),
     ]
@@ -139,7 +139,7 @@ def _best(comparison: Comparison) -> Block:
             for v in one.verdicts
             if v.id == wanted.id and (near := nearness(v)) is not None
         ]
-        row = {"what": label(wanted), "limit": limit_words(wanted), "base": number(wanted.value)}
+        row = {"what": label(wanted), "limit": limit_words(wanted.requirement), "base": number(wanted.value)}
         if ranked:
             high, low = max(ranked, key=lambda r: r[0]), min(ranked, key=lambda r: r[0])
             seen = _SEEN * max(abs(high[0]), 1e-9)
@@ -157,14 +157,6 @@ def _best(comparison: Comparison) -> Block:
 def _first(names: Sequence[str]) -> str:
     """Name the first design, and say how many are as good."""
     return names[0] if len(names) == 1 else f"{names[0]}; {len(names) - 1} alike"
-
-
-def limit_words(verdict: RequirementVerdict) -> str:
-    """Write both limits of a requirement as the design file has them, with the unit."""
-    r = verdict.requirement
-    parts = [f"≥ {r.minimum:g}"] if r.minimum is not None else []
-    parts += [f"≤ {r.maximum:g}"] if r.maximum is not None else []
-    return f"{' and '.join(parts)} {'' if r.unit == '1' else r.unit}".rstrip()
 
 
 def number(value: float | None) -> str | None:

@@ -85,11 +85,8 @@ def _ending(conditional: Conditional, scale: float, unit: str) -> str:
 
 
 def _facts(conditional: Conditional, scale: float, unit: str) -> Block:
-    threshold, full_rad = conditional.threshold_rad, conditional.full_deflection_rad
-    items = [
-        doc.fact("Largest step that settles", (threshold or full_rad) * scale, unit, better=1),
-        doc.fact("Full deflection", full_rad * scale, unit),
-    ]
+    size = (conditional.threshold_rad or conditional.full_deflection_rad) * scale
+    items = [doc.fact("Largest step that no limit keeps moving", size, unit, better=1)]
     for point, margins in conditional.margins.items():
         if margins.stable and margins.gain_lower > 0.0:
             label = f"Lower gain margin at {POINTS.get(point, point)}, all loops closed"

@@ -40,7 +40,7 @@ def summary(result: Corners) -> str:
     if not failed:
         return f"Every loop is stable and every requirement met at all {len(result.corners)} corners."
     share = f"{len(failed)} of {len(result.corners)} corners"
-    return f"Not every loop is stable and every requirement met at {share}: {'; '.join(failed)}."
+    return f"At {share} a loop is not stable or a requirement not met: {'; '.join(failed)}."
 
 
 def unmet(corner: Corner) -> str:

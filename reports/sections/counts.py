@@ -8,11 +8,10 @@ from typing import Any
 from analyses.limit_cycles import Confirmation
 from analyses.limit_cycles.counts import WITHIN, Counts
 from reports import document as doc
-from reports.document_schema import Block, FactItem, Section, Status
+from reports.document_schema import Block, FactItem, Section
 from reports.findings import Finding
 from reports.sections.names import output_unit
 
-FOUND = {True: "found", False: "not found"}
 NAMES = {"motor": "Motor encoder", "output": "Output encoder"}
 
 
@@ -28,13 +27,9 @@ def section(found: Sequence[Counts], axis: str = "rotary") -> Section:
     if cycles:
         blocks.append(_cycles(cycles, axis))
     words = [sentence(one, axis) for one in found]
-    status: Status = "warn" if any(one.resting_rad for one in found) else "info"
-    findings = [
-        Finding(severity="warn" if one.resting_rad else "info", text=text, where="counts")
-        for one, text in zip(found, words, strict=True)
-    ]
+    findings = [Finding(severity="info", text=text, where="counts") for text in words]
     return doc.section(
-        "counts", "Counts of the encoders", blocks, result=" ".join(words), intro=intro, status=status,
+        "counts", "Counts of the encoders", blocks, result=" ".join(words), intro=intro, status="info",
         findings=findings,
     )  # fmt: skip
 
@@ -47,10 +42,7 @@ def sentence(one: Counts, axis: str) -> str:
         words.append(f"steps of {one.speed_step_rad_s:.3g} {speed} in the speed estimate")
     if one.standing_rad:
         words.append(f"up to {one.standing_rad * scale:.2g} {unit} of standing error")
-    rests = "the drive comes to rest"
-    if one.resting_rad:
-        rests = f"the drive does not rest: its output moves by {one.resting_rad * scale:.2g} {unit}"
-    return f"{NAMES[one.sensor]}: counts add {', '.join(words)}; {rests}."
+    return f"{NAMES[one.sensor]}: counts add {', '.join(words)}."
 
 
 def _facts(one: Counts, axis: str) -> list[FactItem]:
@@ -83,9 +75,9 @@ def _cycles(cycles: Sequence[tuple[Counts, Confirmation]], axis: str) -> Block:
         doc.of(lambda pair: pair[1].cycle.output_rad, "output", "At the output", **size),
         doc.of(lambda pair: pair[1].cycle.frequency_hz, "hertz", "Frequency", "Hz", format="sig:3"),
         doc.of(lambda pair: pair[1].ratio, "ratio", "Simulated over predicted", format="sig:3"),
-        doc.of(lambda pair: FOUND[pair[1].verdict == "confirmed"], "verdict", "Simulation"),
+        doc.of(lambda pair: pair[1].verdict, "verdict", "Verdict"),
     ]
-    note = "Without dry friction, which quiets most of them; the drive as it is: see the sentence above."
+    note = "Without dry friction, which quiets most of them."
     return doc.listing("Limit cycles of the counts", cycles, columns, note)
 
 

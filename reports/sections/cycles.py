@@ -61,7 +61,7 @@ def _predicted(result: LimitCycles, fine: float, small: str) -> Block:
     columns = [
         doc.of(lambda one: CAUSES[one.cycle.cause], "cause", "Cause"),
         doc.of(lambda one: "in it" if one.cycle.with_friction else "left out", "friction", "Dry friction"),
-        doc.of(lambda one: "attracting" if one.cycle.stable else "border", "kind", "Kind"),
+        doc.of(lambda one: "stable" if one.cycle.stable else "unstable", "kind", "Kind"),
         doc.of("cycle.output_rad", "size", "Predicted, peak", scale=fine, **size, better=-1),
         doc.of("cycle.frequency_hz", "hz", "at", "Hz", format="sig:3"),
         doc.of(lambda one: _seen(one, fine), "seen", "Simulated", **size),
@@ -69,7 +69,7 @@ def _predicted(result: LimitCycles, fine: float, small: str) -> Block:
         doc.of("verdict", "verdict", "Verdict"),
     ]
     note = (
-        "Attracting: motion near it ends in it. Border: smaller motion dies out, larger grows. Friction left "
+        "Stable: motion near it ends in it. Unstable: smaller motion dies out, larger grows. Friction left "
         "out or by its own describing function, as the column says; no limit acts."
     )
     return doc.listing("Predicted limit cycles, at the output", result.confirmations, columns, note)

@@ -1,10 +1,11 @@
-"""Duty cycle: can the motor do this for ever, by current, overload protection and winding temperature."""
+"""Duty cycle against the continuous rating: current, overload protection and winding temperature."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING, Literal
 
+from actuator_lti.asked.verdict import Verdict
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -21,17 +22,22 @@ def section(result: Duty) -> Section:
     """Make the section from `analyses.duty.duty`."""
     intro = (
         "The motion is simulated until it is steady, friction, play and limits at work, the overload "
-        "protection left out. Its current, repeated for ever, heats the winding by its mean copper loss and "
-        "drives the overload state."
+        "protection left out. Its current, repeated without end, heats the winding by its mean copper loss "
+        "and drives the overload state."
     )
     blocks = [doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), _note(result))]
     blocks.append(_figure(result))
-    severity: Literal["info", "warn"] = "info" if result.passed else "warn"
+    severity: Literal["info", "warn"] = "info" if result.verdict is Verdict.MET else "warn"
     return doc.section(
         "duty", "Duty cycle", blocks, result=summary(result), intro=intro, status=severity, told=severity
     )
 
 
+RATED = {
+    Verdict.MET: "within continuous rating",
+    Verdict.NOT_MET: "beyond continuous rating",
+    Verdict.NOT_PROVEN: "not judged, as no rating is stated",
+}
 _COLUMNS = [
     doc.column("what", "What"),
     doc.column("value", "Found", format="sig:4"),
@@ -53,11 +59,10 @@ def asked_words(result: Duty) -> str:
 
 
 def summary(result: Duty) -> str:
-    """Say whether the drive does it for ever."""
-    able = "can be done for ever" if result.passed else "cannot be done for ever"
+    """Say whether the drive may do it for ever."""
     known = math.isfinite(result.continuous_A)
-    part = f" of {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
-    return f"{asked_words(result)} {able}: {result.rms_A:.4g} A rms{part}."
+    part = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
+    return f"{asked_words(result)} is {RATED[result.verdict]}: {result.rms_A:.4g} A rms{part}."
 
 
 def _note(result: Duty) -> str:

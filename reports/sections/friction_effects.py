@@ -39,7 +39,8 @@ def section(result: FrictionEffects) -> Section:
     blocks += [figure] if figure else []
     blocks += [_settling_table(result, fine, small, load)]
     intro = (
-        "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion."
+        "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion. "
+        "Friction alone: counts and noise of the sensors are left out here."
     )
     status: Status = tally(items).role
     severity: Severity = "fail" if status == "fail" else "warn" if status == "warn" else "info"
@@ -62,7 +63,7 @@ def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> 
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
-        f"No limit cycle at {point.load_Nm:g} {load}",
+        f"No limit cycle of friction at {point.load_Nm:g} {load}",
         value=0.0 if swing is None else fine * swing.swing_rad,
         limit=0.0,
         unit=small,
@@ -80,7 +81,7 @@ def _predicted_words(cycles: LimitCycles, fine: float, small: str) -> str:
     parts = []
     for item in cycles.confirmations:
         one = item.cycle
-        kind = "stable" if one.stable else "unstable, the border of what friction damps"
+        kind = "stable" if one.stable else "unstable, the limit of what friction damps"
         seen = "refuted" if item.ratio is None else f"simulated at {item.ratio:.2f} of that"
         hz = "" if item.frequency_hz is None else f", {item.frequency_hz:.4g} Hz"
         size = fine * one.output_rad
@@ -110,7 +111,7 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
         doc.of("threshold.simulated_rad", "simulated", "simulated", **size),
         doc.of(lambda point: _wait(point, "predicted_s"), "wait", "Wait at half of it", **wait),
         doc.of(lambda point: _wait(point, "simulated_s"), "waited", "simulated", **wait),
-        doc.of(lambda point: _lost(point, "lost_motion_rad"), "width", "Lost motion", **size),
+        doc.of(lambda point: _lost(point, "lost_motion_rad"), "width", "Lost at a reversal", **size),
         doc.of(lambda point: _lost(point, "predicted_rad"), "predicted", "predicted", **size),
         doc.of("hysteresis.largest_rad", "largest", "Largest effect of friction", **size),
     ]
@@ -124,7 +125,9 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
     )
     if result.design.command != Command():
         note += " Steps as they come behind the profile and filter of the command."
-    return doc.listing("Threshold of motion and lost motion", result.points, columns, note)
+    return doc.listing(
+        "Threshold of motion, and motion lost at a reversal of the command", result.points, columns, note
+    )
 
 
 def _after(result: FrictionEffects) -> str:
@@ -161,8 +164,8 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
     ]
     ends = [(point.load_Nm, one) for point in result.points for one in point.cycles.settlings]
     note = (
-        "The third step at each load is 0.3 of the threshold, the fourth that of a predicted cycle. Errors "
-        "below 10⁻⁶ of the step are shown as 0."
+        "Two steps at each load; where there is a threshold, one of 0.3 of it, where a cycle is predicted, "
+        "one of its size. Errors below 10⁻⁶ of the step are shown as 0."
     )
     return doc.listing(
         "Steady-state error after a step", ends, columns, note,
@@ -213,7 +216,7 @@ def _summary(result: FrictionEffects, fine: float, small: str) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
     swing = largest_swing(settlings)
     if swing is not None:
-        return f"The drive does not come to rest after a step: {end_words(swing.rest, fine, small)}."
+        return f"Friction keeps the drive from rest after a step: {end_words(swing.rest, fine, small)}."
     left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
     does = (
         f"The {result.integrator} controller integrates" if result.integrator else "No controller integrates"
@@ -225,6 +228,6 @@ def _summary(result: FrictionEffects, fine: float, small: str) -> str:
     if not result.integrator:
         return f"{does}; the steps leave no error at rest."
     return (
-        f"Dry friction leaves no steady-state error and causes no hunting: the {result.integrator} "
+        f"Dry friction alone leaves no steady-state error and causes no hunting: the {result.integrator} "
         "integrator removes the error."
     )

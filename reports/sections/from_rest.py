@@ -20,8 +20,9 @@ def sections(sweep: RestSweep, axis: str) -> list[Section]:
     low, high = sweep.amplitude_rad.min() * scale, sweep.amplitude_rad.max() * scale
     clear = "" if any(sweep.limiter) else ", below every limit"
     words = described(sweep)
+    sizes = f"{low:.3g} {unit}" if f"{low:.3g}" == f"{high:.3g}" else f"{low:.3g} to {high:.3g} {unit}"
     caption = (
-        f"Command to output from rest, amplitudes of {low:.3g} to {high:.3g} {unit}{clear}. {words} The "
+        f"Command to output from rest, amplitude {sizes}{clear}. {words} The "
         "sliding loop does not include the reversals."
     )
     intro = "Dry friction has no small-signal gain where the speed changes sign: it depends on the amplitude."

@@ -82,7 +82,7 @@ def _in_time(validation: Validation) -> Section:
         "mode 1 % inside and 1 % outside of the gain margin, where it dies out or grows by the predicted "
         "factor."
     )
-    result = f"{met} of {len(rows)} runs go as predicted."
+    result = " ".join([f"{met} of {len(rows)} runs go as predicted.", *(one.text for one in findings[:1])])
     return doc.section(
         "confirmation", "Predictions in time", blocks, result=result, intro=intro, status=status,
         findings=findings,
@@ -109,16 +109,15 @@ def _step(shown: StepShown) -> Block:
 def _margin(shown: MarginShown) -> Block:
     chart = Chart(width=style.HALF, height=240.0)
     panel = chart.panel()
-    last = max(float(shown.inside[0][-1]), float(shown.outside[0][-1]))
-    scale = style.time_axis(panel, last)
-    for (time_s, size), words, k in ((shown.inside, "1 % inside", 0), (shown.outside, "1 % outside", 3)):
-        some = slice(None, None, max(1, time_s.size // 600))
-        panel.curve(scale * time_s[some], size[some], words, **style.series(k))
-    panel.rule_y(0.0)
-    panel.y.label = "critical mode"
+    scale = style.time_axis(panel, max(float(run.time_s[-1]) for run in (shown.inside, shown.outside)))
+    for run, words, k in ((shown.inside, "1 % inside", 0), (shown.outside, "1 % outside", 3)):
+        look = style.series(k)
+        panel.curve(scale * run.time_s, run.factor ** (run.time_s / run.time_s[-1]), words, **look)
+        panel.points(scale * run.time_s, run.amplitude, f"{words}, simulated", **look | {"size": 4.0})
+    panel.y.label = "amplitude of the critical mode"
     decibel = 20.0 * math.log10(shown.ratio)
     caption = (
         f"{LOOPS[shown.place]}: gain margin {decibel:.2f} dB at {shown.frequency_hz:.4g} Hz. The run inside "
-        "dies out, the run outside grows, each by the predicted factor."
+        "dies out, the run outside grows (circles), each by the predicted factor (lines)."
     )
     return doc.figure("margin_runs", chart, caption=caption, alt=caption, layout="half")

@@ -36,7 +36,7 @@ def section(result: LargeSignals) -> Section:
     rules = doc.details("How the map is read", [doc.text(words) for words in (CAUSE_RULE, CRITERIA)])
     blocks = [doc.verdicts(items, what="checks"), _map_figure(result, scale, unit), rules]
     if result.border is not None and np.isfinite(result.border.predicted_rad).any():
-        blocks.append(doc.details("The border in numbers", [_border_table(result, scale, unit)]))
+        blocks.append(doc.details("The linear limit in numbers", [_border_table(result, scale, unit)]))
     blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
     blocks += [_bode_table(result.bode, scale, unit), *_sawtooth_blocks(result.sawtooth, design, scale, unit)]
     intro = (
@@ -206,7 +206,7 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
     style.bound(gain, np.ravel(amplitude_bode.gain_db), span=45.0, top_room=0.12)
     phases = style.known([*np.ravel(amplitude_bode.phase_deg), *amplitude_bode.linear_deg])
     style.phase_axis(phase, [max(v, -360.0) for v in phases])
-    gain.rule_y(-3.0103, dash=1)
+    gain.rule_y(amplitude_bode.level_db, dash=1)
     phase.rule_y(-90.0, dash=1)
     style.frequency(phase, amplitude_bode.frequency_hz)
     gain.y.label, phase.y.label = "gain of the fundamental, dB", "phase, deg"
@@ -256,7 +256,7 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block
         corners = (amplitude_bode.minus3db_hz[k], amplitude_bode.minus90deg_hz[k])
         rows.append((100.0 * fraction, scale * amplitude, *corners, note))
     corners = (amplitude_bode.linear_minus3db_hz, amplitude_bode.linear_minus90deg_hz)
-    rows.append((None, None, *corners, "linear loop, interpolated on the same grid"))
+    rows.append((None, None, *corners, "linear loop"))
     return doc.table(
         "Bandwidth against amplitude", columns, [dict(zip(keys, row, strict=True)) for row in rows]
     )

@@ -11,25 +11,25 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.loops.limiters import Onset
+from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section
-from reports.sections.names import hertz, output_unit
+from reports.sections.names import hertz
 
 
 def section(design: Design, border: Onset) -> Section:
     """Make the section from the onset amplitudes."""
-    scale, unit = (1.0, "m") if design.axis == "linear" else output_unit(design.axis)
+    unit, scale = COMMAND_UNITS[design.axis, design.controller.outermost]
+    where = ", at the output," if design.controller.outermost in ("position", "velocity") else ""
     caption = (
-        "Peak amplitude of a sine command, at the output, at which each limit is just reached. Below the "
+        f"Peak amplitude of a sine command{where} at which each limit is just reached. Below the "
         "lowest line every linear figure of this report holds, except for dry friction."
     )
     rows = _rows(design, border, scale)
-    blocks = [
-        doc.figure("onset", _chart(design, border, scale, unit), caption=caption, alt=caption),
-        _table(rows, unit),
-    ]
+    blocks = [doc.figure("onset", _chart(design, border, scale, unit), caption=caption, alt=caption)]
+    blocks += [_table(rows, unit)] if rows else []
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
     words = _result(rows, unit)
     return doc.section(
@@ -46,7 +46,7 @@ def _chart(design: Design, border: Onset, scale: float, unit: str) -> Chart:
     lines = {name: values for name, values in lines.items() if np.isfinite(values).any()}
     lowest = np.min([np.where(np.isfinite(v), v, np.inf) for v in lines.values()], axis=0)
     there = np.isfinite(lowest)
-    full = design.validation.full_deflection_rad * scale
+    full = _full(design) * scale
     top = 4.0 * max([full, *lowest[there][:1]]) if there.any() else 1.0
     bottom = max(0.6 * min(lowest[there], default=0.1), top / 1e6)
     panel.y.log, panel.y.label = True, f"command amplitude, {unit}"
@@ -63,6 +63,11 @@ def _chart(design: Design, border: Onset, scale: float, unit: str) -> Chart:
     if full:
         panel.rule_y(full, f"full deflection {full:g} {unit}", colour=style.INK, dash=2)
     return chart
+
+
+def _full(design: Design) -> float:
+    """Full deflection; 0 where the command is no position."""
+    return design.validation.full_deflection_rad if design.controller.position is not None else 0.0
 
 
 def _result(rows: Sequence[_Linear], unit: str) -> str:
@@ -99,8 +104,8 @@ class _Linear:
 def _rows(design: Design, border: Onset, scale: float) -> list[_Linear]:
     """List the highest frequency at which each command amplitude still passes unlimited."""
     rows: list[_Linear] = []
-    for fraction in design.validation.amplitude_fractions:
-        amplitude = fraction * design.validation.full_deflection_rad
+    for fraction in design.validation.amplitude_fractions if _full(design) else ():
+        amplitude = fraction * _full(design)
         reached = np.nonzero(border.amplitude_rad < amplitude)[0]
         first = int(reached[0]) if len(reached) else None
         up_to = None if first is None else hertz(_crossing(border, first, amplitude))

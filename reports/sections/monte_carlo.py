@@ -16,7 +16,7 @@ from reports.document_schema import Block, Section, VerdictItem
 from reports.numbers import significant
 from reports.sections.margins import finite
 from reports.sections.names import unit_words
-from reports.sections.requirements import label
+from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
 
 if TYPE_CHECKING:
@@ -120,20 +120,11 @@ def _why(odds: Odds, case: WorstCase | None) -> str:
     return f"every sample passes, but the worst case of the tolerance box fails: {case.value:.4g} {case.unit}"
 
 
-def _limit(odds: Odds) -> str:
-    parts = []
-    if odds.minimum is not None:
-        parts.append(f"≥ {odds.minimum:g} {odds.unit}")
-    if odds.maximum is not None:
-        parts.append(f"≤ {odds.maximum:g} {odds.unit}")
-    return ", ".join(parts)
-
-
 def _odds_table(result: MonteCarloResult) -> Block:
     share: dict[str, Any] = {"unit": "%", "scale": 100.0, "format": "fix:3"}
     columns = [
         doc.of("label", "label", "Requirement"),
-        doc.of(_limit, "limit", "Limit"),
+        doc.of(limit_words, "limit", "Limit"),
         doc.of("probability", "probability", "Probability met", **share, better=1),
         doc.of("low", "low", "95 % lower bound", **share),
         doc.of("high", "high", "95 % upper bound", **share),

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
 from reports.document_schema import Section, Status, VerdictItem
 from reports.sections.names import QUANTITIES, unit_words
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Requirement
+    from analyses.monte_carlo import Odds
 
 
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> Section:
@@ -73,6 +78,13 @@ def label(verdict: RequirementVerdict, load_unit: str = "N m") -> str:
         return f"{verdict.loop.capitalize()} loop{rotor}: {what}{to}"
     load = "" if requirement.load_Nm is None else f" at {requirement.load_Nm:g} {load_unit}"
     return f"Drive: {what}{load}"
+
+
+def limit_words(of: Requirement | Odds) -> str:
+    """Write both limits of a requirement as the design file has them, with the unit."""
+    parts = [f"≥ {of.minimum:g}"] if of.minimum is not None else []
+    parts += [f"≤ {of.maximum:g}"] if of.maximum is not None else []
+    return f"{' and '.join(parts)} {unit_words(of.unit)}".rstrip()
 
 
 def _limit(verdict: RequirementVerdict) -> tuple[float | None, str]:

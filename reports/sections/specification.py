@@ -12,7 +12,7 @@ from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Section
 from reports.findings import Finding
-from reports.numbers import significant
+from reports.numbers import short, significant
 from reports.sections.limits import words_of
 from reports.sections.names import load_unit, output_unit
 
@@ -240,7 +240,7 @@ def _full(design: Design) -> str:
 
 
 def _limit_words(limits: dict[str, float]) -> str:
-    parts = [f"{words_of(name)} {100.0 * share:.2g} %" for name, share in limits.items()]
+    parts = [f"{words_of(name)} {short(100.0 * share, 2)} %" for name, share in limits.items()]
     return ", ".join(parts) or "none"
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import asdict, replace
+from typing import Any, cast
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
@@ -12,7 +12,7 @@ from actuator_lti.drive.signals import LIMITERS
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
-from reports.document_schema import Block, Section, Severity, Status, VerdictItem
+from reports.document_schema import Block, Counts, Section, Severity, Status, VerdictItem
 from reports.findings import Finding
 from reports.numbers import capital
 from reports.sections.conditional import findings_of
@@ -91,7 +91,8 @@ def summary(validation: Validation) -> Section:
     blocks += [doc.remark(note) for note in validation.notes]
     intro = (
         "Every prediction is held against the derivative of the running simulator, taken on its compiled "
-        "tick while the drive runs at constant speed (where dry friction is a constant torque) or stands. "
+        "tick while the drive runs at constant speed (where dry friction is a constant torque) or stands, "
+        "then without dry friction and friction by load: its figures differ from those of sliding by that. "
         "What is large, starts from rest, or is shaken by counts is a finding of its own."
     )
     status: Status = {"met": "pass", "not met": "fail", "not proven": "warn"}[validation.verdict]  # type: ignore[assignment]
@@ -135,7 +136,7 @@ def verdict_items(validation: Validation) -> list[VerdictItem]:
     if not items:
         items.append(_item("judged", "Predictions", 0.0, None, None, "; ".join(validation.notes)))
     for k, failure in enumerate(validation.failures):
-        items.append(_item(f"drive-{k}", capital(failure), None, None, False, ""))
+        items.append(_item(f"drive-{k}", "Stable, and at rest where it is sent", None, None, False, failure))
     items += [
         _item(f"stable-{name}", f"{loop_name(name)}: stable", None, None, None, "not known")
         for name in validation.undecided
@@ -157,7 +158,8 @@ def _rows_item(validation: Validation, name: str, rows: Sequence[Check]) -> Verd
     label = f"{loop_name(name)}: predictions met by the simulator"
     reason = "; ".join(words) or f"largest error {share:.1g} of what is allowed"
     waiver = f"{tally.waived} of {open_ones} waived" if tally.waived and not tally.not_proven else ""
-    return {**_item(name, label, float(tally.met), float(tally.total), passed, reason), "waiver": waiver}
+    item = _item(name, label, float(tally.met), float(tally.total), passed, reason)
+    return {**item, "waiver": waiver, "gathers": cast(Counts, asdict(tally))}
 
 
 def _item(

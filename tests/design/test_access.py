@@ -41,7 +41,6 @@ def test_a_changed_value_says_what_it_was() -> None:
 
 def test_the_relative_tolerance_follows_and_the_absolute_one_stays() -> None:
     relative = with_values(AMBER, {"load.inertia": 4e-4}).parameters["load.inertia"].tolerance
-    assert relative is not None
     assert relative.half_width == pytest.approx(2e-4)
     emps = load_design("emps")
     absolute = with_values(emps, {"motor.rotor_inertia": 200.0}).parameters["motor.rotor_inertia"].tolerance

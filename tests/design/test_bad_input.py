@@ -140,9 +140,7 @@ def test_all_mistakes_are_told_at_once_each_with_its_line() -> None:
         assert any(one.startswith(f"my.toml: line {line}: {path} = ") and why in one for one in told)
 
 
-def test_mistakes_between_keys_are_told_at_once_too(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_mistakes_between_keys_are_told_at_once_too(capsys, tmp_path) -> None:
     text = changed(('"942.5 rad/s"', '"30000 rpm"'), ('"4 A", source', '"14 A", source'))
     assert [one.split(" = ")[0] for one in refused(text).split("\n")] == [
         f"my.toml: line {k}: limits.{key}"
@@ -210,7 +208,7 @@ def test_nonsense_is_refused_quickly(text: str) -> None:
     refused(text)
 
 
-def test_files_that_are_no_design_are_refused(tmp_path: Path) -> None:
+def test_files_that_are_no_design_are_refused(tmp_path) -> None:
     def line(path: Path) -> str:
         with pytest.raises(InputError) as caught:
             load_design(path)
@@ -225,7 +223,7 @@ def test_files_that_are_no_design_are_refused(tmp_path: Path) -> None:
     assert "no regular file" in line(Path("/dev/null"))
 
 
-def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path: Path) -> None:
+def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path) -> None:
     path = tmp_path / "bom.toml"
     path.write_bytes(b"\xef\xbb\xbf" + AMBER.replace("\n", "\r\n").encode())
     assert load_design(path).motor == load_design("ilr33-amber").motor

@@ -76,8 +76,6 @@ def test_a_real_set_of_another_motor_with_either_calibration() -> None:
     for factor, gain in ((1.0, 344e-6), (PER_RPM, 344e-6 * 30 / pi)):
         result = import_objects(objects(real, factor), AMBER)
         control = result.design.controller
-        assert control.current is not None
-        assert control.velocity is not None
         assert (control.current.gain_V_A, control.current.integral_time_s) == pytest.approx((1.028, 385e-6))
         assert (control.velocity.gain, control.velocity.integral_time_s) == pytest.approx((gain, 0.0371))
         assert control.position.gain == 2.0
@@ -262,7 +260,7 @@ def test_toml_that_is_no_settings_file_is_refused(text: str, says: str) -> None:
         read_settings_toml(text, "s")
 
 
-def test_a_settings_file_is_known_by_its_first_sign(tmp_path: object) -> None:
+def test_a_settings_file_is_known_by_its_first_sign(tmp_path) -> None:
     folder = __import__("pathlib").Path(str(tmp_path))
     some = objects({"0x2348.01": 50})
     (folder / "a.xdc").write_text(write_settings_xml(some))

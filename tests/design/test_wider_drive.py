@@ -19,11 +19,11 @@ NOTCH = {"kind": "notch", "frequency": "640 rad/s", "width": "320 rad/s", "depth
 
 def test_filters_keep_their_order_and_have_keys_of_their_own() -> None:
     design = with_overrides(AMBER, {FILTER: [NOTCH, {"kind": "lowpass", "frequency": "1 kHz"}]})
-    first, second = design.controller.velocity.filters  # type: ignore[union-attr]
+    first, second = design.controller.velocity.filters
     assert (first.frequency_rad_s, first.width_rad_s, first.depth) == (640.0, 320.0, 0.1)
     assert second.frequency_rad_s == pytest.approx(2 * pi * 1000, rel=1e-15)
     changed = with_overrides(design, {"control.velocity.filter.1.depth": 0.2})
-    assert changed.controller.velocity.filters[0].depth == 0.2  # type: ignore[union-attr]
+    assert changed.controller.velocity.filters[0].depth == 0.2
     assert read_design_text(write_design(changed), changed.origin) == changed
 
 
@@ -59,10 +59,10 @@ def test_an_ac_motor_keeps_torque_losses_and_voltage_limit(constants: str) -> No
             "limits.speed": "1 rad/s",
         },
     ).effective_motor
-    assert motor.torque_constant_Nm_A * current == pytest.approx(torque, rel=1e-14)  # type: ignore[operator]
-    assert motor.resistance_ohm * current**2 == pytest.approx(loss, rel=1e-14)  # type: ignore[operator]
+    assert motor.torque_constant_Nm_A * current == pytest.approx(torque, rel=1e-14)
+    assert motor.resistance_ohm * current**2 == pytest.approx(loss, rel=1e-14)
     # the peak of the line-line voltage is what the bus limits
-    assert motor.back_emf_constant_Vs_rad * speed == pytest.approx(sqrt(3) * k * speed, rel=1e-14)  # type: ignore[operator]
+    assert motor.back_emf_constant_Vs_rad * speed == pytest.approx(sqrt(3) * k * speed, rel=1e-14)
     assert motor.torque_constant_Nm_A == pytest.approx(motor.back_emf_constant_Vs_rad, rel=1e-14)
 
 

@@ -23,8 +23,6 @@ PAGES = [
 def made() -> ModuleType:
     path = ROOT / "docs" / "_ext" / "generated_pages.py"
     spec = importlib.util.spec_from_file_location("generated_pages", path)
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti import load_design
+from actuator_lti.design.law import LAW_INPUTS, Law
 from actuator_lti.design.model import (
     Command,
     Coupling,
@@ -42,7 +43,7 @@ def random_drive(rng: Rng) -> Design:
     motor = design.motor
     assert motor.resistance_ohm is not None
     assert motor.inductance_H is not None
-    return replace(
+    made = replace(
         design,
         motor=replace(
             motor,
@@ -80,6 +81,34 @@ def random_drive(rng: Rng) -> Design:
         supply=maybe(rng, None, _supply(rng)),
         limits=_limits(rng, design),
     )
+    return _with_law(own.spawn(1)[0], made)
+
+
+def _with_law(rng: Rng, design: Design) -> Design:
+    """One in three with a law of one's own near the gains that the stage had."""
+    stage = maybe(rng, "", str(rng.choice(["current", "velocity", "position"])), 2 / 3)
+    loop = getattr(design.controller, stage, None) if stage else None
+    if loop is None:
+        return design
+    gain, n = loop.gain_V_A if stage == "current" else loop.gain, int(rng.integers(0, 4))
+    inputs = ("error", *(name for name in LAW_INPUTS if name != "error" and rng.random() < 0.5))
+    A, B = rng.standard_normal((n, n)), rng.standard_normal((n, len(inputs)))
+    A *= 0.9 / max(np.abs(np.linalg.eigvals(A)), default=1.0)
+    C, D = 0.1 * gain * rng.standard_normal(n), 1e-3 * gain * rng.standard_normal(len(inputs))
+    D[0] = gain
+    law = Law(inputs=inputs, A=tuple(map(tuple, A.tolist())), B=tuple(map(tuple, (1e-2 * B).tolist())),
+              C=tuple(C.tolist()), D=tuple(D.tolist()), L=tuple((0.1 * rng.standard_normal(n)).tolist()),
+              gain=scaled(rng, 1.0))  # type: ignore[arg-type]  # fmt: skip
+    kept = {
+        key: getattr(loop, key) for key in ("every", "sensor", "back_emf_feedforward") if hasattr(loop, key)
+    }
+    velocity = design.controller.velocity
+    if velocity is not None:
+        speeds = replace(velocity, filters=velocity.filters_on("torque"))
+        design = replace(design, controller=replace(design.controller, velocity=speeds))
+    part = type(loop)(**kept, law=law)
+    control = replace(design.controller, **{stage: part})
+    return replace(design, controller=control, encoder=replace(design.encoder, filter_time_s=0.0))
 
 
 def random_elastic_drive(rng: Rng) -> Design:

@@ -1,7 +1,5 @@
 """Command lines with hostile values: every option of every command that starts no other process."""
 
-from __future__ import annotations
-
 import json
 import random
 from functools import cache

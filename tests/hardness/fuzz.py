@@ -4,8 +4,6 @@ Each input is damaged on purpose, reproducible from seed and number. A good end 
 one printable line. Everything else is a find: it is kept in --keep and named; exit status 1 then.
 """
 
-from __future__ import annotations
-
 import argparse
 import atexit
 import os

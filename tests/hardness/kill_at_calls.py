@@ -4,8 +4,6 @@
 it with SIGKILL at one of its calls, then checks site and history. Prints one line of JSON.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

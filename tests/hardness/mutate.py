@@ -1,8 +1,6 @@
 # ruff: noqa: E501 (tables of tokens)
 """Damage to bytes, texts, trees and numbers, reproducible from a seed."""
 
-from __future__ import annotations
-
 import copy
 import random
 import re

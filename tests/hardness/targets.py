@@ -1,7 +1,5 @@
 """What is attacked: every loader and every command, with a valid input of each to start from."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """What would fill the memory or the night is refused before it is allocated, in one line with its option."""
 
-from __future__ import annotations
-
 import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -89,7 +87,7 @@ def test_a_multisine_of_many_lines_is_summed_in_parts() -> None:
     "given",
     ["--every 9", "--cycles 9", "--count 9", "--seed 9", "--frequency inf", "--to nan", "--amplitude=-inf"],
 )
-def test_a_number_beyond_all_bounds_is_one_line(given: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_number_beyond_all_bounds_is_one_line(given: str, capsys) -> None:
     """Four hundred digits, or no finite number: whatever the option."""
     option = given.replace(" 9", " " + "9" * 400)
     assert main(["simulate", "--command", "stepped-sine", *option.split()]) == 2

@@ -1,7 +1,5 @@
 """Dask without an open door: this machine only, TLS with certificates of the run, no page to look at."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

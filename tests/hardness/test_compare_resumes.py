@@ -1,7 +1,5 @@
 """A comparison that is stopped goes on: each finished design is kept, damaged ones are computed again."""
 
-from __future__ import annotations
-
 import pytest
 
 from analyses.comparison import variants

@@ -1,13 +1,12 @@
 """A crash is no verdict: one line, exit 3, the traceback on disk, and the rest of the report is written."""
 
-from __future__ import annotations
-
 import json
 import re
 from importlib import import_module
 from pathlib import Path
 
 import pytest
+import typer
 
 from actuator_lti.errors import InputError, NumericalError
 from reports.cli import time_limit
@@ -102,9 +101,13 @@ def test_a_figure_that_crashes_leaves_the_page(tmp_path, monkeypatch, capsys) ->
         (ValueError("f(a) and f(b) must have different signs"), 3, "different signs"),
         (RecursionError(), 3, "unforeseen RecursionError"),
         (MemoryError(), 3, "not enough memory"),
-        (NumericalError("no root"), 3, "numerical failure: no root"),
-        (InputError("motor.x = 1: no"), 2, "motor.x = 1: no"),
+        (NumericalError("try a\nlarger band"), 3, "numerical failure: try a larger band"),
+        (InputError("a = 1: must be 2", where="x.toml"), 2, "actuator-lti: x.toml: a = 1: must be 2"),
         (FileNotFoundError(2, "No such file", "a\nb"), 2, "No such file"),
+        (FileNotFoundError(2, "No such file or directory", "a.csv"), 2, "a.csv: No such file or directory"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (typer.Abort(), 130, "interrupted"),
+        (typer.BadParameter("no"), 2, "no"),
     ],
 )
 def test_each_kind_of_failure_has_its_status_and_one_line(error, status, words, capsys) -> None:

@@ -1,13 +1,19 @@
-"""A minute of the attack, the same inputs every time; ``make fuzz`` goes on for as long as one likes."""
+"""A minute of the attack, the same inputs every time; inputs by which it once found something."""
 
-from __future__ import annotations
-
+import json
 import random
+import re
 
+import numpy as np
 import pytest
-from fuzz import attack
+from fuzz import attack, written
 from mutate import damaged, damaged_tree, extreme
-from targets import Target, targets
+from targets import Target, parquet_file, small_report, targets
+
+from actuator_lti.design.loader import design_text
+from actuator_lti.errors import InputError
+from analyses.estimation.least_squares import solve
+from analyses.records.differentiation import filtered_motion
 
 SEED = 18
 INPUTS = {"command": 12, "history": 100, "study": 100}  # by the first word of a target's name
@@ -50,3 +56,103 @@ def test_damage_is_damage_and_comes_again() -> None:
     trees = [damaged_tree(tree, random.Random(k)) for k in range(60)]
     assert tree == {"a": [1, {"b": "c"}], "d": None}
     assert sum(one != tree for one in trees) > 50
+
+
+BY_NAME = {target.name: target for target in targets()}
+
+
+def refused(name: str, data: bytes) -> str:
+    """What is said of an input."""
+    target = BY_NAME[name]
+    with pytest.raises(InputError) as caught:
+        target.attack(written(data, target.suffix))
+    line = str(caught.value)
+    assert line.isprintable()
+    return line
+
+
+def table_of(made: dict) -> dict:
+    return next(block for block in made["sections"][0]["blocks"] if block["kind"] == "table")
+
+
+def glance_of(made: dict) -> dict:
+    return next(block for block in made["sections"][0]["blocks"] if block["kind"] == "glance")
+
+
+@pytest.mark.parametrize(
+    ("design", "known"), [("ilr33-amber-compliant", "planetary, worm"), ("joint", "harmonic")]
+)
+def test_a_coupling_after_a_gear_that_is_none(design: str, known: str) -> None:
+    text = design_text(design)
+    changed = re.sub(r"(?m)^\[coupling\]\n(?:after = .*\n)?", '[coupling]\nafter = "wor[["\n', text)
+    assert changed != text
+    line = refused("design", changed.encode())
+    assert 'coupling.after = "wor[["' in line
+    assert known in line
+
+
+def test_numbers_of_samples_beyond_floats() -> None:
+    line = refused("samples", b"motor.resistance,motor.inductance\n%b,1e-5\n" % (b"9" * 400))
+    assert "no number" in line
+
+
+@pytest.mark.parametrize("written_id", ["{}", "[1]", "3", "true"])
+def test_an_id_of_a_requirement_that_is_no_text(written_id: str) -> None:
+    study = f'[study]\nname = "s"\nbase = "ctms-motor-position"\n[[requirement]]\nid = {written_id}\n'
+    limit = 'quantity = "bandwidth"\nloop = "position"\nminimum = "1 Hz"\n'
+    assert "id" in refused("study", (study + limit).encode())
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda made: table_of(made)["columns"][0].update(format="sig:0"), "format"),
+        (lambda made: glance_of(made)["loops"][0]["figures"][0].update(format="sig:x"), "format"),
+        (lambda made: table_of(made)["rows"][0].update(_status="f{{7*7}}"), "_status"),
+        (lambda made: table_of(made)["rows"][0].update(b={"text": "x"}), "status"),
+        (lambda made: glance_of(made)["loops"][0].update(stable="yes"), "stable"),
+        (lambda made: glance_of(made)["loops"][0]["stable"].pop("status"), "status"),
+        (lambda made: glance_of(made)["weakest"].pop("words"), "words"),
+        (lambda made: made["provenance"].update(time=3), "time"),
+        (lambda made: made["provenance"].update(commit=[1]), "commit"),
+    ],
+)
+def test_a_report_that_no_page_can_be_made_of(change, words: str) -> None:
+    made = json.loads(small_report())
+    change(made)
+    assert words in refused("report", json.dumps(made).encode())
+
+
+def test_a_parquet_file_whose_columns_have_no_readable_names() -> None:
+    column, unreadable = b"\x18\x01i\x00", b"\x18\x01\xaf\x00"
+    assert column in parquet_file()
+    broken = parquet_file().replace(column, unreadable)
+    assert "is no Parquet file" in refused("parquet", broken)
+
+
+def test_the_name_of_a_row_with_a_status_may_have_one_of_its_own() -> None:
+    made = json.loads(small_report())
+    table_of(made)["rows"][0]["a"] = {"text": "worn", "status": "warn"}
+    BY_NAME["report"].attack(written(json.dumps(made).encode(), ".json"))
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_fit_with_no_more_samples_than_parameters(rows: int) -> None:
+    with pytest.raises(InputError, match=rf"{rows} sample\(s\) are left to fit 2 parameter"):
+        solve(np.eye(3)[:rows, :2], np.ones(rows))
+    assert solve(np.eye(3)[:, :2], np.ones(3)).values == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.parametrize("period_s", [5e-324, 1e-300, 1e-9])
+def test_rows_too_close_for_the_filter(period_s: float) -> None:
+    with pytest.raises(InputError, match="too low for rows"):
+        filtered_motion(np.linspace(0.0, 1.0, 100), period_s, cutoff_hz=50.0, order=4)
+
+
+def test_files_of_the_attack_lie_alone_in_their_folder() -> None:
+    first = written(b"1", ".toml")
+    (first.parent / "more").mkdir()
+    (first.parent / "link").symlink_to("more")
+    second = written(b"2", ".csv")
+    assert [path.name for path in second.parent.iterdir()] == ["input.csv"]
+    assert attack(Target("fine", (b"x",), lambda path: path.read_bytes(), fault=damaged), 1, 1) is None

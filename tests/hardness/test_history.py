@@ -1,7 +1,5 @@
 """A history that is lost or damaged is told, by name, and never opens the gate."""
 
-from __future__ import annotations
-
 import json
 import random
 import shutil

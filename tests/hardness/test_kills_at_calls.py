@@ -1,7 +1,5 @@
 """Killed at a file-system call: the site stays whole and the history sound."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Devices, pipes and links as outputs: written through or refused, never replaced."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -13,6 +11,7 @@ import sys
 import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from nightly_fakes import CODE, INLINE, job, study
@@ -21,7 +20,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files import atomic
 from reports.nightly.lock import hold
 from reports.nightly.memory import HistoryLost
-from reports.nightly.night import approve, run_night, state_of
+from reports.nightly.night import Settings, approve, run_night, state_of
 
 SIMULATE = ("simulate", "ilr33-amber", "--duration", "0.01", "--quiet")
 
@@ -191,61 +190,56 @@ def test_links_are_followed_and_stay_links(tmp_path) -> None:
         atomic.write_text(loop, "x")
 
 
-@pytest.mark.parametrize("name", ["nights", "reports"])
-def test_a_site_that_leads_elsewhere_is_refused(tmp_path, name) -> None:
+def night(site: Path, margin: float = 10.0, settings: Settings = INLINE, **more: Any) -> None:
+    run_night(study(job("a", margin)), site, settings, code=CODE, **more)
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    """What lies at and below a path."""
+    below = [path, *path.rglob("*")] if path.is_dir() else [path]
+    return {str(one): one.read_bytes() if one.is_file() else b"" for one in below if os.path.lexists(one)}
+
+
+SITE = ("nights", "reports", "reports/*", "index.html", "summary.json", "junit.xml", ".nightly-site")
+STATE = ("", "history.json", "nights", "nights/000001.json", "nightly.lock", "cache", "cache/ab")
+
+
+@pytest.mark.parametrize("place", [f"site/{x}" for x in SITE] + [f"site.state/{x}".strip("/") for x in STATE])
+def test_a_part_of_a_site_or_its_state_that_leads_elsewhere_is_refused(place, tmp_path) -> None:
     site, elsewhere = tmp_path / "site", tmp_path / "elsewhere"
-    run_night(study(job("a")), site, INLINE, code=CODE)
-    (site / name).rename(elsewhere)
-    before = sorted(path.relative_to(elsewhere) for path in elsewhere.rglob("*"))
-    (site / name).symlink_to(elsewhere)
-    with pytest.raises(InputError, match=f"{name}: is a symbolic link"):
-        run_night(study(job("a", 12.0)), site, INLINE, code=CODE)
-    assert sorted(path.relative_to(elsewhere) for path in elsewhere.rglob("*")) == before
-
-
-def test_a_report_folder_that_leads_elsewhere_is_refused(tmp_path) -> None:
-    site, elsewhere = tmp_path / "site", tmp_path / "elsewhere"
-    run_night(study(job("a")), site, INLINE, code=CODE)
-    (folder,) = (site / "reports").iterdir()
-    folder.rename(elsewhere)
-    folder.symlink_to(elsewhere)
-    count = len(list(elsewhere.rglob("*")))
-    with pytest.raises(InputError, match="is a symbolic link"):
-        run_night(study(job("a", 12.0)), site, INLINE, code=CODE)
-    assert len(list(elsewhere.rglob("*"))) == count
-
-
-@pytest.mark.parametrize("name", ["index.html", "summary.json", "junit.xml", ".nightly-site"])
-def test_a_file_of_a_site_that_leads_elsewhere_is_refused(name, tmp_path) -> None:
-    site, mine = tmp_path / "site", tmp_path / "mine"
-    mine.write_text("mine")
-    run_night(study(job("a")), site, INLINE, code=CODE)
-    (site / name).unlink()
-    (site / name).symlink_to(mine)
-    with pytest.raises(InputError, match=f"{name}: is a symbolic link"):
-        run_night(study(job("a", 12.0)), site, INLINE, code=CODE)
-    assert mine.read_text() == "mine"
+    night(site)
+    (tmp_path / "site.state" / "cache" / "ab").mkdir(exist_ok=True)
+    (path,) = tmp_path.glob(place)
+    path.rename(elsewhere)
+    path.symlink_to(elsewhere)
+    before = contents(elsewhere)
+    with pytest.raises(InputError, match=f"{path.name}: is a symbolic link"):
+        night(site, 12.0)
+    if place.startswith("site.state"):
+        with pytest.raises(InputError, match="is a symbolic link"):
+            approve(study(job("a")), site, by="A", reason="b", settings=INLINE)
+    assert contents(elsewhere) == before
 
 
 @pytest.mark.parametrize("kind", ["link", "pipe", "folder", "device"])
 def test_a_report_on_a_site_that_is_no_file_is_refused_without_reading_it(kind, tmp_path) -> None:
     site, mine = tmp_path / "site", tmp_path / "mine"
     mine.write_text("mine")
-    run_night(study(job("a")), site, INLINE, code=CODE)
+    night(site)
     (report,) = site.glob("reports/*/*/report.html")
     report.unlink()
     make = {"pipe": os.mkfifo, "folder": os.mkdir}
     target = {"link": mine, "device": "/dev/zero"}
     make[kind](report) if kind in make else report.symlink_to(target[kind])
     with pytest.raises(InputError, match=r"report\.html: is no regular file"):
-        run_night(study(job("a")), site, INLINE, code=CODE)
+        night(site)
     assert mine.read_text() == "mine"
 
 
 def test_a_site_is_where_one_stands_and_its_state_beside_it(tmp_path, monkeypatch) -> None:
     (tmp_path / "site").mkdir()
     monkeypatch.chdir(tmp_path / "site")
-    run_night(study(job("a")), Path(), INLINE, code=CODE)
+    night(Path())
     assert sorted(os.listdir(tmp_path)) == ["site", "site.state"]
     assert (tmp_path / "site" / "index.html").is_file()
     with pytest.raises(InputError, match="root of the disk"):
@@ -258,7 +252,7 @@ def test_a_state_inside_the_site_is_refused(state, tmp_path) -> None:
     (tmp_path / "link").symlink_to(site)
     inside = replace(INLINE, state=tmp_path / state)
     with pytest.raises(InputError, match="lies inside the site"):
-        run_night(study(job("a")), site, inside, code=CODE)
+        night(site, settings=inside)
     assert not site.exists()
 
 
@@ -269,42 +263,17 @@ def test_a_state_that_is_no_folder_is_named(place, target, tmp_path) -> None:
     path.parent.mkdir(exist_ok=True)
     path.write_text("mine") if target is None else path.symlink_to(target)
     with pytest.raises(InputError, match="is no folder"):
-        run_night(study(job("a")), tmp_path / "site", INLINE, code=CODE)
-
-
-@pytest.mark.parametrize(
-    "name", ["", "history.json", "nights", "nights/000001.json", "nightly.lock", "cache", "cache/ab"]
-)
-def test_a_state_that_leads_elsewhere_is_refused(name, tmp_path) -> None:
-    site, state, elsewhere = tmp_path / "site", tmp_path / "site.state", tmp_path / "elsewhere"
-    run_night(study(job("a")), site, INLINE, code=CODE)
-    (state / "cache" / "ab").mkdir(exist_ok=True)
-    (state / name).rename(elsewhere)
-    (state / name).symlink_to(elsewhere)
-    before = contents(elsewhere)
-    for again in (
-        lambda: run_night(study(job("a", 12.0)), site, INLINE, code=CODE),
-        lambda: approve(study(job("a")), site, by="A", reason="b", settings=INLINE),
-    ):
-        with pytest.raises(InputError, match="is a symbolic link"):
-            again()
-    assert contents(elsewhere) == before
-
-
-def contents(path: Path) -> dict[str, bytes]:
-    """What lies at and below a path."""
-    below = [path, *path.rglob("*")] if path.is_dir() else [path]
-    return {str(one): one.read_bytes() if one.is_file() else b"" for one in below if os.path.lexists(one)}
+        night(tmp_path / "site")
 
 
 def test_a_cached_result_that_leads_elsewhere_is_built_again(tmp_path) -> None:
     site, elsewhere = tmp_path / "site", tmp_path / "elsewhere"
-    run_night(study(job("a")), site, INLINE, code=CODE)
+    night(site)
     (entry,) = (tmp_path / "site.state" / "cache").glob("*/*.entry")
     entry.rename(elsewhere)
     entry.symlink_to(elsewhere)
     said: list[str] = []
-    run_night(study(job("a")), site, INLINE, code=CODE, say=said.append)
+    night(site, say=said.append)
     assert len(said) == 1
     assert "symbolic link" in said[0]
     assert not entry.is_symlink()
@@ -319,7 +288,7 @@ def test_a_night_that_is_refused_creates_nothing(why, tmp_path) -> None:
     jobs = () if why == "no designs" else (job("a"),)
     held = contextlib.nullcontext()
     if why == "history lost":
-        run_night(study(job("a")), site, INLINE, code=CODE)
+        night(site)
         shutil.rmtree(state)
     elif why == "foreign":
         site.mkdir()
@@ -328,7 +297,7 @@ def test_a_night_that_is_refused_creates_nothing(why, tmp_path) -> None:
         state.mkdir()
         (state / "history.json").write_bytes(b"no history" * 1000)
     elif why == "history newer":
-        run_night(study(job("a")), site, INLINE, code=CODE)
+        night(site)
         index = json.loads((state / "history.json").read_text())
         (state / "history.json").write_text(json.dumps({**index, "version": 999}))
         shutil.rmtree(site)

@@ -1,7 +1,5 @@
 """What is installed: pinned, with hashes, the same versions everywhere they are written."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import re
 import tomllib

@@ -134,7 +134,10 @@ def test_the_map_goes_into_the_design_with_its_errors() -> None:
         assert point.torque_Nm == pytest.approx(result.model[f"map_{k - 1}"], rel=1e-6)
         assert tolerance is not None
     assert result.passed
-    assert result.resimulated[0].relative_error == pytest.approx(result.model.relative_residual, rel=1e-3)
+    assert result.resimulated[0].relative_error < 0.02
+    speeds = np.array([0.003, 0.02, 0.04, 0.1, 0.15])
+    torque = np.interp(speeds, [one.speed_rad_s for one in points], [one.torque_Nm for one in points])
+    assert torque == pytest.approx(_stribeck(speeds), rel=0.05)
 
 
 def test_a_voltage_drive_needs_a_resistance() -> None:

@@ -4,8 +4,6 @@ None is taken for truth: where a tool and the toolkit differ, exact arithmetic h
 ``pip install ctrlsys slycot`` and Debian's ``octave-control`` bring them; without them the tests are skipped.
 """
 
-from __future__ import annotations
-
 import math
 import shutil
 import subprocess

@@ -12,8 +12,6 @@ compiler, without a home, packages in a folder that is only read, by another use
 What that takes of disk and processor time has a bound.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import resource

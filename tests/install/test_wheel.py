@@ -1,7 +1,5 @@
 """What the wheel and the sources hold: all that runs needs, and nothing of the tests."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess
@@ -28,7 +26,7 @@ BUILD = (
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[set[str], set[str], str]:
+def built(tmp_path_factory) -> tuple[set[str], set[str], str]:
     """Names in the wheel and in the sources, and the metadata."""
     if f"setuptools=={version('setuptools')}" != BACK_END:
         pytest.skip(f"the build back-end of this environment is not {BACK_END}")

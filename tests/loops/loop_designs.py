@@ -1,7 +1,5 @@
 """Designs for the loop tests, built directly, and hypothesis strategies for more."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 from typing import Any

@@ -1,7 +1,5 @@
 """The plant by itself, against closed forms of an RL circuit, a rigid drive and two masses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import exp
 from typing import Any
@@ -65,7 +63,6 @@ def test_a_spring_between_two_masses() -> None:
     """Of a force source: w (J_m s + C + felt/N_c Z) = g u and so on, solved from Newton's two equations."""
     design = prompt("joint")
     p, s, coupling = ideal_motor(design), 1j * W, design.coupling
-    assert coupling is not None
     N, J_m, J_l = design.ratio_to_coupling, design.motor_side_inertia_kgm2, design.load_side_inertia_kgm2
     bare = replace(design, load=replace(design.load.bare(), friction=None),
                    friction=replace(design.friction, load_coefficient=0.0))  # fmt: skip
@@ -112,8 +109,6 @@ def test_a_current_command_closes_the_current_loop() -> None:
     """Locked, without delay: PI(s) G/(1 + PI(s) G), G = 1/(L s + R)."""
     design = prompt("ilr33-amber")
     p, loop, s = ideal_motor(design), design.controller.current, 1j * W
-    assert loop is not None
-    assert loop.integral_time_s is not None
     L = loop.gain_V_A * (1 + 1 / (loop.integral_time_s * s)) / (p["L"] * s + p["R"])
     found = plant(design, "ideal", "locked", command="i_ref")
     assert entry(found, "current", "i_ref") == pytest.approx(L / (1 + L), rel=1e-10)

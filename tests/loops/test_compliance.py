@@ -1,6 +1,4 @@
-"""The compliance by periodic response, and the figures of stiffness that a requirement names."""
-
-from __future__ import annotations
+"""Compliance and stiffness, the torque margin: figures that a requirement names, of one and of many."""
 
 from dataclasses import replace
 
@@ -10,12 +8,14 @@ import pytest
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
 from actuator_lti.batch import drive_figures as many
+from actuator_lti.batch.static import drive_figures
 from actuator_lti.design import load_design
-from actuator_lti.design.model import Requirement
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.compliance import compliance
 from actuator_lti.loops.stiffness import stiffness_figures
 from analyses.specification.requirements import evaluate_requirements
+from nonlinear import commands, simulate
 from tests.loops.two_mass import drive_e
 
 
@@ -75,3 +75,46 @@ def test_requirements_on_stiffness_and_lost_motion() -> None:
     (result,) = evaluate_requirements(replace(load_design("fin"), requirements=(lost,)))
     assert result.value == pytest.approx(np.degrees(1.5e-3 + 2 * 0.36 / 800.0), rel=1e-12)
     assert result.verdict == "met"
+
+
+AMBER = load_design("ilr33-amber").with_values({"friction.breakaway_ratio": 1.3})
+
+
+def test_by_hand() -> None:
+    """kM i_peak (or kM U/R) over CM |M| passed to the motor, breakaway on the dry part alone."""
+    friction, motor, limits = AMBER.friction, AMBER.motor, AMBER.limits
+    torque = motor.torque_constant_Nm_A * min(limits.peak_current_A, limits.voltage_V / motor.resistance_ohm)
+    dry = friction.dry_torque_Nm + friction.load_coefficient * 4.0
+    held = dry * friction.breakaway_ratio + abs(friction.offset_torque_Nm)
+    if AMBER.load.path == "back-drivable":
+        held += 4.0 / AMBER.total_ratio
+    assert drive_figure(AMBER, "torque_margin", 4.0) == pytest.approx(torque / held, rel=1e-12)
+
+
+def weak(design: Design, load_Nm: float, margin: float) -> Design:
+    """The same drive with a current limit that gives it this margin."""
+    torque = drive_figure(design, "torque_margin", load_Nm)
+    peak = design.limits.peak_current_A * margin / torque
+    return replace(design, limits=replace(design.limits, peak_current_A=float(peak)))
+
+
+@pytest.mark.parametrize("load_Nm", [0.0, 1.0, 6.0])
+@pytest.mark.parametrize(("margin", "moves"), [(0.98, False), (1.02, True)])
+def test_the_simulator_starts_above_one(load_Nm: float, margin: float, moves: bool) -> None:
+    """A large step in the worse direction, within a voltage that is no limit."""
+    base = replace(AMBER, limits=replace(AMBER.limits, peak_current_A=1.0))
+    design = weak(base, load_Nm, margin)
+    assert drive_figure(design, "torque_margin", load_Nm) == pytest.approx(margin, rel=1e-9)
+    starts = []
+    for sign in (1.0, -1.0):
+        run = simulate(design, commands.step(sign * 0.2), duration_s=0.3, load_Nm=-sign * load_Nm)
+        starts.append(bool(np.abs(run.motor_speed_rad_s).max() > 1e-6))
+    assert all(starts) is moves
+
+
+def test_many_designs_have_the_figure_of_each() -> None:
+    scale = np.array([0.5, 1.0, 2.0])
+    path = "motor.torque_constant"
+    values = {path: AMBER.parameters[path].value * scale}
+    many = drive_figures(Population(AMBER, values, 3), "torque_margin", 4.0)
+    assert many == pytest.approx(scale * drive_figure(AMBER, "torque_margin", 4.0), rel=1e-12)

@@ -1,7 +1,6 @@
-"""DelaySystem against the expressions it stands for, and as a python-control system."""
+"""DelaySystem against the expressions it stands for, and in python-control's own functions."""
 
-from __future__ import annotations
-
+from math import e, factorial, pi
 from typing import Any
 
 import control
@@ -11,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuator_lti import DelaySystem, InputError
+from actuator_lti import DelaySystem, InputError, assemble_loops
 
 S = 1j * np.geomspace(0.01, 1e4, 40)
 LAG = control.tf([2.0], [0.1, 1.0])
@@ -113,3 +112,127 @@ def test_refusals() -> None:
 
 def test_repr_is_short() -> None:
     assert repr(DelaySystem.delay(0.25)) == "DelaySystem(0 states, delays 250 ms)"
+
+
+FORMS = ("sampled", "continuous", "ideal")
+NAMES = ("current", "velocity", "position")
+INTEGRATOR = control.tf([1], [1, 0])
+
+
+@pytest.fixture(scope="module")
+def loops() -> dict:
+    return {form: assemble_loops("ilr33-amber", form=form) for form in FORMS}
+
+
+@pytest.fixture(autouse=True)
+def _closed_figures():
+    yield
+    plt.close("all")
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", NAMES)
+def test_the_functions_of_every_day_take_every_loop(form: str, name: str, loops: dict) -> None:
+    loop = getattr(loops[form], name)
+    for system in (loop.open_loop, loop.closed_loop, loop.sensitivity):
+        drawn = control.bode_plot(system)
+        x, y = drawn.lines[0, 0][0].get_data()
+        points = np.exp(1j * x * system.dt) if system.isdtime(strict=True) else 1j * x
+        np.testing.assert_allclose(y, np.abs(system(points)), rtol=1e-9)
+        assert len(set(system.state_labels)) == system.nstates
+        assert not any("." in label or label.startswith("x[") for label in system.state_labels)
+    control.nyquist_plot(loop.open_loop, warn_encirclements=False)
+    control.nichols_plot(loop.open_loop)
+    times = np.arange(200) * (loop.period_s or 1e-4)
+    response = control.step_response(loop.closed_loop, times)
+    assert response.y.shape == (1, 1, 200)
+    assert np.isfinite(response.y).all()
+    assert response.output_labels == loop.closed_loop.output_labels
+    pade = getattr(loop.closed_loop, "pade", None)
+    if pade is not None:
+        assert pade(3).nstates == loop.closed_loop.nstates + 3 * len(loop.closed_loop.delays_s)
+        assert set(pade(3).state_labels) > set(loop.closed_loop.state_labels)
+
+
+@pytest.mark.filterwarnings("ignore:stability_margins. Falling back", "ignore:Badly conditioned filter")
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("name", NAMES)
+def test_the_margins_of_python_control_fulfil_their_definitions(form: str, name: str, loops: dict) -> None:
+    system = getattr(loops[form], name).open_loop
+    gain, phase, at_180, at_1 = control.margin(system)
+    turn = (lambda w: np.exp(1j * w * system.dt)) if system.isdtime(strict=True) else (lambda w: 1j * w)
+    assert abs(system(turn(at_1))) == pytest.approx(1.0, rel=1e-4)
+    assert np.degrees(np.angle(-system(turn(at_1)))) == pytest.approx(phase, rel=1e-4)
+    if np.isfinite(gain):
+        assert gain * system(turn(at_180)) == pytest.approx(-1.0, rel=1e-4)
+
+
+@pytest.mark.parametrize(("gain", "delay"), [(1.0, 0.1), (300.0, 1e-3), (2e-3, 40.0)])
+def test_an_integrator_behind_a_delay(gain: float, delay: float) -> None:
+    loop = DelaySystem.from_system(gain * INTEGRATOR) * DelaySystem.delay(delay)
+    result = control.margin(loop)
+    wanted = (pi / (2 * gain * delay), 90.0 - np.degrees(gain * delay), pi / (2 * delay), gain)
+    np.testing.assert_allclose(result, wanted, rtol=1e-5)
+
+    times = np.linspace(0.0, 6.3 * delay, 190)
+    terms = [-((-gain) ** k) * np.maximum(times - k * delay, 0.0) ** k / factorial(k) for k in range(1, 8)]
+    closed = loop.feedback()
+    response = control.step_response(closed, times)
+    np.testing.assert_allclose(response.y[0, 0], sum(terms), rtol=1e-4, atol=1e-4 * gain * delay)
+
+
+def test_two_delays_without_a_common_measure() -> None:
+    lag = DelaySystem.from_system(control.tf([1], [1, 1]))
+    first, second = 2**0.5, e
+    system = lag * (DelaySystem.delay(first) + DelaySystem.delay(second))
+    times = np.linspace(0.0, 9.0, 91)
+    wanted = sum(np.where(times > d, 1.0 - np.exp(-(times - d)), 0.0) for d in (first, second))
+    result = control.step_response(system, times).y[0, 0]
+    np.testing.assert_allclose(result, wanted, atol=0.02)  # a jump on no node is spread over one step
+    nodes = lag * (DelaySystem.delay(1.25) + DelaySystem.delay(2.0))
+    wanted = sum(np.where(times > d, 1.0 - np.exp(-(times - d)), 0.0) for d in (1.25, 2.0))
+    np.testing.assert_allclose(control.step_response(nodes, times).y[0, 0], wanted, atol=1e-12)
+
+
+def test_jumps_that_go_round_for_ever() -> None:
+    delay = DelaySystem.delay(0.25)
+    loop = delay.feedback(0.5)  # y(t) = u(t - T) - y(t - T)/2
+    times = np.arange(0.0, 3.0, 0.05) + 0.01
+    rounds = np.floor(times / 0.25).astype(int)
+    wanted = [sum((-0.5) ** k for k in range(n)) for n in rounds]
+    np.testing.assert_allclose(control.step_response(loop, times).y[0, 0][1:], wanted[1:], atol=1e-12)
+
+
+def test_any_input_and_the_states() -> None:
+    system = DelaySystem.from_system(control.ss([[0]], [[1]], [[1]], [[0]])) * DelaySystem.delay(0.5)
+    times = np.linspace(0.0, 2.0, 41)
+    response = control.forced_response(system, times, times)
+    wanted = np.maximum(times - 0.5, 0.0) ** 2 / 2.0
+    np.testing.assert_allclose(response.y[0] if response.y.ndim > 1 else response.y, wanted, atol=1e-9)
+    np.testing.assert_allclose(np.ravel(response.x), wanted, atol=1e-9)
+    from_two = control.forced_response(system, times, 0.0 * times, [2.0])
+    np.testing.assert_allclose(np.ravel(from_two.y), 2.0, atol=1e-12)
+
+
+def test_a_pade_quotient_is_near_and_stable() -> None:
+    loop = DelaySystem.from_system(INTEGRATOR) * DelaySystem.delay(1e-3)
+    near = (300 * loop).feedback().pade(6)
+    assert isinstance(near, control.StateSpace)
+    assert near.poles().real.max() < 0.0
+    omega = np.geomspace(1.0, 2000.0, 50)
+    np.testing.assert_allclose(near(1j * omega), (300 * loop).feedback()(1j * omega), rtol=1e-6)
+
+
+def test_what_needs_a_finite_state_space_is_refused() -> None:
+    delay = DelaySystem.delay(0.1) * DelaySystem.from_system(INTEGRATOR)
+    for order in (0, 13, 2.5, True):
+        with pytest.raises(InputError, match="allowed: a whole number, 1 to 12"):
+            delay.pade(order)
+    with pytest.raises(InputError, match=r"take system\.pade"):
+        delay.linearize(0.0, 0.0)
+    plant = control.ss([[-1.0]], [[1.0]], [[1.0]], [[0.0]], name="plant", inputs="a", outputs="b")
+    part = DelaySystem.from_system(INTEGRATOR) * DelaySystem.delay(0.1)
+    part.update_names(name="late", inputs="b", outputs="c")
+    joined = control.interconnect([plant, part], inputs="a", outputs="c")
+    with pytest.raises(InputError, match=r"take system\.pade"):
+        control.input_output_response(joined, np.linspace(0, 1, 5), np.ones(5))

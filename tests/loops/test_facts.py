@@ -1,7 +1,5 @@
 """What a drive can do: against the simulator, against first principles, and many against one."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -102,7 +100,6 @@ def test_a_hot_motor_is_weaker() -> None:
 def test_torque_gain_with_a_p_current_loop_and_resistance_feedforward() -> None:
     """Rotor at rest: u = Kp (i_ref - i) + k R i_ref = R i, so i = (Kp + k R)/(Kp + R) i_ref."""
     base = drive_e()
-    assert base.controller.current is not None
     current = replace(base.controller.current, integral_time_s=None, resistance_feedforward=0.6)
     design = replace(base, controller=replace(base.controller, current=current))
     share = (0.8 + 0.3) / (0.8 + 0.5)

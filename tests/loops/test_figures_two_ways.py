@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_wide_identity import wide_designs
+from test_recursion import wide_designs
 
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES

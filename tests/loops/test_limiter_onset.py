@@ -1,31 +1,26 @@
-"""Where the limits begin: A_k(w) = limit_k/|T_k| against the tick-by-tick recursion and closed forms."""
-
-from __future__ import annotations
+"""Where the limits begin: A_k(w) = limit_k/|T_k| against the recursion, closed forms, the running drive."""
 
 from dataclasses import replace
-from math import inf
+from math import inf, pi, sin
 
 import numpy as np
 import pytest
 from loop_designs import amber, ctms_position, emps
-from loop_recursion import run
+from recursion import run
 
-from actuator_lti import InputError, assemble_loops, onset
-from actuator_lti.design.model import Design, Limits
+from actuator_lti import InputError, assemble_loops, load_design, onset
+from actuator_lti.design.model import Design, Friction, Limits
+from nonlinear import Drive, commands, simulate
 
 
 def peaks(design: Design, cycles: int, window: int, amplitude: float) -> dict[str, float]:
     """Steady peaks of u, i_ref and w_ref for a sinusoid at the output shaft, run tick by tick."""
-    t = np.arange(2 * window)
-    command = amplitude * np.sin(2 * np.pi * cycles / window * t)
-    result = {}
-    for name, every in (("u", 1), ("i_ref", 2), ("w_ref", 10)):
-        nothing = {name: np.zeros(len(t))}
-        values = run(design, command, inject=nothing)["before"]
-        result[name] = float(np.max(np.abs(values[-window // every :])))
-        if name == "w_ref":
-            result["change"] = float(np.max(np.abs(np.diff(values)[-window // every :]))) / 1e-3
-    return result
+    record = run(design, amplitude * np.sin(2 * np.pi * cycles / window * np.arange(2 * window)))
+    steady = {
+        name: record[name][-window // every :] for name, every in (("u", 1), ("i_ref", 2), ("w_ref", 10))
+    }
+    steady["change"] = np.diff(record["w_ref"])[-window // 10 :] / 1e-3
+    return {name: float(np.max(np.abs(values))) for name, values in steady.items()}
 
 
 @pytest.mark.parametrize("cycles", [61, 401])
@@ -47,8 +42,6 @@ def test_speed_clamp_of_a_p_position_loop_with_ideal_inner_loops() -> None:
     """Onset at A = R sqrt(1 + (w/Kv)^2)/w, R the rate limit at the output (model.md section 5)."""
     design = amber()
     control = design.controller
-    assert control.velocity is not None
-    assert control.current is not None
     # inner loops so fast that they count as ideal
     motor = replace(design.motor, inductance_H=1e-12, back_emf_constant_Vs_rad=1e-9)
     fast = replace(
@@ -80,6 +73,19 @@ def test_the_active_limiter_and_its_bias() -> None:
     assert gone.amplitude_rad[0] == 0
 
 
+def test_the_command_of_a_speed_drive_is_that_of_the_output() -> None:
+    """At low frequency the voltage is what a steady speed takes: N (k_E + R C_v/k_M) of it, in every form."""
+    design = replace(amber(), controller=replace(amber().controller, position=None))
+    motor, viscous = design.effective_motor, design.friction.viscous_Nms_rad
+    constants = motor.back_emf_constant_Vs_rad, motor.resistance_ohm, motor.torque_constant_Nm_A
+    k_E, R, k_M = (float(value or 0.0) for value in constants)
+    a_speed = k_E + R * viscous / k_M
+    wanted = design.limits.voltage_V / (design.total_ratio * a_speed)
+    for form in ("sampled", "continuous", "ideal"):
+        border = onset(assemble_loops(design, form), [1e-3])  # type: ignore[arg-type]
+        assert border.each_rad["voltage"] == pytest.approx(wanted, rel=1e-6)
+
+
 def test_limiters_follow_the_stages() -> None:
     assert list(assemble_loops(amber()).limiters) == ["speed", "acceleration", "current", "voltage"]
     assert list(assemble_loops(emps()).limiters) == ["speed", "acceleration", "voltage"]
@@ -105,5 +111,89 @@ def test_three_forms_agree_at_low_frequency() -> None:
     design = amber(feedforward=0.5)
     reference = assemble_loops(design, "ideal").limiters
     for form in ("sampled", "continuous"):
-        for name, path in assemble_loops(design, form).limiters.items():  # type: ignore[arg-type]
+        for name, path in assemble_loops(design, form).limiters.items():
             np.testing.assert_allclose(path.response(omega), reference[name].response(omega), rtol=2e-2)
+
+
+def heavy(n_v: int, rate_A_s: float) -> Design:
+    """A speed drive with P control whose load hardly moves: i_ref is Kp times the speed command."""
+    design = amber(n_v)
+    control = design.controller
+    velocity = replace(control.velocity, integral_time_s=None, every=n_v)
+    return replace(
+        design,
+        motor=replace(design.motor, rotor_inertia_kgm2=1e9),
+        friction=Friction(),
+        limits=Limits(voltage_V=1e9, current_rate_A_s=rate_A_s),
+        controller=replace(control, position=None, velocity=velocity),
+    )
+
+
+@pytest.mark.parametrize("n_v", [1, 3])
+def test_onset_is_that_of_the_difference_of_a_sine(n_v: int) -> None:
+    """Of A sin(w t) sampled every T the change is at most 2 A sin(w T/2): A = r T/(2 Kp N sin(w T/2))."""
+    design = heavy(n_v, 150.0)
+    velocity, T = design.controller.velocity, n_v * design.controller.period_s
+    path = assemble_loops(design).limiters["current-rate"]
+    assert (path.limit, path.unit) == (150.0, "A/s")
+    for w in (20.0, 700.0, 0.9 * pi / T):
+        expected = 150.0 * T / (2.0 * velocity.gain * sin(w * T / 2.0))
+        assert path.onset_amplitude_rad(w)[0] == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("hertz", [7.3, 61.7])
+def test_multirate_onset_divides_the_runs(hertz: float) -> None:
+    """Three velocity updates in a position update: 1 % below the border nothing acts, 1 % above it does."""
+    design = amber(2, 6)
+    design = replace(
+        design, friction=Friction(viscous_Nms_rad=5e-6), limits=Limits(voltage_V=1e9, current_rate_A_s=1e3)
+    )
+    border = float(assemble_loops(design).limiters["current-rate"].onset_amplitude_rad(2 * pi * hertz)[0])
+    for factor, acts in ((0.99, False), (1.01, True)):
+        run = simulate(design, commands.sine(factor * border, hertz), 1.2)
+        assert run.limit_active("current-rate")[run.time_s > 0.8].any() == acts
+
+
+def test_a_torque_drive_ramps() -> None:
+    """A step of 5 A at 2 A/ms and Ts = 0.1 ms: 0.2 A a tick, 25 ticks, of which the last needs no limit."""
+    base = load_design("ilr33-amber")
+    control = replace(base.controller, position=None, velocity=None)
+    design = replace(base, controller=control, limits=Limits(voltage_V=1e6, current_rate_A_s=2000.0))
+    run = simulate(design, commands.step(5.0), 40 * control.period_s)
+    step = 2000.0 * control.period_s
+    expected = np.minimum(5.0, step * np.arange(1, run.time_s.size + 1))
+    assert np.allclose(run.current_command_A, expected, rtol=0, atol=1e-12)
+    acting = run.limit_active("current-rate")
+    assert acting[:24].all()
+    assert not acting[26:].any()
+    assert run.limits["current-rate"].limit == 2000.0
+    assert run.limits["current-rate"].unit == "A/s"
+    assert (
+        "current-rate"
+        not in simulate(replace(design, limits=Limits(voltage_V=1e6)), commands.step(1.0), 0.01).limits
+    )
+
+
+def test_the_integral_of_a_position_controller_waits() -> None:
+    """PI of position straight on the current: behind the slope limit out is not v, so I is kept."""
+    base = load_design("ilr33-amber")
+    loop = replace(base.controller.position_loop, gain=0.1, every=1, integral_time_s=1e-3)
+    design = replace(
+        base,
+        controller=replace(base.controller, velocity=None, position=loop),
+        limits=Limits(voltage_V=1e6, current_rate_A_s=1.0),
+    )
+    drive = Drive(design)
+    for k in range(1, 4):
+        drive.control(1.0, 0.0, 0.0, 0.0)
+        assert drive.value("position_integrator") == 0.0
+        assert drive.value("current_reference") == pytest.approx(1e-4 * k, rel=1e-12)
+
+
+def test_key() -> None:
+    design = load_design("ilr33-amber").with_values({"limits.current_rate": "2 A/ms"})
+    assert design.limits.current_rate_A_s == pytest.approx(2000.0)
+    assert "current-rate" not in assemble_loops(load_design("ilr33-amber")).limiters
+    assert Limits(voltage_V=1.0).current_rate_A_s == inf
+    with pytest.raises(InputError, match=r"limits\.current_rate"):
+        design.with_values({"limits.current_rate": "0 A/s"})

@@ -1,7 +1,5 @@
 """Published and independently computed figures: the baseline, EMPS, G4 to G6."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -39,9 +37,6 @@ def minus_3db_hz(system: Any, high: float) -> float:
 
 def test_baseline_of_hardware_md() -> None:
     loops = assemble_loops(amber())
-    assert loops.current is not None
-    assert loops.velocity is not None
-    assert loops.position is not None
     assert crossover(loops.current.open_loop, 2000, 4000) == pytest.approx((2737, 89.7), abs=0.5, rel=1e-3)
     assert gain_margin(loops.current.open_loop, 8e3, 2e4)[1] == pytest.approx(9.4, abs=0.05)
     omega, margin = crossover(loops.velocity.open_loop, 200, 2000)
@@ -87,7 +82,7 @@ def motor_speed(gain: float) -> Design:
     )
     bare = replace(amber(), motor=motor, gears=(), friction=Friction(viscous_Nms_rad=0.1))
     design = without(bare, "current", gain=gain)
-    velocity = replace(design.controller.velocity, integral_time_s=None)  # type: ignore[type-var]
+    velocity = replace(design.controller.velocity, integral_time_s=None)
     return replace(design, controller=replace(design.controller, velocity=velocity))
 
 
@@ -95,8 +90,6 @@ def test_g5_ctms_motor_speed() -> None:
     """CTMS, Frequency Domain Methods: 0.0139 (-37.1 dB) at 10 rad/s, so 72 puts the crossover there."""
     plant = assemble_loops(motor_speed(1.0), "ideal").velocity
     loop = assemble_loops(motor_speed(72.0), "ideal").velocity
-    assert plant is not None
-    assert loop is not None
     assert plant.open_loop.dcgain() == pytest.approx(0.01 / (0.1 + 0.01**2), rel=1e-12)
     gain = abs(at(plant.open_loop, 10.0))
     assert gain == pytest.approx(0.0139, abs=5e-5)
@@ -109,7 +102,6 @@ def test_g6_ctms_motor_position() -> None:
     J, b, K, R, L = 3.2284e-6, 3.5077e-6, 0.0274, 4.0, 2.75e-6
     loops = assemble_loops(ctms_position(), "ideal")
     assert loops.velocity is None
-    assert loops.position is not None
     omega = np.geomspace(0.1, 1e7, 50)
     s = 1j * omega
     expected = K / (s * ((J * s + b) * (L * s + R) + K**2))
@@ -120,7 +112,6 @@ def test_g6_sampled_with_a_stiff_electrical_pole() -> None:
     """CTMS, Digital Controller Design: ZOH at 1 ms; partial fractions of P(s)/s give the same P(z)."""
     J, b, K, R, L = 3.2284e-6, 3.5077e-6, 0.0274, 4.0, 2.75e-6
     loop = assemble_loops(ctms_position()).position
-    assert loop is not None
     T = 1e-3
     poles = np.roots([J * L, J * R + b * L, b * R + K**2])
     z = np.exp(1j * np.array([1.0, 10, 100, 1000, 3000]) * T)

@@ -1,7 +1,5 @@
 """A pendulum that stands out level has no slope: cos of a quarter turn is 0, whatever its rounding leaves."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import cos, pi, radians
 

@@ -1,6 +1,4 @@
-"""Many designs at once are each of them alone: random drives over decades, every stage left out."""
-
-from __future__ import annotations
+"""Many designs at once are each of them alone: random drives over decades, every stage left out, all keys."""
 
 from dataclasses import replace
 from typing import Any
@@ -12,12 +10,14 @@ from two_mass import drive_d, drive_e
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures, variable_paths
-from actuator_lti.design import parameter_value
+from actuator_lti.batch.static import drive_figures
+from actuator_lti.design import parameter_value, with_overrides, with_values
 from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Command, Design, Encoder, Filter, Load, PositionLoop
 from actuator_lti.drive.angle import moment_slope
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
+from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram
@@ -34,8 +34,6 @@ def everything() -> Design:
     """A position loop in front of a spring, every slot of the controller filled."""
     base = drive_e()
     control = base.controller
-    assert control.velocity is not None
-    assert control.current is not None
     position = PositionLoop(
         gain=20.0, every=4, feedforward=0.8, integral_time_s=0.2, derivative_time_s=2e-3,
         derivative_filter_s=1e-3, acceleration_feedforward=0.7, sensor="output",
@@ -85,7 +83,6 @@ def scattered(design: Design, count: int) -> dict[str, Any]:
     for path in values:  # what a filter may be is bounded by its period
         if path.startswith("control.velocity.filter") and not path.endswith(("depth", "damping")):
             velocity = design.controller.velocity
-            assert velocity is not None
             most = 2.0 if path.endswith("pole") else 2.5  # a pole on its zero would be no state at all
             values[path] = np.minimum(values[path], most / (velocity.every * values["control.period"]))
     return values
@@ -184,8 +181,46 @@ def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
 def test_gravity_may_differ_from_design_to_design() -> None:
     """The slope of the load is that of cos at each one's own angle."""
     joint = load_design("joint")
-    assert joint.load.gravity is not None
     offsets = np.array([0.1, 1.0, 2.5])
     many = replace(joint, load=replace(joint.load, gravity=replace(joint.load.gravity, offset_rad=offsets)))
     expected = joint.load.moment_slope_Nm_rad + joint.load.gravity.peak_Nm * np.cos(0.3 + offsets)
     assert moment_slope(many, Operating(angle_rad=0.3)) == pytest.approx(expected, rel=1e-14)
+
+
+STATIC = ("output_rate", "motor_current", "acceleration")
+
+
+def rich() -> Design:
+    """The joint, with everything that a joint may have besides."""
+    return with_overrides(load_design("joint"), {
+        "temperature.winding": "80 degC", "temperature.magnet": "60 degC", "supply.resistance": "0.05 ohm",
+        "load.moment_slope": "-20 N*m/rad", "load.friction.offset_torque": "0.1 N*m",
+        "coupling.play": "0.2 mrad", "load.moment_damping": "0.5 N*m*s/rad",
+        "load.gear_error": "0.3 N*m", "load.gear_error_periods": 3, "load.gear_error_phase": "40 deg",
+        "motor.cogging": "4 mN*m", "motor.cogging_periods": 12, "motor.cogging_phase": "70 deg",
+        "control.position.derivative_time": "2 ms", "control.position.derivative_filter": "1 ms",
+        "control.position.acceleration_feedforward": 0.5, "control.current.back_emf_feedforward": 0.5,
+        "control.current.resistance_feedforward": 0.3, "command.filter_time": "3 ms",
+        "friction.offset_torque": "1 mN*m",
+    })  # fmt: skip
+
+
+@pytest.mark.parametrize("path", variable_paths(rich()))
+def test_a_stack_is_its_designs(path: str) -> None:
+    design = rich()
+    value = parameter_value(design, path)
+    other = 1.02 * value if value else 0.01
+    try:
+        alone = with_values(design, {path: other}, check=False)
+    except InputError:
+        pytest.skip("no other value is allowed")
+    stack = Population(design, {path: np.array([value, other])}, 2)
+    many = linear_figures(stack, time_figures=False)
+    single = linear_figures(Population(alone, {}, 1), time_figures=False)
+    for loop in many.loops:
+        for quantity in ("gain_margin", "phase_margin", "bandwidth"):
+            found = many.quantity(quantity, loop)[1]
+            assert found == pytest.approx(single.quantity(quantity, loop)[0], rel=1e-7, nan_ok=True), quantity
+    for quantity in STATIC:
+        expected = drive_figures(Population(alone, {}, 1), quantity, 5.0)[0]
+        assert drive_figures(stack, quantity, 5.0)[1] == pytest.approx(expected, rel=1e-9, nan_ok=True)

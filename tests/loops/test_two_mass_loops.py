@@ -1,7 +1,5 @@
 """Two masses and a spring: the published digits K1 to K4, closed forms, and the rigid limit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 
@@ -27,7 +25,7 @@ from actuator_lti.drive.operating import friction_slope
 NOTCH = Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
 
 
-def table(margins: list) -> list[tuple[float, float]]:  # type: ignore[type-arg]
+def table(margins: list) -> list[tuple[float, float]]:
     return sorted((m.deg, m.frequency_rad_s) for m in margins)
 
 
@@ -39,7 +37,6 @@ def same(result: list[tuple[float, float]], expected: list[tuple[float, float]],
 
 def test_k1_current_loop_with_the_rotor_free() -> None:
     loop = assemble_loops(drive_d()).current
-    assert loop is not None
     margins = stability_margins(loop.open_loop)
     phases = [(77.98855712, 610.7379071), (166.4429489, 645.4654402), (77.45285893, 1612.214119)]
     same(table(margins.phase_margins), phases, 1e-8)
@@ -48,7 +45,6 @@ def test_k1_current_loop_with_the_rotor_free() -> None:
 
 def test_k2_velocity_loop() -> None:
     loop = assemble_loops(drive_d()).velocity
-    assert loop is not None
     margins = stability_margins(loop.open_loop)
     phases = [(74.46418674, 245.4593817), (-129.7195634, 541.7421541), (62.39378704, 872.8623258)]
     same(table(margins.phase_margins), phases, 1e-8)
@@ -67,7 +63,6 @@ def test_k3_notch() -> None:
         [-realisation.A[0][0], -realisation.A[1][0]], [-1.922292822062545, 0.9381484683269357], rtol=1e-13
     )
     loop = assemble_loops(drive_d(NOTCH)).velocity
-    assert loop is not None
     margins = stability_margins(loop.open_loop)
     same(table(margins.phase_margins), [(63.34614837, 241.6147984)], 1e-8)
     same([(m.ratio, m.frequency_rad_s) for m in margins.gain_margins], [(8.849712773, 3101.308198)], 1e-8)
@@ -87,7 +82,6 @@ def test_k4_dynamic_stiffness() -> None:
 
 
 def undamped(design: Design) -> Design:
-    assert design.coupling is not None
     return replace(
         design,
         motor=replace(design.motor, back_emf_constant_Vs_rad=1e-12),
@@ -111,13 +105,13 @@ def test_resonance_and_antiresonance() -> None:
 @pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
 def test_an_ever_stiffer_coupling_tends_to_the_rigid_drive(form: str) -> None:
     free = replace(drive_d(), load=replace(drive_d().load, friction=None))
-    rigid = assemble_loops(replace(free, coupling=None), form)  # type: ignore[arg-type]
+    rigid = assemble_loops(replace(free, coupling=None), form)
     omega = np.geomspace(1, 2000, 12)
     gaps = []
     for k in (4e5, 4e7):
         # damping that keeps the mode's damping ratio, as it moves out
         stiff = Coupling(stiffness_Nm_rad=k, damping_Nms_rad=1e-3 * np.sqrt(k))
-        loops = assemble_loops(replace(free, coupling=stiff), form)  # type: ignore[arg-type]
+        loops = assemble_loops(replace(free, coupling=stiff), form)
         worst = 0.0
         for name, loop in rigid.present.items():
             points = np.exp(1j * omega * loop.period_s) if form == "sampled" else 1j * omega
@@ -135,7 +129,7 @@ def test_driving_and_driven_change_the_reaction() -> None:
 
     design = replace(drive_d(), friction=Friction(load_coefficient=0.02))
     for point, share in (("driving", 0.1 + 0.02), ("driven", 0.1 - 0.02)):
-        plant = motor_plant(design, Operating(point=point))  # type: ignore[arg-type]
+        plant = motor_plant(design, Operating(point=point))
         w, twist = plant.states.index("w"), plant.states.index("twist")
         assert plant.A[w, twist] == pytest.approx(-share * 400 / 2e-5, rel=1e-14)
     gap = motor_plant(design, Operating(point="gap"))
@@ -151,8 +145,6 @@ def test_output_sensor_sees_the_spring() -> None:
     motor, output = (
         assemble_loops(each, "ideal").position for each in (design, replace(design, controller=control))
     )
-    assert motor is not None
-    assert output is not None
     s = 1j * np.array([1.0, 3000.0])
     ratio = output.open_loop(s) / motor.open_loop(s)
     # phi N_c/th = (c s + k)/(J_l s^2 + (c + Cv_l) s + k)
@@ -167,8 +159,6 @@ def test_gravity_is_a_stiffness_at_its_angle() -> None:
         base, load=Load(path="back-drivable", moment_slope_Nm_rad=2.0 * 9.80665 * 0.3 * np.cos(2.5))
     )
     one, other = assemble_loops(hanging, angle_rad=2.5).velocity, assemble_loops(slope).velocity
-    assert one is not None
-    assert other is not None
     np.testing.assert_allclose(one.open_loop.A, other.open_loop.A, rtol=1e-13)
 
 

@@ -1,9 +1,7 @@
-"""Torques that bend with the angle: closed forms of both writings."""
-
-from __future__ import annotations
+"""Torques that bend with the angle or go with the speed of the load: closed forms of both writings."""
 
 from dataclasses import dataclass, replace
-from math import acos, asin, cos, pi, sin, sqrt
+from math import acos, asin, cos, exp, pi, sin, sqrt
 
 import numpy as np
 import pytest
@@ -55,10 +53,7 @@ class Case:
             motor = replace(design.motor, cogging_Nm=A, cogging_periods=self.order, cogging_phase_rad=PHASE)
             return replace(design, motor=motor)
         load = replace(
-            design.load,
-            gear_error_Nm=A * N,
-            gear_error_periods=self.order * N,
-            gear_error_phase_rad=PHASE,
+            design.load, gear_error_Nm=A * N, gear_error_periods=self.order * N, gear_error_phase_rad=PHASE
         )
         return replace(design, load=load)
 
@@ -67,8 +62,10 @@ CASES = [Case("gear error", 24.0 / N), Case("cogging", 12.0)]
 each = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 
-def rotor(viscous: float = 0.0) -> Design:
-    """A torque source without a controller on a drive train that the load turns."""
+def rotor(
+    viscous: float = 0.0, load_coefficient: float = 0.0, path: str = "back-drivable", damping: float = 0.0
+) -> Design:
+    """A torque source without a controller, so that the rotor coasts."""
     return Design(
         name="rotor",
         motor=Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=1.0),
@@ -76,8 +73,8 @@ def rotor(viscous: float = 0.0) -> Design:
         controller=Controller(period_s=Ts, computing_delay_s=0.0),
         limits=Limits(voltage_V=10.0),
         validation=Validation(full_deflection_rad=1.0),
-        load=Load(path="back-drivable"),
-        friction=Friction(viscous_Nms_rad=viscous),
+        load=Load(path=path, moment_damping_Nms_rad=damping),
+        friction=Friction(viscous_Nms_rad=viscous, load_coefficient=load_coefficient),
     )
 
 
@@ -180,7 +177,6 @@ def test_energy_balances(case: Case, name: str) -> None:
     run = simulate(design, commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3, energy=True)
     without = simulate(load_design(name), commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3)
     assert np.max(np.abs(run.current_A - without.current_A)) > 1e-4
-    assert run.energy is not None
     assert run.energy.relative_error < 1e-9
 
 
@@ -222,7 +218,6 @@ def test_keys_of_the_cogging() -> None:
     screw = load_design("ballscrew").with_values(
         {"motor.cogging": "5 mN*m", "motor.cogging_periods": "5 rad/rad"}
     )
-    assert screw.screw is not None
     travel = screw.screw.travel_m_rad
     assert screw.motor.over_angle.at(0.3 * travel) == pytest.approx(5e-3 / travel * sin(5 * 0.3), rel=1e-9)
 
@@ -288,3 +283,83 @@ def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: 
         x = tick.A @ x + tick.B[:, 0] * 1e-4
     seen = 0.5 * (turned[1] - turned[2])
     assert np.max(np.abs(seen - expected)) < 1e-6 * np.max(np.abs(expected))
+
+
+D = 3.0  # N m s/rad
+
+
+def ratio(viscous: float, slope: float) -> float:
+    """w_(k+1)/w_k under the torque -slope w_k, held over a tick, and viscous friction."""
+    if viscous == 0.0:
+        return 1.0 - slope * Ts / J
+    kept = exp(-viscous * Ts / J)
+    return kept - (1.0 - kept) * slope / viscous
+
+
+@pytest.mark.parametrize("viscous", [0.0, 1e-3])
+def test_a_rotor_coasts_to_the_held_recursion(viscous: float) -> None:
+    design = rotor(viscous, damping=D)
+    expected = ratio(viscous, D / N**2)
+    run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=-80.0))
+    w = run.motor_speed_rad_s
+    assert w == pytest.approx(-80.0 * expected ** np.arange(w.size), rel=1e-12)
+    assert run.load_Nm == pytest.approx(-D * w / N, rel=1e-12)
+    tick = TickProgram(wire(design), "voltage").tick(0)
+    assert np.sort(np.linalg.eigvals(tick.A).real) == pytest.approx(sorted([expected, 1.0]), rel=1e-12)
+
+
+def test_a_self_locking_path_feels_it_as_friction_alone() -> None:
+    """T_f = CM |M_ext| = CM D w/N while the load is that moment only."""
+    design = rotor(0.0, 2.0 / N, "self-locking", D)
+    run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=80.0))
+    w = run.motor_speed_rad_s
+    assert w == pytest.approx(80.0 * ratio(0.0, 2.0 * D / N**2) ** np.arange(w.size), rel=1e-12)
+    assert wire(design).plant.moment == {}
+
+
+def test_energy_of_the_moment_is_work_on_the_load() -> None:
+    design = rotor(damping=D)
+    run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=80.0), energy=True)
+    w, energy = run.motor_speed_rad_s, run.energy
+    after = np.append(w, run.final.motor_speed_rad_s)
+    assert energy.output_work_J == pytest.approx(0.5 * J * (80.0**2 - after[-1] ** 2), rel=1e-12)
+    travel = 0.5 * (after[1:] + after[:-1]) * Ts  # under a constant torque
+    assert energy.output_work_J == pytest.approx(float(np.sum(D * w / N**2 * travel)), rel=1e-9)
+
+
+def test_the_plant_holds_the_sum() -> None:
+    """Cv + D/N^2 over J, of which the second part comes through the moment."""
+    base = load_design("ilr33-amber")
+    load = replace(base.load, path="back-drivable", moment_damping_Nms_rad=30.0)
+    design = replace(base, load=load)
+    plant = wire(design).plant
+    own = plant.A[1, 1] + plant.B_M[1] * plant.moment["load_speed"] * plant.rows["load_speed"]["w"]
+    assert -own * design.inertia_kgm2 == pytest.approx(
+        design.friction.viscous_Nms_rad + 30.0 / design.total_ratio**2, rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("path", ["back-drivable", "self-locking"])
+def test_top_speed_is_that_of_the_run(path: str) -> None:
+    """(kM U/R - C0) over kM kE/R + Cv + (1/N + CM) D/N, or CM D/N where the path locks itself."""
+    base = load_design("ilr33-amber")
+    load = replace(base.load, path=path, moment_damping_Nms_rad=20.0)
+    open_loop = replace(base.controller, position=None, velocity=None, current=None)
+    design = replace(base, load=load, controller=open_loop)
+    motor, friction, N = design.effective_motor, design.friction, design.total_ratio
+    per_volt = motor.torque_constant_Nm_A / motor.resistance_ohm
+    passed = friction.load_coefficient + (1.0 / N if path == "back-drivable" else 0.0)
+    slope = per_volt * motor.back_emf_constant_Vs_rad + friction.viscous_Nms_rad + passed * 20.0 / N
+    expected = (per_volt * design.limits.voltage_V - friction.dry_torque_Nm) / slope / N
+    assert capability(design).output_rate_rad_s == pytest.approx(expected, rel=1e-12)
+    run = simulate(design, commands.step(design.limits.voltage_V), 0.5)
+    assert run.motor_speed_rad_s[-1] / N == pytest.approx(expected, rel=1e-9)
+
+
+def test_key_and_its_bound() -> None:
+    fin = load_design("fin")
+    damped = fin.with_values({"load.moment_damping": "0.01 N*m*s/rad"})
+    assert "load.moment_damping" in damped.load.acting()
+    assert not damped.load.bare().acting()
+    with pytest.raises(InputError, match=r"load\.moment_damping = .*: held over a tick .*; allowed: at most"):
+        fin.with_values({"load.moment_damping": "1e6 N*m*s/rad"})

@@ -1,7 +1,5 @@
 """The wider drive in all three forms: limits of the sampled one, hand-made transfer functions, budgets."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -22,9 +20,7 @@ def faster(design: Design, factor: float) -> Design:
     """The same continuous drive, sampled faster (its filters stay)."""
     control_ = design.controller
     quick = replace(
-        control_,
-        period_s=control_.period_s / factor,
-        computing_delay_s=control_.computing_delay_s / factor,
+        control_, period_s=control_.period_s / factor, computing_delay_s=control_.computing_delay_s / factor
     )
     return replace(design, controller=quick)
 
@@ -60,8 +56,6 @@ def test_pid_with_filters_by_hand() -> None:
         assemble_loops(replace(base, controller=replace(base.controller, position=law)), "ideal").position
         for law in (PositionLoop(gain=20.0), pid)
     )
-    assert one is not None
-    assert two is not None
     s = 1j * np.geomspace(1, 1000, 10)
     law = 1 + 1 / (0.2 * s) + 2e-3 * s / (1e-3 * s + 1)
     np.testing.assert_allclose(two.open_loop(s), law * one.open_loop(s), rtol=1e-9)
@@ -69,8 +63,6 @@ def test_pid_with_filters_by_hand() -> None:
 
 def test_torque_filters_multiply_the_velocity_loop() -> None:
     plain, filtered = (assemble_loops(drive_d(*f), "ideal").velocity for f in ((), FILTERS[:3]))
-    assert plain is not None
-    assert filtered is not None
     s = 1j * np.geomspace(1, 5000, 10)
     w2, w1 = 2000.0, 900.0
     shape = w2**2 / (s**2 + np.sqrt(2) * w2 * s + w2**2)
@@ -82,16 +74,12 @@ def test_torque_filters_multiply_the_velocity_loop() -> None:
 def test_resistance_and_back_emf_feedforward_make_the_current_loop_ideal() -> None:
     """With k = 1 and w itself measured, the current loop is that of a locked rotor: back-EMF is gone."""
     base = drive_d()
-    assert base.controller.current is not None
     fed = replace(base.controller, current=replace(base.controller.current, back_emf_feedforward=1.0))
     free = assemble_loops(replace(base, controller=fed), "ideal").current
     locked = assemble_loops(base, "ideal", rotor="locked").current
-    assert free is not None
-    assert locked is not None
     s = 1j * np.geomspace(1, 1e4, 10)
     np.testing.assert_allclose(free.open_loop(s), locked.open_loop(s), rtol=1e-9)
     sampled = assemble_loops(replace(base, controller=fed)).current
-    assert sampled is not None
     assert sampled.periodic  # the speed is measured every other tick
 
 
@@ -135,7 +123,6 @@ def test_the_budget_has_a_share_for_each_filter() -> None:
         assert (budget.total_deg - exact + 180) % 360 - 180 == pytest.approx(0, abs=1e-6)
         assert len(budget.filters_deg) == 5
     current = design.controller.current
-    assert current is not None
     unfed = replace(design.controller, current=replace(current, back_emf_feedforward=0.0))
     shares = delay_budget(replace(design, controller=unfed), "velocity", omega).filters_deg
     s = 1j * omega
@@ -190,11 +177,11 @@ def test_any_loop_goes_through_python_control() -> None:
         assert len(set(loop.open_loop.state_labels)) == loop.open_loop.nstates
         assert len(loop.closed_loop.poles()) == loop.closed_loop.nstates
         control.frequency_response(loop.open_loop, np.array([10.0, 100.0, 1000.0]))
-    assert "W" in loops.velocity.open_loop.state_labels  # type: ignore[union-attr]
-    total = control.feedback(loops.position.open_loop, 1)  # type: ignore[union-attr]
-    assert total.nstates == loops.position.open_loop.nstates  # type: ignore[union-attr]
+    assert "W" in loops.velocity.open_loop.state_labels
+    total = control.feedback(loops.position.open_loop, 1)
+    assert total.nstates == loops.position.open_loop.nstates
     ideal = assemble_loops(everything(), "ideal")
-    assert "torque2_0" in ideal.velocity.open_loop.state_labels  # type: ignore[union-attr]
+    assert "torque2_0" in ideal.velocity.open_loop.state_labels
     control.step_response(ideal.reference_to_output, np.linspace(0, 0.1, 50))
 
 
@@ -204,8 +191,6 @@ def test_a_derivative_without_a_filter_is_refused_only_where_it_is_improper() ->
     bare = PositionLoop(gain=20.0, derivative_time_s=2e-3)
     loop = assemble_loops(replace(base, controller=replace(base.controller, position=bare)), "ideal").position
     plain = assemble_loops(base, "ideal").position
-    assert loop is not None
-    assert plain is not None
     s = 1j * np.geomspace(1, 1000, 10)
     np.testing.assert_allclose(loop.open_loop(s), (1 + 2e-3 * s) * plain.open_loop(s), rtol=1e-8)
 
@@ -220,7 +205,6 @@ def test_the_survey_and_its_budget_table_know_filters_and_the_gap() -> None:
     from reports.sections.delays import section
 
     base = drive_d(*FILTERS[:2])
-    assert base.coupling is not None
     coupling = replace(base.coupling, play_rad=0.01)
     design = replace(base, coupling=coupling, friction=replace(base.friction, load_coefficient=0.01))
     survey = survey_loops(design)

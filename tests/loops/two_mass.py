@@ -1,7 +1,5 @@
 """Drives D and E of the reference cases: two masses, built directly."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

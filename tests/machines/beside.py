@@ -6,8 +6,6 @@ follows from the number and a seed alone, so that equal numbers stay equal (conj
 matrices symmetric, the same question has the same answer) and zero stays zero.
 """
 
-from __future__ import annotations
-
 import functools
 import types
 from collections.abc import Callable

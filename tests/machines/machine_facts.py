@@ -3,8 +3,6 @@
 ``discrete`` has to be the same on every machine, ``figures`` to 1e-9.
 """
 
-from __future__ import annotations
-
 import cmath
 import json
 import math
@@ -14,13 +12,7 @@ from typing import Any
 import control
 import numpy as np
 
-from actuator_lti import (
-    assemble_loops,
-    closed_loop_bandwidth,
-    load_design,
-    stability_margins,
-    step_figures,
-)
+from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins, step_figures
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import parameter_value
 from actuator_lti.errors import InputError, NumericalError

@@ -3,8 +3,6 @@
 A kernel for instructions that the processor does not have would end the process: it is left out.
 """
 
-from __future__ import annotations
-
 import sys
 
 from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__

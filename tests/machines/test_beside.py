@@ -1,7 +1,5 @@
 """The processor that is not at hand: what it changes, and what it never changes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from beside import MOST, moved

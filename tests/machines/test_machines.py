@@ -1,7 +1,5 @@
 """Every kind of machine says the same: discrete facts exactly, figures to 1e-9."""
 
-from __future__ import annotations
-
 import functools
 import json
 import os

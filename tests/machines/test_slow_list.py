@@ -1,7 +1,5 @@
 """The list of slow tests names tests that are there."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 HERE = Path(__file__).parents[1]

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from actuator_lti.margins import StabilityMargins, stability_margins
+from actuator_lti.systems.delay_system import DelaySystem
 
 Z = control.tf([1, 0], [1], 1.0)
 
@@ -178,3 +179,12 @@ def test_a_fraction_of_a_sample_goes_to_whole_samples(gain: float, den: list[flo
             assert [p.deg for p in m.phase_margins] == pytest.approx(
                 [p.deg for p in limit.phase_margins], abs=1e-3
             )
+
+
+def test_small_coefficients_of_a_numerator_stay_where_a_delay_is_joined() -> None:
+    """(1e-17 s + 1e-17)/(s^2 + 1e-9 s + 1e-16): python-control drops the numerator."""
+    loop = control.tf([1e-17, 1e-17], [1.0, 1e-9, 1e-16])
+    joined = DelaySystem.from_system(loop)
+    w = 1j * np.geomspace(1e-9, 1e3, 25)
+    exact = (1e-17 * w + 1e-17) / (w * w + 1e-9 * w + 1e-16)
+    assert np.array([joined(s) for s in w]) == pytest.approx(exact, rel=1e-12)

@@ -4,8 +4,6 @@
 with SIGKILL at a random moment, and checks site and history.  Prints one line of JSON.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

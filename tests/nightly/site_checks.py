@@ -1,7 +1,5 @@
 """Checks of a published site that several tests share."""
 
-from __future__ import annotations
-
 import json
 from html.parser import HTMLParser
 from pathlib import Path
@@ -9,50 +7,50 @@ from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 
 VOID = {"meta", "link", "input", "br", "hr", "img", "wbr", "path", "circle", "rect", "line"}
+UNSEEN = ("style", "script")
 
 
 class Page(HTMLParser):
-    """Collects links, ids, tags and text; remembers whether every element was closed."""
+    """Tags with their attributes, and the text that is seen; ``open``: what was not closed."""
 
     def __init__(self, text: str) -> None:
         super().__init__(convert_charrefs=True)
-        self.links: list[str] = []
-        self.ids: set[str] = set()
-        self.tags: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.words: list[str] = []
-        self.handlers: list[str] = []
-        self.depth: list[str] = []
+        self.open: list[str] = []
         self.feed(text)
         self.close()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        for name, value in attrs:
-            if name in ("href", "src", "xlink:href", "action", "srcset"):
-                self.links.append(value or "")
-            if name == "id":
-                self.ids.add(value or "")
-            if name.startswith("on"):
-                self.handlers.append(name)
+        self.tags.append((tag, dict(attrs)))
         if tag not in VOID:
-            self.depth.append(tag)
+            self.open.append(tag)
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.handle_starttag(tag, attrs)
-        if tag not in VOID:
-            self.depth.pop()
+        self.tags.append((tag, dict(attrs)))
 
     def handle_endtag(self, tag: str) -> None:
-        if tag in self.depth:
-            while self.depth.pop() != tag:
+        if tag in self.open:
+            while self.open.pop() != tag:
                 pass
 
     def handle_data(self, data: str) -> None:
-        self.words.append(data)
+        if not set(self.open[-1:]) & set(UNSEEN):
+            self.words.append(data)
+
+    @property
+    def names(self) -> list[str]:
+        return [tag for tag, _ in self.tags]
 
     @property
     def text(self) -> str:
         return " ".join(" ".join(self.words).split())
+
+    def given(self, *keys: str) -> list[str]:
+        """Values of attributes."""
+        return [
+            value or "" for _, attributes in self.tags for key, value in attributes.items() if key in keys
+        ]
 
 
 def check_whole(site: Path) -> Page:
@@ -70,8 +68,8 @@ def _check_page(path: Path, site: Path, seen: set[Path]) -> Page:
     page = Page(text)
     if path.name != "report.html":
         assert text.rstrip().endswith("</html>"), f"{path} is cut off"
-    assert not page.depth or path.name == "report.html", f"{path}: {page.depth} not closed"
-    for link in page.links:
+    assert not page.open or path.name == "report.html", f"{path}: {page.open} not closed"
+    for link in page.given("href", "src", "xlink:href", "action", "srcset"):
         parts = urlsplit(link)
         if link.startswith("data:") or (not parts.path and not parts.netloc):
             continue

@@ -1,7 +1,5 @@
 """The site in a real browser: sort, search, open a report, dark mode, print, keyboard, contrast."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """The command itself, on real designs."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A full disk, a read-only site, damaged caches: told in one line, nothing lost."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -19,7 +17,7 @@ TOLD = re.compile("No space left on device|disk is full|disk I/O error")
 
 
 @pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
+def small_disk(tmp_path) -> Iterator[Path]:
     """A file system of 3 MB, where this process may mount one."""
     place = tmp_path / "disk"
     place.mkdir()
@@ -84,7 +82,7 @@ def test_a_disk_without_a_byte_is_told_in_one_line(small_disk: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_a_read_only_site_keeps_the_old_night_and_catches_up(tmp_path: Path) -> None:
+def test_a_read_only_site_keeps_the_old_night_and_catches_up(tmp_path) -> None:
     site = tmp_path / "site"
     nightly(site, 10.0)
     done = subprocess.run(

@@ -1,7 +1,5 @@
 """A night says the cause first, then what it did to the figure that matters most."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The history: what is written comes back, what is as before is kept once, nothing half-written stays."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
@@ -49,12 +47,7 @@ def test_every_figure_comes_back_to_the_last_bit(tmp_path_factory, values) -> No
 
 
 @pytest.mark.parametrize(
-    ("more", "homes"),
-    [
-        ({}, [1, 1, 1]),
-        ({"unit": "deg"}, [1, 2, 2]),
-        ({"gain": "2"}, [1, 2, 2]),
-    ],
+    ("more", "homes"), [({}, [1, 1, 1]), ({"unit": "deg"}, [1, 2, 2]), ({"gain": "2"}, [1, 2, 2])]
 )
 def test_what_is_as_before_refers_to_the_night_that_has_it(tmp_path, more, homes) -> None:
     with open_history(tmp_path) as history:

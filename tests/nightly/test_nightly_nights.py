@@ -1,7 +1,5 @@
 """Whole nights: what is built, what is not built again, what changed and what is approved."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from xml.etree import ElementTree
@@ -277,7 +275,4 @@ def test_several_runs_a_day_are_no_missing_nights() -> None:
 def test_figures_that_appear_or_vanish_are_changes_without_a_side() -> None:
     columns = Columns([Figure(name=name, value=None, better=1) for name in "xy"], Tolerances())
     result = columns.compare(np.array([1.0, np.nan]), np.array([np.nan, 1.0]))
-    assert [(c.figure, c.worse) for c in result] == [
-        ("x", None),
-        ("y", None),
-    ]
+    assert [(c.figure, c.worse) for c in result] == [("x", None), ("y", None)]

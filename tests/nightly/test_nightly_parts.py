@@ -1,7 +1,5 @@
 """The parts of the nightly: texts, cache, tolerances, figures of a report, lock."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from functools import partial
@@ -11,13 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from nightly_fakes import fake_document
 
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.errors import InputError
 from reports.nightly.cache import Cache, CorruptEntry, sealed
 from reports.nightly.code_version import code_version, commits_between
-from reports.nightly.figures import digest, figures_of
+from reports.nightly.figures import Figure, digest, figures_of
 from reports.nightly.lock import hold
 from reports.nightly.text import csv_cell, one_line, slug, visible
-from reports.nightly.tolerance import read_tolerances
+from reports.nightly.tolerance import Tolerances, read_tolerances
+from reports.sections.margins import MARGIN_COLUMNS, RESPONSE_COLUMNS
 
 
 @given(st.text())
@@ -59,7 +59,6 @@ def test_the_cache_gives_back_what_it_was_given(tmp_path) -> None:
     cache = Cache(tmp_path)
     cache.take("ab12", sealed("ab12", {"failed": 0}, {"report.html": b"x" * 1000}))
     entry = cache.read("ab12")
-    assert entry is not None
     assert entry.meta["failed"] == 0
     assert entry.file("report.html") == b"x" * 1000
     assert cache.read("cd34") is None
@@ -173,3 +172,38 @@ def test_no_program_of_a_foreign_work_tree_is_started(tmp_path) -> None:
     assert lines[0].endswith("second <b>⟨U+202E⟩")
     assert not trap.exists()
     assert commits_between(tmp_path, "0" * 40, new) == ()
+
+
+@pytest.mark.parametrize("quantity", [q for q in QUANTITIES.values() if q.heading], ids=lambda q: q.name)
+def test_every_heading_is_a_column_of_the_report_with_its_tolerance(quantity) -> None:
+    (column,) = [c for c in (*MARGIN_COLUMNS, *RESPONSE_COLUMNS) if c["label"] == quantity.heading]
+    unit = column.get("unit") or ""
+    figure = Figure(name=f"margins / A table / Current loop / {column['label']}", value=1.0, unit=unit)
+    absolute, relative = Tolerances().pair(figure)
+    factor = {"ms": 1e3}.get(unit, 1.0)
+    assert absolute == pytest.approx(quantity.tolerance * factor, rel=1e-12)
+    assert relative == 1e-3
+
+
+def test_quantities_of_loops_have_a_column_and_one_tolerance_a_unit() -> None:
+    assert all(q.heading for q in LOOP_QUANTITIES.values())
+    by_unit: dict[str, set[float]] = {}
+    for quantity in LOOP_QUANTITIES.values():
+        by_unit.setdefault(quantity.unit, set()).add(quantity.tolerance)
+    assert all(len(result) == 1 for result in by_unit.values()), by_unit
+
+
+@pytest.mark.parametrize(
+    ("unit", "absolute"),
+    [("dB", 0.01), ("deg", 0.05), ("%", 0.05), ("s", 1e-7), ("samples", 0.01), ("A", 1e-9)],
+)
+def test_a_figure_of_another_name_has_the_tolerance_of_its_unit(unit: str, absolute: float) -> None:
+    figure = Figure(name="drive / something else", value=1.0, unit=unit)
+    assert Tolerances().pair(figure) == (absolute, 1e-3)
+    assert Tolerances().of(figure, 1e6) == pytest.approx(1e3)
+
+
+def test_a_rule_of_the_study_comes_first() -> None:
+    figure = Figure(name="margins / A table / Current loop / Gain margin", value=1.0, unit="dB")
+    assert read_tolerances({"*gain margin": "0.5 dB"}, "study.toml").pair(figure) == (0.5, 0.0)
+    assert Tolerances().pair(Figure(name="x: met", value=1.0, kind="verdict")) == (0.5, 0.0)

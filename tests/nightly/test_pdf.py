@@ -1,7 +1,5 @@
 """Reports as PDF: what must stand in it stands in it, as text, with fonts embedded and page numbers."""
 
-from __future__ import annotations
-
 import io
 
 import pytest

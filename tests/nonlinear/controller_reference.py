@@ -1,7 +1,5 @@
 """The controller of model.md sections 2 and 7 in plain Python, written from the equations alone."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 from math import inf, log, sqrt, tan
@@ -212,6 +210,10 @@ class Controller:
             return out
         return self.limit_outer(direct + self.I)
 
+    def at(self, point: str, value: float, k: int) -> float:
+        """What leaves a stage at a tick: for who adds to it."""
+        return value
+
     def torque_gain(self) -> float:
         m = self.design.effective_motor
         if m.source_gain_Nm_V is not None:
@@ -244,7 +246,7 @@ class Controller:
             else:
                 out = self.limit_outer(self.design.total_ratio * r if c.velocity else r)
             if c.velocity:
-                self.w_ref = out
+                self.w_ref = self.at("w_ref", out, self.k)
             elif c.current:
                 self.i_ref = out
             else:
@@ -257,7 +259,7 @@ class Controller:
                 out = item(out)
             out = clamp(out, limit)
             if c.current:
-                self.i_ref = self.slope(out, self.n_v)
+                self.i_ref = self.slope(self.at("i_ref", out, self.k), self.n_v)
             else:
                 self.u = out
         if self.pi_c:

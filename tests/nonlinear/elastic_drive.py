@@ -1,7 +1,5 @@
 """Two-mass drives for the tests, and the event-driven plant under prescribed voltages and moments."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any
 

@@ -5,8 +5,6 @@ is.  Each stretch is integrated by DOP853 at its tightest, with steps short agai
 restarts at every kink.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -137,7 +135,9 @@ class Reference:
         return min(self.k * beyond, self.spring(x, side))
 
     def step(self) -> float:
-        """A step short against every mode."""
+        """A step short against every mode; of a rigid drive the integrator's own."""
+        if self.rigid and not self.friction.points:
+            return np.inf
         fast = [self.R / self.L if self.source is None else 0.0, np.sqrt(self.k / self.Jl)]
         fast += [np.sqrt(self.k / self.Jm) / self.Nc, self.c / self.Jl, self.c / self.Jm / self.Nc**2]
         fast += [np.sqrt(self.kE * self.kM / self.L / self.Jm)]

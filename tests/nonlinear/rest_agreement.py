@@ -6,8 +6,6 @@ For each stable position drive a step of 1 % of full deflection, as `cycles` wai
 judges it after runs of two lengths.
 """
 
-from __future__ import annotations
-
 import sys
 
 from actuator_lti.design.model import Design

@@ -1,10 +1,7 @@
 """A biquad is (b0 + b1 z^-1 + b2 z^-2)/(1 + a1 z^-1 + a2 z^-2), a = [a1, a2], wherever a drive is written."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -118,9 +115,7 @@ def test_the_running_drive_and_the_facts_have_its_difference_equation(
         ("b", "[1, 2, 3, 4]", "1 to 3, b0 b1 b2"),
     ],
 )
-def test_a_refusal_names_file_key_and_what_is_allowed(
-    tmp_path: Path, key: str, value: str, allowed: str
-) -> None:
+def test_a_refusal_names_file_key_and_what_is_allowed(tmp_path, key: str, value: str, allowed: str) -> None:
     lines = {"b": "[1.0]", "a": "[0.0]"} | {key: value}
     shipped = files("actuator_lti.design").joinpath("shipped/ilr33-amber.toml").read_text()
     table = "".join(f"{name} = {text}\n" for name, text in lines.items())

@@ -1,35 +1,39 @@
-"""`actuator-lti simulate` from the command line."""
+"""`actuator-lti simulate`: commands, loads and records begin when they say, and mean what they say."""
 
-from __future__ import annotations
-
-import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet
 import pytest
 
+from actuator_lti.errors import InputError
+from nonlinear import loads
 from reports.cli.main import main
 
+TS = 1e-4
 
-def test_json_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    files = {kind: tmp_path / f"run.{kind}" for kind in ("csv", "parquet", "svg")}
-    status = main(
-        f"simulate ilr33-amber --command sine --amplitude 5 --frequency 1 --duration 0.5 --load 4 --energy "
-        f"--csv {files['csv']} --parquet {files['parquet']} --plot {files['svg']} --json".split()
-    )
-    assert status == 0
-    facts = json.loads(capsys.readouterr().out)
-    assert facts["limits"]["speed"]["fraction"] > 0.3
-    assert facts["energy"]["relative_error"] < 1e-9
-    rows = np.genfromtxt(files["csv"], delimiter=",", names=True)
-    table = pyarrow.parquet.read_table(files["parquet"])
-    assert rows.size == table.num_rows == facts["rows"] == 5000
-    assert rows["output_angle_rad"].max() == facts["largest_output_rad"]
-    assert np.array_equal(table["current_A"].to_numpy(), rows["current_A"])
-    svg = files["svg"].read_text()
-    assert "speed limit acts" in svg
-    assert "limit acts" not in svg.replace("speed limit acts", "").replace("current limit acts", "")
+
+def table(path: Path, head: str, *columns: Any) -> Path:
+    """A file of columns."""
+    rows = "".join(",".join(map(str, row)) + "\n" for row in zip(*columns, strict=True))
+    path.write_text(f"{head}\n{rows}")
+    return path
+
+
+def test_json_and_files(run, tmp_path) -> None:
+    parquet, svg = tmp_path / "run.parquet", tmp_path / "run.svg"
+    words = "--command sine --amplitude 5 --frequency 1 --duration 0.5 --load 4 --energy"
+    made = run(f"ilr33-amber {words} --parquet {parquet} --plot {svg}")
+    assert made.facts["limits"]["speed"]["fraction"] > 0.3
+    assert made.facts["energy"]["relative_error"] < 1e-9
+    kept = pyarrow.parquet.read_table(parquet)
+    assert made.rows.size == kept.num_rows == made.facts["rows"] == 5000
+    assert made.rows["output_angle_rad"].max() == made.facts["largest_output_rad"]
+    assert np.array_equal(kept["current_A"].to_numpy(), made.rows["current_A"])
+    drawn = svg.read_text()
+    assert "speed limit acts" in drawn
+    assert "limit acts" not in drawn.replace("speed limit acts", "").replace("current limit acts", "")
 
 
 @pytest.mark.parametrize(
@@ -46,78 +50,132 @@ def test_json_and_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
         ("--command stepped-sine --frequency 5 --to 20 --count 3 --duration 1", "takes 1.75 s"),
         ("--start 3 --duration 1", "the run ends at 1 s"),
         ("--start 1", "the run ends at 1 s"),
+        ("--start -1", "--start"),
+        ("--held", "--held"),
+        ("--command hold --start 0.1", "--start 0.1: a hold is there from the first tick on"),
         ("--command sine --frequency 2 --cycles 3 --duration 1", "3 periods take 1.5 s"),
         ("--command step --cycles 3", "allowed with --command sine"),
     ],
 )
-def test_refusals(arguments: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["simulate", "ilr33-amber", *arguments.split()]) == 2
-    line = capsys.readouterr().err
-    assert words in line
-    assert line.count("\n") == 1
+def test_refusals(arguments: str, words: str, run) -> None:
+    made = run(f"ilr33-amber {arguments}")
+    assert made.status == 2
+    assert words in made.said
+    assert made.said.count("\n") == 1
 
 
-def test_record_with_a_hole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "record.csv"
+def test_a_record_with_a_hole(run, tmp_path) -> None:
     times = [0.0, 0.1, 0.2, 0.5, 0.6]
-    path.write_text("t,angle\n" + "".join(f"{t},{t}\n" for t in times))
-    assert main(["simulate", "--record", str(path)]) == 2
-    assert "hole in time from 0.2 s to 0.5 s" in capsys.readouterr().err
-    path.write_text("t,angle\n" + "".join(f"{0.1 * k},{k / 10}\n" for k in range(11)))
-    assert main(["simulate", "--record", str(path), "--duration", "1.5", "--json"]) == 0
-    facts = json.loads(capsys.readouterr().out)
+    path = table(tmp_path / "record.csv", "t,angle", times, times)
+    made = run(f"--record {path}")
+    assert made.status == 2
+    assert "hole in time from 0.2 s to 0.5 s" in made.said
+    table(path, "t,angle", 0.1 * np.arange(11), np.arange(11) / 10)
+    facts = run(f"--record {path} --duration 1.5").facts
     assert np.degrees(facts["final_output_rad"]) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_linear_axis_speaks_millimetres(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "run.csv"
-    assert main(f"simulate emps --command ramp --amplitude 10 --csv {path} --json".split()) == 0
-    assert json.loads(capsys.readouterr().out)["final_output_m"] == pytest.approx(0.01, rel=0.05)
-    assert "output_angle_m,motor_angle_m,motor_speed_m_s" in path.read_text().splitlines()[0].replace('"', "")
+def test_linear_axis_speaks_millimetres(run) -> None:
+    made = run("emps --command ramp --amplitude 10")
+    assert made.facts["final_output_m"] == pytest.approx(0.01, rel=0.05)
+    assert {"output_angle_m", "motor_angle_m", "motor_speed_m_s"} <= set(made.rows.dtype.names)
 
 
-@pytest.mark.parametrize("kind", ["hold", "triangle", "chirp", "stepped-sine", "multisine"])
-def test_every_command(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
-    duration = 2.0 if kind == "stepped-sine" else 0.4  # 5 cycles of 5, 10 and 20 Hz: 1.75 s
-    arguments = f"simulate --command {kind} --amplitude 0.2 --frequency 5 --to 20 --count 3"
-    assert main(f"{arguments} --duration {duration} --bias-rate 5 --load-slope -20 --every 10".split()) == 0
+@pytest.mark.parametrize("kind", ["hold", "triangle", "chirp", "multisine", "stepped-sine"])
+def test_every_command_on_the_terminal(kind: str, capsys) -> None:
+    stepped = kind == "stepped-sine"  # to its end: 5 cycles of 5, 10 and 20 Hz, 1.75 s
+    arguments = f"simulate --command {kind} --frequency 5 --to 20 --count 3 --every 10"
+    more = "" if stepped else " --amplitude 0.2 --duration 0.4 --bias-rate 5 --load-slope -20"
+    assert main(f"{arguments}{more}".split()) == 0
     out = capsys.readouterr().out
-    assert f"{1000 * duration:.0f} rows, status following" in out
-
-
-def test_a_stepped_sine_runs_to_its_end(capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = "--command stepped-sine --frequency 5 --to 20 --count 3 --every 10"
-    assert main(["simulate", *arguments.split()]) == 0
-    out = capsys.readouterr().out
-    assert "1750 rows, status comes to rest" in out
+    assert ("1750 rows, status comes to rest" if stepped else "400 rows, status following") in out
     assert " deg " in out
 
 
-def test_a_sine_plays_the_periods_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "run.csv"
-    arguments = f"--command sine --frequency 4 --cycles 3 --start 0.1 --amplitude 1 --csv {path} --json"
-    assert main(["simulate", *arguments.split()]) == 0
-    assert json.loads(capsys.readouterr().out)["rows"] == round((0.1 + 3 / 4) / 1e-4)
-    command = np.genfromtxt(path, delimiter=",", names=True)["reference_rad"]
-    peaks = (command[1:-1] > command[:-2]) & (command[1:-1] >= command[2:])
-    assert np.count_nonzero(peaks) == 3
+@pytest.mark.parametrize("kind", ["step", "ramp", "sine", "triangle", "chirp", "stepped-sine", "multisine"])
+def test_every_command_begins_at_its_start(kind: str, run) -> None:
+    words = f"--command {kind} --amplitude 0.1 --frequency 10 --to 40 --count 2 --start 0.1"
+    words += " --cycles 2" if kind in ("sine", "triangle", "stepped-sine") else ""
+    reference = run(f"{words} --duration {1.0 if kind == 'stepped-sine' else 0.3}").rows["reference_rad"]
+    assert not reference[:1000].any()
+    assert np.abs(reference[1000:1200]).max() > 0.0
 
 
-def test_a_load_file_is_on_the_clock_of_the_record(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_record_begins_at_its_start(run, tmp_path) -> None:
+    k = np.arange(11)
+    path = table(tmp_path / "record.csv", "t,angle", 7.0 + 0.01 * k, 0.1 + 0.01 * k)
+    reference = np.degrees(run(f"--record {path} --start 0.05").rows["reference_rad"])
+    assert not reference[:500].any()
+    assert reference[500] == pytest.approx(0.1, rel=1e-12)
+    assert reference[-1] == pytest.approx(0.2, rel=1e-3)
+
+
+def test_a_record_is_a_command(run, tmp_path) -> None:
+    path = table(tmp_path / "record.csv", "t,angle", [0, 1], [0, 1])
+    made = run(f"--record {path} --command sine")
+    assert made.status == 2
+    assert "--record and --command sine: one of them" in made.said
+    assert run(f"--record {path} --command recorded --duration 0.1").status == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "seconds", "rising"),
+    [
+        ("sine --frequency 4 --cycles 3 --start 0.1", 0.1 + 3 / 4, 2),
+        ("stepped-sine --frequency 5 --to 10 --count 2 --cycles 3", 3 / 5 + 3 / 10, 5),
+    ],
+)
+def test_cycles_are_those_played(words: str, seconds: float, rising: int, run) -> None:
+    """The first period begins at zero: one rising crossing less than there are periods."""
+    made = run(f"--amplitude 0.05 --command {words}")
+    assert made.facts["rows"] == pytest.approx(seconds / TS, abs=2)
+    reference = made.rows["reference_rad"]
+    assert np.flatnonzero((reference[:-1] < 0.0) & (reference[1:] >= 0.0)).size == rising
+
+
+def test_a_load_keeps_its_own_clock(run, tmp_path) -> None:
+    """Rows from 0.1 s on: until then there is no load, at 0.15 s half of what it grows to."""
+    path = table(tmp_path / "load.csv", "t,M", [0.1, 0.2], [2, 4])
+    load = run(f"--command hold --amplitude 0 --load-file {path} --duration 0.3").rows["load_Nm"]
+    assert not load[:1000].any()
+    assert load[[1000, 1500, 2000, 2999]] == pytest.approx([2.0, 3.0, 4.0, 4.0], rel=1e-12)
+    with pytest.raises(InputError, match="must be 0 or later"):
+        loads.series([-2.0, -1.0], [1.0, 1.0])
+
+
+def test_a_load_file_is_on_the_clock_of_the_record(run, tmp_path) -> None:
     """A record from 5 s on, held at zero, and a load from 5.5 s on, of the same clock: half a second late."""
-    record, load, early = (tmp_path / name for name in ("record.csv", "load.csv", "early.csv"))
-    record.write_text("t,deg\n" + "".join(f"{5.0 + 0.1 * k},0\n" for k in range(11)))
-    load.write_text("t,Nm\n5.5,2\n5.6,2\n5.7,2\n")
-    early.write_text("t,Nm\n0.5,2\n0.6,2\n0.7,2\n")
-    path = tmp_path / "run.csv"
-    assert main(f"simulate --record {record} --load-file {load} --csv {path} --json".split()) == 0
-    rows = np.genfromtxt(path, delimiter=",", names=True)
+    record = table(tmp_path / "record.csv", "t,deg", 5.0 + 0.1 * np.arange(11), [0] * 11)
+    load = table(tmp_path / "load.csv", "t,Nm", [5.5, 5.6, 5.7], [2] * 3)
+    early = table(tmp_path / "early.csv", "t,Nm", [0.5, 0.6, 0.7], [2] * 3)
+    rows = run(f"--record {record} --load-file {load}").rows
     assert rows["load_Nm"][rows["time_s"] < 0.5 - 1e-6].tolist() == [0.0] * 5000
     assert np.all(rows["load_Nm"][rows["time_s"] > 0.5 + 1e-6] == 2.0)
-    capsys.readouterr()
-    assert main(f"simulate --record {record} --load-file {early}".split()) == 2
-    assert "the run from 5 to 6 s on the record's clock: no load would act" in capsys.readouterr().err
-    assert main(f"simulate --load-file {load}".split()) == 2
-    assert "the run from 0 to 1 s: no load would act" in capsys.readouterr().err
+    for words, said in (
+        (f"--record {record} --load-file {early}", "the run from 5 to 6 s on the record's clock: no load"),
+        (f"--load-file {load}", "the run from 0 to 1 s: no load would act"),
+    ):
+        made = run(words)
+        assert made.status == 2
+        assert said in made.said
+
+
+def test_content_above_nyquist_is_refused(run, tmp_path) -> None:
+    """The position loop of this drive runs at 1 kHz: 700 Hz would be seen as 300."""
+    t = np.arange(0.0, 0.2, 1e-4)
+    step = np.where(t < 0.05, 0.0, 0.1)  # a step has lines everywhere, none of them large
+    waves = [(0.1 * np.sin(2.0 * np.pi * hertz * t), status) for hertz, status in ((700.0, 2), (100.0, 0))]
+    for angle, status in [*waves, (step, 0)]:
+        made = run(f"ilr33-amber-multirate --record {table(tmp_path / 'record.csv', 't,angle', t, angle)}")
+        assert made.status == status
+        assert ("above the Nyquist frequency" in made.said) == (status == 2)
+
+
+def test_an_event_log_is_held(run, tmp_path) -> None:
+    path = table(tmp_path / "log.csv", "t,angle", [0, 0.01, 0.013, 0.1], [0, 0.1, 0.05, 0.2])
+    made = run(f"--record {path}")
+    assert made.status == 2
+    assert "--held" in made.said
+    reference = np.degrees(run(f"--record {path} --held --duration 0.12").rows["reference_rad"])
+    wanted = [0, 0.1, 0.1, 0.05, 0.05, 0.2, 0.2]
+    assert reference[[99, 100, 129, 130, 999, 1000, 1199]] == pytest.approx(wanted)

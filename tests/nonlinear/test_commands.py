@@ -1,10 +1,7 @@
 """Commands, loads and results: values, units and refusals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,10 +29,7 @@ T = np.arange(2000) * TS
             commands.chirp(1.0, 1.0, 20.0, 2.0),
             signal.chirp(T, 1.0, 2.0, 20.0, method="logarithmic", phi=-90.0),
         ),
-        (
-            commands.chirp(1.0, 1.0, 20.0, 2.0, logarithmic=False),
-            signal.chirp(T, 1.0, 2.0, 20.0, phi=-90.0),
-        ),
+        (commands.chirp(1.0, 1.0, 20.0, 2.0, logarithmic=False), signal.chirp(T, 1.0, 2.0, 20.0, phi=-90.0)),
         (commands.sampled([0.0, 1.0, 2.0], [0.0, 3.0, 1.0]), np.interp(T, [0, 1, 2], [0, 3, 1])),
     ],
     ids=lambda value: value.kind if isinstance(value, Command) else "",
@@ -86,7 +80,7 @@ def test_refusals(make: Callable[[], object], words: str) -> None:
         make()
 
 
-def test_cells_that_are_no_numbers(tmp_path: Path) -> None:
+def test_cells_that_are_no_numbers(tmp_path) -> None:
     path = tmp_path / "r.csv"
     path.write_text("t,a\n0,1\n1,x\n")
     with pytest.raises(InputError, match=r'line 3, column 2 = "x"'):
@@ -183,3 +177,29 @@ def test_a_coarse_encoder_makes_the_drive_rough() -> None:
         runs[counts] = np.std(run.current_A[2500:])
     assert runs[None] < 1e-6
     assert runs[1024] > 10.0 * runs[65536] > 0.0
+
+
+def test_a_record_holds_the_whole_load() -> None:
+    """Slope and gravity at the angle that the output has, by their formulas."""
+    made, load = (
+        simulate("joint", commands.step(0.1), 0.05, loads.proportional(-3.0, 1.5)),
+        load_design("joint").load,
+    )
+    angle, gravity = made.output_angle_rad, load.gravity
+    own = gravity.mass_kg * 9.80665 * gravity.arm_m * np.sin(angle + gravity.offset_rad)
+    wanted = 1.5 + (load.moment_slope_Nm_rad - 3.0) * angle + own
+    np.testing.assert_allclose(made.load_Nm, wanted, rtol=1e-12, atol=1e-12)
+
+
+def test_a_multisine_is_periodic_and_begins_at_zero() -> None:
+    """Twice its duration is it twice; every line a whole number of periods."""
+    values = commands.multisine(0.3, [3.3, 7.1, 12.9], 1.0, 1e-4, seed=4).values(1e-4, 10_001)
+    assert abs(values[0]) < 1e-12
+    assert values[10_000] == pytest.approx(values[0], abs=1e-12)
+    assert values[1] > 0.0
+    lines = np.abs(np.fft.rfft(values[:10_000])) / 5000.0
+    assert set(np.flatnonzero(lines > 1e-9).tolist()) == {3, 7, 13}
+    assert np.abs(values).max() == pytest.approx(0.3, rel=1e-12)
+    for wrong, words in (([0.2], "less than one period"), ([3.1, 3.2], "same number of periods")):
+        with pytest.raises(InputError, match=words):
+            commands.multisine(0.3, wrong, 1.0, 1e-4)

@@ -1,6 +1,4 @@
-"""Every slot of the controller against a plain writing of its equations, on random drives and inputs."""
-
-from __future__ import annotations
+"""Every slot of the controller against a plain writing of its equations; what each number of its state is."""
 
 from dataclasses import replace
 from math import inf, pi
@@ -8,8 +6,10 @@ from math import inf, pi
 import numpy as np
 import pytest
 from controller_reference import Controller
+from elastic_drive import two_mass
 
 from actuator_lti import load_design
+from actuator_lti.design import shipped_designs
 from actuator_lti.design.model import (
     Command,
     CurrentLoop,
@@ -19,39 +19,43 @@ from actuator_lti.design.model import (
     Limits,
     OutputEncoder,
     PositionLoop,
+    Supply,
     VelocityLoop,
 )
 from nonlinear import Drive
+from nonlinear._kernels import elastic_layout, layout
+from nonlinear._kernels.state_kinds import CONTINUOUS, KINDS, NOTE, WORK, state_kinds
 
 TICKS = 240
 CASES = 120
 
 
 def some_filters(rng: np.random.Generator, T: float) -> tuple[Filter, ...]:
-    w = lambda: float(rng.uniform(0.02, 0.8) * pi / T)  # noqa: E731
+    def w() -> float:
+        return float(rng.uniform(0.02, 0.8) * pi / T)
+
     kinds = [
-        lambda on: Filter(kind="lowpass", on=on, frequency_rad_s=w(), order=1),
-        lambda on: Filter(
-            kind="lowpass", on=on, frequency_rad_s=w(), order=2, damping=float(rng.uniform(0.4, 1.2))
-        ),
-        lambda on: Filter(
-            kind="notch", on=on, frequency_rad_s=w(), width_rad_s=w(), depth=float(rng.uniform(0, 0.5))
-        ),
-        lambda on: Filter(kind="leadlag", on=on, zero_rad_s=w(), pole_rad_s=w()),
-        lambda on: Filter(
-            kind="skewed-notch", on=on, zero_rad_s=w(), pole_rad_s=w(), width_rad_s=w(), depth=0.2
-        ),
-        lambda on: Filter(kind="biquad", on=on, b=(0.3, 0.1, 0.05), a=(-0.4, 0.15)),
-        lambda on: Filter(kind="biquad", on=on, b=(0.5,), a=(-0.5,)),
-    ]
+        lambda: {"kind": "lowpass", "frequency_rad_s": w(), "order": 1},
+        lambda: {"kind": "lowpass", "frequency_rad_s": w(), "order": 2, "damping": rng.uniform(0.4, 1.2)},
+        lambda: {"kind": "notch", "frequency_rad_s": w(), "width_rad_s": w(), "depth": rng.uniform(0, 0.5)},
+        lambda: {"kind": "leadlag", "zero_rad_s": w(), "pole_rad_s": w()},
+        lambda: {
+            "kind": "skewed-notch", "zero_rad_s": w(), "pole_rad_s": w(), "width_rad_s": w(), "depth": 0.2
+        },
+        lambda: {"kind": "biquad", "b": (0.3, 0.1, 0.05), "a": (-0.4, 0.15)},
+        lambda: {"kind": "biquad", "b": (0.5,), "a": (-0.5,)},
+    ]  # fmt: skip
+    places = ("torque", "speed")
     count = int(rng.integers(0, 5))
-    return tuple(kinds[rng.integers(len(kinds))](("torque", "speed")[rng.integers(2)]) for _ in range(count))
+    return tuple(
+        Filter(on=places[rng.integers(2)], **kinds[rng.integers(len(kinds))]()) for _ in range(count)
+    )
 
 
 def some_drive(rng: np.random.Generator) -> Design:
     """Any stages, any options, on the motor of the baseline."""
 
-    def pick(*values):  # type: ignore[no-untyped-def]
+    def pick(*values):
         return values[rng.integers(len(values))]
 
     base = load_design("ilr33-amber")
@@ -171,3 +175,87 @@ def test_random_controllers(part: int) -> None:
         assert drive.value("speed_command") == pytest.approx(plain.w_ref, rel=1e-9, abs=1e-9)
         limited += bool((np.abs(result) == 20.0).any()) and not (np.abs(result) == 20.0).all()
     assert limited > CASES / 16  # the limits and what follows them were seen
+
+
+STATE_TICKS = 60
+NAMED = [
+    (part, name)
+    for part, begin in ((layout, "S_"), (elastic_layout, "ES_"))
+    for name in vars(part)
+    if name.startswith(begin) and name != "ES_END"
+]
+
+
+def kinds_of(drive: Drive) -> np.ndarray:
+    return state_kinds(drive._p)
+
+
+def drives() -> list[Design]:
+    """Every shipped drive, random cascades, two masses with play, stick on both sides, and a supply."""
+    play = two_mass(
+        friction={"dry_torque_Nm": 0.02, "load_coefficient": 0.01}, load_friction={"dry_torque_Nm": 0.1}
+    )
+    play = replace(play, load=replace(play.load, moment_damping_Nms_rad=0.01))
+    weak = load_design("ilr33-amber")
+    weak = replace(weak, supply=Supply(resistance_ohm=0.05, regenerative=False, capacitance_F=1e-3))
+    feeding = replace(
+        weak.controller, position=replace(weak.controller.position, acceleration_feedforward=0.5)
+    )
+    random = [some_drive(np.random.default_rng(case)) for case in range(60)]
+    return [*map(load_design, shipped_designs()), *random, play, replace(weak, controller=feeding)]
+
+
+def command(tick: int) -> float:
+    return 0.3 * np.sin(0.2 * tick) + 0.01 * tick
+
+
+def test_every_number_has_a_kind() -> None:
+    assert all(name in part.__annotations__ for part, name in NAMED)
+    for design in drives():
+        drive = Drive(design)
+        kinds = kinds_of(drive)
+        assert kinds.shape == drive.get().shape
+        assert set(kinds) <= set(KINDS)
+        lines = slice(layout.S_QUEUE, int(drive._p[layout.AT_WORK]))  # delay line, angles, average, rings
+        assert set(kinds[lines]) == {CONTINUOUS}
+
+
+def test_nothing_goes_on_from_notes_and_work_space() -> None:
+    """NaN in all of them before every tick: not one bit of what goes on is different."""
+    for design in drives():
+        plain, spoilt = Drive(design), Drive(design)
+        kinds = kinds_of(plain)
+        held = np.isin(kinds, (NOTE, WORK))
+        for k in range(STATE_TICKS):
+            state = spoilt.get()
+            state[held] = np.nan
+            spoilt.set(state)
+            for drive in (plain, spoilt):
+                drive.step(command(k))
+            assert np.array_equal(plain.get()[~held], spoilt.get()[~held])
+
+
+def test_something_goes_on_from_every_continuous_number() -> None:
+    """Each of them, moved in one drive or the other, moves another number."""
+    idle = {getattr(part, name): name for part, name in NAMED}
+    for design in drives():
+        drives_of_it = [Drive(design) for _ in range(3)]
+        kinds = kinds_of(drives_of_it[0])
+        idle = {place: name for place, name in idle.items() if kinds[place] == CONTINUOUS}
+        for k in range(0, STATE_TICKS, 4):
+            idle = {place: name for place, name in idle.items() if not moves(*drives_of_it, place, k)}
+            for j in range(4):
+                drives_of_it[0].step(command(k + j))
+    assert list(idle.values()) == ["S_QUEUE"]  # the oldest voltage, which the delay line drops
+
+
+def moves(drive: Drive, twin: Drive, changed: Drive, place: int, tick: int) -> bool:
+    """Whether a number of the state of ``drive`` changes another one within three ticks."""
+    state = drive.get()
+    twin.set(state)
+    state[place] += 2.0 if place == layout.S_OVERLOAD else 1e-3 * (abs(state[place]) + 1e-3)  # felt at 1
+    changed.set(state)
+    for k in range(3):
+        twin.step(command(tick + k))
+        changed.step(command(tick + k))
+    return not np.array_equal(np.delete(twin.get(), place), np.delete(changed.get(), place))

@@ -1,19 +1,20 @@
-"""Stick, slip and breakaway against scipy.integrate.solve_ivp with event functions."""
-
-from __future__ import annotations
+"""Stick, slip, breakaway, contact: against scipy.integrate.solve_ivp with event functions."""
 
 from dataclasses import replace
 from math import exp
 
 import numpy as np
 import pytest
-from stick_slip_reference import bare_drive, bare_source, drive_open, reference
 
-from actuator_lti.design.model import Design, Friction
-from nonlinear import State
+from actuator_lti import load_design
+from actuator_lti.design.model import Design, Friction, Limits, Motor
+from nonlinear import Probe, State, Trajectory, commands, simulate
+from nonlinear._kernels import layout
+from tests.nonlinear.elastic_drive import random_drive, run_plant, stribeck, two_mass
+from tests.nonlinear.elastic_reference import reference
 
 DRY = Friction(dry_torque_Nm=0.02, viscous_Nms_rad=5e-6)
-HARD = Friction(
+UNEVEN = Friction(
     dry_torque_Nm=0.02,
     viscous_Nms_rad=5e-6,
     dry_torque_reverse_Nm=0.03,
@@ -22,6 +23,21 @@ HARD = Friction(
     offset_torque_Nm=0.004,
 )
 LONG = 2e-3  # a tick longer than every time constant: much happens in it
+
+
+def bare_drive(friction: Friction, period_s: float, delay_s: float = 0.0, **motor: float) -> Design:
+    """The baseline's plant with other friction, tick and motor values, voltage unlimited."""
+    design = load_design("ilr33-amber")
+    control = replace(design.controller, period_s=period_s, computing_delay_s=delay_s)
+    motor = replace(design.motor, **motor)
+    return replace(design, motor=motor, friction=friction, limits=Limits(voltage_V=1e9), controller=control)
+
+
+def drive_open(design: Design, voltages: np.ndarray, start: State, load_Nm: float = 0.0) -> Trajectory:
+    """Simulate with the voltage prescribed at every tick (the loops are cut at u)."""
+    probe = Probe(point="u", gain=0.0, injection=voltages)
+    duration = voltages.size * design.controller.period_s
+    return simulate(design, commands.hold(), duration, load_Nm, probes=[probe], initial=start)
 
 
 def double_inductance(design: Design) -> float:
@@ -37,14 +53,19 @@ def assert_same(
     design: Design, voltages: np.ndarray, start: State, events: int, load_Nm: float = 0.0
 ) -> None:
     run = drive_open(design, voltages, start, load_Nm)
-    expected = reference(design, voltages, start, load_Nm)
+    delay, Ts = design.controller.computing_delay_s, design.controller.period_s
+    whole = int(delay / Ts + 1e-9)
+    late = np.concatenate([np.zeros(whole), voltages])[: voltages.size]
+    first = (start.current_A, start.motor_speed_rad_s, 0.0, start.motor_angle_rad, 0.0)
+    states = reference(design, late, load_Nm, first, delay - whole * Ts)
+    expected = states[:-1, [0, 1, 3]]
     simulated = np.column_stack([run.current_A, run.motor_speed_rad_s, run.motor_angle_rad])
     assert run.events_per_tick >= events
     scale = np.abs(expected).max(axis=0) + 1e-12
     np.testing.assert_allclose(simulated / scale, expected / scale, atol=2e-9, rtol=0)
 
 
-@pytest.mark.parametrize("friction", [DRY, HARD], ids=["plain", "asymmetric"])
+@pytest.mark.parametrize("friction", [DRY, UNEVEN], ids=["plain", "asymmetric"])
 @pytest.mark.parametrize("inductance", ["real", "complex", "double"])
 @pytest.mark.parametrize("delay", [0.0, 0.4, 1.3])
 def test_several_events_in_a_tick(friction: Friction, inductance: str, delay: float) -> None:
@@ -52,7 +73,7 @@ def test_several_events_in_a_tick(friction: Friction, inductance: str, delay: fl
     value = {"real": 6e-6, "complex": 4e-5, "double": double_inductance(design)}[inductance]
     design = replace(design, motor=replace(design.motor, inductance_H=value))
     rng = np.random.default_rng(3)
-    voltages = rng.uniform(0.15, 0.9, 40) * (-1.0) ** np.arange(40)
+    voltages = rng.uniform(0.15, 0.9, 30) * (-1.0) ** np.arange(30)
     voltages[10:14] = 0.0
     assert_same(design, voltages, State(motor_speed_rad_s=40.0), 2)
 
@@ -64,14 +85,16 @@ def test_ringing_faster_than_the_tick() -> None:
 
 
 def test_events_with_a_load_that_drives_back() -> None:
-    design = bare_drive(HARD, LONG)
+    design = bare_drive(UNEVEN, LONG)
     design = replace(design, load=replace(design.load, path="back-drivable"))
-    voltages = 0.6 * np.sin(np.arange(40.0))
+    voltages = 0.6 * np.sin(np.arange(24.0))
     assert_same(design, voltages, State(), 1, load_Nm=60.0)
 
 
 def test_torque_source() -> None:
-    design = bare_source(HARD, LONG, gain=0.1, delay_s=0.3 * LONG)
+    design = bare_drive(UNEVEN, LONG, 0.3 * LONG)
+    motor = Motor(rotor_inertia_kgm2=design.motor.rotor_inertia_kgm2, source_gain_Nm_V=0.1)
+    design = replace(design, motor=motor, controller=replace(design.controller, current=None))
     voltages = 0.5 * np.sin(0.9 * np.arange(60.0))
     assert_same(design, voltages, State(motor_speed_rad_s=5.0), 2)
 
@@ -106,3 +129,90 @@ def test_comes_to_rest_and_stays() -> None:
     assert run.motor_speed_rad_s[-1] == 0.0
     assert np.ptp(run.motor_angle_rad[-100:]) == 0.0
     assert run.events == 1
+
+
+TICKS = np.arange(24)
+SQUARE = 4.0 * np.sign(np.sin(2 * np.pi * TICKS / 13 + 0.3))
+WAVE = 0.5 * np.sin(TICKS / 5)
+FRICTION = {
+    "dry_torque_Nm": 0.05,
+    "dry_torque_reverse_Nm": 0.03,
+    "viscous_Nms_rad": 1e-4,
+    "load_coefficient": 0.02,
+    "breakaway_ratio": 1.3,
+    "offset_torque_Nm": 0.01,
+}
+LOAD = {"dry_torque_Nm": 0.3, "viscous_Nms_rad": 1e-3, "breakaway_ratio": 1.2, "offset_torque_Nm": 0.02}
+CURVE = stribeck((0, 0.06), (5, 0.02), (40, 0.03), (80, 0.05))
+ONE_SIDED = stribeck((0, 0.03), (30, 0.01), direction="reverse") + stribeck(
+    (0, 0.06), (5, 0.02), direction="forward"
+)
+HARD = {
+    "play and damping": ({}, 0.0),
+    "play without damping": ({"coupling": {"damping_Nms_rad": 0.0}}, 0.0),
+    "play, damped beyond its critical value": ({"coupling": {"damping_Nms_rad": 0.6}}, 0.0),
+    "bilateral": ({"coupling": {"play_rad": 0.0}}, 0.0),
+    "stick of both sides": ({"friction": FRICTION, "load_friction": LOAD}, 0.0),
+    "friction follows the sign of T_s": (
+        {"coupling": {"play_rad": 0.0}, "friction": {"load_coefficient": 0.03, "dry_torque_Nm": 0.01}},
+        WAVE,
+    ),
+    "self-locking stage": (
+        {
+            "path": "self-locking",
+            "friction": {"load_coefficient": 0.13, "dry_torque_Nm": 0.01},
+            "load_friction": LOAD,
+        },
+        WAVE,
+    ),
+    "self-locking, bilateral": (
+        {"path": "self-locking", "friction": {"load_coefficient": 0.13}, "coupling": {"play_rad": 0.0}},
+        WAVE,
+    ),
+    "Stribeck map": ({"friction": {"points": CURVE}, "load_friction": LOAD}, WAVE),
+    "map of each side": ({"friction": {"points": ONE_SIDED, "load_coefficient": 0.01}}, WAVE),
+    "rigid drive with a map": (
+        {"coupling": None, "friction": {"points": CURVE, "load_coefficient": 0.01}},
+        WAVE,
+    ),
+    "rigid and self-locking with a map": (
+        {"coupling": None, "path": "self-locking", "friction": {"points": CURVE, "load_coefficient": 0.2}},
+        WAVE,
+    ),
+}
+SEVERAL = two_mass(2e-2, coupling={"play_rad": 0.002})
+
+
+@pytest.mark.parametrize(
+    ("source", "fraction"), [(False, 0.37), (True, 0.0)], ids=["R-L, split tick", "source"]
+)
+@pytest.mark.parametrize("name", HARD)
+def test_hard_case(name: str, source: bool, fraction: float) -> None:
+    parts, moment = HARD[name]
+    design = two_mass(1e-3, source=source, **parts)
+    voltages = 0.1 * SQUARE if source else SQUARE
+    run = run_plant(design, voltages, moment, fraction_s=fraction * 1e-3)
+    expected = reference(design, voltages, moment, fraction_s=fraction * 1e-3)
+    assert run.status == layout.OK
+    assert sum(run.events) > 0 or name == "bilateral"
+    assert_close(run.states, expected)
+
+
+def test_play_crossed_several_times_in_a_tick() -> None:
+    run = run_plant(SEVERAL, SQUARE[:10])
+    assert max(run.events) >= 6
+    assert_close(run.states, reference(SEVERAL, SQUARE[:10]))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_drive(seed: int) -> None:
+    design, voltages, moments, fraction = random_drive(seed)
+    run = run_plant(design, voltages, moments, fraction_s=fraction)
+    assert run.status == layout.OK
+    assert_close(run.states, reference(design, voltages, moments, fraction_s=fraction))
+
+
+def assert_close(states: np.ndarray, expected: np.ndarray) -> None:
+    """To 1e-9 of the largest value of each state."""
+    scale = np.abs(expected).max(axis=0)
+    assert np.all(np.abs(states - expected) <= 1e-9 * scale)

@@ -1,105 +1,214 @@
-"""Model.md section 4: while the speed keeps its sign, the simulator is the sampled linear loop."""
+"""Model.md section 4: where no friction turns, no limit and no event acts, the running drive is the loop."""
 
-from __future__ import annotations
-
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import inf
 
 import control
 import numpy as np
 import pytest
+from test_controller import some_drive
 
 from actuator_lti import assemble_loops, load_design
-from actuator_lti.design.model import Design
-from nonlinear import State, Trajectory, commands, simulate
+from actuator_lti.design.model import Command, Design, Friction, Limits, LoadFriction
+from nonlinear import Rows, State, Trajectory, commands, simulate
+from tests.nonlinear.elastic_drive import drive_f
 
 TICKS = 20_000
-SPEED = 300.0  # rad/s, motor: the bias motion of every run
-RATES = [(1, 1), (2, 10)]
-DELAYS = [0.0, 0.5, 1.0, 1.5]
+SPEED, SPRUNG_SPEED = 300.0, 100.0  # rad/s, motor: the motion of every run
+DRY, LOAD_DRY = 0.01, 0.3
+SIGNALS = {
+    "th": "motor_angle_rad", "w": "motor_speed_rad_s", "i": "current_A", "u": "voltage_V",
+    "i_ref": "current_command_A", "w_ref": "speed_command_rad_s", "output_angle": "output_angle_rad",
+    "W": "output_speed_rad_s", "T_s": "coupling_torque_Nm",
+}  # fmt: skip
+every_delay = pytest.mark.parametrize("delay", [0.0, 0.5, 1.0, 1.5])
+every_rate = pytest.mark.parametrize("rates", [(1, 1), (2, 10)])
 
 
-def variant(delay: float, rates: tuple[int, int], feedforward: float = 0.0, **encoder: object) -> Design:
-    design = load_design("ilr33-amber")
+def timed(design: Design, delay: float, rates: tuple[int, int], feedforward: float = 0.0) -> Design:
+    """The design with a computing delay in ticks and the updates of its velocity and position loop."""
     c = design.controller
-    assert c.velocity is not None
-    return replace(
-        design,
-        controller=replace(
-            c,
-            computing_delay_s=delay * c.period_s,
-            velocity=replace(c.velocity, every=rates[0]),
-            position=replace(c.position, every=rates[1], feedforward=feedforward),
-        ),
-        encoder=replace(design.encoder, counts_per_rev=None, **encoder),
-    )
+    velocity = replace(c.velocity, every=rates[0])
+    position = replace(c.position, every=rates[1], feedforward=feedforward)
+    c = replace(c, computing_delay_s=delay * c.period_s, velocity=velocity, position=position)
+    return replace(design, controller=c)
 
 
-def run_on_bias(
-    design: Design, *, friction_on: bool, load_Nm: float = 0.0, limits_on: bool = True
-) -> tuple[Trajectory, dict[str, np.ndarray]]:
-    """The same motion twice: simulated, and by control.forced_response of the assembled loops."""
-    start = -SPEED / design.controller.position.gain
-    bias = commands.ramp(SPEED / design.total_ratio)
-    signal = commands.sine(1.5e-3, 7.0)
-    duration = TICKS * design.controller.period_s
-    initial = State(motor_angle_rad=start, motor_speed_rad_s=SPEED, speed_command_rad_s=SPEED)
-    run = simulate(
-        design, signal, duration, load_Nm, bias=bias, initial=initial, friction_on=friction_on,
-        limits_on=limits_on,
-    )  # fmt: skip
-    system = assemble_loops(design, load_Nm=load_Nm).tick_system
-    T_v = design.controller.velocity.every * design.controller.period_s
-    known = {"w": SPEED, "th": start, "speed.filter": SPEED, "acc": T_v * SPEED, "ref_prev": start}
-    past = [name for name in system.states if name.startswith("estimate.D")]
-    known |= {name: int(name.removeprefix("estimate.D")) * T_v * SPEED for name in past}
+def linear_run(
+    design: Design, run: Trajectory, known: Mapping[str, float], torque: float, moment: float, **point: object
+) -> dict[str, np.ndarray]:
+    """The same motion by control.forced_response of the assembled loops, from the states that are known."""
+    system = assemble_loops(design, **point).tick_system
     x0 = system.initial_state({name: value for name, value in known.items() if name in system.states})
-    lifted = system.lifted()
-    n = system.ticks
-    torque = -design.friction.dry_Nm(load_Nm) if friction_on else 0.0
-    held = np.ones(TICKS // n)
-    inputs = np.vstack([run.reference_rad[::n], torque * held, 0.0 * held])  # no load moment beside it
-    times = np.arange(TICKS // n) * (n * design.controller.period_s)
-    response = control.forced_response(lifted, times, inputs, x0)
-    outputs = response.outputs.reshape(n, len(system.outputs), -1)
-    return run, {
-        name: outputs[:, k, :].T.reshape(-1) for k, name in enumerate(system.outputs)
-    }  # fmt: skip
+    n, held = system.ticks, np.ones(TICKS // system.ticks)
+    inputs = np.vstack([run.reference_rad[::n], torque * held, moment * held])
+    times = np.arange(held.size) * (n * design.controller.period_s)
+    outputs = control.forced_response(system.lifted(), times, inputs, x0).outputs
+    outputs = outputs.reshape(n, len(system.outputs), -1)
+    return {name: outputs[:, k, :].T.reshape(-1) for k, name in enumerate(system.outputs)}
 
 
-def assert_identical(run: Trajectory, linear: dict[str, np.ndarray]) -> None:
-    simulated = {
-        "th": run.motor_angle_rad,
-        "w": run.motor_speed_rad_s,
-        "i": run.current_A,
-        "u": run.voltage_V,
-        "i_ref": run.current_command_A,
-        "w_ref": run.speed_command_rad_s,
-        "output_angle": run.output_angle_rad,
-    }
+def assert_identical(
+    run: Trajectory, linear: Mapping[str, np.ndarray], moved: float, off: float = 0.0
+) -> None:
+    assert np.ptp(run.motor_speed_rad_s) > moved  # the motion is not trivial
+    for name in SIGNALS.keys() & linear.keys():
+        expected = linear[name]
+        values = getattr(run, SIGNALS[name]) + (off if name == "output_angle" else 0.0)
+        assert np.abs(values - expected).max() <= 1e-9 * np.abs(expected).max(), name
+
+
+def assert_rigid(
+    design: Design, *, friction: bool = False, load_Nm: float = 0.0, limits: bool = True
+) -> None:
+    """The shipped rigid drive on a ramp with a sine upon it."""
+    start, T_v = -SPEED / design.controller.position.gain, design.controller.velocity.every * 1e-4
+    run = simulate(
+        design, commands.sine(1.5e-3, 7.0), TICKS * 1e-4, load_Nm,
+        bias=commands.ramp(SPEED / design.total_ratio),
+        initial=State(motor_angle_rad=start, motor_speed_rad_s=SPEED, speed_command_rad_s=SPEED),
+        friction_on=friction, limits_on=limits,
+    )  # fmt: skip
+    known = {"w": SPEED, "th": start, "speed.filter": SPEED, "acc": T_v * SPEED, "ref_prev": start}
+    known |= {f"estimate.D{k}": k * T_v * SPEED for k in range(1, 4)}
+    torque = -design.friction.dry_Nm(load_Nm) if friction else 0.0
+    linear = linear_run(design, run, known, torque, 0.0, load_Nm=load_Nm)  # no load moment beside it
     assert (run.motor_speed_rad_s > 0).all()
     assert not any(use.active for use in run.limits.values())
-    assert np.ptp(run.motor_speed_rad_s) > 100.0  # the motion is not trivial
-    for name, expected in linear.items():
-        error = np.abs(simulated[name] - expected).max() / np.abs(expected).max()
-        assert error < 1e-9, name
+    assert set(linear) < set(SIGNALS)
+    assert_identical(run, linear, 100.0)
 
 
-@pytest.mark.parametrize("rates", RATES)
-@pytest.mark.parametrize("delay", DELAYS)
+def amber(delay: float, rates: tuple[int, int], feedforward: float = 0.0, **encoder: object) -> Design:
+    design = timed(load_design("ilr33-amber"), delay, rates, feedforward)
+    return replace(design, encoder=replace(design.encoder, counts_per_rev=None, **encoder))
+
+
+@every_rate
+@every_delay
 def test_without_dry_friction(delay: float, rates: tuple[int, int]) -> None:
-    assert_identical(*run_on_bias(variant(delay, rates), friction_on=False))
+    assert_rigid(amber(delay, rates))
 
 
 @pytest.mark.parametrize(("delay", "rates"), [(1.0, (1, 1)), (0.5, (2, 10))])
 def test_with_constant_friction_torque(delay: float, rates: tuple[int, int]) -> None:
-    assert_identical(*run_on_bias(variant(delay, rates), friction_on=True, load_Nm=4.0))
+    assert_rigid(amber(delay, rates), friction=True, load_Nm=4.0)
 
 
 @pytest.mark.parametrize(("delay", "rates", "samples"), [(1.0, (1, 1), 1), (1.5, (2, 10), 3)])
 def test_with_speed_by_difference(delay: float, rates: tuple[int, int], samples: int) -> None:
-    design = variant(delay, rates, speed="difference", difference_samples=samples, filter_time_s=2e-4)
-    assert_identical(*run_on_bias(design, friction_on=True, limits_on=False))
+    design = amber(delay, rates, speed="difference", difference_samples=samples, filter_time_s=2e-4)
+    assert_rigid(design, friction=True, limits=False)
 
 
 def test_with_feedforward() -> None:
-    assert_identical(*run_on_bias(variant(1.0, (2, 10), feedforward=0.2), friction_on=False, limits_on=False))
+    assert_rigid(amber(1.0, (2, 10), feedforward=0.2), limits=False)
+
+
+@dataclass(frozen=True)
+class Point:
+    """An operating point: side of the contact (0: gap), moment at the output, total play, load friction."""
+
+    name: str
+    side: float
+    moment_Nm: float
+    play_rad: float = 0.02
+    load_coefficient: float = 0.02
+
+
+POINTS = [
+    Point("driving", 1.0, 0.0),
+    Point("driven", -1.0, 2.0),
+    Point("gap", 0.0, LOAD_DRY + 0.01, 1e3),
+    Point("sliding", 1.0, LOAD_DRY, 0.0, 0.0),  # a spring without play: its torque passes zero
+]
+
+
+def cruise(design: Design, point: Point) -> tuple[State, dict[str, float]]:
+    """State of steady motion for the running and for the linear drive."""
+    motor, coupling, N, w = design.motor, design.coupling, design.ratio_to_coupling, SPRUNG_SPEED
+    torque = (LOAD_DRY + 1e-3 * w / N - point.moment_Nm) * abs(point.side)
+    share = 1 / N + point.side * design.friction.load_coefficient
+    i = (DRY + 1e-4 * w + share * torque) / motor.torque_constant_Nm_A
+    u = motor.resistance_ohm * i + 0.05 * w
+    th, twist = -w / design.controller.position_loop.gain, torque / coupling.stiffness_Nm_rad
+    state = State(
+        motor_angle_rad=th, motor_speed_rad_s=w, current_A=i, current_integral_V=u, velocity_integral=i,
+        speed_command_rad_s=w, current_command_A=i, voltage_V=u,
+        output_angle_rad=th / N - twist - point.side * coupling.play_rad / 2,
+    )  # fmt: skip
+    linear = {"i": i, "w": w, "th": th, "W": w / N, "twist": twist, "velocity.I": i, "current.I": u}
+    return state, linear | {"hold_w_ref": w, "hold_i_ref": i, "u1": u, "u2": u}
+
+
+@every_rate
+@every_delay
+@pytest.mark.parametrize("point", POINTS, ids=lambda point: point.name)
+def test_behind_a_coupling_between_its_events(point: Point, delay: float, rates: tuple[int, int]) -> None:
+    design = timed(drive_f(), delay, rates)
+    design = replace(
+        design,
+        friction=Friction(dry_torque_Nm=DRY, viscous_Nms_rad=1e-4, load_coefficient=point.load_coefficient),
+        load=replace(design.load, friction=LoadFriction(dry_torque_Nm=LOAD_DRY, viscous_Nms_rad=1e-3)),
+        coupling=replace(design.coupling, play_rad=point.play_rad),
+    )
+    initial, known = cruise(design, point)
+    bias = commands.ramp(SPRUNG_SPEED / design.total_ratio)
+    duration = TICKS * design.controller.period_s
+    run = simulate(design, commands.sine(0.03, 7.0), duration, point.moment_Nm, bias=bias, initial=initial)
+    assert run.events == 0
+    if point.play_rad == 0.0:
+        assert np.ptp(np.sign(run.coupling_torque_Nm)) == 2.0
+    else:
+        assert (point.side * run.coupling_torque_Nm > 0.0).all() or point.side == 0.0
+    linear = linear_run(design, run, known, -DRY, point.moment_Nm - LOAD_DRY, operating_point=point.name)
+    assert set(linear) == {*SIGNALS, "phi"}
+    assert_identical(run, linear, 5.0, off=point.side * point.play_rad / 2)
+
+
+def linear_drive(case: int) -> Design:
+    """A random drive with all that is linear, back-drivable against a spring, at any computing delay."""
+    rng = np.random.default_rng(case)
+    design = some_drive(rng)
+    delay = float(rng.choice([0.0, 0.5, 1.0, 1.5, 2.7])) * design.controller.period_s
+    slope, damping = float(rng.choice([0.0, -200.0])), float(rng.choice([0.0, 3.0]))
+    c, command = replace(design.controller, computing_delay_s=delay), design.command
+    if c.position is not None:
+        c = replace(c, position=replace(c.position, friction_feedforward=0.0))
+    return replace(
+        design,
+        controller=c,
+        friction=Friction(viscous_Nms_rad=2e-6),
+        limits=Limits(voltage_V=1e12),
+        load=replace(
+            design.load, path="back-drivable", moment_slope_Nm_rad=slope, moment_damping_Nms_rad=damping
+        ),
+        encoder=replace(design.encoder, counts_per_rev=None),
+        output_encoder=replace(design.output_encoder, counts_per_rev=None),
+        command=Command(filter_time_s=command.filter_time_s, filter_order=command.filter_order),
+    )
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_random_linear_drives(part: int) -> None:
+    ticks = 300
+    for case in range(1000 + 20 * part, 1020 + 20 * part):
+        design = linear_drive(case)
+        assert design.limits.speed_rad_s == inf
+        rng, t = np.random.default_rng(case), np.arange(ticks)
+        command = np.sin(t * rng.uniform(0.01, 0.1)) + 1e-3 * t
+        rows = Rows.of(design, limits_on=False)
+        rows["ticks"], rows["load"] = ticks, 3.0
+        rows.series("command", command)
+        system = assemble_loops(design).tick_system
+        # the linear writing takes the command of a speed drive at the motor
+        scale = design.total_ratio if design.controller.outermost == "velocity" else 1.0
+        with np.errstate(over="ignore", invalid="ignore"):
+            run, linear = rows.trajectory(), system.respond(scale * command, 0.0, None, 3.0)
+        # a loop may grow: as long as both are far from the end of the numbers
+        some = np.maximum.accumulate(np.abs(linear["w"])) < 1e12
+        for name in ("th", "w", "i", "u"):
+            result, expected = getattr(run, SIGNALS[name])[some], linear[name][some]
+            error = np.abs(result - expected).max() / np.abs(expected).max()
+            assert error < 1e-9, (case, name, error, design.controller)

@@ -1,7 +1,5 @@
 """Limits alone: the large-signal numbers H1 and H2, the sawtooth of the paper, and the anti-windup."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import acos, asin, degrees, inf, pi, radians
 

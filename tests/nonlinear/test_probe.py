@@ -1,7 +1,5 @@
 """Probes: what they measure is the assembled loop, and what they add is what was asked for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -108,6 +106,6 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match="one a point"):
         simulate(design, commands.hold(), 0.1, probes=[Probe(point="u"), Probe(point="u")])
     with pytest.raises(InputError, match="must be one of"):
-        Probe(point="v")  # type: ignore[arg-type]
+        Probe(point="v")
     with pytest.raises(InputError, match="zero or more"):
         Probe(point="u", delay_samples=-1.0)

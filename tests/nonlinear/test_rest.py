@@ -1,7 +1,5 @@
 """The judge of rest, against closed forms, plain long runs, and drives described in words."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -60,7 +58,6 @@ def test_a_slow_stick_slip_cycle_takes_its_own_time_and_little_work() -> None:
     values = {"friction.breakaway_ratio": 1.5, "control.velocity.integral_time": 100.0}
     design = with_values(AMBER, values)
     cycles = friction_effects(design).points[0].cycles
-    assert cycles.stick_slip is not None
     rest = cycles.settlings[-1].rest
     assert rest.verdict == "limit cycle"
     assert rest.frequency_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=0.03)
@@ -72,13 +69,11 @@ def test_waiting_is_that_of_the_closed_form() -> None:
     """A step of 0.1 of the threshold moves after Tn (1/0.1 - 1), an hour and a half; 1e5 ticks of work."""
     design = with_values(AMBER, {"control.velocity.integral_time": 600.0})
     threshold = friction_effects(AMBER).points[0].threshold
-    assert threshold is not None
     size = 0.1 * threshold.static.forward_rad
     rows = Rows.of(design)
     rows.step("command", size)
     assert first_motion_s(rows.running()) == pytest.approx(600.0 * 9.0, rel=1e-3)
     rest = judge(rows.running(), most_ticks=100_000)
-    assert rest is not None
     assert 600.0 * 9.0 < rest.after_s < 600.0 * 9.0 + 10.0
 
 
@@ -98,7 +93,6 @@ def test_without_limits_an_unstable_drive_diverges() -> None:
     run = simulate(loud, commands.step(0.01), 0.001, limits_on=False)
     assert run.running is not None
     rest = judge(run.running)
-    assert rest is not None
     assert rest.verdict == "diverging"
 
 
@@ -204,7 +198,6 @@ def test_the_same_state_has_the_same_end_however_it_is_reached() -> None:
     run = simulate(AMBER, commands.hold(0.01), 0.01, initial=start)
     assert run.running is not None
     rest = judge(run.running)
-    assert rest is not None
     assert rest.comes_to_rest
     assert rest.error == pytest.approx(0.0, abs=1e-12)
 

@@ -1,7 +1,5 @@
 """Loads, supply, overload, instruments, profile and other outermost stages against laws and closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf, pi, sqrt
 
@@ -348,56 +346,26 @@ def test_any_stage_may_be_the_outermost() -> None:
     assert ramped[-1] == pytest.approx(0.2, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("design", "what"),
-    [
-        (
-            replace(changed(position=None, velocity=None), command=Command(rate_rad_s=1.0)),
-            "need a position or a velocity loop",
-        ),
-        (replace(AMBER, command=Command(jerk_rad_s3=1.0)), "needs command.acceleration"),
-        (replace(AMBER, command=Command(acceleration_rad_s2=1.0, jerk_rad_s3=1e-4)), "a mean over"),
-        (replace(AMBER, supply=Supply(regenerative=False)), "supply.capacitance: missing"),
-        (replace(AMBER, encoder=replace(AMBER.encoder, speed="tracking")), "encoder.bandwidth: missing"),
-        (
-            changed(
-                velocity=replace(
-                    AMBER.controller.velocity,
-                    filters=(Filter(kind="notch", frequency_rad_s=4e4, width_rad_s=1.0),),
-                )
-            ),
-            "below pi/T",
-        ),
-        (
-            changed(
-                velocity=replace(
-                    AMBER.controller.velocity, filters=(Filter(kind="notch", frequency_rad_s=400.0),)
-                )
-            ),
-            "width = None",
-        ),
-        (
-            changed(
-                velocity=replace(
-                    AMBER.controller.velocity, filters=(Filter(kind="lowpass", frequency_rad_s=400.0),) * 9
-                )
-            ),
-            "at most 8",
-        ),
-        (
-            changed(
-                velocity=replace(
-                    AMBER.controller.velocity, filters=(Filter(kind="biquad", b=(1.0,), a=(-1.0,)),)
-                )
-            ),
-            "unit circle",
-        ),
-        (
-            replace(changed(current=None), limits=replace(AMBER.limits, peak_time_s=1.0)),
-            "needs a current loop",
-        ),
-    ],
-)
-def test_refusals(design: Design, what: str) -> None:
+def filtered(count: int = 1, **item: object) -> Design:
+    return changed(velocity=replace(AMBER.controller.velocity, filters=(Filter(**item),) * count))
+
+
+TORQUE = changed(position=None, velocity=None)
+REFUSED = {
+    "need a position or a velocity loop": replace(TORQUE, command=Command(rate_rad_s=1.0)),
+    "needs command.acceleration": replace(AMBER, command=Command(jerk_rad_s3=1.0)),
+    "a mean over": replace(AMBER, command=Command(acceleration_rad_s2=1.0, jerk_rad_s3=1e-4)),
+    "supply.capacitance: missing": replace(AMBER, supply=Supply(regenerative=False)),
+    "encoder.bandwidth: missing": replace(AMBER, encoder=replace(AMBER.encoder, speed="tracking")),
+    "below pi/T": filtered(kind="notch", frequency_rad_s=4e4, width_rad_s=1.0),
+    "width = None": filtered(kind="notch", frequency_rad_s=400.0),
+    "at most 8": filtered(9, kind="lowpass", frequency_rad_s=400.0),
+    "unit circle": filtered(kind="biquad", b=(1.0,), a=(-1.0,)),
+    "needs a current loop": replace(changed(current=None), limits=replace(AMBER.limits, peak_time_s=1.0)),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_refusals(what: str) -> None:
     with pytest.raises(InputError, match=what):
-        simulate(design, commands.hold(), 0.01)
+        simulate(REFUSED[what], commands.hold(), 0.01)

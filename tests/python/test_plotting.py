@@ -1,6 +1,5 @@
 """Figures and tables of results in Python: what is drawn is what was found."""
 
-import subprocess
 import sys
 
 import matplotlib.pyplot as plt
@@ -109,16 +108,7 @@ def test_pages_and_notebooks_have_the_same_colours() -> None:
     assert set(COLOURS) == {paint.COLOURS[name] for name in (*paint.SERIES, "ink", "muted")}
 
 
-def test_matplotlib_is_imported_only_when_something_is_drawn() -> None:
-    code = (
-        "import sys, nonlinear, analyses.linear.loop_survey, actuator_lti.drawing.plotting;"
-        "from actuator_lti import load_design; load_design('ilr33-amber'); print('matplotlib' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "False"
-
-
-def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:
     run = simulate("ilr33-amber", commands.step(0.01), 0.01)
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(

@@ -1,19 +1,40 @@
-"""The report of the shipped baseline, validation included, built once for all tests of this folder."""
+"""The report of the shipped baseline, built once for all tests of this folder; pages to open."""
 
-from __future__ import annotations
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
 
 import pytest
 from built_report import Built, validated
+from live_page import opened, written
 
 from actuator_lti import load_design
+from actuator_lti.design.model import Design
 from reports.build import design_report, write_report
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Built:
+def built(tmp_path_factory) -> Built:
     """Build the report of ilr33-amber at a fixed time."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
         document = design_report(load_design("ilr33-amber"), validated())
     page, data = write_report(document, tmp_path_factory.mktemp("report"))
     return Built(document, page, data)
+
+
+@pytest.fixture
+def opens(browser, tmp_path) -> Iterator[Callable[..., Any]]:
+    """Open pages, of a design or from disk; in the end none has complained or asked for anything."""
+    trouble: list[str] = []
+    pages = []
+
+    def call(what: Design | Path, fragment: str = "", **options: Any) -> Any:
+        path = written(what, tmp_path) if isinstance(what, Design) else what
+        pages.append(opened(browser, path, trouble, fragment, **options))
+        return pages[-1]
+
+    yield call
+    for page in pages:
+        page.context.close()
+    assert trouble == []

@@ -1,9 +1,6 @@
 """Requirements on failures, duty, limit cycles and corners, and the tables that they read."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -67,12 +64,11 @@ def test_every_requirement_reads_its_analysis(fin: Design) -> None:
         "failure_deflection": max(one.at_detection_rad for one in failures(fin).cases) * 57.29577951308232,
         "failure_moment": max(one.peak_moment_Nm for one in failures(fin).cases),
         "duty_current": duty(fin).rms_A,
-        "winding_temperature": duty(fin).heating.final_degC,  # type: ignore[union-attr]
+        "winding_temperature": duty(fin).heating.final_degC,
         "limit_cycle": 0.0 if limit_cycles(fin).hunting is None else None,
     }
     made = []
     for name, value in wanted.items():
-        assert value is not None
         side = "minimum" if ANALYSIS_QUANTITIES[name].better > 0 else "maximum"
         made += [
             requirement(name, **{side: value * share + shift}) for share, shift in ((1.0, 1e-3), (1.0, -1e-3))
@@ -94,8 +90,8 @@ def test_margins_at_the_corners() -> None:
     design = replace(load_design("ballscrew"), requirements=asked)
     gain, phase = evaluate_requirements(design)
     loops = [one.margins for corner in corners(design).corners for one in corner.figures.values()]
-    assert gain.value == pytest.approx(min(abs(one.gain_margin_db) for one in loops))  # type: ignore[arg-type]
-    assert phase.value == pytest.approx(min(abs(one.phase_margin_deg) for one in loops))  # type: ignore[arg-type]
+    assert gain.value == pytest.approx(min(abs(one.gain_margin_db) for one in loops))
+    assert phase.value == pytest.approx(min(abs(one.phase_margin_deg) for one in loops))
 
 
 def test_a_figure_that_there_is_not_says_why() -> None:
@@ -106,7 +102,7 @@ def test_a_figure_that_there_is_not_says_why() -> None:
     assert (source.verdict, source.reason) == ("not proven", "duty: an ideal torque source has no current")
 
 
-def test_a_study_of_many_designs_leaves_them_out_and_says_so(tmp_path: Path) -> None:
+def test_a_study_of_many_designs_leaves_them_out_and_says_so(tmp_path) -> None:
     asked = requirement("duty_current", maximum=1.0)
     design = replace(load_design("fin"), requirements=(*load_design("fin").requirements, asked))
     result = monte_carlo(design, tmp_path, MonteCarloSettings(samples=16, worst_cases=False))

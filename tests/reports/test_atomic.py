@@ -1,7 +1,5 @@
 """Files are whole or not there."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -11,7 +9,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files import atomic
 
 
-def test_a_file_replaces_the_old_one_and_leaves_nothing_beside_it(tmp_path: Path) -> None:
+def test_a_file_replaces_the_old_one_and_leaves_nothing_beside_it(tmp_path) -> None:
     target = tmp_path / "new" / "a.txt"
     atomic.write_text(target, "one")
     atomic.write_text(target, "two µ")
@@ -19,7 +17,7 @@ def test_a_file_replaces_the_old_one_and_leaves_nothing_beside_it(tmp_path: Path
     assert os.listdir(target.parent) == ["a.txt"]
 
 
-def test_files_written_together_stay_old_if_one_cannot_be_written(tmp_path: Path) -> None:
+def test_files_written_together_stay_old_if_one_cannot_be_written(tmp_path) -> None:
     (tmp_path / "a").write_text("old")
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(InputError, match="cannot write"):
@@ -28,9 +26,7 @@ def test_files_written_together_stay_old_if_one_cannot_be_written(tmp_path: Path
     assert sorted(os.listdir(tmp_path)) == ["a", "file"]
 
 
-def test_an_interrupt_while_writing_leaves_the_old_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupt_while_writing_leaves_the_old_file(tmp_path, monkeypatch) -> None:
     target = tmp_path / "a"
     target.write_text("old")
 
@@ -44,7 +40,7 @@ def test_an_interrupt_while_writing_leaves_the_old_file(
     assert os.listdir(tmp_path) == ["a"]
 
 
-def test_who_reads_the_old_file_reads_on_in_it(tmp_path: Path) -> None:
+def test_who_reads_the_old_file_reads_on_in_it(tmp_path) -> None:
     target = tmp_path / "a"
     target.write_text("old" * 10_000)
     with target.open() as reader:
@@ -54,9 +50,7 @@ def test_who_reads_the_old_file_reads_on_in_it(tmp_path: Path) -> None:
     assert target.read_text() == "new"
 
 
-def test_all_is_on_the_disk_before_anything_is_in_its_place(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_all_is_on_the_disk_before_anything_is_in_its_place(tmp_path, monkeypatch) -> None:
     steps: list[str] = []
     fsync, replace = os.fsync, os.replace
 
@@ -74,14 +68,14 @@ def test_all_is_on_the_disk_before_anything_is_in_its_place(
     assert steps == ["flush 7", "flush 9", "move a", "move b"]
 
 
-def test_the_file_gets_the_rights_that_any_new_file_gets(tmp_path: Path) -> None:
+def test_the_file_gets_the_rights_that_any_new_file_gets(tmp_path) -> None:
     plain, written = tmp_path / "plain", tmp_path / "written"
     plain.write_text("x")
     atomic.write_text(written, "x")
     assert written.stat().st_mode == plain.stat().st_mode
 
 
-def test_a_folder_in_the_way_is_named(tmp_path: Path) -> None:
+def test_a_folder_in_the_way_is_named(tmp_path) -> None:
     (tmp_path / "taken").mkdir()
     with pytest.raises(InputError, match="taken: cannot write") as caught:
         atomic.write_text(tmp_path / "taken", "x")

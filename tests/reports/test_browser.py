@@ -41,7 +41,7 @@ def test_no_error_no_request_and_no_sideways_scrolling(browser: Browser, built: 
     page, trouble = opened(browser, built, **SCREENS[screen])
     assert trouble == []
     width = page.evaluate("document.documentElement.scrollWidth")
-    assert width <= SCREENS[screen]["viewport"]["width"]  # type: ignore[index]
+    assert width <= SCREENS[screen]["viewport"]["width"]
 
 
 @pytest.mark.parametrize("screen", SCREENS)
@@ -52,7 +52,6 @@ def test_every_figure_is_seen_with_ink_in_it(browser: Browser, built: Built, scr
     assert figures.count() == built.page.read_text(encoding="utf-8").count('<svg class="plot"') > 10
     for k in range(figures.count()):
         box = figures.nth(k).bounding_box()
-        assert box is not None
         assert box["width"] > 200
         assert box["height"] > 100
         assert figures.nth(k).locator(".world path, .marks use").count() > 2
@@ -175,7 +174,6 @@ def test_contents_lead_to_the_sections(browser: Browser, built: Built) -> None:
     page, _ = opened(browser, built, viewport={"width": 1360, "height": 900})
     page.locator('.toc a[href="#limits"]').click()
     box = page.locator("#limits").bounding_box()
-    assert box is not None
     assert abs(box["y"]) < 120
 
 

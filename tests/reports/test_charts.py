@@ -1,7 +1,5 @@
 """Charts: ticks that can be read alone, words off the curves, places that are where the values are."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re
@@ -12,10 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from reports.charts import style
 from reports.charts.axis import Axis, linear_ticks, log_ticks
 from reports.charts.chart import Chart
 from reports.charts.labels import Room
 from reports.charts.svg import page_svg, paper_svg
+from reports.sections.loop_charts import nichols
 
 finite = st.floats(-1e9, 1e9, allow_nan=False)
 
@@ -79,7 +79,6 @@ def test_gaps_break_a_line() -> None:
     chart = Chart()
     chart.panel().curve([0, 1, 2, 3, 4], [0.0, 1.0, None, 1.0, 0.0])
     path = re.search(r'class="curve" d="([^"]*)"', page_svg(chart, "f", ""))
-    assert path is not None
     assert path.group(1).count("M") == 2
 
 
@@ -93,9 +92,6 @@ def test_the_points_of_a_curve_are_where_its_values_are() -> None:
     svg = page_svg(chart, "f", "")
     x_axis, y_axis = (re.search(rf'data-{k}="(\w+) ([^"]*)"', svg) for k in "xy")
     path = re.search(r'class="curve" d="([^"]*)"', svg)
-    assert x_axis is not None
-    assert y_axis is not None
-    assert path is not None
     low, high, a, b = map(float, x_axis.group(2).split())
     bottom, top, c, d = map(float, y_axis.group(2).split())
     for (x, y), hz in zip(re.findall(r"[ML]([-\d.]+) ([-\d.]+)", path.group(1)), f, strict=True):
@@ -115,7 +111,6 @@ def test_equal_axes_have_equal_units() -> None:
     units = []
     for key in "xy":
         result = re.search(rf'data-{key}="lin ([^"]*)"', svg)
-        assert result is not None
         low, high, a, b = map(float, result.group(1).split())
         assert low <= -1.0
         assert high >= 1.0
@@ -164,3 +159,37 @@ def test_pictures_and_panels_have_ids_of_their_own() -> None:
         panel.bar(0.0, 1.0, 2.0, "c", hatch="x")
     ids = re.findall(r' id="([^"]*)"', page_svg(chart, "f1", "") + page_svg(chart, "f2", ""))
     assert len(ids) == len(set(ids)) > 10
+
+
+def nichols_curves(
+    phase_deg: list[float], gain_db: list[float]
+) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
+    made = nichols(np.array([1.0, 10.0]), np.array(gain_db), np.array(phase_deg))
+    panel = made.columns[0].panels[0]
+    curves: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"S": [], "T": [], "+": []}
+    for item in panel.items:
+        if getattr(item, "x", None) is not None:
+            kind = {style.ORANGE: "S", style.PURPLE: "T"}.get(item.look.colour, "")
+            if item.look.marker == "+":
+                kind = "+"
+            if kind:
+                curves[kind].append((item.x, item.y))
+    return curves
+
+
+def test_every_point_of_an_outline_has_that_peak() -> None:
+    made = nichols_curves([-90.0, -700.0], [20.0, -30.0])
+    for kind, magnitude in (("S", lambda L: 1 / abs(1 + L)), ("T", lambda L: abs(L / (1 + L)))):
+        assert len(made[kind]) == 2  # about -180 and about -540 degrees
+        for x, y in made[kind]:
+            L = 10 ** (y / 20.0) * np.exp(1j * np.radians(x))
+            np.testing.assert_allclose(20 * np.log10(magnitude(L)), 6.0, atol=1e-9)
+            assert np.abs(np.diff(x)).max() < 60.0  # no jump of a turn
+
+
+def test_the_critical_points_are_odd_half_turns() -> None:
+    assert sorted(float(x[0]) for x, _ in nichols_curves([10.0, -700.0], [20.0, -30.0])["+"]) == [
+        -540.0,
+        -180.0,
+        180.0,
+    ]

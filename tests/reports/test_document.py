@@ -1,11 +1,8 @@
 """The document: plain JSON, versioned, complete."""
 
-from __future__ import annotations
-
 import json
 from functools import reduce
 from operator import getitem
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -165,7 +162,7 @@ CURVE = ("columns", 0, "panels", 0, "items", 0)
     ],
 )
 def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(
-    place: tuple[str | int, ...], value: Any, words: str, tmp_path: Path
+    place: tuple[str | int, ...], value: Any, words: str, tmp_path
 ) -> None:
     chart = Chart()
     chart.panel().curve([0.0, 1.0, 2.0], [3.0, None, 4.0], "k")

@@ -6,13 +6,12 @@ The truth is the axis: what lies between two places on a scale in dB is a factor
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from live_page import opened, read, settled, written
+from live_page import read, settled, written
 
 from actuator_lti import load_design
 from actuator_lti.design import with_values
@@ -20,7 +19,7 @@ from actuator_lti.design.control import Filter
 from actuator_lti.design.model import Design
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Page
 
 VALUE = "JSON.parse(document.getElementById('live-data').textContent)"
 # a place on a curve where nothing lies above it, on the screen
@@ -51,7 +50,6 @@ SCALE = """([chart, k]) => {
 def drive() -> Design:
     amber = load_design("ilr33-amber")
     velocity = amber.controller.velocity
-    assert velocity is not None
     notch = Filter(
         kind="notch", frequency_rad_s=2.0 * math.pi * 200.0, width_rad_s=2.0 * math.pi * 60.0, depth=0.3
     )
@@ -59,19 +57,16 @@ def drive() -> Design:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory) -> Path:
     return written(drive(), tmp_path_factory.mktemp("drag"))
 
 
 @pytest.fixture
-def page(browser: Browser, made: Path) -> Iterator[Page]:
-    trouble: list[str] = []
-    result = opened(browser, made, trouble)
+def page(opens, made: Path) -> Page:
+    result = opens(made)
     settled(result, lambda: result.locator(".tabs button", has_text="Velocity").click())
     result.locator('[data-chart="bode"]').scroll_into_view_if_needed()
-    yield result
-    result.context.close()
-    assert trouble == []
+    return result
 
 
 def value(page: Page, key: str) -> float:
@@ -130,7 +125,6 @@ def test_the_nyquist_curve_is_dragged_outwards(page: Page) -> None:
 def test_the_corner_and_the_notch_are_moved_by_their_handles(page: Page) -> None:
     def middle(name: str) -> tuple[float, float]:
         box = page.locator(f'[data-chart="bode"] circle[data-name="{name}"]').bounding_box()
-        assert box is not None
         return box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0
 
     low, high, apart = page.evaluate(SCALE, ["bode", 1])[0]
@@ -177,10 +171,9 @@ def test_a_value_that_does_not_parse_is_said_beside_itself(page: Page) -> None:
     assert read(page) == before
 
 
-def test_a_design_with_a_limit_that_fails_marks_only_that(browser: Browser, tmp_path: Path) -> None:
-    trouble: list[str] = []
+def test_a_design_with_a_limit_that_fails_marks_only_that(opens) -> None:
     late = with_values(load_design("ilr33-amber"), {"control.velocity.gain": 0.75})
-    page = opened(browser, written(late, tmp_path), trouble)
+    page = opens(late)
     settled(page, lambda: page.locator(".tabs button", has_text="Velocity").click())
     colours = page.eval_on_selector_all(
         '[data-chart="bode"] .live-marks .stem', "(all) => all.map((n) => n.style.stroke)"
@@ -193,5 +186,3 @@ def test_a_design_with_a_limit_that_fails_marks_only_that(browser: Browser, tmp_
         f"var(--{'fail' if met[name] == 'false' else 'pass'})" for name in ("gain-margin", "phase-margin")
     ]
     assert "var(--fail)" in colours
-    assert trouble == []
-    page.context.close()

@@ -1,7 +1,9 @@
-"""What holds of every command: --json, --set where it takes a design, help, the verdict first."""
+"""What holds of every command: --json, --set, help, the verdict first, no line wider than the terminal."""
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -59,14 +61,14 @@ def test_every_command_speaks_json_and_takes_changes(name: str) -> None:
 
 
 @pytest.mark.parametrize("words", [[], ["objects"], ["export"]])
-def test_no_command_prints_help(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_command_prints_help(words: list[str], capsys) -> None:
     main(words)
     shown = capsys.readouterr()
     assert "Usage" in shown.out + shown.err
     assert "Traceback" not in shown.err
 
 
-def test_json_of_commands_that_write(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_of_commands_that_write(tmp_path, capsys) -> None:
     file = tmp_path / "mine.toml"
     for words in (
         ["init", str(file)],
@@ -97,13 +99,7 @@ def test_json_of_commands_that_write(tmp_path: Path, capsys: pytest.CaptureFixtu
     ],
     ids=lambda value: " ".join(value[:1]) if isinstance(value, list) else str(value),
 )
-def test_the_first_line_is_the_verdict(
-    words: list[str],
-    passed: bool,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_the_first_line_is_the_verdict(words: list[str], passed: bool, tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
     status = main([*words, "--quiet"] if words[0] in ("compare", "tune") else words)
@@ -116,9 +112,7 @@ def test_the_first_line_is_the_verdict(
 
 
 @pytest.mark.parametrize("width", [30, 60, 80, 200])
-def test_side_by_side_tables_are_stacked_rather_than_broken(
-    width: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_side_by_side_tables_are_stacked_rather_than_broken(width: int, monkeypatch, capsys) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
     names = [f"Variant-{k}" for k in range(9)]
     columns = [
@@ -137,12 +131,92 @@ def test_side_by_side_tables_are_stacked_rather_than_broken(
         assert not re.search(r"^\s*\w\s*$", out, re.M)
 
 
-def test_a_name_of_a_record_is_changed_for_identify(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_name_of_a_record_is_changed_for_identify(tmp_path, capsys) -> None:
     file = tmp_path / "d.toml"
     file.write_text(write_design(load_design("emps")))
     assert main(["identify", str(file), "--set", "nothing"]) == 2
     assert main(["correlate", str(file), "none.csv", "--set", "limits.voltage"]) == 2
     shown = capsys.readouterr().err
     assert "allowed: KEY=VALUE" in shown
+
+
+WORDS = ["gain", "crossover", "velocity", "position", "anti-windup"]
+
+
+def wide_table(columns: int) -> dict:
+    named = [doc.column("name", "Loop"), *(doc.column(f"c{k}", f"Column {k}", "ms") for k in range(columns))]
+    rows = [
+        {"name": f"row {r}", **{f"c{k}": f"{WORDS[(r + k) % 5]}-{100 * r + k}" for k in range(columns)}}
+        for r in range(3)
+    ]
+    return doc.table("A table", named, rows)
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 200])
+@pytest.mark.parametrize("columns", [1, 4, 12])
+def test_no_value_is_broken_and_no_line_is_too_long(width: int, columns: int, monkeypatch, capsys) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    block = wide_table(columns)
+    print_blocks([block])
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= width
+    for row in block["rows"]:
+        assert all(value in out for value in row.values())
+
+
+@pytest.mark.parametrize("width", range(70, 140, 5))
+def test_headings_break_before_a_word_of_a_cell_is_cut(width: int, monkeypatch, capsys) -> None:
+    """A table whose headings are longer than its cells, narrower than they are, wider than the cells."""
+    monkeypatch.setenv("COLUMNS", str(width))
+    labels = ["Cause", "Dry friction", "Kind", "Predicted, peak", "at", "Simulated", "at", "Verdict"]
+    columns = [doc.column(f"c{k}", label, "Hz" * (3 <= k < 7)) for k, label in enumerate(labels)]
+    cells = ["quantised output sensor", "left out", "attracting", "45.5", "35.3", "46.5", "30.8", "confirmed"]
+    print_blocks([doc.table("A table", columns, [{f"c{k}": cell for k, cell in enumerate(cells)}])])
+    out = capsys.readouterr().out
+    assert max(map(len, out.splitlines())) <= width
+    words = out.replace("\n", " ").lower().split()
+    for word in " ".join([*labels[1:], *cells]).lower().split():  # stacked, the first column needs no name
+        assert any(one.startswith(word) for one in words), word
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_margins_say_the_verdict_first_and_fit(width: int, monkeypatch, capsys) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert main(["margins", "ilr33-amber"]) == 0
+    first, *rest = capsys.readouterr().out.splitlines()
+    assert first == "PASS  ilr33-amber: every loop is stable. 12 of 12 requirements met."
+    assert max(map(len, rest)) <= width
+    assert sum(line.count("✓ met") for line in rest) == 12
+
+
+def test_a_failed_requirement_is_in_the_first_line(capsys) -> None:
+    assert main(["margins", "ilr33-amber", "--set", "control.position.gain=1560 1/s"]) == 1
+    first = capsys.readouterr().out.splitlines()[0]
+    said = "FAIL  ilr33-amber: every loop is stable. 9 of 12 requirements met, 3 not met. Not met: "
+    assert first.startswith(said)
+    assert main(["margins", "ilr33-amber", "--set", "control.position.gain=9000 1/s"]) == 1
+    assert (
+        capsys.readouterr().out.splitlines()[0].startswith("FAIL  ilr33-amber: not stable: Position loop. ")
+    )
+
+
+def test_the_program_runs_as_a_module() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "reports.cli", "designs"],
+        cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert "ilr33-amber" in done.stdout
+    done = subprocess.run(
+        [sys.executable, "-m", "reports.cli", "margins", "no-such-design"],
+        cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+
+
+def test_help_breaks_lines_at_the_width_of_the_terminal() -> None:
+    """A paragraph of a docstring is one line for the terminal, whose own width breaks it."""
+    from reports.cli.app import flowed
+
+    assert flowed("One.\n\n    Two goes\n    on.\n") == "One.\n\nTwo goes on."

@@ -1,19 +1,30 @@
-"""The first screen answers: five figures a loop with their distance, the weakest point, what to watch."""
+"""The first screen answers: figures with their distance, the weakest point of all, what to watch."""
 
-from __future__ import annotations
-
+import json
 from dataclasses import replace
+from math import inf, log10, radians, sin
 from typing import Any
 
+import numpy as np
 import pytest
 from built_report import Built
+from hypothesis import given
+from hypothesis import strategies as st
 
-from actuator_lti import load_design
+from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.asked.quantities import CUSTOMARY, distance_from_minus_one, reserve
+from actuator_lti.design import with_values
+from actuator_lti.design.model import Design
 from analyses.corners import corners
 from analyses.large_signal.by_amplitude import AmplitudeMargin
+from analyses.linear.loop_survey import LoopSurvey, operating_points, survey_loops
+from analyses.specification.mending import mending
+from analyses.specification.weakest import spread, views, weakest
 from reports import document as doc
 from reports.build import design_report
+from reports.cli.main import main
 from reports.findings import Finding, gathered
+from reports.sections.answer import weakest as words_of
 from reports.sections.by_amplitude import remark
 
 
@@ -91,7 +102,8 @@ def test_a_large_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field
     )  # fmt: skip
     assert remark(item) == (
         "The position loop sustains an oscillation if its gain is raised by 6.02 dB or more after release "
-        "from 50 % of full range; the linear gain margin is 20 dB. The current limit acts."
+        "from 50 % of full range; the linear gain margin on the validation's operating motion is 20 dB. The "
+        "current limit acts."
     )
 
 
@@ -103,7 +115,7 @@ def test_a_drive_that_oscillates_as_it_is_is_said_so(kind: str, value: float, wo
     )  # fmt: skip
     assert remark(item) == (
         "The position loop, without dry friction, sustains an oscillation as designed after release from 2 % "
-        f"of full range; the linear {kind} margin is {words}."
+        f"of full range; the linear {kind} margin on the validation's operating motion is {words}."
     )
 
 
@@ -136,3 +148,130 @@ def test_every_section_opens_with_one_sentence_that_says_its_result(built: Built
     for part in built.document["sections"][1:]:
         assert part["result"].endswith("."), part["id"]
         assert len(part["result"]) < 220, part["id"]
+
+
+@pytest.fixture(scope="module")
+def fin() -> Design:
+    return replace(load_design("fin"), requirements=())
+
+
+@pytest.fixture(scope="module")
+def survey(fin: Design) -> LoopSurvey:
+    return survey_loops(fin)
+
+
+@given(db=st.floats(0.01, 60.0), deg=st.floats(0.01, 180.0))
+def test_a_margin_is_the_distance_of_a_point_from_minus_one(db: float, deg: float) -> None:
+    """At a gain margin g the loop is at -1/g, at a phase margin phi at exp(j (phi - pi))."""
+    assert distance_from_minus_one("gain_margin", db) == pytest.approx(abs(-(10 ** (-db / 20)) + 1.0))
+    point = np.exp(1j * (radians(deg) - np.pi))
+    assert distance_from_minus_one("phase_margin", deg) == pytest.approx(abs(point + 1.0), abs=1e-12)
+    peak_db = 20.0 * log10(1.0 / 0.5)  # |S| = 1/|1 + L|
+    assert distance_from_minus_one("sensitivity_peak", peak_db) == pytest.approx(0.5)
+
+
+def test_margins_are_not_ranked_by_shares_of_decibels() -> None:
+    """9 dB of 6 has half as much again in decibels; as a distance 29 %, less than 45 deg of 30 with 48 %."""
+    gain, phase = reserve("gain_margin", 9.0, 6.0, 3.0), reserve("phase_margin", 45.0, 30.0, 15.0)
+    assert gain == pytest.approx((1 - 10 ** (-9 / 20)) / (1 - 10 ** (-6 / 20)) - 1)
+    assert phase == pytest.approx(sin(radians(22.5)) / sin(radians(15.0)) - 1)
+    assert gain < phase
+
+
+def test_every_view_is_looked_at(fin: Design, survey: LoopSurvey) -> None:
+    seen = {(view.place, view.loop, view.cut) for view in views(survey, corners(fin))}
+    for place in ("", "load driven by the motor", "motor driven by the load", "in the gap of the play"):
+        assert (place, "position", "") in seen
+    assert any(place.startswith("at rest, load ") for place, _, _ in seen)
+    assert {cut for place, _, cut in seen if place == "all loops closed"} == set(survey.break_points)
+    assert ("tolerances of the worst phase margin", "velocity", "") in seen
+    assert not any("speed amplitude" in place for place, _, _ in seen)
+
+
+def test_the_weakest_point_of_the_fin_is_where_it_is_not_stable(fin: Design, survey: LoopSurvey) -> None:
+    """Its position loop is unstable at the worst tolerances; without them the driven point is nearest."""
+    point = weakest(survey, corners(fin))
+    assert (point.reserve, point.view.stable) == (-inf, False)
+    assert words_of(point)["status"] == "warn"
+    nominal = weakest(survey)
+    loop = assemble_loops(fin, operating_point="driven").position
+    margins = stability_margins(loop.open_loop)
+    wanted = {
+        "gain_margin": (1 - 10 ** (-abs(margins.gain_margin_db) / 20)) / (1 - 10 ** (-6 / 20)),
+        "phase_margin": sin(radians(abs(margins.phase_margin_deg) / 2)) / sin(radians(15)),
+        "modulus_margin": margins.modulus_margin / 0.5,
+    }
+    assert (nominal.view.place, nominal.view.loop) == ("motor driven by the load", "position")
+    assert nominal.quantity == min(wanted, key=lambda name: wanted[name])
+    assert nominal.reserve == pytest.approx(min(wanted.values()) - 1.0, rel=1e-9)
+    assert nominal.limit == CUSTOMARY[nominal.quantity]
+    said = words_of(nominal)
+    assert said["label"] == "Position loop, motor driven by the load"
+    assert said["words"] == "modulus margin 0.481, customary 0.5: 0.0186 beyond"
+
+
+def test_a_required_limit_stands_for_the_customary_one(survey: LoopSurvey, fin: Design) -> None:
+    from actuator_lti.design.model import Requirement
+
+    asked = Requirement(id="m", quantity="modulus_margin", unit="1", loop="every", minimum=0.7)
+    point = weakest(replace(survey, design=replace(fin, requirements=(asked,))))
+    assert (point.view.place, point.view.loop, point.limit, point.required) == ("", "position", 0.7, True)
+    assert words_of(point)["status"] == "fail"
+
+
+def test_the_spread_is_that_of_the_operating_points(fin: Design) -> None:
+    found = spread(operating_points(fin, [], described=False, certify=False))["position"]["gain_margin"]
+    loads = fin.validation.loads_Nm
+    every = {"driving": 0.0, "driven": 0.0, "gap": 0.0, "sliding": 0.0}
+    margins = []
+    for point, load in [*every.items(), *(("rest", load) for load in loads)]:
+        loop = assemble_loops(fin, operating_point=point, load_Nm=load).position
+        margins.append(abs(stability_margins(loop.open_loop).gain_margin_db))
+    assert (found.least, found.most) == (pytest.approx(min(margins)), pytest.approx(max(margins)))
+    assert found.where == "motor driven by the load"
+
+
+def test_margins_shows_the_spread_and_names_the_points(capsys) -> None:
+    assert main(["margins", "fin", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["spread"]["position"]["gain_margin"]["where"] == "motor driven by the load"
+    assert main(["margins", "--help"]) == 0
+    said = capsys.readouterr().out
+    for name in ("sliding", "rest", "describing-function", "driving", "driven", "gap"):
+        assert name in said
+
+
+def test_the_move_that_mends_brings_the_weakest_margin_just_within_its_limit() -> None:
+    """Judged by the exact loops: with the move it is within, with a fifth of it less it is not."""
+    design = load_design("ilr33-amber")
+    seen = survey_loops(design)
+    point = weakest(seen)
+    assert point is not None
+    assert (point.view.kind, point.view.load_Nm, point.quantity) == ("rest", 8.0, "phase_margin")
+    move = mending(point, seen)
+    assert move is not None
+    for part, inside in ((1.0, True), (0.8, False)):
+        value = move.was + part * (move.value - move.was)
+        loops = assemble_loops(with_values(design, {move.path: value}), operating_point="rest", load_Nm=8.0)
+        assert loops.position is not None
+        margins = stability_margins(loops.position.open_loop)
+        found = {
+            "phase_margin": abs(margins.phase_margin_deg), "gain_margin": abs(margins.gain_margin_db),
+            "modulus_margin": margins.modulus_margin,
+        }  # fmt: skip
+        assert all(found[name] >= limit for name, limit in CUSTOMARY.items()) is inside
+    mended = weakest(survey_loops(with_values(design, {move.path: move.value})))
+    assert mended is not None
+    assert mended.reserve >= 0.0
+
+
+def test_no_move_that_costs_a_requirement(fin: Design, survey: LoopSurvey) -> None:
+    """Less position gain mends the fin at its worst tolerances; with the bandwidth required, nothing does."""
+    bounds = corners(fin)
+    point = weakest(survey, bounds)
+    assert point is not None
+    free = mending(point, survey, bounds)
+    assert free is not None
+    assert free.path == "control.position.gain"
+    whole = load_design("fin")
+    assert mending(point, replace(survey, design=whole), bounds) is None

@@ -1,7 +1,5 @@
 """A load that pushes away: an inner loop alone is unstable, the drive is not, and is judged so everywhere."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from math import exp

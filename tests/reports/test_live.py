@@ -67,14 +67,14 @@ def document() -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("live") / "page.html"
     path.write_text(page_of(document()), encoding="utf-8")
     return path
 
 
 @pytest.fixture
-def page(browser: Browser, made: Path, request: pytest.FixtureRequest) -> Iterator[Page]:
+def page(browser: Browser, made: Path, request) -> Iterator[Page]:
     """Open the page from disk, offline; any complaint and any request fails the test."""
     options = {"viewport": {"width": 1400, "height": 1000}, **getattr(request, "param", {})}
     context = browser.new_context(offline=True, **options)

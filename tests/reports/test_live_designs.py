@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,13 +13,11 @@ from live_page import (
     FIGURES,
     agree,
     command_line,
-    opened,
     read,
     saved,
     settled,
     type_value,
     verdicts_agree,
-    written,
 )
 
 from actuator_lti import assemble_loops, load_design, stability_margins
@@ -35,7 +31,7 @@ from nonlinear import Rows
 from reports.live import live_model
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Page
 
 CHANGES = {  # in the units of the page; the last restores no design
     "ilr33-amber": {"control.position.gain": 140.0},
@@ -51,20 +47,16 @@ CHANGES = {  # in the units of the page; the last restores no design
 
 
 @pytest.fixture(params=sorted(CHANGES))
-def shown(request: pytest.FixtureRequest, browser: Browser, tmp_path: Path) -> Iterator[tuple[str, Page]]:
-    """Open the page of a shipped design."""
-    trouble: list[str] = []
-    page = opened(browser, written(load_design(request.param), tmp_path), trouble)
-    yield request.param, page
-    page.context.close()
-    assert trouble == []
+def shown(request, opens) -> tuple[str, Page]:
+    """The page of a shipped design."""
+    return request.param, opens(load_design(request.param))
 
 
 def test_no_shipped_design_is_left_out() -> None:
     assert sorted(CHANGES) == sorted(shipped_designs())
 
 
-def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page], tmp_path: Path) -> None:
+def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page], tmp_path) -> None:
     name, page = shown
     agree(read(page), command_line(saved(page, tmp_path / "same.toml")))
     verdicts_agree(page, command_line(tmp_path / "same.toml", "requirements"))
@@ -82,11 +74,10 @@ def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page],
         assert parameter_value(load_design(changed), key) != parameter_value(load_design(name), key)
 
 
-def test_periodic_break_points_follow_once_nothing_moves(browser: Browser, tmp_path: Path) -> None:
+def test_periodic_break_points_follow_once_nothing_moves(opens) -> None:
     """Their fundamental has the margins of the command line's; while a value moves the row says so."""
     design = load_design("ilr33-amber-multirate")
-    trouble: list[str] = []
-    page = opened(browser, written(design, tmp_path), trouble)
+    page = opens(design)
     type_value(page, "control.current.gain", 2e-2)
     page.wait_for_selector("#hands-on[data-behind=done]")
     value = page.evaluate("JSON.parse(document.getElementById('live-data').textContent).keys")
@@ -98,15 +89,12 @@ def test_periodic_break_points_follow_once_nothing_moves(browser: Browser, tmp_p
     assert ours["phase_margin"] == pytest.approx(wanted.phase_margin_deg, rel=1e-9)
     assert ours["delay_margin"] == pytest.approx(wanted.delay_margin_s, rel=1e-9)
     assert "fundamental" in page.inner_text('.now th[data-loop="at u"]')
-    page.context.close()
-    assert trouble == []
 
 
-def test_where_rounding_decides_no_figure_is_shown(browser: Browser, tmp_path: Path) -> None:
+def test_where_rounding_decides_no_figure_is_shown(opens, tmp_path) -> None:
     """An unstable current loop between slow updates: the command line withholds, so does the page."""
     design = load_design("ilr33-amber-multirate")
-    trouble: list[str] = []
-    page = opened(browser, written(design, tmp_path), trouble)
+    page = opens(design)
     key = "control.current.gain"
     type_value(page, key, 60.0 * float(page.input_value(f'.row[data-path="{key}"] .field')))
     type_value(page, "control.position.every", 20)
@@ -116,14 +104,11 @@ def test_where_rounding_decides_no_figure_is_shown(browser: Browser, tmp_path: P
     assert "position" not in read(page)
     assert "stability not known" in page.inner_text("table.now")
     assert page.get_attribute(".state", "class") == "state fail"
-    page.context.close()
-    assert trouble == []
 
 
-def test_whole_numbers_stay_whole_and_multiples(browser: Browser, tmp_path: Path) -> None:
+def test_whole_numbers_stay_whole_and_multiples(opens, tmp_path) -> None:
     design = load_design("ilr33-amber-multirate")
-    trouble: list[str] = []
-    page = opened(browser, written(design, tmp_path), trouble)
+    page = opens(design)
     row = '.row[data-path="control.velocity.every"]'
     before = read(page)
     type_value(page, "control.velocity.every", 3)  # 10 is no multiple of 3
@@ -138,17 +123,14 @@ def test_whole_numbers_stay_whole_and_multiples(browser: Browser, tmp_path: Path
     page.fill(f"{row} .field", "2.5")
     page.press(f"{row} .field", "Enter")
     assert page.get_attribute(f"{row} input[type=range]", "aria-valuetext").strip() == "3"
-    page.context.close()
-    assert trouble == []
 
 
-def test_a_friction_map_has_sliders(browser: Browser, tmp_path: Path) -> None:
+def test_a_friction_map_has_sliders(opens, tmp_path) -> None:
     """The loops have the slope of the map's first piece, as the linear form has at rest."""
     map_Nm = ((0.0, 3e-3), (40.0, 2e-3), (900.0, 4e-3))
     points = tuple(FrictionPoint(speed_rad_s=speed, torque_Nm=torque) for speed, torque in map_Nm)
     design = replace(load_design("ilr33-amber"), name="mapped", friction=Friction(points=points))
-    trouble: list[str] = []
-    page = opened(browser, written(design, tmp_path), trouble)
+    page = opens(design)
     key = "control.velocity.gain"
     type_value(page, key, 1.3 * float(page.input_value(f'.row[data-path="{key}"] .field')))
     file = saved(page, tmp_path / "mapped.toml")
@@ -163,26 +145,19 @@ def test_a_friction_map_has_sliders(browser: Browser, tmp_path: Path) -> None:
             elif math.isfinite(wanted):
                 assert ours[loop][name] == pytest.approx(wanted, rel=1e-9, abs=1e-9), (loop, name)
     assert "first piece" in page.inner_text("#hands-on")
-    page.context.close()
-    assert trouble == []
 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "fin"])
-def test_cells_of_the_map_are_named_as_the_command_line_names_them(
-    browser: Browser, tmp_path: Path, name: str
-) -> None:
+def test_cells_of_the_map_are_named_as_the_command_line_names_them(opens, tmp_path, name: str) -> None:
     """Every cell again, as a sine from rest, by the simulator and the rule of the large-signal map."""
     design = load_design(name)
-    trouble: list[str] = []
-    page = opened(browser, written(design, tmp_path), trouble)
+    page = opens(design)
     page.locator('[data-chart="border"]').scroll_into_view_if_needed()
     page.wait_for_function(
         "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
     )
     page.wait_for_selector("#hands-on[data-behind=done]", timeout=60_000)
     cells = json.loads(page.get_attribute("#hands-on", "data-cells") or "[]")
-    page.context.close()
-    assert trouble == []
     assert len(cells) == 18 * 12
     every = design.controller.position_loop.every
     ticks, hertz, updates, amplitude = (
@@ -208,7 +183,7 @@ ASKED = (
 )
 
 
-def test_requirements_on_the_whole_drive_follow(browser: Browser, tmp_path: Path) -> None:
+def test_requirements_on_the_whole_drive_follow(opens, tmp_path) -> None:
     """Rate, current, acceleration, torque margin and lost motion of a loaded drive as `margins` has them."""
     limits = [
         Requirement(id=f"r{k}", quantity=name, unit=unit, minimum=low, maximum=9.0 if low is None else None,
@@ -216,8 +191,7 @@ def test_requirements_on_the_whole_drive_follow(browser: Browser, tmp_path: Path
         for k, (name, unit, low, load) in enumerate(ASKED)
     ]  # fmt: skip
     design = replace(load_design("fin"), requirements=tuple(limits))
-    trouble: list[str] = []
-    page = opened(browser, written(design, tmp_path), trouble)
+    page = opens(design)
     verdicts_agree(page, command_line(saved(page, tmp_path / "a.toml"), "requirements"))
     first = page.eval_on_selector_all(
         "table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)"
@@ -231,11 +205,9 @@ def test_requirements_on_the_whole_drive_follow(browser: Browser, tmp_path: Path
     verdicts_agree(page, command_line(saved(page, tmp_path / "b.toml"), "requirements"))
     then = page.eval_on_selector_all("table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)")
     assert all(a != b for a, b in zip(first, then, strict=True))
-    page.context.close()
-    assert trouble == []
 
 
-def test_a_requirement_that_needs_a_simulation_of_its_own_is_named(tmp_path: Path) -> None:
+def test_a_requirement_that_needs_a_simulation_of_its_own_is_named(tmp_path) -> None:
     limits = (Requirement(id="swing", quantity="limit_cycle", unit="deg", maximum=0.1),)
     design = replace(load_design("ilr33-amber"), requirements=limits)
     model = live_model(design)

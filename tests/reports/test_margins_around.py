@@ -1,7 +1,5 @@
 """An outer loop around a drive: its margins are borders of the running drive; bad files are one line."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path
@@ -31,7 +29,7 @@ WEATHERCOCK = {
 }  # fmt: skip
 
 
-def growth(table: dict, factor: float, folder: Path, seconds: float) -> float:  # type: ignore[type-arg]
+def growth(table: dict, factor: float, folder: Path, seconds: float) -> float:
     """Largest output of the last third over that of the second, the drive as its exported C in the loop."""
     from examples.exported_drive import ExportedDrive
 
@@ -56,9 +54,7 @@ def growth(table: dict, factor: float, folder: Path, seconds: float) -> float:  
 @needs_compiler
 @pytest.mark.parametrize(("table", "seconds"), [(AIRFRAME, 0.6), (WEATHERCOCK, 1.5)])
 def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(
-    table: dict,  # type: ignore[type-arg]
-    seconds: float,
-    tmp_path: Path,
+    table: dict, seconds: float, tmp_path
 ) -> None:
     loop = loop_around(assemble_loops("ilr33-amber"), outer_loop(table, "test"))
     result = stability_margins(loop.open_loop)
@@ -96,7 +92,7 @@ def test_coefficients_and_matrices_of_one_sampled_system_are_one_loop() -> None:
         assert complex(loop_around(loops, outer).open_loop(z)) == pytest.approx(want, rel=1e-12)
 
 
-def test_the_command_line_judges_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_line_judges_it(tmp_path, capsys) -> None:
     path = tmp_path / "airframe.json"
     path.write_text(json.dumps(AIRFRAME))
     assert main(["margins", "ilr33-amber", "--around", str(path), "--json"]) == 0
@@ -135,12 +131,7 @@ def test_the_command_line_judges_it(tmp_path: Path, capsys: pytest.CaptureFixtur
         *((text, "airframe.json") for text in ("", "[1, 2]", "{", '{"num": [NaN]}', '{"dt": 0, "dt": 1}')),
     ],
 )  # fmt: skip
-def test_a_bad_file_is_one_line(
-    change: dict | str,  # type: ignore[type-arg]
-    said: str,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_a_bad_file_is_one_line(change: dict | str, said: str, tmp_path, capsys) -> None:
     path = tmp_path / "airframe.json"
     if isinstance(change, str):
         path.write_text(change)

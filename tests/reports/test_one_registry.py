@@ -1,7 +1,5 @@
 """A figure is declared in the registry of quantities alone: what shows it, ranks it or searches it loops."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

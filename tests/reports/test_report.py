@@ -1,13 +1,9 @@
 """The report of a design: page and JSON say the same, nothing comes through unescaped."""
 
-from __future__ import annotations
-
 import json
 import math
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,34 +21,7 @@ from reports.drawing import draw_svg
 from reports.html import page
 from reports.numbers import show
 from reports.sections.names import loop_words
-
-
-class Reader(HTMLParser):
-    """Collect the tags, their attributes and the text of a page."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.words: list[str] = []
-        self.skipping = 0
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-        self.skipping += tag in ("style", "script")
-
-    def handle_endtag(self, tag: str) -> None:
-        self.skipping -= tag in ("style", "script")
-
-    def handle_data(self, data: str) -> None:
-        if not self.skipping:
-            self.words.append(data)
-
-
-def read(content: str) -> Reader:
-    """Parse a page."""
-    reader = Reader()
-    reader.feed(content)
-    return reader
+from tests.nightly.site_checks import Page
 
 
 def curves(panel: Panel) -> list[Curve]:
@@ -104,7 +73,7 @@ def test_the_tables_hold_the_margins_of_the_engine(built: Built, name: str) -> N
 
 
 def test_the_page_shows_what_the_json_holds(built: Built) -> None:
-    words = " ".join(read(built.page.read_text(encoding="utf-8")).words)
+    words = " ".join(Page(built.page.read_text(encoding="utf-8")).words)
     for section in built.document["sections"]:
         for block in doc.walk(section):
             if block["kind"] != "table":
@@ -152,9 +121,7 @@ def test_parameters_come_with_source_and_grade(built: Built) -> None:
     assert rows["load.inertia"]["tolerance"] == "±50 %"
 
 
-def test_the_same_input_gives_the_same_bytes(
-    built: Built, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_same_input_gives_the_same_bytes(built: Built, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     document = design_report(load_design("ilr33-amber"), validated())
     page_path, data = write_report(document, tmp_path)
@@ -162,7 +129,7 @@ def test_the_same_input_gives_the_same_bytes(
     assert page_path.read_bytes() == built.page.read_bytes()
 
 
-def test_a_time_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_time_that_is_none_is_refused(monkeypatch) -> None:
     from reports.provenance import build_time
 
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
@@ -173,7 +140,7 @@ def test_a_time_that_is_none_is_refused(monkeypatch: pytest.MonkeyPatch) -> None
 def test_the_page_asks_no_network_and_is_small(built: Built) -> None:
     content = built.page.read_text(encoding="utf-8")
     assert len(content) < 1_300_000
-    for tag, attributes in read(content).tags:
+    for tag, attributes in Page(content).tags:
         for key in ("src", "href", "xlink:href", "action", "data"):
             value = attributes.get(key)
             assert value is None or value.startswith(("#", "data:,")), (tag, key, value)
@@ -182,7 +149,7 @@ def test_the_page_asks_no_network_and_is_small(built: Built) -> None:
 
 
 def test_ids_are_unique(built: Built) -> None:
-    result = read(built.page.read_text(encoding="utf-8"))
+    result = Page(built.page.read_text(encoding="utf-8"))
     ids = [attributes["id"] for _, attributes in result.tags if attributes.get("id")]
     assert len(ids) == len(set(ids))
     targets = {str(attributes["href"])[1:] for tag, attributes in result.tags if tag == "a"}
@@ -190,7 +157,7 @@ def test_ids_are_unique(built: Built) -> None:
 
 
 def test_tables_have_captions_and_scoped_headers(built: Built) -> None:
-    tags = read(built.page.read_text(encoding="utf-8")).tags
+    tags = Page(built.page.read_text(encoding="utf-8")).tags
     names = [tag for tag, _ in tags]
     assert names.count("table") == names.count("caption") > 8
     assert all(attributes.get("scope") in ("row", "col") for tag, attributes in tags if tag == "th")
@@ -219,7 +186,7 @@ def test_names_from_a_design_file_stay_text() -> None:
         parameters=parameters,
     )
     content = page(design_report(hostile))
-    reader = read(content)
+    reader = Page(content)
     kinds = [attributes.get("type") for tag, attributes in reader.tags if tag == "script"]
     # one that runs; the others are data of the sliders
     assert sorted(kinds, key=str) == [None, "application/json", "application/octet-stream"]

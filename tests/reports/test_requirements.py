@@ -1,7 +1,5 @@
 """Verdict and distance of requirements."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

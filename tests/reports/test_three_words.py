@@ -1,7 +1,5 @@
 """Met, not met, not proven: the same words, counts and exit status wherever a requirement is judged."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace
@@ -9,17 +7,22 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
+import analyses.linear.loop_survey
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import design_hash, load_design, read_design_text, write_design
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.errors import InputError
+from analyses.isolation import drain
 from analyses.linear import loop_figures
 from analyses.margins import run
 from analyses.validation import CHECKS, validate
+from reports import document as doc
+from reports.cli.app import build
 from reports.cli.main import main
 from reports.sections.validation import section
-from reports.verdict_summary import verdict_of
+from reports.verdict_summary import verdict_of, verdict_words
 
 HOT = Requirement(id="hot", quantity="winding_temperature", unit="degC", maximum=100.0)
 WAIVED = Waiver(requirement="hot", reason="the motor is outside", date="2026-11-22")
@@ -30,7 +33,7 @@ def asking(*waivers: Waiver, requirements: tuple[Requirement, ...] = (HOT,)) -> 
     return replace(load_design("ilr33-amber"), requirements=requirements, waivers=waivers)
 
 
-def status(path: Path, design: Design, capsys: pytest.CaptureFixture[str], *call: str) -> tuple[int, str]:
+def status(path: Path, design: Design, capsys, *call: str) -> tuple[int, str]:
     path.write_text(write_design(design), encoding="utf-8")
     code = main([call[0], str(path), *call[1:]])
     return code, capsys.readouterr().out
@@ -40,8 +43,8 @@ def status(path: Path, design: Design, capsys: pytest.CaptureFixture[str], *call
     ("waivers", "code", "head", "word"), [((), 1, "NOT PROVEN", "not proven"), ((WAIVED,), 0, "PASS", "met")]
 )
 def test_margins_and_report_say_the_same(
-    waivers: tuple[Waiver, ...], code: int, head: str, word: str, tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    waivers: tuple[Waiver, ...], code: int, head: str, word: str, tmp_path,
+    capsys,
 ) -> None:  # fmt: skip
     design, path = asking(*waivers), tmp_path / "d.toml"
     made = status(path, design, capsys, "margins")
@@ -65,9 +68,7 @@ def test_margins_and_report_say_the_same(
     assert ("the motor is outside" in page) is bool(waivers)
 
 
-def test_a_loop_whose_stability_is_not_known_is_no_pass(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_loop_whose_stability_is_not_known_is_no_pass(monkeypatch, capsys) -> None:
     known = loop_figures.all_loop_figures
 
     def undecided(*args: Any, **options: Any) -> Mapping[str, loop_figures.LoopFigures]:
@@ -81,7 +82,7 @@ def test_a_loop_whose_stability_is_not_known_is_no_pass(
     assert first.startswith("NOT PROVEN  ilr33-amber: stability not known: Current loop.")
 
 
-def test_a_design_without_requirements_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_design_without_requirements_says_so(tmp_path, capsys) -> None:
     code, said = status(tmp_path / "d.toml", asking(requirements=()), capsys, "margins")
     assert code == 0
     assert "The design states no requirements." in said
@@ -144,3 +145,65 @@ def test_a_row_of_a_validation_not_proven_can_be_waived(waived: tuple[str, ...],
     assert made[0]["status"] == ("pass" if passes else "warn")
     wrong = replace(judged, rows=tuple(replace(row, verdict=Verdict.NOT_MET) for row in rows))
     assert wrong.verdict == "not met"  # a waiver lets go what is not proven, never what is contradicted
+
+
+def document(*sections: doc.Section, kind: str = "report") -> Any:
+    return doc.document(title="T", subtitle="", design={}, provenance={}, sections=sections, kind=kind)
+
+
+def test_a_failed_section_fails_the_report() -> None:
+    met = doc.verdict("a", "A", value=3.0, limit=2.0, unit="dB", distance=1.0, passed=True)
+    good = doc.section("one", "One", [doc.verdicts([met])], status="pass")
+    bad = doc.section("missing-linear", "Missing parts", [], status="fail")
+    assert document(good)["verdict"]["passed"] is True
+    whole = document(good, bad)
+    assert whole["verdict"]["passed"] is False
+    assert verdict_words(whole["verdict"]) == ["failed: Missing parts", "1 of 1 requirements met"]
+    assert doc.loads(doc.dumps(whole))["verdict"] == whole["verdict"]
+    assert document(good, bad, kind="validation")["verdict"]["passed"] is True  # its own verdicts decide
+
+
+def test_a_section_with_a_failed_verdict_is_not_said_twice() -> None:
+    missed = doc.verdict("a", "A", value=1.0, limit=2.0, unit="dB", distance=-1.0, passed=False)
+    verdict = document(doc.section("one", "One", [doc.verdicts([missed])], status="fail"))["verdict"]
+    assert verdict_words(verdict) == ["0 of 1 requirements met, 1 not met"]
+
+
+def reported(folder: Path, *changes: str) -> tuple[int, str, Any]:
+    call = ["report", "ilr33-amber", "--no-validation", "--quiet", "--out", str(folder), *changes]
+    done = CliRunner().invoke(build(), call)
+    return done.exit_code, done.output, json.loads((folder / "report.json").read_text())
+
+
+@pytest.mark.parametrize(
+    ("slope", "status", "word"), [("-1", 0, "PASS"), ("1", 0, "PASS"), ("1e9", 1, "FAIL")]
+)
+def test_the_report_of_a_drive_under_a_slope(slope: str, status: int, word: str, tmp_path) -> None:
+    """Held by the load, pushed by it, driven away by it."""
+    changes = ("--set", "load.path=back-drivable", "--set", f"load.moment_slope={slope} N*m/rad")
+    code, output, document = reported(tmp_path, *changes)
+    assert (code, document["verdict"]["passed"]) == (status, status == 0)
+    assert output.lstrip().startswith(word)
+    assert "could not be computed" not in json.dumps(document)
+    if slope == "1":
+        assert "unstable by itself, outer loops open and rotor free" in json.dumps(document)
+        live = document["live"]  # the page has the loop by itself: what is asked of it is named apart
+        assert {item["loop"] for item in live["requirements"] if item["loop"]} == {"velocity", "position"}
+        assert "phase margin, current loop held" in [item["words"] for item in live["apart"]]
+
+
+def test_a_missing_part_is_in_headline_and_json(tmp_path, monkeypatch) -> None:
+    def fails(*_: Any) -> None:
+        raise ZeroDivisionError("made up")
+
+    monkeypatch.setattr(analyses.linear.loop_survey, "_other_form", fails)
+    code, output, document = reported(tmp_path)
+    drain()
+    assert code != 0
+    assert document["verdict"]["passed"] is False
+    assert document["verdict"]["failed_sections"] == ["Missing parts"]
+    assert "FAIL" in output
+    assert "failed: Missing parts" in output
+    assert "failed: Missing parts" in (tmp_path / "report.html").read_text()
+    titles = [part["title"] for part in document["sections"]]
+    assert "Sampled, continuous, ideal" in titles  # of the sampled form alone

@@ -1,4 +1,4 @@
-"""The compiled figures of many designs against assemble_loops and the margin engine, and their own bits."""
+"""Figures of many designs, compiled, against one design's own margins, surveys of them in time."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, sta
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, with_overrides, with_values
 from actuator_lti.errors import InputError
+from analyses.linear.loop_survey import MOST_STATES, survey_loops
 
 NAMES = ("ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps")
 
@@ -117,7 +118,19 @@ def test_the_angle_under_an_elastic_load_is_no_instability():
         assert figures.quantity("phase_margin", name)[0] == pytest.approx(truth.phase_margin_deg, rel=1e-6)
     width = closed_loop_bandwidth(loops.velocity.closed_loop)
     # T at DC is read off at the lowest angle here, not at zero
-    assert figures.quantity("bandwidth", "velocity")[0] == pytest.approx(width.minus3db_hz, rel=1e-3)
+    assert figures.quantity("bandwidth", "velocity")[0] == pytest.approx(width.minus3db_hz, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-compliant", "ballscrew"])
+@pytest.mark.parametrize("slope", [-1e-2, -1e-3, -1e-4])
+def test_a_current_loop_with_an_integrator_has_a_gain_of_one_at_rest_behind_the_softest_spring(name, slope):
+    """For one design and for many: the spring's mode is slow, but seen, and takes T(0) back to 1."""
+    changes = {"load.path": "back-drivable", "load.moment_slope": f"{slope} N*m/rad"}
+    design = with_overrides(load_design(name), changes)
+    width = closed_loop_bandwidth(assemble_loops(design).current.closed_loop)
+    assert width.dc_gain == pytest.approx(1.0, abs=1e-9)
+    figures = linear_figures(Population(design, {}, 1), time_figures=False)
+    assert figures.quantity("bandwidth", "current")[0] == pytest.approx(width.minus3db_hz, rel=1e-9)
 
 
 def test_an_unstable_loop_is_called_so_and_takes_no_delay():
@@ -203,3 +216,17 @@ def test_a_step_is_followed_for_as_long_as_its_resonance_rings(above):
     assert row[_figures.SETTLING] == pytest.approx(truth.settling_time_s / 1e-3, abs=1e-6)
     assert row[_figures.RISE] == pytest.approx(truth.rise_time_s / 1e-3, abs=1e-6)
     assert row[_figures.OVERSHOOT] == pytest.approx(truth.overshoot_percent, rel=1e-7)
+
+
+def test_a_fundamental_of_very_many_states_has_exact_borders_and_a_reason() -> None:
+    changed = {"control.position.every": 40, "control.position.gain": 5.0}
+    design = with_values(load_design("ballscrew"), changed)
+    states = {name: len(loop.plain_open.A) for name, loop in assemble_loops(design).break_points.items()}
+    points = survey_loops(design).break_points
+    large = [name for name, count in states.items() if count > MOST_STATES]
+    assert large
+    for name in large:
+        assert points[name].figures is None
+        assert points[name].exact is not None
+        assert f"{states[name]} states" in points[name].reason
+    assert points["output"].figures is not None

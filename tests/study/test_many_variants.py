@@ -1,7 +1,5 @@
 """A comparison of more designs than a page can show: the ends on the page, the verdict and a table of all."""
 
-from __future__ import annotations
-
 import csv
 import io
 import random
@@ -33,7 +31,7 @@ def one() -> Comparison:
 def moved(verdict: RequirementVerdict, distance: float) -> RequirementVerdict:
     """A verdict whose value lies at another distance from its limit."""
     of = verdict.requirement
-    value = of.maximum - distance if of.minimum is None else of.minimum + distance  # type: ignore[operator]
+    value = of.maximum - distance if of.minimum is None else of.minimum + distance
     return replace(verdict, value=value, distance=distance)
 
 

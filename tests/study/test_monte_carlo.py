@@ -66,7 +66,7 @@ def test_the_worst_case_lies_beyond_the_worst_sample_in_the_corner(study, design
     assert study.verdict == "not met"
     saved = load_design(case.file)
     assert saved.friction.load_coefficient == pytest.approx(1.6 * 1.34e-3)
-    margin = next(w for w in study.worst if w.requirement == "gain-margin")
+    margin = next(w for w in study.worst if w.requirement == "gain-margin/position")
     assert margin.value <= margin.sampled
 
 

@@ -1,12 +1,23 @@
-"""Samples of tolerances: reproducible one by one, with the distributions that were asked for."""
+"""Samples and what is counted of them: Sobol' points, intervals of odds, steps of a sweep."""
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_equal
+from scipy.stats import binom
 
 from actuator_lti import load_design, read_design_text, write_design
+from actuator_lti.batch import Population
+from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.model import Tolerance
 from actuator_lti.errors import InputError
+from analyses.monte_carlo.sketch import MOST, Sketch, merged
+from analyses.monte_carlo.statistics import SHARES, clopper_pearson, column_statistics
+from analyses.monte_carlo.stepping import StepCheck, step_columns, step_rows, step_units
 from analyses.studies.sampling import Factor, Sampler, read_table, sampler_of
+from nonlinear import commands
+from nonlinear.runs.batch import Reducers, Run, simulate_many
 
 R, L = "motor.resistance", "motor.inductance"
 
@@ -110,3 +121,131 @@ def test_a_normal_tolerance_that_reaches_a_negative_inertia_is_refused():
     text = text.replace('tolerance = "50 %"', 'tolerance = { kind = "normal", std = "50 %" }')
     with pytest.raises(InputError, match="truncated-normal"):
         sampler_of(read_design_text(text))
+
+
+def statistics_of(values, size):
+    parts = [Sketch.of(values[k : k + size]) for k in range(0, len(values), size)]
+    return column_statistics("x", "dB", merged(parts))
+
+
+@pytest.mark.parametrize("values", [
+    np.random.default_rng(0).normal(size=MOST),
+    np.random.default_rng(1).lognormal(sigma=3, size=5000),
+    -np.random.default_rng(2).lognormal(sigma=3, size=5000),
+    np.round(np.random.default_rng(3).normal(size=200_000), 3),
+    np.ones(100),
+    np.array([3.0]),
+    np.array([0.0, -0.0, 5e-324, -5e-324, 1e307, -1e307]),
+])  # fmt: skip
+def test_up_to_so_many_different_values_quantiles_are_the_order_statistics(values):
+    result = statistics_of(values, 4096)
+    ranks = np.clip(np.ceil(np.array(SHARES) * len(values)).astype(int) - 1, 0, None)
+    assert result.quantiles == tuple(np.sort(values)[ranks])
+    assert result.count == sum(result.counts) == len(values)
+    assert result.mean == pytest.approx(values.mean(), rel=1e-12, abs=1e-15)
+    if len(values) > 1 and np.abs(values).max() < 1e100:
+        assert result.std == pytest.approx(values.std(ddof=1), rel=1e-9, abs=1e-300)
+
+
+@pytest.mark.parametrize("values", [
+    9.4 + 0.001 * np.random.default_rng(0).normal(size=300_000),
+    np.random.default_rng(1).normal(size=300_000),
+    np.random.default_rng(2).lognormal(sigma=3, size=300_000),
+])  # fmt: skip
+def test_of_more_values_a_quantile_is_that_of_a_narrow_bin(values):
+    """Within a thousandth of the spread or of the value; counts and ends stay exact, the memory bounded."""
+    sketch = merged(Sketch.of(part) for part in np.array_split(values, 50))
+    assert MOST // 4 < len(sketch.keys) <= MOST
+    result = column_statistics("x", "1", sketch)
+    exact = np.quantile(values, SHARES, method="inverted_cdf")
+    np.testing.assert_allclose(result.quantiles, exact, rtol=1e-3, atol=1e-3 * min(1.0, values.std()))
+    assert (result.minimum, result.maximum, result.count) == (values.min(), values.max(), 300_000)
+    assert result.mean == pytest.approx(values.mean(), rel=1e-4, abs=1e-4 * values.std())
+    assert result.std == pytest.approx(values.std(ddof=1), rel=1e-3)
+
+
+@given(
+    values=st.lists(
+        st.floats(-1e307, 1e307) | st.sampled_from([np.nan, np.inf, -np.inf]), min_size=1, max_size=60
+    ),
+    cuts=st.lists(st.integers(1, 59), max_size=6),
+    seed=st.integers(0, 99),
+)
+@settings(max_examples=60)
+def test_sketches_of_parts_are_that_of_the_whole_in_any_order(values, cuts, seed):
+    """Also where bits are dropped: at most 16 bins here."""
+    column = np.array(values)
+    parts = np.split(column, sorted({cut for cut in cuts if cut < len(column)}))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("analyses.monte_carlo.sketch.MOST", 16)
+        whole = Sketch.of(column)
+        shuffled = [Sketch.of(parts[k]) for k in np.random.default_rng(seed).permutation(len(parts))]
+        made = merged(shuffled)
+    assert len(whole.keys) <= 16
+    assert_equal(vars(made), vars(whole))
+    assert_equal(made.moments(), whole.moments())
+
+
+def test_infinite_and_missing_figures_are_counted_apart():
+    values = np.concatenate([np.arange(90.0), np.full(10, np.inf), np.full(100, np.nan)])
+    result = statistics_of(values, 7)
+    assert (result.count, result.missing, result.infinite) == (200, 100, 10)
+    assert result.quantiles[SHARES.index(0.5)] == 49.0  # of the 100 that are defined
+    assert result.quantiles[SHARES.index(0.95)] == np.inf
+    assert result.maximum == 89.0
+
+
+@pytest.mark.parametrize("probability", [0.003, 0.05, 0.5, 0.97])
+def test_the_exact_interval_covers_at_least_as_claimed(probability):
+    count = 200
+    outcomes = np.arange(count + 1)
+    ends = [clopper_pearson(int(k), count) for k in outcomes]
+    covers = np.array([low <= probability <= high for low, high in ends])
+    coverage = binom.pmf(outcomes, count, probability)[covers].sum()
+    assert 0.95 <= coverage <= 1.0
+
+
+def test_the_interval_covers_for_sobol_points_too():
+    """400 studies of 128 points of a known probability: P(x + y < 0.3) = 0.045 in the unit square."""
+    covered = 0
+    for seed in range(400):
+        factors = tuple(Factor(p, 0.5, Tolerance(kind="uniform", half_width=0.5)) for p in "xy")
+        points = Sampler(factors, np.eye(2), seed=seed).draw(0, 128)
+        low, high = clopper_pearson(int((points.sum(axis=1) < 0.3).sum()), 128)
+        covered += low <= 0.045 <= high
+    assert covered >= 0.95 * 400
+
+
+FIXED = ("control.period", "limits.continuous_current", "load.moment_max", "load.moment_slope")
+STEP = StepCheck(0.01, 0.1, load_Nm=2.0)
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position"])
+def test_rows_are_those_of_the_designs(name):
+    design = load_design(name)
+    rng = np.random.default_rng(4)
+    changing = [
+        p
+        for p in paths_of(design)
+        if p in design.parameters and p.startswith(("motor", "gear", "friction", "control", "limits", "load"))
+        and p not in FIXED and not p.endswith("every")
+    ]  # fmt: skip
+    values = {p: parameter_value(design, p) * rng.uniform(0.95, 1.0, 3) for p in changing}
+    if "motor.back_emf_constant" in values:
+        values["motor.back_emf_constant"] = values["motor.torque_constant"]
+    rows = step_rows(STEP, Population(design, values, 3))
+    for k in range(3):
+        changed = with_values(design, {p: float(v[k]) for p, v in values.items()})
+        run = Run(
+            design=changed, command=commands.step(STEP.amplitude_rad), duration_s=0.1, load_Nm=2.0,
+            reducers=Reducers(step_target_rad=STEP.amplitude_rad, extremes=True),
+        )  # fmt: skip
+        truth = simulate_many([run], threads=1).rows[0]
+        assert rows.values[k] == pytest.approx(truth, rel=1e-12, abs=1e-300)
+
+
+def test_every_column_has_a_unit_and_a_value():
+    columns = step_columns(STEP, Population(load_design("ilr33-amber"), {}, 1))
+    assert columns.keys() == step_units().keys()
+    assert columns["nonlinear.rise_time"][0] > 0.01
+    assert columns["nonlinear.peak_current"][0] <= 12.5

@@ -11,26 +11,40 @@ from actuator_lti import assemble_loops, load_design
 from actuator_lti.bandwidth import closed_loop_bandwidth
 from analyses.large_signal.bode import MINUS_3DB, AmplitudeBode, _crossing, amplitude_bode, crossing_range
 from analyses.large_signal.map import amplitude_map
+from analyses.linear.loop_figures import all_loop_figures
 from reports.sections.large_signal import _result
 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "emps"])
 def test_small_amplitudes_without_friction_have_the_linear_bandwidth(name: str) -> None:
-    """Interpolated between 40 frequencies: to 0.5 %."""
+    """Between the map's frequencies as the linear response goes: to 5e-6."""
     design = load_design(name)
     loops = assemble_loops(design)
     small = replace(design.validation, full_deflection_rad=design.validation.full_deflection_rad / 1e5)
     tiny = replace(design, validation=small)
-    result = amplitude_bode(tiny, amplitude_map(tiny, loops, friction_on=False, counts=(6, 40)))
+    result = amplitude_bode(tiny, loops, amplitude_map(tiny, loops, friction_on=False, counts=(6, 40)))
     exact = closed_loop_bandwidth(loops.reference_to_output)
-    np.testing.assert_allclose(result.minus3db_hz, exact.minus3db_hz, rtol=5e-3)
-    np.testing.assert_allclose(result.minus90deg_hz, exact.minus90deg_hz, rtol=5e-3)
-    assert result.linear_minus3db_hz == pytest.approx(exact.minus3db_hz, rel=5e-3)
+    np.testing.assert_allclose(result.minus3db_hz, exact.minus3db_hz, rtol=5e-6)
+    np.testing.assert_allclose(result.minus90deg_hz, exact.minus90deg_hz, rtol=5e-6)
+    assert result.linear_minus3db_hz == pytest.approx(exact.minus3db_hz, rel=5e-6)
+
+
+@pytest.mark.parametrize("name", ["fin", "ballscrew"])
+def test_the_linear_bandwidth_is_that_of_the_margins_however_coarse_the_map(name: str) -> None:
+    """A moment over the angle (the gain at zero frequency is no 1), a limited jerk."""
+    design = load_design(name)
+    loops = assemble_loops(design)
+    result = amplitude_bode(design, loops, amplitude_map(design, loops, counts=(2, 14)))
+    exact = all_loop_figures(loops)["position"].bandwidth
+    assert exact is not None
+    assert result.linear_minus3db_hz == pytest.approx(exact.minus3db_hz, rel=1e-4)
+    assert result.linear_minus90deg_hz == pytest.approx(exact.minus90deg_hz, rel=1e-4)
 
 
 def test_limits_take_bandwidth_away_as_the_amplitude_grows() -> None:
     design = load_design("ilr33-amber")
-    result = amplitude_bode(design, amplitude_map(design, assemble_loops(design), counts=(16, 30)))
+    loops = assemble_loops(design)
+    result = amplitude_bode(design, loops, amplitude_map(design, loops, counts=(16, 30)))
     full = design.validation.full_deflection_rad
     np.testing.assert_allclose(result.amplitude_rad, np.array(result.fractions) * full)
     assert result.fractions == (0.05, 0.1, 0.25, 0.5, 1.0)

@@ -37,7 +37,11 @@ def test_rms_current_of_a_slow_sine_is_friction_and_inertia() -> None:
     dry = design.friction.dry_torque_Nm + design.friction.load_coefficient * M
     torque = dry * np.sign(w) + design.friction.viscous_Nms_rad * w + design.inertia_kgm2 * dw
     assert result.rms_A == pytest.approx(np.sqrt(np.mean(torque**2)) / 5.9e-3, rel=0.02)
-    assert result.passed == (result.rms_A <= 4.0)
+    assert result.verdict == ("met" if result.rms_A <= 4.0 else "not met")
+
+
+def test_without_any_rating_nothing_is_proven() -> None:
+    assert duty(load_design("fin")).verdict == "not proven"
 
 
 def test_motion_and_rest_add_by_their_squares() -> None:
@@ -70,7 +74,7 @@ def test_the_protection_acts_when_the_running_drive_says() -> None:
     asked = Asked.of(design, amplitude_rad=0.4, frequency_hz=2.0, load_Nm=60.0)
     result = duty(design, asked)
     assert result.overload is not None
-    assert not result.passed
+    assert result.verdict == "not met"
     drive, k, ticks = Drive(design, load_Nm=60.0), 0, len(result.time_s)
     while drive.value("overloaded") == 0.0 and k < 100 * ticks:
         drive.step(0.4 * sin(2 * pi * k / ticks))

@@ -82,7 +82,7 @@ def test_the_bandwidth_of_the_map_is_that_of_the_output() -> None:
     """Behind a soft spring, where the motor's side has another."""
     soft = replace(drive_f().coupling, stiffness_Nm_rad=3.0)  # type: ignore[type-var]
     design = small(without_friction(replace(drive_f(), coupling=soft)))
-    bode = amplitude_bode(design, mapped(design, (2, 40)))
+    bode = amplitude_bode(design, assemble_loops(design), mapped(design, (2, 40)))
     np.testing.assert_allclose(bode.minus3db_hz, bode.linear_minus3db_hz, rtol=1e-5)
 
 

@@ -118,12 +118,16 @@ def test_python_control_draws_it() -> None:
     )
 
 
-FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035]
+FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035, 740_026,
+               741_646, 90_006, 770_155]  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", FAILED_ONCE)
 def test_drives_that_failed_once(seed: int) -> None:
-    """A filter of the command lags behind a ramp; margins, peaks at rest lie on a mode at rest, an angle."""
+    """A filter of the command lags behind a ramp; margins, peaks at rest lie on a mode at rest, an angle.
+
+    A slow pair was taken for the rest that an integral holds; a response of 1e-10 was left to rounding.
+    """
     result = validate(full_drive(seed), CHECKS)
     assert result.passed, [str(row) for row in result.not_met]
 
@@ -134,14 +138,29 @@ def test_drives_that_failed_once(seed: int) -> None:
         (730_131, ("command", "load")),
         (730_124, ("position", "w_ref", "command")),
         (720_019, ("velocity", "i_ref")),
+        (240, ("command", "load")),
     ],
 )
 def test_drives_that_were_not_proven_once(seed: int, places: tuple[str, ...]) -> None:
-    """Cogging of which large steps saw the mean; a twist beside a large angle; angles moved by 1e-13."""
+    """Cogging of which large steps saw the mean; a twist beside a large angle; angles moved by 1e-13.
+
+    A drive that stands with its coupling pressed was fed forward to the angle of its output (240).
+    """
     design = full_drive(seed)
     bench = Bench(design, design)
     for name in places:
         assert {row.verdict for row in small_signal(bench.place(name))} == {Verdict.MET}, name
+
+
+def test_a_resonance_that_is_not_resolved_is_not_proven() -> None:
+    """A load of damping 5e-9: each figure is allowed what the errors make of it where it is."""
+    design = full_drive(760_008)
+    rows = small_signal(Bench(design, design).place("u"))
+    unproven = [row for row in rows if row.verdict is not Verdict.MET]
+    assert {"response", "sensitivity_peak"} <= {row.name for row in unproven}
+    for row in unproven:
+        assert row.verdict is Verdict.NOT_PROVEN
+        assert "stated error of the tangent there" in row.because
 
 
 def test_a_place_that_there_is_not() -> None:

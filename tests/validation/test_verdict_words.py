@@ -56,7 +56,7 @@ def test_an_unstable_loop_is_not_met_and_its_response_still_is() -> None:
     assert not result.not_met  # the simulator's poles and response are those predicted, unstable as they are
     made = summary(result)
     items = next(block for block in made["blocks"] if block["kind"] == "verdicts")["items"]
-    assert any(item["verdict"] == "not met" and "unstable" in item["label"] for item in items)
+    assert any(item["verdict"] == "not met" and "unstable" in item["reason"] for item in items)
 
 
 def hunting(step_rad: float, swing_rad: float, hertz: float) -> Settling:

@@ -1,0 +1,113 @@
+"""A law of one's own in place of a stage's gains and filters (model.md section 10), and the keys of it.
+
+Once a period T of its stage
+
+    v_k = gain (C x_k + D e_k),   x_(k+1) = A x_k + B e_k + L (u_k - v_k),
+
+u being what the limits of the stage leave of v, e the named signals as the controller sees them.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal, NamedTuple, get_args
+
+import numpy as np
+
+from actuator_lti.design.field import BIG, matrix, names, positive, quantities, quantity
+
+LawInput = Literal["command", "error", "speed", "angle", "current", "output_angle", "output_speed"]
+LAW_INPUTS: tuple[str, ...] = get_args(LawInput)
+MOST_STATES = 16
+"""Order of a law that the running drive has room for."""
+SINGULAR = 1e12  # condition of I - A beyond which a law integrates
+Matrix = tuple[tuple[float, ...], ...]
+_LIST = {"low": -BIG, "high": BIG}
+
+
+class Matrices(NamedTuple):
+    """A (n, n), B (n, m), C (n,), D (m,), L (n,) as arrays."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    L: np.ndarray
+
+
+# fmt: off
+@dataclass(frozen=True, kw_only=True)
+class StateSpace:
+    """A, B, C and D of a law with one output: ``n`` states, ``m`` inputs; without A a mere gain D."""
+
+    A: Annotated[Matrix, matrix("A", "n rows of n numbers; without states left out")] = ()
+    B: Annotated[Matrix, matrix("B", "n rows, a column for each input")] = ()
+    C: Annotated[tuple[float, ...], quantities("C", "1", "one row of n numbers", **_LIST)] = ()
+    D: Annotated[tuple[float, ...], quantities(
+        "D", "1", "one row, a number for each input; zeros where left out", **_LIST)] = ()
+
+    def sizes(self, inputs: int) -> dict[str, tuple[str, bool]]:
+        """Of each matrix the shape that it must have, and whether it has it."""
+        n = len(self.A)
+        return {
+            "A": (f"{n} x {n}", all(len(row) == n for row in self.A)),
+            "B": (f"{n} x {inputs}", len(self.B) == n and all(len(row) == inputs for row in self.B)),
+            "C": (f"1 x {n}", len(self.C) == n),
+            "D": (f"1 x {inputs}", len(self.D) in ((0, inputs) if n else (inputs,))),
+        }
+
+    def matrices(self, inputs: int, L: tuple[float, ...] = ()) -> Matrices:
+        """As arrays; D and L of zeros where they are left out."""
+        n = len(self.A)
+        return Matrices(
+            np.array(self.A, dtype=float).reshape(n, n),
+            np.array(self.B, dtype=float).reshape(n, inputs),
+            np.array(self.C, dtype=float).reshape(n),
+            np.array(self.D or (0.0,) * inputs, dtype=float),
+            np.array(L or (0.0,) * n, dtype=float),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Law(StateSpace):
+    """A discrete linear law of one stage, at that stage's period."""
+
+    inputs: Annotated[tuple[LawInput, ...], names(
+        "inputs", "the signals that it takes, a column of B and D each")]
+    L: Annotated[tuple[float, ...], quantities(
+        "L", "1", "anti-windup: n numbers that the states take of u - v; zeros where left out", **_LIST)] = ()
+    gain: Annotated[float, quantity(
+        "gain", "1", "", "factor on the law; its tolerance is that of the whole law", example="1")] = 1.0
+    period_s: Annotated[float | None, positive(
+        "period", "s", "", "period that the law was made for: must be that of its stage", high=1e4,
+        example="1 ms")] = None
+    continuous: StateSpace | None = None
+
+    @property
+    def sampled(self) -> Matrices:
+        """The matrices that run."""
+        return self.matrices(len(self.inputs), self.L)
+
+    @property
+    def integrates(self) -> bool:
+        """Whether it has a pole at z = 1."""
+        return bool(self.A) and bool(np.linalg.cond(np.eye(len(self.A)) - self.sampled.A) > SINGULAR)
+
+    @property
+    def direct(self) -> float:
+        """What a command of one gives at once."""
+        return self.gain * sum(self._commanded(self.sampled.D))
+
+    def steady(self, name: str) -> float:
+        """Gain on a signal at zero frequency (of the command by the error, too); inf: integrates."""
+        A, B, C, D, _ = self.sampled
+        if self.integrates:
+            return np.inf
+        gains = D + C @ np.linalg.solve(np.eye(len(A)) - A, B)
+        if name == "command":
+            return self.gain * sum(self._commanded(gains))
+        return self.gain * float(gains[self.inputs.index(name)]) if name in self.inputs else 0.0
+
+    def _commanded(self, gains: np.ndarray) -> list[float]:
+        """Of the gains on all inputs those that a command reaches."""
+        return [
+            float(one) for name, one in zip(self.inputs, gains, strict=True) if name in ("command", "error")
+        ]

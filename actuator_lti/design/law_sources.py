@@ -1,0 +1,110 @@
+"""Matrices of a law of one's own from a .mat or JSON file."""
+
+from __future__ import annotations
+
+import io
+import json
+from math import isqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.errors import InputError
+from actuator_lti.files.reading import decode, read_bytes, shown_path
+from actuator_lti.files.tree import Tree
+
+PARTS = ("A", "B", "C", "D")
+_PERIODS = ("period", "Ts", "dt")
+_WHAT = "file of a law: A, B, C, D and Ts, as .mat up to version 7 or .json"
+
+
+def read_law(path: Path) -> Tree:
+    """The matrices of a file as a design file writes them, with ``period``.
+
+    MATLAB: ``[A,B,C,D,Ts] = ssdata(K); save('k.mat','A','B','C','D','Ts')``, or a structure of these fields.
+
+    Raises
+    ------
+    InputError
+        Naming the file and what is allowed.
+    """
+    where, data = shown_path(path), read_bytes(path, _WHAT)
+    if path.suffix not in (".mat", ".json"):
+        raise InputError(f"allowed: a {_WHAT}", where=where)
+    try:
+        held = _from_mat(data) if path.suffix == ".mat" else json.loads(decode(data, where))
+    except (ValueError, TypeError, RecursionError, NotImplementedError, OSError) as error:
+        raise InputError(f"cannot be read: {error}; allowed: a {_WHAT}", where=where) from None
+    held = _holding(held)
+    if held is None:
+        raise InputError(f"holds no A, B, C and D; allowed: a {_WHAT}", where=where)
+    period = next((held[name] for name in _PERIODS if name in held), None)
+    if period is None:
+        raise InputError(f"has no Ts, the period that the law was made for; allowed: a {_WHAT}", where=where)
+    try:
+        A, B, C, D, L = (held.get(part, ()) for part in (*PARTS, "L"))
+        return law_tree(A, B, C, D, L, np.asarray(period).item())
+    except (ValueError, TypeError) as error:
+        raise InputError(f"{error}; allowed: a {_WHAT}", where=where) from None
+
+
+def _from_mat(data: bytes) -> Tree:
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        return dict(loadmat(io.BytesIO(data), mat_dtype=True))
+    except MatReadError as error:
+        raise ValueError(error) from None
+
+
+def _holding(held: Any) -> Tree | None:
+    """The table that has D and perhaps the others: the file itself, or the one structure in it."""
+    if not isinstance(held, dict):
+        return None
+    inside = [held, *(_fields(value) for value in held.values())]
+    return next((one for one in inside if one is not None and "D" in one), None)
+
+
+def _fields(value: Any) -> Tree | None:
+    """A table, or the fields of a MATLAB structure."""
+    names = getattr(getattr(value, "dtype", None), "names", None)
+    if names and value.size == 1:
+        return {name: value[name].flat[0] for name in names}
+    return value if isinstance(value, dict) else None
+
+
+def law_tree(A: Any, B: Any, C: Any, D: Any, L: Any = (), period_s: Any = None) -> Tree:
+    """Matrices of one output as a design file writes them.
+
+    Raises
+    ------
+    InputError
+        For what is no matrix of numbers, or more than one output.
+    """
+    parts = {}
+    for name, given in zip((*PARTS, "L"), (A, B, C, D, L), strict=True):
+        try:
+            parts[name] = np.asarray(given, dtype=float)
+        except (ValueError, TypeError):
+            raise InputError(f"{name}: allowed: a matrix of real numbers") from None
+    n = isqrt(parts["A"].size)
+    if parts["A"].size != n * n or (parts["A"].ndim == 2 and parts["A"].shape != (n, n)):
+        raise InputError(f"A: {_shape(parts['A'])}; allowed: as many rows as columns")
+    for name in ("C", "D"):
+        if parts[name].ndim > 2 or (parts[name].ndim == 2 and len(parts[name]) > 1):
+            raise InputError(f"{name}: {_shape(parts[name])}; allowed: one row, a law has one output")
+    if n and parts["B"].size % n:
+        raise InputError(f"B: {_shape(parts['B'])}; allowed: {n} rows, as A has")
+    tree: Tree = {
+        "A": parts["A"].reshape(n, n).tolist(),
+        "B": parts["B"].reshape(n, -1).tolist() if n else [],
+        **{name: parts[name].ravel().tolist() for name in ("C", "D", "L")},
+    }
+    tree = {name: value for name, value in tree.items() if value}
+    return tree if period_s is None else {**tree, "period": f"{float(period_s)!r} s"}
+
+
+def _shape(matrix: np.ndarray) -> str:
+    return " x ".join(str(size) for size in matrix.shape) or "one number"

@@ -1,0 +1,104 @@
+"""A system of python-control or scipy as a law of one's own of a design."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.design.law import LAW_INPUTS
+from actuator_lti.design.law_sources import PARTS, law_tree
+from actuator_lti.design.model import Design
+from actuator_lti.design.writing import design_tree, with_overrides
+from actuator_lti.errors import InputError
+from actuator_lti.files.reading import shown
+
+STAGES = ("current", "velocity", "position")
+METHODS = {"tustin": "bilinear", "zoh": "zoh"}
+"""How a continuous system may be sampled, and scipy's word for it."""
+_KEPT = ("every", "sensor", "back_emf_feedforward", "resistance_feedforward")
+
+
+def _columns(system: Any) -> tuple[Any, ...]:
+    """A, B, C, D of a transfer function of python-control with one output, its columns side by side."""
+    from scipy.linalg import block_diag
+    from scipy.signal import tf2ss
+
+    if len(system.num) != 1:
+        raise InputError(f"system: {len(system.num)} outputs; allowed: one, that of the stage")
+    parts = [tf2ss(num, den) for num, den in zip(system.num[0], system.den[0], strict=True)]
+    A, B, C, D = zip(*parts, strict=True)
+    return block_diag(*A), block_diag(*B), np.hstack(C), np.hstack(D)
+
+
+def _state_space(system: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """A, B, C, D and dt of what somebody calls a system; dt is ``None`` where it does not say."""
+    if isinstance(system, tuple | list) and len(system) in (4, 5):
+        return (*system[:4], system[4] if len(system) == 5 else None)
+    dt = getattr(system, "dt", None)
+    if type(system).__module__.startswith("scipy.signal"):
+        dt = 0 if dt is None else dt
+        system = system.to_ss()
+    elif hasattr(system, "num") and hasattr(system, "den"):
+        return (*_columns(system), dt)
+    if not all(hasattr(system, part) for part in PARTS):
+        raise InputError(
+            f"system = {shown(system)}: allowed: a state space or transfer function of python-control or "
+            "scipy.signal, or (A, B, C, D, dt)"
+        )
+    return system.A, system.B, system.C, system.D, dt
+
+
+def _inputs(system: Any, inputs: Sequence[str] | None) -> list[str]:
+    """The names of the inputs: as given, else the system's own labels."""
+    given = getattr(system, "input_labels", None) if inputs is None else inputs
+    if isinstance(given, str) or not isinstance(given, Sequence) or not {*given} <= {*LAW_INPUTS}:
+        raise InputError(f"inputs = {shown(given)}: allowed: a list of {', '.join(LAW_INPUTS)}")
+    return list(given)
+
+
+def with_law(
+    design: Design,
+    stage: str,
+    system: Any,
+    inputs: Sequence[str] | None = None,
+    *,
+    L: Any = (),
+    gain: float = 1.0,
+    every: int | None = None,
+    method: str | None = None,
+    continuous: Any = None,
+) -> Design:
+    """A copy of a design with a law of one's own at a stage, see `Design.with_law`."""
+    if stage not in STAGES:
+        raise InputError(f"stage = {shown(stage)}: allowed: {', '.join(STAGES)}")
+    there: Mapping[str, Any] = design_tree(design)["control"].get(stage, {})
+    table = {key: value for key, value in there.items() if key in _KEPT}
+    table |= {} if every is None else {"every": every}
+    ticks = 1 if stage == "current" else table.get("every", 1)
+    period_s = design.controller.period_s * (ticks if isinstance(ticks, int) and ticks > 0 else 1)
+    A, B, C, D, dt = _state_space(system)
+    if method is not None:
+        continuous, (A, B, C, D), dt = (A, B, C, D), _sampled((A, B, C, D), dt, period_s, method), period_s
+    elif dt is None or dt is True or dt == 0:
+        kind = "continuous" if dt is not None and dt is not True else "of no stated period"
+        raise InputError(
+            f"system: {kind}; allowed: a sampled one of dt = {period_s:g} s, the {stage} stage's period, "
+            f"or a continuous one with method = {' or '.join(METHODS)}"
+        )
+    law = {**law_tree(A, B, C, D, L, dt), "inputs": _inputs(system, inputs), "gain": gain}
+    if continuous is not None:
+        law["continuous"] = law_tree(*_state_space(continuous)[:4])
+    return with_overrides(design, {f"control.{stage}": {**table, "law": law}})
+
+
+def _sampled(parts: tuple[Any, ...], dt: Any, period_s: float, method: str) -> tuple[Any, ...]:
+    """A continuous system sampled by a stated method."""
+    from scipy.signal import cont2discrete
+
+    if method not in METHODS:
+        raise InputError(f"method = {shown(method)}: allowed: {' or '.join(METHODS)}")
+    if dt not in (None, 0) or dt is False:
+        raise InputError(f"method = {shown(method)}: the system is sampled already, dt = {dt}")
+    return tuple(cont2discrete(tuple(np.atleast_2d(part) for part in parts), period_s, METHODS[method])[:4])

@@ -1,0 +1,161 @@
+"""The axis in the parts in which a factored loop is searched: its ends, all crossings, smallest distances."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.errors import NumericalError
+from actuator_lti.margins.axis_search import Found, passages, search
+from actuator_lti.margins.distances import Distance
+from actuator_lti.margins.factored import Response
+from actuator_lti.margins.factors_on_axis import Factored
+from actuator_lti.margins.loop import Mask, Real
+from actuator_lti.margins.nearest import nearest
+from actuator_lti.margins.trust import Doubtful
+
+_LOW, _HIGH = 1e-3, 1e3  # of the smallest and largest root: where the ends of the axis begin
+_NEAR_ONE = 1e-6
+_HARDLY = 1e-12  # rad
+_FLOORS = (0.01, 0.1, 0.5, 0.9)  # gain below which, behind a delay, no crossing of the real axis is listed
+_LEAST_GAIN = 1e-8
+_MOST_TURNS = 100_000  # of the delay that are listed, about a second's work
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the axis: up to the middle, or from there on as 1/w."""
+
+    factors: Factored
+    found: Found
+    beyond: bool
+
+
+def axis_parts(factors: Factored, band: tuple[float, float] | None) -> tuple[list[Part], float, float]:
+    """The axis in one part where the gain falls off or turns for ever, else in two: infinity is zero of 1/w.
+
+    With them, up to where crossings of the real axis are listed, and above which gain.
+    """
+    size = np.abs(factors.roots[factors.roots != 0.0])
+    scale = 1.0 / factors.delay if factors.delay else 1.0
+    least, most = (float(size.min()), float(size.max())) if size.size else (scale, scale)
+    low = _start(factors, _LOW * min(least, scale if factors.delay else least))
+    if factors.delay:
+        most_turned = 2.0 * math.pi * _MOST_TURNS / factors.delay
+        high, listed_to, floor = _turning_stop(factors, low, most, most_turned)
+        if band is not None:
+            listed_to, high = float(band[1]), max(high, 2.0 * float(band[1]))
+        if listed_to > most_turned:
+            turns = factors.delay * listed_to / (2.0 * math.pi)
+            raise NumericalError(
+                f"the delay turns the loop {turns:.1e} times where margins are listed; "
+                "shorten the delay, or ask for a narrower band_rad_s"
+            )
+        return [Part(factors, search(factors, low, high, listed_to), False)], listed_to, floor
+    if factors.at_infinity:
+        return [Part(factors, search(factors, low, _stop(factors, _HIGH * most)), False)], math.inf, 0.0
+    middle, mirrored = 2.0 * most, factors.reciprocal()
+    return (
+        [
+            Part(factors, search(factors, low, middle), False),
+            Part(mirrored, search(mirrored, _start(mirrored, _LOW / most), 1.0 / middle), True),
+        ],
+        math.inf,
+        0.0,
+    )
+
+
+def _turning_stop(
+    factors: Factored, low: float, most: float, most_turned: float
+) -> tuple[float, float, float]:
+    """Under a delay: a frequency above which |L| is next to nothing, and up to where crossings are listed.
+
+    With them the gain above which they are: the lowest of `_FLOORS` that does not list too many turns.
+    """
+    slope, high = factors.at_infinity, _HIGH * most
+    if not slope:
+        listed_to = 10.0 * most + 8.0 * math.pi / factors.delay
+        return 10.0 * max(high, listed_to), listed_to, 0.0
+    top = max(high, high * math.exp((math.log(_LEAST_GAIN) - factors.log_at(high)[0]) / slope))
+    for floor in _FLOORS:
+        listed_to = float(passages(factors, low, top, math.log(floor)).max(initial=low))
+        if listed_to <= most_turned:
+            break
+    return top, listed_to, floor
+
+
+def _stop(factors: Factored, high: float) -> float:
+    """A frequency above which gain and phase follow the slope at infinity."""
+    slope = factors.at_infinity
+    high = max(high, 10.0 * high * math.exp(-factors.log_at(high)[0] / slope))
+    if not high < 1e150:
+        raise Doubtful("too wide a range")
+    if slope % 2 == 0 and abs(math.sin(factors.log_at(high)[1])) < _HARDLY:
+        raise Doubtful("the phase hardly leaves the real axis at an end of the axis")
+    return high
+
+
+def _start(factors: Factored, low: float) -> float:
+    """Zero, or a frequency below which gain and phase follow the roots at zero."""
+    order = factors.at_zero
+    if not order:
+        if abs(factors.log_at(0.0)[0]) < _NEAR_ONE:
+            raise Doubtful("the gain is one at an end of the axis")
+        return 0.0
+    low = min(low, 0.1 * low * math.exp(-factors.log_at(low)[0] / order))
+    if not 1e-150 < low < 1e150:
+        raise Doubtful("too wide a range")
+    if order % 2 == 0 and abs(math.sin(factors.log_at(low)[1])) < _HARDLY:
+        raise Doubtful("the phase hardly leaves the real axis at an end of the axis")
+    return low
+
+
+def axis_ends(factors: Factored, response: Response) -> tuple[complex, complex]:
+    """L at both ends of the axis: infinity where it has a pole, exactly 0 where it has a zero."""
+    first = response.at_rest() if not factors.at_zero else complex(math.inf if factors.at_zero < 0.0 else 0.0)
+    return first, response.at_end()
+
+
+def merged(parts: list[Part]) -> tuple[Real, Real, Mask, int]:
+    """All crossings in order of w."""
+
+    def whole(name: str) -> Any:
+        return np.concatenate([getattr(part.found, name)[:: -1 if part.beyond else 1] for part in parts])
+
+    beyond = [part.beyond for part in parts]
+
+    def in_w(name: str) -> Real:
+        late = np.repeat(beyond, [getattr(part.found, name).size for part in parts])
+        values = whole(name)
+        return np.asarray(np.where(late, 1.0 / values, values))
+
+    return in_w("gain_w"), in_w("real_w"), whole("rising"), sum(part.found.far for part in parts)
+
+
+def distances_over(
+    factors: Factored,
+    response: Response,
+    parts: list[Part],
+    ends: tuple[complex, complex],
+    distances: tuple[Distance, ...],
+) -> list[tuple[float, float]]:
+    """Smallest values of distances, each with its frequency."""
+    nearest_ends = (ends[0], complex(-abs(ends[1])) if factors.delay else ends[1])
+    best = [
+        min((d.at(value), w) for value, w in zip(nearest_ends, (0.0, math.inf), strict=True))
+        for d in distances
+    ]
+    for part in parts:
+        found = nearest(part.factors, part.found.known, distances, best)
+        best = [
+            (new[0], 1.0 / new[1] if part.beyond else new[1]) if new[0] < old[0] else old
+            for new, old in zip(found, best, strict=True)
+        ]
+    out = []
+    for d, (value, w) in zip(distances, best, strict=True):
+        inside = 0.0 < w < math.inf
+        out.append((d.at(complex(response.at(np.array([w]))[0])) if inside else value, response.frequency(w)))
+    return out

@@ -1,0 +1,156 @@
+"""A record before it is believed: clipped, late, drifting; put right where it can be, and said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.means import correlation_time
+from analyses.identification.inverse import fit_records
+from analyses.identification.joint_model import JointModel, Recipe
+from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows
+from analyses.identification.simultaneous import SURE, Lag, lag_of, shifted
+from analyses.records.consistency import Finding
+from analyses.records.record import FloatArray, Record
+
+LEAST_RUN = 3
+"""Samples in a row at the largest or smallest value of all: a flat top."""
+
+Fitted = tuple[JointModel, tuple[Record, ...]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Diagnosed:
+    """The model of records that were put right, these as the result simulates them, and what was found."""
+
+    model: JointModel
+    records: tuple[Record, ...]
+    simulated: tuple[Record, ...]
+    findings: Mapping[str, tuple[Finding, ...]]
+
+
+def diagnosed(
+    start: Design,
+    records: Sequence[Record],
+    fit: Callable[[Sequence[Record]], Fitted],
+    recipe: Recipe | None,
+) -> Diagnosed:
+    """Fit records, rows of clipped current left out and lags taken back where they are sure.
+
+    Parameters
+    ----------
+    fit : callable
+        The model of records, and these as the design that comes of it simulates them (none: it cannot).
+    recipe : Recipe or None
+        Of the fit.
+    """
+    found: dict[str, list[Finding]] = {record.name: [] for record in records}
+    used = tuple(_without_flat_tops(start, record, recipe, found[record.name]) for record in records)
+    model, simulated = fit(used)
+    lags = [_lag(start, *pair, model, recipe) for pair in zip(used, simulated, strict=bool(simulated))]
+    for record, lag in zip(used, lags, strict=False):
+        if lag is not None:
+            found[record.name].append(_of_lag(drive_of(start, record)[1], lag))
+    sure = [lag for lag in lags if lag is not None and lag.is_sure]
+    if sure:
+        pairs = zip(used, lags, strict=True)
+        used = tuple(
+            shifted(start, record, lag.seconds) if lag is not None and lag.is_sure else record
+            for record, lag in pairs
+        )
+        before = model
+        model, simulated = fit(used)
+        model = _with_error_of(sure, before, model)
+    return Diagnosed(
+        model=model,
+        records=used,
+        simulated=simulated,
+        findings={name: tuple(each) for name, each in found.items()},
+    )
+
+
+def _lag(
+    start: Design, record: Record, simulated: Record, model: JointModel, recipe: Recipe | None
+) -> Lag | None:
+    """The lag of a record, less what the same analysis finds in its simulation, which has none."""
+    if is_benchmark(record):
+        return None
+    lag, own = (lag_of(start, one, simulated, model, recipe) for one in (record, simulated))
+    return None if lag is None or own is None else lag.less(own)
+
+
+def _of_lag(signal: str, lag: Lag) -> Finding:
+    subject = f"{signal.replace('_', ' ')} and motion at one time"
+    late, error = 1e3 * lag.seconds, 1e3 * lag.standard_error
+    if not lag.is_sure:
+        text = f"within {max(abs(late), 2.0 * error):.2g} ms"
+        return Finding(subject=subject, passed=True, text=text)
+    which = "later" if late > 0.0 else "earlier"
+    text = f"the {signal} is {abs(late):.3g} ms (standard error {error:.1g} ms) {which} than the motion"
+    return Finding(subject=subject, passed=None, text=f"{text}: taken back by as much before the fit")
+
+
+def _with_error_of(lags: Sequence[Lag], before: JointModel, model: JointModel) -> JointModel:
+    """The model with what the error of the lags adds to its covariance."""
+    if before.names != model.names:
+        return model
+    moved = model.values - before.values
+    share = float(np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in lags]))
+    return replace(model, covariance=model.covariance + share * np.outer(moved, moved))
+
+
+def flat_tops(values: FloatArray) -> NDArray[np.bool_]:
+    """Where a signal stands at its largest or smallest value for three samples or more.
+
+    Examples
+    --------
+    >>> flat_tops(np.array([0.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.0])).astype(int).tolist()
+    [0, 1, 1, 1, 0, 0, 0, 0]
+    """
+    out = np.zeros(len(values), dtype=bool)
+    for level in (np.max(values), np.min(values)):
+        at = np.abs(values - level) <= 1e-9 * np.ptp(values)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], at.astype(np.int8), [0]])))
+        for start, stop in zip(edges[::2], edges[1::2], strict=True):
+            out[start:stop] |= stop - start >= LEAST_RUN
+    return out
+
+
+def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None, found: list[Finding]) -> Record:
+    """The record without the rows of a flat top, where all others say that the drive signal was larger."""
+    name = drive_of(start, record)[1]
+    flat = flat_tops(record[name])
+    if is_benchmark(record) or not np.any(flat) or np.all(flat):
+        return record
+    reach = 2 * (recipe or recipe_for(record)).decimation  # of the filter before the decimation
+    near = np.convolve(flat, np.ones(2 * reach + 1), mode="same") > 0.5
+    without = replace(record, left_out=near)
+    try:
+        fit, whole = (
+            fit_records(start, [without], recipe=recipe),
+            record_rows(start, record, "symmetric", recipe),
+        )
+    except (InputError, NumericalError):
+        return record
+    rows = (whole.keep & ~fit.records[0].keep)[whole.keep]
+    if not np.any(rows):
+        return record
+    modelled = whole.w[rows] @ np.array([fit[name] for name in whole.names])
+    more = np.sign(whole.y[rows]) * (modelled - whole.y[rows])
+    rest = fit.residual
+    error = float(np.std(rest)) * np.sqrt(correlation_time(rest) / len(more))
+    subject = f"{name} without flat tops"
+    share = 100.0 * np.count_nonzero(flat) / len(flat)
+    if not float(np.mean(more)) > SURE * error:
+        return record
+    text = (
+        f"{share:.2g} % of its samples stand at the largest value, {np.max(np.abs(record[name])):.4g}, where "
+        "the other rows say that it was larger: clipped; these rows are left out"
+    )
+    found.append(Finding(subject=subject, passed=None, text=text))
+    return without

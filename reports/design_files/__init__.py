@@ -1,0 +1,1 @@
+"""What is asked about design files: which are shipped, which keys there are, one to start from."""

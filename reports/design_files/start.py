@@ -1,0 +1,83 @@
+"""A design file to start from."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from actuator_lti.errors import InputError
+from analyses.request import FORCE, Option
+
+# Kind of drive, and the shipped design that it starts from; None is the starter with all keys explained.
+KINDS: dict[str, str | None] = {"servo-axis": None, "joint": "joint", "ballscrew": "ballscrew", "fin": "fin"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """Where to write, and what to start from."""
+
+    file: Annotated[Path, Option(words="Design file to write.", metavar="FILE", argument=True)] = Path(
+        "my-drive.toml"
+    )
+    source: Annotated[
+        str | None,
+        Option(words="Start from this design (shipped name or file) instead.", metavar="NAME", flag="from"),
+    ] = None
+    kind: Annotated[
+        str | None, Option(words=f"Start from a typical drive: {', '.join(KINDS)}.", metavar="KIND")
+    ] = None
+    force: Annotated[bool, FORCE] = False
+
+    def __post_init__(self) -> None:
+        """Refuse a kind that there is not, and two sources."""
+        if self.kind is not None and self.source is not None:
+            raise InputError(f'--kind = "{self.kind}": not allowed beside --from')
+        if self.kind is not None and self.kind not in KINDS:
+            raise InputError(f'--kind = "{self.kind}": allowed: {", ".join(KINDS)}')
+
+
+@dataclass(frozen=True)
+class Started:
+    """The file that was written."""
+
+    file: str
+
+    def __str__(self) -> str:
+        return f"wrote {self.file}; next: actuator-lti report {self.file}"
+
+
+def start(asked: Asked) -> Started:
+    """Write a commented design file, named as the file is.
+
+    Raises
+    ------
+    InputError
+        If there is such a file already, or the source is no design.
+    """
+    from actuator_lti.design import read_design_text
+    from actuator_lti.files.atomic import write_text
+    from reports.cli.targets import refuse_existing
+
+    refuse_existing(asked.file, asked.force)
+    text = _renamed(_source_text(KINDS[asked.kind] if asked.kind else asked.source), asked.file.stem)
+    read_design_text(text, str(asked.file))
+    write_text(asked.file, text)
+    return Started(str(asked.file))
+
+
+def _source_text(source: str | None) -> str:
+    """The text to start from, comments included."""
+    from actuator_lti.design.loader import design_text
+
+    if source is None:
+        return (Path(__file__).parents[1] / "templates" / "design.toml").read_text(encoding="utf-8")
+    return design_text(source)
+
+
+def _renamed(text: str, name: str) -> str:
+    """The text with the design's name set to that of the file, where it can be one."""
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", name):
+        return text
+    return re.sub(r'(?m)^(\[design\]\n(?:[^\[\n]*\n)*?name = )"[^"\n]*"', rf'\1"{name}"', text, count=1)

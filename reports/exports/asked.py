@@ -1,0 +1,56 @@
+"""What is asked of an export."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from analyses.request import FORCE, Option
+
+CHECK = Option(
+    words="Measure the margins of the compiled code (sweep by injection, borders in time) and say so in the "
+    "export; needs a C compiler.",
+    flag="check/--no-check",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AskedC:
+    """C files."""
+
+    target: Annotated[Path, Option(words="Folder for the files; drive-c.", metavar="DIR", flag="out")] = Path(
+        "drive-c"
+    )
+    single: Annotated[bool, Option(words="float in place of double.")] = False
+    check: Annotated[bool, CHECK] = True
+    force: Annotated[bool, FORCE] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class AskedFmu:
+    """A unit for co-simulation."""
+
+    target: Annotated[Path | None, Option(words="File to write; NAME.fmu.", metavar="FILE", flag="out")] = (
+        None
+    )
+    version: Annotated[int, Option(words="Version of FMI; 2.", metavar="2|3", flag="fmi")] = 2
+    platform: Annotated[
+        list[str] | None,
+        Option(words="linux64 or win64, may be repeated; both.", metavar="NAME"),
+    ] = None
+    plain: Annotated[bool, Option(words="Without reports inside, and no check.")] = False
+    check: Annotated[bool, CHECK] = True
+    force: Annotated[bool, FORCE] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class AskedLinear:
+    """Linear models."""
+
+    to: Annotated[Literal["json", "mat", "python"], Option(words="Format; json.")] = "json"
+    target: Annotated[
+        Path | None,
+        Option(words="File to write; NAME-linear.json, .mat or .py.", metavar="FILE", flag="out"),
+    ] = None
+    force: Annotated[bool, FORCE] = False

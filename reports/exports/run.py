@@ -1,0 +1,125 @@
+"""Write the drive as C99, as an FMU, or its linear models; the compiled code is measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from actuator_lti.asked.verdict import Verdict
+from reports.cli.targets import folder_for_results, refuse_existing
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.linear.code_check import CodeCheck
+    from reports.exports.asked import AskedC, AskedFmu, AskedLinear
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written, in words too, and what the check of the compiled code has found.
+
+    Attributes
+    ----------
+    files : tuple of str
+    words : str
+    check : CodeCheck or None
+        ``None`` where it was not asked for.
+    """
+
+    files: tuple[str, ...]
+    words: str
+    check: CodeCheck | None = None
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Of the compiled code; ``None`` where it was not measured."""
+        return None if self.check is None or self.check.reason else Verdict.of(not self.check.failed)
+
+    def __str__(self) -> str:
+        from reports.export_check import summary
+
+        return "\n".join([self.words, *([summary(self.check)] if self.check else [])])
+
+
+def export_c(design: Design, asked: AskedC) -> Exported:
+    """Write drive.h, drive.c, the design's parameters, an example and a README.
+
+    Raises
+    ------
+    InputError
+        If there are such files already, or the folder cannot be written.
+    """
+    from actuator_lti.files.atomic import write_together
+    from nonlinear.export import c_export
+    from reports.export_check import check_text
+
+    folder = asked.target
+    folder_for_results(folder)
+    texts = c_export(design, single_precision=asked.single)
+    for name in texts:
+        refuse_existing(folder / name, asked.force)
+    check = _checked(design) if asked.check else None
+    texts["README.md"] += "\n" + check_text(check, single_precision=asked.single)
+    write_together({folder / name: text.encode() for name, text in texts.items()})
+    return Exported(tuple(str(folder / name) for name in texts), f"{folder}: {', '.join(texts)}", check)
+
+
+def export_fmu(design: Design, asked: AskedFmu) -> Exported:
+    """Write a co-simulation FMU: binaries, sources, every key of the design as a parameter.
+
+    Raises
+    ------
+    InputError
+        If there is such a file already, or the version or a platform is not known.
+    """
+    from actuator_lti.files.atomic import write_bytes
+    from nonlinear.export import PLATFORMS, fmu_bytes, refuse_unknown
+    from reports.export_documents import export_documents
+    from reports.model_picture import model_png
+    from reports.provenance import package_version
+
+    target = asked.target or Path(f"{design.name}.fmu")
+    refuse_existing(target, asked.force)
+    platforms = tuple(dict.fromkeys(asked.platform or PLATFORMS))
+    refuse_unknown(asked.version, platforms)
+    check = _checked(design) if asked.check and not asked.plain else None
+    data = fmu_bytes(
+        design,
+        asked.version,  # type: ignore[arg-type]
+        platforms,
+        documents={} if asked.plain else export_documents(design, check),
+        picture=model_png(design),
+        tool=f"actuator-lti {package_version()}",
+    )
+    write_bytes(target, data)
+    words = f"{target}: FMI {asked.version}.0 co-simulation, {', '.join(platforms)}, {len(data)} bytes"
+    return Exported((str(target),), words, check)
+
+
+def export_linear(design: Design, asked: AskedLinear) -> Exported:
+    """Write every loop, break point, command and load response as state space, with units and margins.
+
+    Raises
+    ------
+    InputError
+        If there is such a file already.
+    """
+    from actuator_lti.files.atomic import write_bytes
+    from reports.linear_models import FORMS, SUFFIXES, linear_models, written_models
+
+    target = asked.target or Path(f"{design.name}-linear{SUFFIXES[asked.to]}")
+    refuse_existing(target, asked.force)
+    tree = linear_models(design)
+    data = written_models(tree, asked.to)
+    write_bytes(target, data)
+    named = [*tree["sampled"]["loops"], *tree["sampled"]["break_points"], *tree["sampled"]["responses"]]
+    return Exported((str(target),), f"{target}: {', '.join(named)}, {' and '.join(FORMS)}, {len(data)} bytes")
+
+
+def _checked(design: Design) -> CodeCheck:
+    from analyses.linear.code_check import check_code
+    from nonlinear.runs.waiting import told_if_slow
+
+    with told_if_slow("measuring the margins of the compiled code (--no-check leaves it out)"):
+        return check_code(design)

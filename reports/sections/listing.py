@@ -1,0 +1,28 @@
+"""A result that is a list: its sentence, and a table by the headings that the fields of a row state."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+from reports import document as doc
+from reports.document_schema import Section
+
+
+def section(result: Any) -> Section:
+    """Make the section of a result whose one tuple, if there is any, holds the rows."""
+    rows = next((value for value in vars(result).values() if isinstance(value, tuple)), ())
+    columns = _columns(type(rows[0])) if rows else []
+    blocks = [doc.listing("", rows, columns)] if columns else []
+    return doc.section("list", "List", blocks, result=str(result))
+
+
+def _columns(kind: type) -> list[doc.Shown]:
+    hints = get_type_hints(kind, include_extras=True).items()
+    headed = {name: get_args(hint)[1] for name, hint in hints if get_origin(hint) is Annotated}
+    return [doc.of(partial(_text, name), name, heading) for name, heading in headed.items()]
+
+
+def _text(name: str, row: Any) -> Any:
+    value = getattr(row, name)
+    return ", ".join(value) if isinstance(value, tuple) else value

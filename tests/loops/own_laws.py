@@ -1,0 +1,98 @@
+"""Random laws of one's own on shipped drives, and a plain writing of model.md section 10."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from actuator_lti import load_design
+from actuator_lti.design import Design
+from actuator_lti.design.law import LAW_INPUTS, Law
+from actuator_lti.design.model import Command, Encoder, Instruments, Limits, OutputEncoder
+from actuator_lti.loops.assemble import assemble_loops
+from actuator_lti.loops.blocks import compose
+
+SIZES = {"command": 1.0, "error": 1.0, "speed": 1e-3, "angle": 0.1, "current": 1e-2, "output_angle": 0.1,
+         "output_speed": 1e-3}  # fmt: skip
+STAGES = {"current": 0.02, "velocity": 0.05, "position": 50.0}
+BASES = ("ilr33-amber-multirate", "joint", "emps", "ilr33-amber")
+
+
+def period_s(design: Design, stage: str) -> float:
+    return design.controller.period_s * getattr(getattr(design.controller, stage), "every", 1)
+
+
+def linear(design: Design) -> Design:
+    """Without counts, dry friction, limits and what bends: what the linear loops are of."""
+    return replace(
+        design,
+        encoder=Encoder(speed=design.encoder.speed, bandwidth_rad_s=design.encoder.bandwidth_rad_s),
+        output_encoder=OutputEncoder(),
+        friction=replace(
+            design.friction,
+            dry_torque_Nm=0.0, dry_torque_reverse_Nm=None, load_coefficient=0.0, points=(),
+            offset_torque_Nm=0.0, viscous_reverse_Nms_rad=None, law="coulomb",
+        ),
+        coupling=None if design.coupling is None else replace(design.coupling, play_rad=0.0),
+        load=replace(design.load, gravity=None, friction=None),
+        limits=Limits(voltage_V=1e12),
+        command=Command(), instruments=Instruments(), supply=None,
+    )  # fmt: skip
+
+
+def radius(design: Design) -> float:
+    """Spectral radius of the whole closed loop over a base period."""
+    system = assemble_loops(design).tick_system
+    assert system is not None
+    program = system.program
+    A, _ = compose([program.tick(k) for k in range(program.ticks)])
+    return float(np.max(np.abs(np.linalg.eigvals(A))))
+
+
+def random_law(rng: np.random.Generator, design: Design, stage: str, stable: bool = False) -> Design:
+    """A law of any order and any inputs, its gains over decades; at most so large that the loop is stable."""
+    known = [name for name in LAW_INPUTS if name != "current" or design.motor.has_electrical_dynamics]
+    inputs = [name for name in known if rng.random() < 0.6] or ["error"]
+    n, m, size = int(rng.integers(0, 7)), len(inputs), STAGES[stage] * 10.0 ** rng.uniform(-3, 0)
+    A = rng.standard_normal((n, n))
+    A *= rng.uniform(0.2, 1.0) / max(np.abs(np.linalg.eigvals(A)), default=1.0)
+    B, C, D = rng.standard_normal((n, m)), rng.standard_normal((1, n)), rng.standard_normal((1, m))
+    scale = np.array([SIZES[name] for name in inputs])
+    for _ in range(60):
+        made = (A, B * size * scale, C, D * size * scale, period_s(design, stage))
+        result = design.with_law(stage, made, inputs, L=0.1 * rng.standard_normal(n) if n else ())
+        if not stable or radius(result) < 1.0 + 1e-6:
+            return result
+        size *= 0.5
+    raise AssertionError("no stable loop found")
+
+
+def drawn(case: int, stable: bool = False) -> tuple[Design, str] | None:
+    """The case-th drive with its law; None where the drive has no such stage."""
+    rng = np.random.default_rng(case)
+    design = linear(load_design(BASES[case % len(BASES)]))
+    stage = str(rng.choice(list(STAGES)))
+    if getattr(design.controller, stage) is None:
+        return None
+    if rng.random() < 0.5 and design.controller.velocity is not None:
+        tracking = Encoder(speed="tracking", bandwidth_rad_s=0.3 / period_s(design, "velocity"))
+        counted = Encoder(speed="difference", difference_samples=3)
+        design = replace(design, encoder=(tracking, counted)[int(rng.integers(2))])
+    return random_law(rng, design, stage, stable), stage
+
+
+class PlainLaw:
+    """v = gain (C x + D e), then x+ = A x + B e + L (u - v), written out."""
+
+    def __init__(self, law: Law) -> None:
+        self.law, self.m = law, law.sampled
+        self.x = np.zeros(len(self.m.A))
+
+    def output(self, signals: dict[str, float]) -> float:
+        self.e = np.array([signals[name] for name in self.law.inputs])
+        self.v = self.law.gain * float(self.m.C @ self.x + self.m.D @ self.e)
+        return self.v
+
+    def step(self, u: float) -> None:
+        self.x = self.m.A @ self.x + self.m.B @ self.e + self.m.L * (u - self.v)

@@ -1,0 +1,61 @@
+"""Responses as they are drawn: of many states, at a pole, and the branch of the phase."""
+
+import control
+import numpy as np
+import pytest
+
+from actuator_lti.systems.plain_system import PlainSystem
+from analyses.linear.responses import LARGE, curve, response_at
+
+PERIOD_S = 1e-3
+
+
+def late_lag(pole: float, delay: int) -> PlainSystem:
+    """z^-delay / (z - pole) as a chain of states."""
+    n = delay + 1
+    A = np.diag(np.ones(n - 1), -1)
+    A[0, 0] = pole
+    B, C = np.eye(n)[:, :1], np.eye(n)[-1:]
+    return PlainSystem(A, B, C, np.zeros((1, 1)), PERIOD_S)
+
+
+@pytest.mark.parametrize("delay", [3, LARGE - 2, LARGE + 40])
+def test_a_delayed_lag_of_many_states(delay: int) -> None:
+    omega = np.geomspace(1.0, 3000.0, 50)
+    z = np.exp(1j * omega * PERIOD_S)
+    assert response_at(late_lag(0.9, delay), omega) == pytest.approx(z**-delay / (z - 0.9), rel=1e-11)
+
+
+@pytest.mark.parametrize("delay", [3, LARGE + 40])
+def test_at_a_pole_it_is_infinite_and_nowhere_else(delay: int) -> None:
+    omega = np.concatenate([[0.0], np.geomspace(1.0, 3000.0, 50)])
+    values = response_at(late_lag(1.0, delay), omega)
+    assert not np.isfinite(values[0])
+    assert np.isfinite(values[1:]).all()
+
+
+OMEGA = np.geomspace(1e-2, 1e3, 60)
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-12, -1e-12, 1e-9, -1e-9])
+def test_speed_against_a_spring_begins_at_90_deg_whatever_rounding_does_to_its_zero(off: float) -> None:
+    """A zero at 1 + off: outside of the circle its phase begins at 180 deg, below any frequency drawn."""
+    loop = control.tf([1.0, -1.0 - off], [1.0, -1.7, 0.72], PERIOD_S)
+    phase = curve(loop, OMEGA).phase_deg
+    assert phase[0] == pytest.approx(90.0, abs=1.0)
+    assert (np.abs(np.diff(phase)) < 180.0).all()
+
+
+@pytest.mark.parametrize(
+    ("num", "den", "begin"),
+    [
+        ([1.0], [1.0, 1.0], 0.0),
+        ([-1.0], [1.0, 1.0], -180.0),
+        ([1.0], [1.0, 0.0], -90.0),
+        ([-1.0], [1.0, 1.0, 0.0], -270.0),
+        ([1.0], [1.0, 1.0, 0.0, 0.0], -180.0),
+        ([1.0], [1.0, 1.0, 0.0, 0.0, 0.0], -270.0),
+    ],
+)
+def test_integrators_and_signs_keep_their_branch(num: list[float], den: list[float], begin: float) -> None:
+    assert curve(control.tf(num, den), OMEGA * 1e-2).phase_deg[0] == pytest.approx(begin, abs=1.0)

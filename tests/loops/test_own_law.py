@@ -1,0 +1,273 @@
+"""A law of one's own (model.md section 10): both writings, what it does at limits, sources, refusals."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from math import floor, inf, pi
+from pathlib import Path
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+import scipy.signal
+import tomli_w
+from own_laws import PlainLaw, drawn, period_s
+from scipy.io import savemat
+
+from actuator_lti import InputError, assemble_loops, load_design, stability_margins
+from actuator_lti.design import Design, design_hash, read_design_text, write_design
+from actuator_lti.design.model import Command, Encoder, Limits, OutputEncoder
+from actuator_lti.design.writing import design_tree
+from actuator_lti.loops.assemble import loops_at
+from nonlinear import Drive, Rows, tangent
+from nonlinear.bench.loop_setup import loop_setup
+
+TICKS = 400
+SIGNALS = {"th": "motor_angle_rad", "w": "motor_speed_rad_s", "i": "current_A", "u": "voltage_V"}
+
+
+def as_law(design: Design, stage: str, **settings: Any) -> Design:
+    """The drive with the PI of a stage (its position P) written as a law of one's own on the error."""
+    loop, T = getattr(design.controller, stage), period_s(design, stage)
+    gain = loop.gain_V_A if stage == "current" else loop.gain
+    if loop.integral_time_s is None:
+        return design.with_law(stage, ([], [], [], [[gain]], T), ["error"], **settings)
+    step = gain * T / loop.integral_time_s
+    return design.with_law(stage, ([[1.0]], [[step]], [[1.0]], [[gain + step]], T), ["error"], **settings)
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_both_writings_agree_on_random_laws(part: int) -> None:
+    """Any stage, order, inputs, estimate of the speed, rates and delay; loops that grow too."""
+    cases = [drawn(case) for case in range(24 * part, 24 * part + 24)]
+    stages = set()
+    for case, found in enumerate(cases):
+        if found is None:
+            continue
+        design, stage = found
+        stages.add(stage)
+        rng, t = np.random.default_rng(case), np.arange(TICKS)
+        command = 1e-2 * (np.sin(t * rng.uniform(0.01, 0.1)) + 1e-3 * t)
+        rows = Rows.of(design, limits_on=False)
+        rows["ticks"], rows["load"] = TICKS, 0.1
+        rows.series("command", command)
+        system = assemble_loops(design).tick_system
+        assert system is not None
+        with np.errstate(over="ignore", invalid="ignore"):
+            run, linear = rows.trajectory(), system.respond(command, 0.0, None, 0.1)
+        for name, ours in SIGNALS.items():
+            if name not in linear:
+                continue
+            some = np.maximum.accumulate(np.abs(linear["w"])) < 1e12
+            most = np.abs(linear[name][some]).max()
+            assert np.abs(getattr(run, ours) - linear[name])[some].max() <= 1e-9 * most, (part, case, name)
+    assert stages == {"current", "velocity", "position"}
+
+
+@pytest.mark.parametrize("case", [c for c in range(60) if drawn(c) is not None][:12])
+def test_the_tangent_is_the_linear_loop_at_every_place(case: int) -> None:
+    found = drawn(case, stable=True)
+    assert found is not None
+    design, _ = found
+    for place in (*design.controller.stages, *assemble_loops(design).break_points):
+        setup = loop_setup(design, place, limits_on=False)
+        loops = loops_at(design, setup.bias.operating(design))
+        loop = {**loops.present, **loops.break_points}[place]
+        if loop.periodic:
+            continue
+        model = tangent(design, place, setup=setup)
+        z = np.exp(1j * np.geomspace(1e-3, 3.0, 40))
+        theirs, ours = loop.closed_loop(z), model.closed(z)
+        most = np.abs(theirs).max()
+        assert np.abs(ours - theirs).max() <= 1e-9 * most + 1e-12, (case, place, most)
+
+
+@pytest.mark.parametrize("stage", ["current", "velocity", "position"])
+def test_a_pi_written_as_a_law_is_the_pi(stage: str) -> None:
+    """The same margins from a loop that is cut elsewhere, in every form, and the same run to rounding."""
+    design = replace(load_design("ilr33-amber"), encoder=Encoder())  # a law takes counted angles
+    loop, T = getattr(design.controller, stage), period_s(design, stage)
+    gain = loop.gain_V_A if stage == "current" else loop.gain
+    rate = None if loop.integral_time_s is None else gain / loop.integral_time_s
+    same = ([], [], [], [[gain]]) if rate is None else ([[0.0]], [[rate]], [[1.0]], [[gain]])
+    mine = as_law(design, stage, continuous=same)
+    for form in ("sampled", "continuous", "ideal"):
+        ours, theirs = (assemble_loops(each, form) for each in (mine, design))  # type: ignore[arg-type]
+        omega = np.geomspace(1.0, 0.9 * pi / T, 60)
+        for name, loop in {**theirs.present, **theirs.break_points}.items():
+            other = {**ours.present, **ours.break_points}[name]
+            point = 1j * omega if loop.period_s is None else np.exp(1j * omega * loop.period_s)
+            np.testing.assert_allclose(other.open_loop(point), loop.open_loop(point), rtol=1e-9, err_msg=name)
+    for one, two in zip(*(stability_margins(getattr(assemble_loops(each), stage).open_loop).gain_margins
+                          for each in (mine, design)), strict=True):  # fmt: skip
+        assert one.ratio == pytest.approx(two.ratio, rel=1e-9)
+    runs = []
+    for each in (mine, design):
+        rows = Rows.of(each, limits_on=False)
+        rows["ticks"] = 2000
+        rows.step("command", 0.01)
+        runs.append(rows.trajectory().output_angle_rad)
+    np.testing.assert_allclose(runs[0], runs[1], rtol=0, atol=1e-9 * 0.01)
+
+
+def test_what_a_law_sees_and_how_it_is_limited() -> None:
+    """The controller alone against a plain writing: counted angles, limits of each stage, anti-windup."""
+    base = replace(
+        load_design("joint"), command=Command(),
+        encoder=Encoder(counts_per_rev=4096, speed="difference", difference_samples=2),
+        output_encoder=OutputEncoder(counts_per_rev=1 << 14),
+        limits=Limits(voltage_V=24.0, speed_rad_s=30.0, acceleration_rad_s2=4e4, peak_current_A=2.0,
+                      current_rate_A_s=4e3),
+    )  # fmt: skip
+    base = replace(base, controller=replace(base.controller, period_s=1e-4, computing_delay_s=1e-4))
+    inputs = ["command", "error", "speed", "angle", "current", "output_angle", "output_speed"]
+    for stage, size in (("current", 0.1), ("velocity", 0.1), ("position", 1.0)):
+        rng = np.random.default_rng(7)
+        A, B, C, D = (rng.standard_normal(shape) for shape in ((3, 3), (3, 7), (1, 3), (1, 7)))
+        T = period_s(base, stage)
+        system, L = (0.4 * A, B, size * C, size * D, T), [0.3, -0.1, 0.2]
+        design = base.with_law(stage, system, inputs, L=L, gain=0.7)
+        control_, drive = design.controller, Drive(design)
+        law, N = PlainLaw(getattr(control_, stage).law), design.total_ratio
+        n_v, n_p = control_.velocity.every, control_.position.every  # type: ignore[union-attr]
+        line, w_ref, i_ref, speed, limited = [0.0, 0.0], 0.0, 0.0, 0.0, 0
+        for k in range(300):
+            i, w, th, W = (float(value) for value in rng.standard_normal(4) * (1.0, 5.0, 0.5, 0.1))
+            y, command = th / N + 1e-3 * float(rng.standard_normal()), 0.3 * float(np.sin(0.05 * k))
+            u = drive.control(command, i, w, th, y, None, W)
+            q, qo = 4096 / (2 * pi), (1 << 14) / (2 * pi)
+            counted, out = floor(th * q) / q, floor(y * qo) / qo
+            if k % n_v == 0:
+                speed = (counted - line[0]) / (2 * n_v * 1e-4)
+                line = [line[1], counted]
+            seen = {"speed": speed, "angle": counted, "current": i, "output_angle": out, "output_speed": W}
+            if stage == "position" and k % n_p == 0:
+                own = counted if control_.position.sensor == "motor" else N * out  # type: ignore[union-attr]
+                v = law.output(seen | {"command": N * command, "error": N * command - own})
+                clamped = min(max(v, -30.0), 30.0)
+                step = 4e4 * T
+                new = w_ref + min(max(clamped - w_ref, -step), step)
+                limited += new != v
+                w_ref = new
+                law.step(w_ref)
+                assert drive.value("speed_command") == pytest.approx(w_ref, rel=1e-12, abs=1e-12)
+            if stage == "velocity" and k % n_v == 0:
+                reference = drive.value("speed_reference")
+                v = law.output(seen | {"command": reference, "error": reference - speed})
+                clamped, step = min(max(v, -2.0), 2.0), 4e3 * T
+                new = i_ref + min(max(clamped - i_ref, -step), step)
+                limited += new != v
+                i_ref = new
+                law.step(i_ref)
+                assert drive.value("current_reference") == pytest.approx(i_ref, rel=1e-12, abs=1e-12)
+            if stage == "current":
+                reference = drive.value("current_reference")
+                v = law.output(seen | {"command": reference, "error": reference - i})
+                limited += abs(v) > 24.0
+                law.step(min(max(v, -24.0), 24.0))
+                assert u == pytest.approx(min(max(v, -24.0), 24.0), rel=1e-12, abs=1e-12)
+        assert 5 < limited < 290, (stage, limited)
+
+
+def _with_file(design: Design, name: str, folder: Path) -> None:
+    """The design file with the velocity's matrices in another file."""
+    tree = design_tree(design)
+    stage = tree["control"]["velocity"]
+    stage["law"] = {"inputs": stage["law"]["inputs"], "file": name}
+    (folder / "mine.toml").write_text(tomli_w.dumps(tree))
+
+
+def test_every_source_gives_the_same_law(tmp_path: Path) -> None:
+    base = load_design("ilr33-amber-multirate")
+    T = period_s(base, "velocity")
+    A, B, C, D = [[0.5, 0.1], [0.0, 0.9]], [[1e-3, 0.0], [2e-3, 1e-4]], [[1.0, 0.5]], [[0.1, -1e-3]]
+    inputs = ["error", "speed"]
+    want = base.with_law("velocity", (A, B, C, D, T), inputs)
+    assert want.with_law("velocity", control.ss(A, B, C, D, T, inputs=inputs)) == want
+    assert base.with_law("velocity", scipy.signal.StateSpace(A, B, C, D, dt=T), inputs) == want
+    written = {"A": A, "B": B, "C": C, "D": D}
+    savemat(tmp_path / "k.mat", written | {"Ts": T})
+    savemat(tmp_path / "struct.mat", {"K": written | {"Ts": T}})
+    (tmp_path / "k.json").write_text(json.dumps(written | {"dt": T}))
+    for name in ("k.mat", "struct.mat", "k.json"):
+        _with_file(want, name, tmp_path)
+        read = load_design(tmp_path / "mine.toml")
+        assert read.controller == want.controller, name
+        assert read_design_text(write_design(read)).controller == read.controller
+    z = np.exp(1j * np.geomspace(1e-3, 3.0, 30))
+    tf = control.tf([0.2, -0.15], [1.0, -0.9], T)
+    mine = base.with_law("velocity", tf, ["error"]).controller.velocity.law.sampled  # type: ignore[union-attr]
+    made = control.ss(mine.A, mine.B, mine.C[None], mine.D[None], T)
+    np.testing.assert_allclose(made(z), tf(z), rtol=1e-12)
+    slow = base.with_law("velocity", control.tf([2.0, 30.0], [1.0, 100.0]), ["error"], method="tustin")
+    law = slow.controller.velocity.law  # type: ignore[union-attr]
+    made = control.ss(law.sampled.A, law.sampled.B, law.sampled.C[None], law.sampled.D[None], T)
+    s = 2 / T * (z - 1) / (z + 1)
+    np.testing.assert_allclose(made(z), (2 * s + 30) / (s + 100), rtol=1e-9)
+    assert len(assemble_loops(slow, "continuous").present) == 3
+
+
+def test_hash_tolerance_and_values_follow() -> None:
+    base = load_design("ilr33-amber")
+    mine = as_law(base, "velocity")
+    assert design_hash(mine) != design_hash(base)
+    more = mine.with_values({"control.velocity.law.gain": {"value": 1.2, "tolerance": "10 %"}})
+    assert more.parameters["control.velocity.law.gain"].tolerance.half_width == pytest.approx(0.12)  # type: ignore[union-attr]
+    nominal, up = (stability_margins(assemble_loops(each).velocity.open_loop) for each in (mine, more))  # type: ignore[union-attr]
+    assert up.gain_margins[-1].ratio == pytest.approx(nominal.gain_margins[-1].ratio / 1.2, rel=1e-9)
+    assert "control.velocity.gain" not in {item.path for item in mine.parameters.values()}
+
+
+def _refused(what: Any) -> str:
+    with pytest.raises(InputError) as error:
+        what()
+    return str(error.value)
+
+
+def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
+    base, T = load_design("ilr33-amber"), 1e-4
+    unit = ([[0.5]], [[1.0]], [[1.0]], [[0.0]], T)
+
+    def made(system: Any, inputs: Any = ("error",), stage: str = "velocity", **more: Any) -> str:
+        return _refused(lambda: base.with_law(stage, system, inputs, **more))
+
+    assert "0.0001 s, that of its stage" in made((*unit[:4], 2e-4))
+    assert "continuous; allowed: a sampled one of dt = 0.0001 s" in made(control.ss(*unit[:4]))
+    assert "of no stated period" in made(control.ss(*unit[:4], True))
+    assert "sampled already" in made(unit, method="zoh")
+    assert "tustin or zoh" in made(unit[:4], method="euler")
+    assert "current, velocity, position" in made(unit, stage="torque")
+    for system, inputs in ((unit, ["sped"]), (unit, None), (control.ss(*unit), None), (unit, "error")):
+        assert "allowed: a list of command, error, speed" in made(system, inputs)
+    assert "B = other sizes: allowed: 1 x 2" in made(unit, ["error", "speed"])
+    assert "one row, a law has one output" in made(([[0.5]], [[1.0]], [[1.0], [1.0]], [[0.0], [0.0]], T))
+    assert "as many rows as columns" in made(([[0.5, 1.0]], [[1.0]], [[1.0]], [[0.0]], T))
+    assert "real numbers" in made(([["a"]], [[1.0]], [[1.0]], [[0.0]], T))
+    assert "real numbers" in made(([[1j]], [[1.0]], [[1.0]], [[0.0]], T))
+    assert "number" in made(([[inf]], [[1.0]], [[1.0]], [[0.0]], T))
+    assert "at most 16" in made((np.eye(17), np.ones((17, 1)), np.ones((1, 17)), [[0.0]], T))
+    assert "one a state" in made(unit, L=[1.0, 2.0])
+    for none in ("k.mat", lambda e: e, 3.0, (1, 2)):
+        assert "of python-control or scipy.signal" in made(none)
+    assert "each at most once" in made(unit, ["error", "error"])
+    twice = base.with_law("velocity", unit, ["error"])
+    assert "at one stage" in _refused(lambda: twice.with_law("position", unit, ["error"]))
+    for key, value in (("gain", "0.1 A*s/rad"), ("integral_time", "1 ms")):
+        refused = _refused(lambda key=key, value=value: twice.with_values({f"control.velocity.{key}": value}))
+        assert refused.split("control.velocity.", 1)[1].startswith(key)
+        assert "not allowed beside control.velocity.law" in refused
+    notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz"}
+    assert "not allowed beside" in _refused(lambda: twice.add_filter("velocity", **notch))
+    filtered = {"encoder.filter_time": "1 ms"}
+    assert "without encoder.filter_time" in _refused(lambda: twice.with_values(filtered))
+    force, slow = load_design("emps"), (*unit[:4], load_design("emps").controller.period_s)
+    assert "no current" in _refused(lambda: force.with_law("position", slow, ["current"]))
+    assert "control.*.law is a sampled one" in _refused(lambda: assemble_loops(twice, "continuous"))
+    wrong = (("none.mat", "no such file"), ("k.csv", ".mat up to version 7"), ("k.mat", "cannot be read"))
+    for name, words in wrong:
+        (tmp_path / "k.csv").write_text("1")
+        (tmp_path / "k.mat").write_text("x")
+        _with_file(twice, name, tmp_path)
+        assert words in _refused(lambda: load_design(tmp_path / "mine.toml"))

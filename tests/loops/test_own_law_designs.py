@@ -1,0 +1,194 @@
+"""Four controllers made outside and brought in as a law of one's own, each with a truth of its own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from own_laws import linear, period_s
+from scipy.linalg import solve_continuous_are, solve_discrete_are
+from scipy.signal import place_poles
+
+from actuator_lti import assemble_loops, load_design, plant, stability_margins
+from actuator_lti.design import Design
+from actuator_lti.design.model import Encoder, PositionLoop
+from nonlinear import Rows, tangent
+
+
+def poles(design: Design) -> np.ndarray:
+    """Of the whole closed drive over its period (one tick here)."""
+    system = assemble_loops(design).tick_system
+    assert system is not None
+    assert system.ticks == 1
+    return np.linalg.eigvals(system.matrices(0)[0])
+
+
+def same_poles(found: np.ndarray, wanted: np.ndarray, within: float) -> None:
+    """Every wanted pole is there, each once."""
+    left = list(found)
+    for pole in wanted:
+        nearest = min(left, key=lambda one: abs(one - pole))
+        assert abs(nearest - pole) < within, (pole, nearest)
+        left.remove(nearest)
+
+
+def test_lqg_velocity_controller() -> None:
+    """Separation: the closed drive has the poles of the regulator and of the observer, by scipy's Riccati."""
+    base = replace(linear(load_design("ilr33-amber")), requirements=(), encoder=Encoder())
+    base = replace(base, controller=replace(base.controller, position=None))
+    system, T = plant(base, command="i_ref"), period_s(base, "velocity")
+    seen = [k for k, name in enumerate(system.state_labels) if name != "th"]
+    A, B = system.A[np.ix_(seen, seen)], system.B[seen, :1]
+    C = system.C[system.output_labels.index("speed")][None, seen]
+    n = len(A)
+    S = solve_discrete_are(A, B, 1e-3 * C.T @ C + 1e-12 * np.eye(n), [[1.0]])
+    K = np.linalg.solve(1.0 + B.T @ S @ B, B.T @ S @ A)
+    P = solve_discrete_are(A.T, C.T, 1e2 * B @ B.T + 1e-9 * np.eye(n), [[1.0]])
+    G = np.linalg.solve(1.0 + C @ P @ C.T, C @ P @ A.T).T
+    closed = A - B @ K
+    pre = 1.0 / (C @ np.linalg.solve(np.eye(n) - closed, B)).item()
+    law = (closed - G @ C, np.hstack([G, pre * B]), -K, [[0.0, pre]], T)
+    mine = base.with_law("velocity", law, ["speed", "command"], L=B)
+    same_poles(poles(mine), np.concatenate([np.linalg.eigvals(closed), np.linalg.eigvals(A - G @ C)]), 1e-7)
+    assert stability_margins(assemble_loops(mine).velocity.open_loop).stable  # type: ignore[union-attr]
+    # the observer knows what the limit left of its output: a step far into the current limit does not wind up
+    limited = replace(mine, limits=replace(load_design("ilr33-amber").limits, speed_rad_s=np.inf))
+    rows = Rows.of(limited)
+    rows["ticks"] = 2500
+    rows.step("command", 600.0 / base.total_ratio)
+    run = rows.trajectory()
+    assert run.limits["current"].fraction > 0.01
+    assert abs(run.motor_speed_rad_s[-1] / 600.0 - 1.0) < 1e-6
+    assert run.motor_speed_rad_s.max() < 1.05 * 600.0
+
+
+def bilinear(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> tuple[np.ndarray, ...]:
+    """s = (z - 1)/(z + 1): sampled to continuous; the unit circle becomes the imaginary axis."""
+    inverse = np.linalg.inv(A + np.eye(len(A)))
+    return (
+        inverse @ (A - np.eye(len(A))),
+        np.sqrt(2) * inverse @ B,
+        np.sqrt(2) * C @ inverse,
+        D - C @ inverse @ B,
+    )
+
+
+def back(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The other way: z = (1 + s)/(1 - s)."""
+    inverse = np.linalg.inv(np.eye(len(A)) - A)
+    return (
+        inverse @ (np.eye(len(A)) + A),
+        np.sqrt(2) * inverse @ B,
+        np.sqrt(2) * C @ inverse,
+        D + C @ inverse @ B,
+    )
+
+
+def test_h_infinity_position_controller_of_order_6() -> None:
+    """Normalised coprime factors: the four-block norm of the closed drive lies between its optimum and gamma.
+
+    The optimum sqrt(1 + rho(X Z)) is exact (Glover and McFarlane 1989); bilinear maps keep the norm.
+    """
+    base = replace(linear(load_design("ilr33-amber")), requirements=(), encoder=Encoder())
+    T, k = period_s(base, "position"), 100.0
+    gain = base.controller.position_loop.gain
+    open_loop = assemble_loops(base).position.open_loop  # type: ignore[union-attr]
+    A, B, C, D = bilinear(open_loop.A, open_loop.B * k / gain, open_loop.C, np.zeros((1, 1)))
+    n, R = len(A), 1.0 + D.item() ** 2
+    assert n == 6
+    left = A - B @ (D / R) @ C
+    Z = solve_continuous_are(left.T, C.T, B @ B.T / R, np.array([[R]]))
+    X = solve_continuous_are(left, B, C.T @ C / R, np.array([[R]]))
+    optimum = float(np.sqrt(1.0 + np.max(np.abs(np.linalg.eigvals(X @ Z)))))
+    gamma = 1.1 * optimum
+    F = -(D.T @ C + B.T @ X) / R
+    W = np.linalg.inv(((1.0 - gamma**2) * np.eye(n) + X @ Z).T)
+    H = gamma**2 * W @ Z @ C.T
+    Ak, Bk, Ck, Dk = back(A + B @ F + H @ (C + D @ F), H, B.T @ X, -D.T)
+    mine = base.with_law("position", (Ak, Bk, -k * Ck, -k * Dk, T), ["error"])
+    law = mine.controller.position_loop.law
+    assert law is not None
+    assert len(law.A) == 6
+    loop = assemble_loops(mine).position
+    assert loop is not None
+    assert stability_margins(loop.open_loop).stable
+    z = np.exp(1j * np.geomspace(1e-4, np.pi * 0.9999, 4000))
+    L, P = loop.open_loop(z), open_loop(z) * k / gain
+    K = L / P  # of what runs, in units of the shaped plant
+    norm = np.sqrt((1.0 + np.abs(K) ** 2) * (1.0 + np.abs(P) ** 2)) / np.abs(1.0 + L)
+    assert optimum * (1 - 1e-6) < norm.max() < gamma * (1 + 1e-6)
+    model = tangent(mine, "position")
+    assert np.abs(model.open(z[::100]) / L[::100] - 1.0).max() < 1e-6
+
+
+def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
+    """All poles where they were placed: current, motor, coupling and load measured, the delay remembered."""
+    base = replace(linear(load_design("joint")), requirements=(), encoder=Encoder())
+    control = replace(base.controller, current=None, velocity=None, position=PositionLoop(gain=1.0),
+                      computing_delay_s=base.controller.period_s)  # fmt: skip
+    base = replace(base, controller=control)
+    system, T = plant(base, command="u"), base.controller.period_s
+    names = list(system.state_labels)
+    assert names == ["i", "w", "th", "W", "twist", "u1"]
+    A, B = system.A, system.B[:, :1]
+    wanted = np.exp(
+        T * np.array([-4000.0, -900.0, -60.0 + 60.0j, -60.0 - 60.0j, -250.0 + 150.0j, -250.0 - 150.0j])
+    )
+    K = place_poles(A, B, wanted).gain_matrix[0]
+    N_c, N_r = base.ratio_to_coupling, base.ratio_behind_coupling
+    gains = dict(zip(names, K, strict=True))
+    inputs = ["current", "speed", "angle", "output_speed", "output_angle", "command"]
+    D = -np.array([gains["i"], gains["w"], gains["th"] + gains["twist"] / N_c, gains["W"] * N_r,
+                   -gains["twist"] * N_r, 0.0])  # fmt: skip
+    D[5] = gains["th"]  # the command is the motor's angle at rest
+    law = ([[-gains["u1"]]], [D], [[-gains["u1"]]], [D], T)  # x is the voltage of the last tick
+    mine = base.with_law("position", law, inputs, L=[1.0])
+    same_poles(poles(mine), wanted, 1e-7)
+    rows = Rows.of(mine, limits_on=False)
+    rows["ticks"] = int(0.3 / T)
+    rows.step("command", 0.1)
+    assert abs(rows.trajectory().output_angle_rad[-1] - 0.1) < 1e-7
+    loop = assemble_loops(mine).position
+    assert loop is not None
+    z = np.exp(1j * np.geomspace(1e-3, 3.0, 50))
+    bare, own = (
+        np.where(np.arange(6) == 5, 0.0, K),
+        gains["u1"],
+    )  # its own output it remembers: no loop is cut
+    theirs = np.array([(bare @ np.linalg.solve(one * np.eye(6) - A, B)).item() for one in z]) / (
+        1.0 + own / z
+    )
+    np.testing.assert_allclose(loop.open_loop(z), theirs, rtol=1e-7)
+
+
+def test_torque_loop_on_the_twist() -> None:
+    """PI on the spring's torque: the loop is k times the plant's response; at rest the torque is exact."""
+    base = replace(linear(load_design("joint")), requirements=(), encoder=Encoder())
+    coupling = base.coupling
+    assert coupling is not None
+    base = replace(base, controller=replace(base.controller, position=None),
+                   load=replace(base.load, inertia_kgm2=1e9))  # fmt: skip
+    T, k = period_s(base, "velocity"), coupling.stiffness_Nm_rad
+    kp, ki, per_command = 2e-3, 0.4, 5.0  # A/(N m), A/(N m s), N m per rad/s of the command
+    row = np.array([per_command, -k / base.ratio_to_coupling, k * base.ratio_behind_coupling])
+    law = ([[1.0]], [ki * T * row], [[1.0]], [(kp + ki * T) * row], T)
+    mine = base.with_law("velocity", law, ["command", "angle", "output_angle"])
+    loop = assemble_loops(mine).velocity
+    assert loop is not None
+    assert stability_margins(loop.open_loop).stable
+    system, ticks = plant(base, command="i_ref"), round(T / base.controller.period_s)
+    A, B, C = system.A, system.B[:, :1], system.C[[system.output_labels.index("twist")]]
+    z = np.exp(1j * np.geomspace(1e-2, 3.0, 40))
+    held = sum(np.linalg.matrix_power(A, j) @ B for j in range(ticks))
+    P = np.array(
+        [
+            (C @ np.linalg.solve(one * np.eye(len(A)) - np.linalg.matrix_power(A, ticks), held)).item()
+            for one in z
+        ]
+    )
+    np.testing.assert_allclose(loop.open_loop(z), k * P * (kp + ki * T * z / (z - 1.0)), rtol=1e-6)
+    rows = Rows.of(mine, limits_on=False)
+    rows["ticks"] = int(4.0 / base.controller.period_s)
+    rows.step("command", 3.0 / base.total_ratio)
+    run = rows.trajectory()
+    assert abs(run.coupling_torque_Nm[-1] / (3.0 * per_command) - 1.0) < 1e-6  # type: ignore[index]

@@ -1,0 +1,242 @@
+"""Cross-check: the assembled sampled loops are sections 2, 6 and 7 of model.md run tick by tick."""
+
+from dataclasses import replace
+
+import control
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from loop_designs import amber, designs, emps, without
+from recursion import run
+from test_stacked import DRIVES, FILTERS, everything
+from two_mass import drive_d, drive_e
+
+from actuator_lti import assemble_loops
+from actuator_lti.design.model import (
+    Command,
+    Controller,
+    Coupling,
+    Design,
+    Encoder,
+    Filter,
+    Friction,
+    Load,
+    LoadFriction,
+    PositionLoop,
+)
+
+UNITS = {"position": 1.0, "velocity": 30.0, "current": 2.0, "voltage": 1.0}
+CONTACTS = {"driving": 1.0, "driven": -1.0}
+TICK = 1e-4
+START = (0.5, 40.0, 3.0)  # i, w, th
+
+
+def worst(ours: np.ndarray, theirs: np.ndarray) -> float:
+    return float(np.max(np.abs(ours - theirs)) / np.max(np.abs(theirs)))
+
+
+def agree(design: Design, ticks: int, tolerance: float, point: str = "sliding", torque: float = 0.0,
+          start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:  # fmt: skip
+    """Same command, a constant moment and torque: every signal to a part of its largest value."""
+    t = np.arange(ticks)
+    command = UNITS[design.controller.outermost] * (0.2 * np.sin(t / 40) + 1e-3 * t)
+    theirs = run(design, command, torque, 0.3, CONTACTS.get(point, 1.0), start)
+    system = assemble_loops(design, operating_point=point).tick_system
+    named = {name: v for name, v in zip(("i", "w", "th"), start, strict=True) if name in system.states}
+    ours = system.respond(command, torque, system.initial_state(named), 0.3)
+    for name in ("th", "w", "u", "phi") if design.coupling is not None else ("th", "w", "u"):
+        assert worst(ours[name], theirs[name]) < tolerance, name
+
+
+def between_two_gears() -> Design:
+    base = everything()
+    first = replace(base.gears[0], name="first", ratio=4.0, output_inertia_kgm2=1e-5)
+    second = replace(base.gears[0], name="second", ratio=2.5, input_inertia_kgm2=2e-5)
+    return replace(base, gears=(first, second), coupling=replace(base.coupling, after="first"))
+
+
+OPEN = replace(drive_d(), controller=Controller(period_s=1e-4, computing_delay_s=1.5e-4))
+KINDS = {**DRIVES, "open-loop voltage": OPEN, "coupling between two gears": between_two_gears()}
+DELAYS, RATES = (0.0, 0.5, 1.0, 1.5), ((1, 1), (2, 10))
+ESTIMATES = (
+    Encoder(speed="difference"),
+    Encoder(speed="difference", difference_samples=3),
+    Encoder(speed="difference", difference_samples=2, filter_time_s=8e-4),
+)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_of_drive(name: str) -> None:
+    agree(KINDS[name], 2000, 1e-9)
+
+
+@pytest.mark.parametrize("rates", RATES)
+@pytest.mark.parametrize("delay", DELAYS)
+def test_every_delay_and_rate(delay: float, rates: tuple[int, int]) -> None:
+    ticks = 20_000 if delay == 1.5 else 4000
+    agree(amber(*rates, delay_s=delay * TICK), ticks, 1e-10, torque=-2.25e-3, start=START)
+
+
+@pytest.mark.parametrize("rates", RATES)
+@pytest.mark.parametrize("encoder", ESTIMATES)
+def test_speed_estimates_and_feedforward(encoder: Encoder, rates: tuple[int, int]) -> None:
+    design = amber(*rates, delay_s=1.5e-4, feedforward=0.8, encoder=encoder)
+    agree(design, 4000, 1e-10, torque=-2.25e-3, start=START)
+
+
+def test_force_source_on_a_linear_axis() -> None:
+    agree(emps(delay_s=5e-4), 4000, 1e-10, torque=-20.0, start=(0.0, 0.02, 0.001))
+
+
+@pytest.mark.parametrize("point", CONTACTS)
+@pytest.mark.parametrize("delay", DELAYS)
+def test_driving_and_driven_for_every_delay(point: str, delay: float) -> None:
+    design = replace(everything(), friction=Friction(viscous_Nms_rad=1e-5, load_coefficient=0.02))
+    control = replace(design.controller, computing_delay_s=delay * 2e-4)
+    agree(replace(design, controller=control), 5000, 1e-9, point)
+
+
+@st.composite
+def wide_designs(draw: st.DrawFn) -> Design:
+    """Any stage outermost, any plant, any slot of the controller filled or empty."""
+    n_v = draw(st.sampled_from([1, 2, 3]))
+    base = draw(st.sampled_from([drive_e(), amber(), without(amber(), "current", gain=0.01), emps(5e-4)]))
+    control = base.controller
+    velocity, current, position = control.velocity, control.current, control.position
+    T = n_v * control.period_s
+    kinds = (
+        Filter(kind="lowpass", frequency_rad_s=0.4 / T, order=draw(st.sampled_from([1, 2]))),
+        Filter(kind="notch", frequency_rad_s=0.8 / T, width_rad_s=0.3 / T, depth=0.2),
+        Filter(kind="skewed-notch", zero_rad_s=0.5 / T, pole_rad_s=0.7 / T, width_rad_s=0.4 / T, depth=0.1),
+        Filter(kind="leadlag", zero_rad_s=0.1 / T, pole_rad_s=0.3 / T, on="speed"),
+        Filter(kind="biquad", b=(0.2, 0.1, 0.05), a=(-0.9, 0.25)),
+    )
+    some = st.booleans()
+    velocity = replace(
+        velocity,
+        every=n_v,
+        filters=tuple(item for item in kinds if draw(some)),
+        integral_time_s=draw(st.sampled_from([None, 0.03])),
+        sensor=draw(st.sampled_from(["motor", "output"])),
+    )
+    position = replace(
+        position,
+        every=n_v * draw(st.sampled_from([1, 2, 5])),
+        feedforward=draw(st.sampled_from([0.0, 0.9])),
+        acceleration_feedforward=draw(st.sampled_from([0.0, 0.5])),
+        integral_time_s=draw(st.sampled_from([None, 0.5])),
+        derivative_time_s=draw(st.sampled_from([0.0, 1e-3])),
+        derivative_filter_s=draw(st.sampled_from([0.0, 1e-3])),
+        sensor=draw(st.sampled_from(["motor", "output"])),
+    )
+    if current is not None:
+        current = replace(
+            current,
+            back_emf_feedforward=draw(st.sampled_from([0.0, 0.8])),
+            resistance_feedforward=draw(st.sampled_from([0.0, 0.6])),
+        )
+    control = replace(
+        control,
+        computing_delay_s=control.period_s * draw(st.floats(0.0, 3.0)),
+        position=draw(st.sampled_from([position, position, None])),
+        velocity=draw(st.sampled_from([velocity, velocity, None])),
+        current=current,
+    )
+    encoder = draw(
+        st.sampled_from(
+            [
+                Encoder(),
+                Encoder(speed="difference", difference_samples=3),
+                Encoder(speed="tracking", bandwidth_rad_s=0.3 / T, filter_time_s=T),
+            ]
+        )
+    )
+    coupling = draw(st.sampled_from([None, Coupling(stiffness_Nm_rad=300.0, damping_Nms_rad=0.05)]))
+    J_l = 2e-3 * base.total_ratio**2 / 100 if base.axis == "rotary" else 20.0
+    k = 300.0 * base.total_ratio**2 / 100 if base.axis == "rotary" else 2e6
+    if coupling is not None:
+        coupling = Coupling(stiffness_Nm_rad=k, damping_Nms_rad=1e-3 * k)
+    load = Load(
+        inertia_kgm2=J_l,
+        path=draw(st.sampled_from(["back-drivable", "self-locking"])),
+        moment_slope_Nm_rad=draw(st.sampled_from([0.0, -0.05 * k])),
+        moment_damping_Nms_rad=draw(st.sampled_from([0.0, 2e-4 * k])),
+        friction=LoadFriction(viscous_Nms_rad=1e-4 * k),
+    )
+    command = Command(
+        filter_time_s=draw(st.sampled_from([0.0, 20 * T])), filter_order=draw(st.sampled_from([1, 2]))
+    )
+    friction = replace(base.friction, load_coefficient=0.3 / base.total_ratio)
+    return replace(
+        base, controller=control, encoder=encoder, coupling=coupling, load=load, command=command,
+        friction=friction,
+    )  # fmt: skip
+
+
+@settings(max_examples=60)
+@given(wide_designs())
+def test_any_wide_design(design: Design) -> None:
+    agree(design, 90, 1e-9)
+
+
+@settings(max_examples=40)
+@given(designs())
+def test_any_design_from_any_start(design: Design) -> None:
+    agree(design, 120, 1e-9, torque=-2.25e-3, start=START)
+
+
+def test_the_gate_has_teeth() -> None:
+    """A notch moved by 0.1 %, or 1 % of a tick of delay more, is far outside the tolerance."""
+    design = everything()
+    velocity = design.controller.velocity
+    assert velocity.filters == FILTERS
+    moved = replace(FILTERS[1], frequency_rad_s=900.9)
+    other = replace(velocity, filters=(FILTERS[0], moved, *FILTERS[2:]))
+    late = replace(amber().controller, computing_delay_s=1.01e-4)
+    command = 0.1 * np.sin(np.arange(2000) / 40)
+    for base, changed in ((design, replace(design.controller, velocity=other)), (amber(), late)):
+        ours = assemble_loops(base).tick_system.respond(command)["u"]
+        assert worst(ours, run(replace(base, controller=changed), command)["u"]) > 1e-6
+
+
+def test_position_loop_of_a_rigid_drive_does_not_care_for_the_sensor() -> None:
+    design = amber()
+    other = replace(design.controller, position=PositionLoop(gain=120.0, sensor="output"))
+    one, two = (assemble_loops(each).position for each in (design, replace(design, controller=other)))
+    np.testing.assert_allclose(one.open_loop.A, two.open_loop.A, rtol=1e-14)
+
+
+@pytest.mark.parametrize("rates", RATES)
+def test_lifted_system_in_forced_response(rates: tuple[int, int]) -> None:
+    system = assemble_loops(amber(*rates, delay_s=1.5e-4)).tick_system
+    steps = 2000 // rates[1]
+    command, torque = np.repeat(0.01 * np.sin(np.arange(steps) / 20), rates[1]), -1e-3
+    direct, lifted = system.respond(command, torque), system.lifted()
+    inputs = np.vstack([command[:: rates[1]], np.full(steps, torque), np.zeros(steps)])
+    answer = control.forced_response(lifted, np.arange(steps) * lifted.dt, inputs)
+    stacked = answer.outputs.reshape(rates[1], len(system.outputs), steps).transpose(2, 0, 1)
+    for r, name in enumerate(system.outputs):
+        assert worst(stacked[:, :, r].reshape(-1), direct[name]) < 1e-11
+
+
+def _fundamental(values: np.ndarray, z: complex) -> complex:
+    return complex(np.sum(values * z ** -np.arange(len(values))))
+
+
+@pytest.mark.parametrize(("point", "every"), [("u", 1), ("i_ref", 2), ("w_ref", 10)])
+def test_a_response_analyser_on_the_multirate_drive_sees_the_break_point_loop(point: str, every: int) -> None:
+    """Inject a sinusoid into the running cascade; fundamentals before and after give L = -before/after."""
+    design, window = amber(2, 10, delay_s=1.5e-4), 2000
+    loop = assemble_loops(design).break_points[point]
+    assert loop.periodic == (every < 10)
+    assert loop.period_s == pytest.approx(every * TICK)
+    for cycles in (3, 17, 40) if point == "w_ref" else (3, 40, 130, 331):
+        omega = 2 * np.pi * cycles / (window * TICK)
+        d = np.cos(omega * TICK * np.arange(4 * window))
+        record = run(design, np.zeros(4 * window), inject={point: d})[point]
+        z = np.exp(1j * omega * every * TICK)
+        before, at_point = (_fundamental(each[-window // every :], z) for each in (record, d[::every]))
+        after = before + at_point
+        assert loop.open_loop(z) == pytest.approx(-before / after, rel=1e-6)
+        assert loop.sensitivity(z) == pytest.approx(after / at_point, rel=1e-6)

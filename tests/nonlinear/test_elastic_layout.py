@@ -1,9 +1,0 @@
-"""The parts of the rows that belong to the event-driven plant."""
-
-from __future__ import annotations
-
-from nonlinear._kernels import elastic_layout, layout
-
-
-def test_state_fits_its_place() -> None:
-    assert elastic_layout.ES_END - layout.ELASTIC_STATE == layout.ELASTIC_STATE_SIZE

@@ -1,0 +1,151 @@
+"""Style and scripts of a page: contrast, the bundle of its modules, ranges of sliders, the glossary."""
+
+import re
+import shutil
+import subprocess
+from html import unescape
+from importlib.resources import files
+
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.asked.quantities import QUANTITIES
+from reports import document as doc
+from reports import scripts
+from reports.glossary import TERMS, glossary, meaning
+from reports.html import environment, script
+from reports.live.keys import SLIDER_FACTOR, followed
+from reports.scripts import asset
+
+TEXT, GRAPHICS = 4.5, 3.0
+PAIRS = [
+    *((ink, ground) for ink in ("ink", "muted", "link", "fail", "pass") for ground in ("bg", "paper")),
+    ("pass", "pass-bg"), ("fail", "fail-bg"), ("warn", "warn-bg"), ("info", "info-bg"),
+    ("ink", "fail-bg"), ("muted", "fail-bg"), ("ink", "info-bg"), ("paper", "c1"),
+]  # fmt: skip
+
+
+def schemes() -> dict[str, dict[str, str]]:
+    """The variables of each scheme, as they stand in the style sheet; light where it leaves one out."""
+    blocks = re.findall(
+        r"(@media \([^)]*dark\) \{\s*|@media print \{\s*)?:root \{(.*?)\}", asset("style.css"), re.S
+    )
+    light = dict(re.findall(r"--([\w-]+): (#\w+);", blocks[0][1]))
+    return {
+        "dark" if "dark" in head else "print" if "print" in head else "light": {
+            **light, **dict(re.findall(r"--([\w-]+): (#\w+);", body))
+        }
+        for head, body in blocks
+    }  # fmt: skip
+
+
+def luminance(colour: str) -> float:
+    digits = colour[1:] if len(colour) == 7 else "".join(2 * letter for letter in colour[1:])
+    parts = [int(digits[k : k + 2], 16) / 255.0 for k in (0, 2, 4)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: str, other: str) -> float:
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_the_formula_is_that_of_the_standard() -> None:
+    assert contrast("#000", "#ffffff") == pytest.approx(21.0)
+    assert contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.005)  # the well-known near miss
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark", "print"])
+def test_text_and_figures_stand_out(scheme: str) -> None:
+    known = schemes()[scheme]
+    for ink, ground in PAIRS:
+        if ground == "c1" and scheme == "print":
+            continue  # the pressed button is not printed
+        assert contrast(known[ink], known[ground]) >= TEXT, (ink, ground)
+    for k in range(1, 8):
+        assert contrast(known[f"c{k}"], known["paper"]) >= GRAPHICS, k
+
+
+def test_nothing_moves_for_a_reader_who_wants_no_motion() -> None:
+    assert "prefers-reduced-motion: reduce" in asset("style.css")
+    assert "smooth" not in script(live=True)
+
+
+ROOM = files("reports").joinpath("templates", "page")
+
+
+def test_every_module_is_on_the_page_once_behind_its_imports() -> None:
+    text = script(live=True)
+    names = sorted(one.name.removesuffix(".js") for one in ROOM.iterdir())
+    places = {name: text.index(f"const {name}$ = ") for name in names}
+    assert all(text.count(f"const {name}$ = ") == 1 for name in names)
+    for name in names:
+        source = ROOM.joinpath(f"{name}.js").read_text(encoding="utf-8")
+        assert len(source.splitlines()) <= 250
+        wanted = re.findall(r'^import .* from "\./(\w+)\.js";$', source, re.MULTILINE)
+        assert len(wanted) == source.count("import {"), name
+        assert all(places[other] < places[name] for other in wanted), name
+    assert not re.search(r"^\s*(import|export)\b", text, re.MULTILINE)
+
+
+def test_modules_in_a_circle_are_refused(monkeypatch) -> None:
+    texts = {"page/a.js": 'import { b } from "./b.js";\nexport const a = 1;\n',
+             "page/b.js": 'import { a } from "./a.js";\nexport const b = 2;\n'}  # fmt: skip
+    monkeypatch.setattr(scripts, "asset", texts.__getitem__)
+    with pytest.raises(ValueError, match="a -> b -> a"):
+        scripts.bundled.__wrapped__("a")
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
+def test_a_bundle_runs_as_its_modules_would(monkeypatch, tmp_path) -> None:
+    texts = {"page/a.js": 'import { two } from "./b.js";\nconst own = 3;\nconsole.log(own * two());\n',
+             "page/b.js": "const own = 2;\nexport const two = () => own;\n"}  # fmt: skip
+    monkeypatch.setattr(scripts, "asset", texts.__getitem__)
+    (tmp_path / "a.js").write_text(scripts.bundled.__wrapped__("a"), encoding="utf-8")
+    done = subprocess.run(["node", str(tmp_path / "a.js")], capture_output=True, text=True, check=True)
+    assert done.stdout == "6\n"
+
+
+AMBER = load_design("ilr33-amber")
+
+
+@pytest.mark.parametrize("value", [-1e-3, 1e-3])
+def test_a_value_below_zero_has_both_signs(value: float) -> None:
+    design = AMBER.with_values({"friction.offset_torque": value})
+    one = next(s for s in followed(design).free if s["path"] == "friction.offset_torque")
+    ends = (-SLIDER_FACTOR * abs(value), SLIDER_FACTOR * abs(value))
+    if value < 0.0:
+        assert (one["low"], one["high"]) == pytest.approx(ends)
+    else:
+        assert (one["low"], one["high"]) == pytest.approx((value / SLIDER_FACTOR, ends[1]))
+
+
+def test_whole_numbers_and_all_values_lie_inside() -> None:
+    for one in followed(AMBER).free:
+        assert one["low"] <= one["value"] <= one["high"]
+        if one["whole"]:
+            assert one["low"] >= 1.0
+            assert one["high"] > one["low"]
+
+
+def test_every_figure_and_term_has_one_line() -> None:
+    terms = glossary()
+    assert {quantity.title or quantity.words for quantity in QUANTITIES.values()} | set(TERMS) == set(terms)
+    assert list(terms) == sorted(terms, key=str.lower)
+    assert all(line and "\n" not in line for line in terms.values())
+
+
+def test_a_heading_of_a_table_says_its_line() -> None:
+    headings = ("Disk margin", "Gain margin", "No term")
+    block = doc.table("Words", [doc.column(f"c{k}", words) for k, words in enumerate(headings)], [])
+    template = environment().from_string('{% import "blocks.html" as b with context %}{{ b.table(block) }}')
+    page = template.render(block=block, unique=lambda letter: letter)
+    found = {
+        name: unescape(line)
+        for line, name in re.findall(r'<th scope="col"[^>]*?(?: title="([^"]*)")?>([^<]*)<', page)
+    }
+    assert found == {name: meaning(name) for name in headings}
+    assert found["Disk margin"] == TERMS["Disk margin"]
+    assert found["Gain margin"] == QUANTITIES["gain_margin"].description
+    assert found["No term"] == ""
