@@ -18,6 +18,7 @@ from reports.analyses import BY_NAME, FURTHER, Analysis
 from reports.document_schema import Document
 
 if TYPE_CHECKING:
+    from analyses.corners import Corners
     from analyses.isolation import Missing
     from analyses.linear.loop_figures import LoopFigures
     from analyses.linear.loop_survey import LoopSurvey
@@ -28,7 +29,10 @@ Progress = Callable[[int, int], None]
 
 
 def design_report(
-    design: Design, validation: Sequence[doc.Section] = (), progress: Progress | None = None
+    design: Design,
+    validation: Sequence[doc.Section] = (),
+    progress: Progress | None = None,
+    source: str | None = None,
 ) -> Document:
     """Compute the report of a design as a document.
 
@@ -40,6 +44,8 @@ def design_report(
         before them; their verdicts count.
     progress : callable, optional
         Called with (steps done, steps in all).
+    source : str, optional
+        The text that the design was read from: the page changes that, not one written anew.
 
     Returns
     -------
@@ -60,7 +66,7 @@ def design_report(
     origin, head = provenance(design_hash(design)), design_head(design)
     with isolated() as missing:
         figures, loops, survey = _loops(design, progress)
-        point, ranges = _views(design, survey)
+        point, ranges, bounds = _views(design, survey)
     first = [part for part in validation if part["id"] == "validation"]
     sections = [
         *loops[:1],
@@ -77,7 +83,11 @@ def design_report(
             else []
         )
         answered = attempt(
-            "first screen", lambda: answer.section(figures, items, sections, point, ranges), None
+            "first screen",
+            lambda: answer.section(
+                figures, items, sections, point, ranges, bounds=bounds, mend=_mend(point, survey, bounds)
+            ),
+            None,
         )
     first_screen = [answered] if answered and figures else []
     sections[:0] = [*first_screen, *notices([*missing, *unanswered], "linear")]
@@ -88,7 +98,7 @@ def design_report(
         provenance=origin,
         sections=sections,
     )
-    live = attempt("sliders", lambda: live_model(design, _held(figures)), None)
+    live = attempt("sliders", lambda: live_model(design, _held(figures), source), None)
     if live and figures:
         made["live"] = live
     return made
@@ -101,16 +111,28 @@ def _held(figures: Mapping[str, LoopFigures]) -> list[str]:
 
 def _views(
     design: Design, survey: LoopSurvey | None
-) -> tuple[WeakPoint | None, Mapping[str, Mapping[str, Spread]]]:
-    """The weakest point of all views, and the spread over the operating points."""
+) -> tuple[WeakPoint | None, Mapping[str, Mapping[str, Spread]], Corners | None]:
+    """The weakest point of all views, the spread over the operating points, and the corners."""
     from analyses.isolation import attempt
     from analyses.specification.weakest import spread, weakest
 
     if survey is None:
-        return None, {}
+        return None, {}, None
     bounds = attempt("corners", lambda: corners(design), None)
     point = attempt("weakest point", lambda: weakest(survey, bounds), None)
-    return point, spread(survey.operating_points)
+    return point, spread(survey.operating_points), bounds
+
+
+def _mend(point: WeakPoint | None, survey: LoopSurvey | None, bounds: Corners | None) -> str:
+    """Say which move mends the weakest point, where it is beyond its limit."""
+    from analyses.isolation import attempt
+    from analyses.specification.mending import mending
+    from reports.sections.answer import NO_MOVE, move_words
+
+    if point is None or survey is None or point.reserve >= 0.0:
+        return ""
+    move = attempt("move that mends the weakest point", lambda: mending(point, survey, bounds), None)
+    return NO_MOVE if move is None else move_words(survey.design, move)
 
 
 def _loops(

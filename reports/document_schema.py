@@ -217,6 +217,21 @@ class Weakest(TypedDict):
     label: str
     words: str
     status: Status
+    move: NotRequired[str]
+
+
+@_strict
+class Bar(TypedDict):
+    """A requirement on the first screen; ``band``: between which values its figure lies at the corners."""
+
+    id: str
+    label: str
+    value: float | None
+    limit: float | None
+    comparison: str
+    unit: str
+    verdict: Judged
+    band: list[float] | None
 
 
 @_strict
@@ -226,6 +241,10 @@ class GlanceBlock(TypedDict):
     kind: Literal["glance"]
     loops: list[GlanceLoop]
     weakest: Weakest | None
+    believed: NotRequired[str]
+    linear: NotRequired[str]
+    bars: NotRequired[list[Bar]]
+    more_bars: NotRequired[int]
     findings: list[FindingItem]
     more: int
 

@@ -25,10 +25,14 @@ class FixedKey(NamedKey):
 
 
 class SliderKey(NamedKey):
-    """A key with the ends of its slider and of its tolerance."""
+    """A key with the ends of its slider, of its tolerance, and of what a design file may have."""
 
     low: float
     high: float
+    least: float | None
+    most: float | None
+    open: bool
+    allowed: str
     band: list[float] | None
 
 
@@ -105,7 +109,8 @@ class LiveData(TypedDict):
     stages: dict[str, int]
     points: dict[str, int]
     point: str
-    multiples: list[list[str]]
+    relations: list[list[list[str | float]]]
+    electrical: bool
     limiters: list[list[object]]
     quantities: list[str]
     figures: list[FollowedFigure]

@@ -13,6 +13,7 @@ from functools import cache
 from jinja2 import Environment, PackageLoader
 
 IMPORT = re.compile(r'^import \{ ([\w, ]+) \} from "\./(\w+)\.js";\n', re.MULTILINE)
+ASIDE = re.compile(r"^[ \t]+|^//[^\n]*\n", re.MULTILINE)  # what a page does not need: indents, remarks
 EXPORT = re.compile(r"^export (const|class) (\w+)", re.MULTILINE)
 
 
@@ -44,5 +45,5 @@ def _take(name: str, made: dict[str, str], above: tuple[str, ...]) -> None:
         _take(other, made, (*above, name))
     taken = "".join(f"const {{ {names} }} = {other}$;\n" for names, other in wanted)
     given = ", ".join(name for _, name in EXPORT.findall(text))
-    body = EXPORT.sub(r"\1 \2", IMPORT.sub("", text))
+    body = ASIDE.sub("", EXPORT.sub(r"\1 \2", IMPORT.sub("", text)))
     made[name] = f"const {name}$ = (() => {{\n{taken}{body}return {{ {given} }};\n}})();\n"

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
 from actuator_lti.asked.verdict import Tally, Verdict
 from analyses.monte_carlo.statistics import ColumnStatistics
 from analyses.specification.verdicts import RequirementVerdict, tally
 
-__all__ = ["ColumnStatistics", "MonteCarloResult", "Odds", "WorstCase"]
+__all__ = ["ColumnStatistics", "Driver", "MonteCarloResult", "Odds", "WorstCase"]
 
 
 @dataclass(frozen=True)
@@ -86,6 +87,34 @@ class WorstCase:
 
 
 @dataclass(frozen=True)
+class Driver:
+    """What one tolerance alone does to a figure.
+
+    Attributes
+    ----------
+    column, path : str
+    low_value, high_value : float
+        Ends of the parameter's range (three standard deviations of a normal one), SI.
+    low, high : float or None
+        The figure there, in its unit; ``None`` where there is none.
+    """
+
+    column: str
+    path: str
+    low_value: float
+    high_value: float
+    low: float | None
+    high: float | None
+
+    @property
+    def swing(self) -> float:
+        """Distance between the figure at both ends; infinite where it is lost at one."""
+        if self.low is None or self.high is None:
+            return 0.0 if self.low == self.high else inf
+        return abs(self.high - self.low)
+
+
+@dataclass(frozen=True)
 class MonteCarloResult:
     """A finished study.
 
@@ -109,6 +138,8 @@ class MonteCarloResult:
         Probability of meeting a requirement, with 95 % confidence, that is enough; without it every sample
         and the worst case have to.
     notes : tuple of str
+    drivers : tuple of Driver
+        For each figure that a requirement looks at, every tolerance alone, the one that moves it most first.
     """
 
     design_name: str
@@ -124,6 +155,7 @@ class MonteCarloResult:
     left_out: tuple[RequirementVerdict, ...] = ()
     at_least: float | None = None
     notes: tuple[str, ...] = ()
+    drivers: tuple[Driver, ...] = ()
 
     @property
     def tally(self) -> Tally:

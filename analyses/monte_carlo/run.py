@@ -22,7 +22,7 @@ from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
 from analyses.monte_carlo.judging import by_loop, in_populations, judge, label, source_columns
 from analyses.monte_carlo.reduction import BLOCK, Reducing, Reduction, Tally, judged, reduced, unpacked
-from analyses.monte_carlo.result import MonteCarloResult, Odds, WorstCase
+from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
 from analyses.monte_carlo.sketch import MOST
 from analyses.monte_carlo.statistics import clopper_pearson, column_statistics
 from analyses.monte_carlo.stepping import StepCheck
@@ -143,8 +143,30 @@ def monte_carlo(
         {name: column_statistics(name, unit, whole.columns[name]) for name, unit in task.units.items()},
         tuple(odds), worst, Path(folder),
         {name: float(values[0]) for name, values in nominal.items()}, _left_out(design),
-        notes=_notes(task, settings.samples),
+        notes=_notes(task, settings.samples), drivers=_drivers(task, odds),
     )  # fmt: skip
+
+
+def _drivers(task: SampleTask, odds: Sequence[Odds]) -> tuple[Driver, ...]:
+    """What each tolerance does alone to the figures that requirements look at, all others nominal."""
+    factors, names = task.sampler.factors, dict.fromkeys(name for one in odds for name in one.columns)
+    if not factors or not names:
+        return ()
+    rows = np.tile(task.sampler.nominal, (2 * len(factors), 1))
+    for k, factor in enumerate(factors):
+        rows[2 * k : 2 * k + 2, k] = factor.box
+    figures = task.figures(rows)
+    made = [
+        Driver(name, factor.path, *factor.box, *(_known(x) for x in figures[name][2 * k : 2 * k + 2]))
+        for name in names
+        for k, factor in enumerate(factors)
+    ]
+    order = {name: place for place, name in enumerate(names)}
+    return tuple(sorted(made, key=lambda one: (order[one.column], -one.swing)))
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
 
 
 def _odds(id: str, words: str, unit: str, passed: int, count: int) -> Odds:

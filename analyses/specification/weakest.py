@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isinf, log10
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, reserve
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
+    from actuator_lti.drive.operating import OperatingPoint
     from actuator_lti.margins import StabilityMargins
     from analyses.corners import Corners
     from analyses.linear.loop_figures import LoopFigures
@@ -39,6 +40,12 @@ class View:
         By the names of `CUSTOMARY`; ``inf`` where nothing limits.
     cut : str
         The break point, with all other loops closed.
+    kind, load_Nm : str, float
+        The operating point.
+    design : Design, optional
+        Where it is not the nominal one: that of a corner.
+    found : LoopFigures, optional
+        The loop as it is there.
     """
 
     place: str
@@ -47,6 +54,10 @@ class View:
     stable: bool | None
     figures: Mapping[str, float]
     cut: str = ""
+    kind: OperatingPoint = "sliding"
+    load_Nm: float = 0.0
+    design: Design | None = None
+    found: LoopFigures | None = None
 
 
 @dataclass(frozen=True)
@@ -95,18 +106,19 @@ def views(survey: LoopSurvey, corners: Corners | None = None) -> Iterator[View]:
         yield _at_break_point(name, point)
     for one in survey.operating_points:
         if one.kind != "describing-function":
-            yield from _loops(one.place, one.figures)
+            yield from _loops(one.place, one.figures, kind=one.kind, load_Nm=one.load_Nm or 0.0)
     for corner in corners.corners[1:] if corners else ():
         place = corner.name.replace("worst ", "tolerances of the worst ", 1)
-        yield from _loops(place, corner.figures)
+        yield from _loops(place, corner.figures, design=corner.design)
 
 
-def _loops(place: str, loops: Mapping[str, LoopFigures]) -> Iterator[View]:
+def _loops(place: str, loops: Mapping[str, LoopFigures], **at: Any) -> Iterator[View]:
     for name, one in loops.items():
-        judged = one.judged
-        yield View(place, name, one.rotor, judged.margins.stable, figures_of(judged.margins))
-        if one.locked is not None and one.held is None:
-            yield View(place, name, "locked", one.locked.stable, figures_of(one.locked.margins))
+        seen = [(one.rotor, one.judged)]
+        seen += [("locked", one.locked)] if one.locked is not None and one.held is None else []
+        for rotor, found in seen:
+            margins = found.margins
+            yield View(place, name, rotor, margins.stable, figures_of(margins), found=found, **at)
 
 
 def _at_break_point(name: str, point: BreakPoint) -> View:
@@ -114,7 +126,7 @@ def _at_break_point(name: str, point: BreakPoint) -> View:
     if point.exact is not None and point.exact.stable:  # periodic: the fundamental alone is not all of it
         up, down = point.exact.gain_upper, point.exact.gain_lower
         figures["gain_margin"] = 20.0 * log10(min(up, 1.0 / down if down else inf))
-    return View("all loops closed", "", "", point.stable, figures, name)
+    return View("all loops closed", "", "", point.stable, figures, name, found=point.figures)
 
 
 def figures_of(margins: StabilityMargins) -> dict[str, float]:
@@ -129,23 +141,23 @@ def _points(view: View, design: Design) -> Iterator[WeakPoint]:
     if view.stable is not True:
         return
     for name, value in view.figures.items():
-        required = _required(design, name, view)
-        limit = CUSTOMARY[name] if required is None else required
+        limit, required = limit_of(design, name, view)
         if not isinf(value):
-            yield WeakPoint(
-                view, name, value, limit, required is not None, reserve(name, value, limit, value - limit)
-            )
+            yield WeakPoint(view, name, value, limit, required, reserve(name, value, limit, value - limit))
 
 
-def _required(design: Design, quantity: str, view: View) -> float | None:
-    """The limit that a requirement sets on a loop as it is judged; elsewhere custom holds."""
+def limit_of(design: Design, quantity: str, view: View) -> tuple[float, bool]:
+    """The limit of a margin in a view, and whether a requirement sets it.
+
+    A requirement holds for a loop as it is judged; elsewhere custom does.
+    """
     limits = [
         item.minimum
         for item in design.requirements
         if item.quantity == quantity and item.loop in ("every", view.loop) and item.minimum
         if view.rotor in ("", item.rotor or "free")
     ]
-    return max(limits) if limits and not view.place else None
+    return (max(limits), True) if limits and not view.place else (CUSTOMARY[quantity], False)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The relations between the keys of a design as C, found by running the checks of a design on traced values.
+"""The relations between the keys of a design as statements: the checks of a design, run on traced values.
 
 Each comparison that a check makes is turned over: where the check then refuses, that is a relation, in the
 check's own words; where it does not, the check is followed from there.
@@ -7,7 +7,7 @@ check's own words; where it does not, the check is followed from there.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -41,17 +41,22 @@ class _Way(Tape):
 
 def relation_functions(design: Design, keys: Sequence[Key]) -> list[list[str]]:
     """Statements of C functions of ``(k, why, size)``: 0 where keys contradict each other, and why."""
+    return [_indented(way) for way in relation_statements(design, {key.path: key.value for key in keys})]
+
+
+def relation_statements(design: Design, keys: Mapping[str, float]) -> list[tuple[Statement, ...]]:
+    """Each check of a design as statements of its keys, ``k[0]``, ``k[1]``, ... in their order."""
     bare = replace(design, parameters=FrozenMap({}))  # values are shown as they are then, not as written
     ways = [_followed(bare, keys, check, (), 0) for check in (*FIRST_RELATIONS, *RELATIONS)]
-    return [_indented(used(way)) for way in ways if _refuses(way)]
+    return [used(way) for way in ways if _refuses(way)]
 
 
 def _followed(
-    design: Design, keys: Sequence[Key], check: Any, told: tuple[bool, ...], turns: int
+    design: Design, keys: Mapping[str, float], check: Any, told: tuple[bool, ...], turns: int
 ) -> list[Statement]:
     """What a check does behind the outcomes that are told, up to what it refuses first."""
     way = _Way(loose=True, told=told)
-    values = {key.path: Traced(way, f"k[{n}]", key.value) for n, key in enumerate(keys)}
+    values = {path: Traced(way, f"k[{n}]", value) for n, (path, value) in enumerate(keys.items())}
     end = Statement("allowed")
     try:
         for refusal in check(stacked(design, values)):
@@ -84,7 +89,7 @@ def _refusal(text: str) -> Statement:
     """A message that shows the values of then."""
     parts = _SHOWN.split(text.replace("%", "%%"))  # words, form, name, words, ...
     words = "".join(part if n % 3 == 0 else f"%{part}" for n, part in enumerate(parts) if n % 3 < 2)
-    return Statement("refusal", does=c_text(words), terms=tuple(parts[2::3]))
+    return Statement("refusal", does=words, terms=tuple(parts[2::3]))
 
 
 def _indented(statements: Sequence[Statement]) -> list[str]:
@@ -92,6 +97,7 @@ def _indented(statements: Sequence[Statement]) -> list[str]:
     depth = 0
     for statement in statements:
         depth -= statement.kind == "end"
-        lines.append("    " * depth + statement.c)
+        shown = replace(statement, does=c_text(statement.does)) if statement.kind == "refusal" else statement
+        lines.append("    " * depth + shown.c)
         depth += statement.kind == "branch"
     return lines

@@ -28,8 +28,8 @@ class Statement:
         Number of the value, or place in the row; of a condition or branch 1 where it has to hold, else 0.
     does : str
         A sign between two terms, the name of a function of the C library, ``where`` (condition, yes, no),
-        ``zero_below`` (value, least), or empty for the term itself.  Of a refusal: the C string of its words,
-        the form of ``printf`` where a term is shown.
+        ``zero_below`` (value, least), or empty for the term itself.  Of a refusal: its words, the form of
+        ``printf`` where a term is shown.
     terms : tuple of str or float
     """
 

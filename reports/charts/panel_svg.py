@@ -183,6 +183,6 @@ def _path(x: np.ndarray, y: np.ndarray) -> str:
     parts, pen_down = [], False
     for a, b, there in zip(x.tolist(), y.tolist(), good.tolist(), strict=True):
         if there:
-            parts.append(f"{'L' if pen_down else 'M'}{a:.2f} {b:.3f}")
+            parts.append(f"{'L' if pen_down else 'M'}{a:.2f} {b:.2f}")
         pen_down = there
     return "".join(parts)

@@ -13,9 +13,18 @@ ReportArgument = Annotated[Path, typer.Argument(metavar="REPORT_JSON", help="A r
 FileOption = Annotated[
     Path | None, typer.Option("--out", metavar="FILE", help="The PDF; beside the JSON where left out.")
 ]
+SummaryOption = Annotated[
+    bool,
+    typer.Option("--summary", help="In the PDF the first screen and one line a section: about four pages."),
+]
 
 
-def pdf(report: ReportArgument, out: FileOption = None, as_json: JsonOption = False) -> None:
+def pdf(
+    report: ReportArgument,
+    out: FileOption = None,
+    summary: SummaryOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Typeset any report.json as PDF: cover with verdicts and lines to sign, tables, vector figures."""
     from actuator_lti.errors import InputError
     from analyses.isolation import drain
@@ -23,7 +32,7 @@ def pdf(report: ReportArgument, out: FileOption = None, as_json: JsonOption = Fa
     from reports.document import load
     from reports.pdf import write_pdf
 
-    path = write_pdf(load(report), out or report.with_suffix(".pdf"))
+    path = write_pdf(load(report), out or report.with_suffix(".pdf"), whole=not summary)
     if as_json:
         print_json({"schema": "actuator-lti/pdf", "version": 1, "file": str(path)})
     else:

@@ -17,6 +17,7 @@ from reports.cli.options import (
     OutOption,
     QuietOption,
 )
+from reports.cli.pdf import SummaryOption
 
 IncludeOption = Annotated[
     list[Path] | None,
@@ -45,6 +46,7 @@ def report(
     out: OutOption = DEFAULT_OUT,
     validation: ValidationOption = True,
     pdf: PdfOption = False,
+    summary: SummaryOption = False,
     include: IncludeOption = None,
     also: AlsoOption = None,
     as_json: JsonOption = False,
@@ -57,6 +59,7 @@ def report(
     failure cases, duty cycle, limit cycles and corners.
     """
     from actuator_lti.asked.verdict import Verdict
+    from actuator_lti.design.loader import design_text
     from reports.build import design_report, further_sections, validation_sections, write_report
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
@@ -74,13 +77,14 @@ def report(
         with progress(f"validating {drive.name}", quiet=quiet) as validating:
             added = [*validation_sections(drive, validating), *added]
     with progress(f"computing {drive.name}", quiet=quiet) as computing:
-        made = design_report(drive, added, progress=computing)
+        source = None if changes else design_text(design)
+        made = design_report(drive, added, progress=computing, source=source)
     with progress("drawing figures", quiet=quiet) as drawing:
         written: tuple[Path, ...] = write_report(made, out, progress=drawing)
     if pdf:
         from reports.pdf import write_pdf
 
-        written = (*written, write_pdf(made, out / "report.pdf"))
+        written = (*written, write_pdf(made, out / "report.pdf", whole=not summary))
     passed = bool(made["verdict"]["passed"])
     if as_json:
         print_line(dumps(made).rstrip("\n"))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from actuator_lti.drive.signals import LIMITERS
+from actuator_lti.design.model import Axis
+from actuator_lti.drive.signals import LIMITERS, SIGNALS
 from nonlinear.export.page import line_of
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -16,14 +17,14 @@ FRAME = 1.6
 BORDERS = tuple(limiter.words for limiter in LIMITERS.values() if line_of(limiter) is not None)
 
 
-def live_charts(unit: str) -> dict[str, str]:
-    """Give each figure's SVG by its name; ``unit`` is that of the command."""
+def live_charts(unit: str, axis: Axis = "rotary", *, electrical: bool = True) -> dict[str, str]:
+    """Give each figure's SVG by its name; ``unit`` is that of the command, ``electrical``: with a current."""
     drawn = {
         "bode": _bode(),
         "nyquist": _nyquist(),
         "sensitivity": _sensitivity(),
         "step": _step(),
-        "run": _run(),
+        "run": _run(unit, axis, electrical),
         "border": _border(unit),
     }
     words = {
@@ -32,7 +33,7 @@ def live_charts(unit: str) -> dict[str, str]:
         "sensitivity": "Sensitivity S and closed loop T, as designed and as changed.",
         "step": "Step response of the linear loop, as designed and as changed.",
         "border": "Command amplitude at which a limit is reached, as designed and as changed.",
-        "run": "Step with limits and friction, as designed and as changed, and a measured record.",
+        "run": "Run with limits and friction, as designed and as changed, and a measured record.",
     }
     return {name: page_svg(chart, f"live{k}", words[name]) for k, (name, chart) in enumerate(drawn.items())}
 
@@ -105,15 +106,24 @@ def _step() -> Chart:
     return chart
 
 
-def _run() -> Chart:
-    chart = Chart(width=style.HALF, height=290.0)
-    panel = chart.panel()
-    panel.curve((0.0, 1.0), (0.0, 0.0), "command", colour=style.INK, width=1.0)
-    panel.curve((0.0, 1.0), (0.0, 0.0), "measured record", colour=style.RED, width=2.6, opacity=0.6)
-    _both(panel)
-    panel.x.label, panel.y.label = "time, ms", "share of the largest command"
-    panel.x.limits(0.0, 1.0)
-    panel.y.limits(-0.1, 1.3)
+def _run(unit: str, axis: Axis, electrical: bool) -> Chart:
+    traces = {"w": "speed", "i": "current", "u": "voltage"}
+    if not electrical:
+        del traces["i"]
+    labels = [
+        f"output, {unit}",
+        *(f"{words}, {SIGNALS[name].unit_for(axis)}" for name, words in traces.items()),
+    ]
+    chart = Chart(width=style.HALF, height=170.0 + 105.0 * len(traces))
+    panels = chart.column(*([1.5] + [1.0] * len(traces)))
+    panels[0].curve((0.0, 1.0), (0.0, 0.0), "command", colour=style.INK, width=1.0)
+    panels[0].curve((0.0, 1.0), (0.0, 0.0), "measured record", colour=style.ORANGE, width=2.6, opacity=0.6)
+    for panel, label in zip(panels, labels, strict=True):
+        _both(panel)
+        panel.y.label = label
+        panel.y.limits(-0.1, 1.3)
+    panels[-1].x.label = "time, ms"
+    panels[-1].x.limits(0.0, 1.0)
     return chart
 
 

@@ -61,7 +61,7 @@ def followed(design: Design, figures: Iterable[Figure] = ()) -> Followed:
             continue
         reason = _reason(design, path, asked)
         if reason:
-            fixed.append({**_named(design, path), "why": reason})
+            fixed.append({**named(design, path), "why": reason})
         else:
             free.append(_slider(design, path))
     values = {key["path"]: key["value"] for key in free}
@@ -102,7 +102,7 @@ def _top(design: Design, path: str) -> float:
     return min(1.0 if unit == "1" else LONGEST * design.controller.period_s, field.high)
 
 
-def _named(design: Design, path: str) -> NamedKey:
+def named(design: Design, path: str) -> NamedKey:
     """Give path, value and unit as the design file writes them."""
     field, _ = located(design, path)
     value, known = parameter_value(design, path), design.parameters.get(path)
@@ -133,13 +133,17 @@ def _written(known: Parameter | None, value: float, unit: str) -> tuple[str, flo
 def _slider(design: Design, path: str) -> SliderKey:
     """Give a key with the range of its slider and the band of its tolerance."""
     field, _ = located(design, path)
-    made, value = _named(design, path), parameter_value(design, path)
+    made, value = named(design, path), parameter_value(design, path)
     low, high = _range(design, path, value)
     known = design.parameters.get(path)
     return {
         **made,
         "low": max(low, field.low),
         "high": min(high, field.high),
+        "least": field.low if math.isfinite(field.low) else None,
+        "most": field.high if math.isfinite(field.high) else None,
+        "open": field.low_open,
+        "allowed": field.allowed(field.unit(Structure.of(design))),
         "band": None if known is None or known.tolerance is None else _band(value, known.tolerance),
     }
 

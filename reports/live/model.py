@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 from actuator_lti.asked.quantities import (
     DRIVE_QUANTITIES,
@@ -14,12 +14,14 @@ from actuator_lti.asked.quantities import (
     judged_loops,
 )
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.grid import LEAST_UPDATES
 from analyses.monte_carlo.judging import in_populations
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported
+from nonlinear.export.relations import relation_statements
 from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
@@ -30,6 +32,7 @@ from reports.live_schema import (
     MapData,
     NotFollowed,
     Refused,
+    SliderKey,
     StepData,
 )
 from reports.sections.amplitude_map import COLOURS, WORDS
@@ -43,7 +46,7 @@ LONGEST_TICKS = 20_000  # before a cell is looked at
 POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
 
 
-def live_model(design: Design, held: Collection[str] = ()) -> LiveData | Refused:
+def live_model(design: Design, held: Collection[str] = (), source: str | None = None) -> LiveData | Refused:
     """Give the page's data, or why there is none under ``refused``.
 
     Requirements on the loops of ``held``, which the report judges held (`analyses.linear.held_loops`), are
@@ -56,7 +59,7 @@ def live_model(design: Design, held: Collection[str] = ()) -> LiveData | Refused
     except InputError as refused:
         return {"refused": f"{refused}."}
     result = followed(design, _figures(design))
-    text, places = patches(design, result.free)
+    text, places = patches(design, result.free, source)
     return {
         "name": design.name,
         "axis": design.axis,
@@ -72,8 +75,9 @@ def live_model(design: Design, held: Collection[str] = ()) -> LiveData | Refused
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
         "point": _point(design, held),
-        "multiples": [list(pair) for pair in _multiples(design)],
-        "limiters": [list(limiter) for limiter in page.LIMITERS],
+        "relations": _relations(design, result.free),
+        "electrical": design.motor.has_electrical_dynamics,
+        "limiters": [[name, bit, LIMITERS[name].words, LIMITERS[name].signal] for name, bit in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
         "figures": [_followed(each) for each in LOOP_QUANTITIES.values() if each.followed],
         "requirements": [*_on_loops(design, held), *_on_drive(design, result.figures)],
@@ -83,7 +87,7 @@ def live_model(design: Design, held: Collection[str] = ()) -> LiveData | Refused
         "borders": list(BORDERS),
         "map": _map(design),
         "text": text,
-        "patches": places,
+        "patches": [list(place) for place in places],
     }
 
 
@@ -108,12 +112,10 @@ def _point(design: Design, held: Collection[str]) -> str:
     return " ".join(words)
 
 
-def _multiples(design: Design) -> list[tuple[str, str]]:
-    """Give the keys that must stay multiples of another."""
-    control = design.controller
-    if control.position is None or control.velocity is None:
-        return []
-    return [("control.position.every", "control.velocity.every")]
+def _relations(design: Design, keys: Sequence[SliderKey]) -> list[list[list[str | float]]]:
+    """Give what refuses keys that contradict each other: the checks of a design file, as statements."""
+    checks = relation_statements(design, {key["path"]: key["value"] for key in keys})
+    return [[statement.data for statement in check] for check in checks]
 
 
 def _limit(item: Requirement) -> FollowedLimit:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from actuator_lti.files.tree import Tree
-from reports.document import figures, walk
+from reports.document import column, figures, section, table, walk
 from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed
 from reports.numbers import show
@@ -23,6 +23,23 @@ SCALE = 0.54
 _LONG_WORD = re.compile(r"\S{24,}")
 _BREAKS = re.compile(r"[\t\n\r\f\v\x1c-\x1f\x85\u2028\u2029]+")
 _SIZE = re.compile(r'<svg [^>]*viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
+
+
+def summary(made: Mapping[str, Any]) -> Tree:
+    """A document with the first screen, what it found in one line a section, and where it comes from."""
+    kept = [part for part in made["sections"] if part["id"] in ("answer", "provenance")]
+    columns = [column("part", "Section"), column("found", "Found")]
+    rows = [
+        {"part": part["title"], "found": part.get("result") or "", "_status": part["status"]}
+        for part in made["sections"]
+        if part not in kept
+    ]
+    for row in rows:  # green is said of verdicts only
+        row["_status"] = row["_status"] if row["_status"] in ("fail", "warn") else ""
+    found = section(
+        "found", "Section by section", [table("What each section of the whole report says", columns, rows)]
+    )
+    return {**made, "sections": [*kept[:1], found, *kept[1:]]}
 
 
 def printable(made: Mapping[str, Any]) -> Tree:
@@ -149,6 +166,8 @@ def _glance(block: Mapping[str, Any]) -> Tree:
     ]
     weakest = block["weakest"]
     words = [f"Weakest point: {weakest['label']}, {weakest['words']}."] if weakest else []
+    words += [f"{weakest['move']}."] if weakest and weakest.get("move") else []
+    words += [said for key in ("believed", "linear") if (said := block.get(key))]
     words += [item["text"] for item in block["findings"]]
     note = clean(" ".join(words), 2000)
     return {"kind": "table", "caption": "Each loop", "note": note, "columns": columns, "rows": rows}

@@ -12,13 +12,13 @@ from typing import Any
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
-from reports.pdf.printable import printable
+from reports.pdf.printable import printable, summary
 
 TEMPLATE = Path(__file__).resolve().parents[1] / "templates" / "pdf" / "report.typ"
 MAX_BYTES = 64_000_000
 
 
-def write_pdf(made: Mapping[str, Any], path: str | Path) -> Path:
+def write_pdf(made: Mapping[str, Any], path: str | Path, *, whole: bool = True) -> Path:
     """Write a report as PDF: cover with verdicts and lines to sign, tables, vector figures, page numbers.
 
     Parameters
@@ -27,6 +27,8 @@ def write_pdf(made: Mapping[str, Any], path: str | Path) -> Path:
         A document of `reports.document`.
     path : str or Path
         Where to write; written whole or not at all.
+    whole : bool
+        Everything, or the first screen and one line a section.
 
     Raises
     ------
@@ -35,7 +37,7 @@ def write_pdf(made: Mapping[str, Any], path: str | Path) -> Path:
     NumericalError
         If typst refuses it (no text of a document should be able to make it).
     """
-    write_bytes(path, pdf_bytes(made))
+    write_bytes(path, pdf_bytes(made if whole else summary(made)))
     return Path(path)
 
 

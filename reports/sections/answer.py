@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from actuator_lti.asked.quantities import AT_A_GLANCE, QUANTITIES, reserve
 from analyses.linear.held_loops import HELD
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.responses import frequency_grid
-from analyses.specification.weakest import Spread, WeakPoint
+from analyses.specification.mending import Move
+from analyses.specification.weakest import Spread, View, WeakPoint
 from reports import document as doc
 from reports.document_schema import (
+    Bar,
     Block,
     GlanceBlock,
     GlanceFigure,
@@ -22,12 +25,20 @@ from reports.document_schema import (
     Weakest,
 )
 from reports.findings import Finding, gathered, plain
+from reports.live.keys import named
 from reports.numbers import capital, short
 from reports.sections import loop as loop_section
 from reports.sections.margins import margin_row, range_words, shown, worst_status
 from reports.sections.names import LOOPS, POINTS, loop_words
+from reports.verdict_summary import tally
 
-SHOWN = 5
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+    from analyses.corners import Corners
+
+SHOWN = 3
+MOST_BARS = 12
+NO_MOVE = "No gain alone mends it without losing a requirement or another margin"
 
 
 def section(
@@ -36,23 +47,117 @@ def section(
     sections: Sequence[Section],
     point: WeakPoint | None = None,
     ranges: Mapping[str, Mapping[str, Spread]] | None = None,
+    *,
+    bounds: Corners | None = None,
+    mend: str = "",
 ) -> Section:
     """Make the first screen from the loops, the verdicts on the requirements and all other sections.
 
-    ``point`` is the weakest of all views, ``ranges`` the margins over the operating points.
+    ``point`` is the weakest of all views and ``mend`` the words of the move that mends it; ``ranges`` are the
+    margins over the operating points, ``bounds`` the corners, between which each requirement's figure lies.
     """
-    result = gathered(sections)
+    linear = next((part.get("result", "") for part in sections if part["id"] == "limits"), "")
+    result = [item for item in gathered(sections) if item.text != linear]
+    bars = _bars(items, bounds)
     glance: GlanceBlock = {
         "kind": "glance",
         "loops": [_loop(name, one, items, (ranges or {}).get(name, {})) for name, one in figures.items()],
-        "weakest": weakest(point) if point else None,
+        "weakest": {**weakest(point), "move": mend} if point else None,
+        "believed": believed(sections),
+        "linear": linear,
+        "bars": bars[:MOST_BARS],
+        "more_bars": max(len(bars) - MOST_BARS, 0),
         "findings": plain(result[:SHOWN]),
         "more": max(len(result) - SHOWN, 0),
     }
     status = worst_status([one.sound for one in figures.values()])
     if any(item["verdict"] == "not met" for item in items) or any(item.severity == "fail" for item in result):
         status = "fail"
-    return doc.section("answer", "At a glance", [glance, *_pictures(figures)], status=status)
+    return doc.section("answer", "At a glance", [glance, *_pictures(figures, point)], status=status)
+
+
+def believed(sections: Sequence[Section]) -> str:
+    """Say in one line how far linear and simulated agree, and what is not proven."""
+    checks = [
+        item
+        for part in sections
+        for block in doc.walk(part)
+        if block["kind"] == "verdicts" and block.get("what") == "checks"
+        for item in block["items"]
+    ]
+    if not checks:
+        return "Not checked by simulation."
+    errors = [
+        error
+        for part in sections
+        if part["id"] == "validation"
+        for block in doc.walk(part)
+        if block["kind"] == "table"
+        for row in block["rows"]
+        if isinstance(error := row.get("error"), float)
+        and row.get("predicted") is None
+        and not row.get("unit")
+    ]
+    count = tally(checks)
+    words = [f"Linear equals simulated to {power_above(max(errors))}"] if errors and max(errors) > 0.0 else []
+    words += [f"{count.met} of {count.total} checks by simulation met"]
+    open_ones = [item["label"] for item in checks if item["verdict"] == "not proven"]
+    words += [f"{len(open_ones)} not proven" if open_ones else "nothing unproven"]
+    return capital("; ".join(words)) + "."
+
+
+def power_above(value: float) -> str:
+    """The power of ten that a value does not pass.
+
+    Examples
+    --------
+    >>> power_above(2.3e-9), power_above(1e-9)
+    ('10⁻⁸', '10⁻⁹')
+    """
+    power = math.ceil(math.log10(value) - 1e-9)
+    return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+def _bars(items: Sequence[VerdictItem], bounds: Corners | None) -> list[Bar]:
+    """Give each requirement with a figure and a limit, the one with least left first."""
+    known = [item for item in items if item["value"] is not None and item["limit"] is not None]
+    found: dict[tuple[str, str | None], list[float]] = {}
+    for corner in bounds.corners if bounds else ():
+        for one in corner.verdicts:
+            if one.value is not None and math.isfinite(one.value):
+                found.setdefault((one.id, one.loop), []).append(one.value)
+    return [
+        {
+            "id": item["id"],
+            "label": item["label"],
+            "value": item["value"],
+            "limit": item["limit"],
+            "comparison": item["comparison"],
+            "unit": item["unit"],
+            "verdict": item["verdict"],
+            "band": [min(values), max(values)] if (values := _corner_values(item, found)) else None,
+        }
+        for item in sorted(known, key=_nearness)
+    ]
+
+
+def _corner_values(item: VerdictItem, found: Mapping[tuple[str, str | None], list[float]]) -> list[float]:
+    return found.get((item["id"], item.get("loop")), [])
+
+
+def move_words(design: Design, move: Move) -> str:
+    """Say a move in the unit in which the design file has the gain.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> move_words(load_design("ilr33-amber"), Move("control.velocity.integral_time", 0.015, 0.0286))
+    'control.velocity.integral_time 15 ms to 28.6 ms mends it'
+    """
+    key = named(design, move.path)
+    unit = f" {key['unit']}" if key["unit"] else ""
+    was, value = (f"{short(value / key['factor'], 4)}{unit}" for value in (move.was, move.value))
+    return f"{move.path} {was} to {value} mends it"
 
 
 def _loop(
@@ -89,11 +194,7 @@ def _loop(
 
 def weakest(point: WeakPoint) -> Weakest:
     """Say which margin of which view has least left to its limit, or lies furthest beyond it."""
-    view = point.view
-    loop = loop_words(view.loop, view.rotor) if view.loop else ""
-    cut = f"cut at the {POINTS.get(view.cut, view.cut)}" if view.cut else ""
-    label = ", ".join(filter(None, (loop, view.place, cut)))
-    label = capital(label)
+    view, label = point.view, weakest_label(point.view)
     if not point.quantity:
         return {"label": label, "words": "not stable", "status": "warn" if view.place else "fail"}
     quantity = QUANTITIES[point.quantity]
@@ -108,6 +209,13 @@ def weakest(point: WeakPoint) -> Weakest:
     return {"label": label, "words": words, "status": status}
 
 
+def weakest_label(view: View) -> str:
+    """Name a view: loop, operating point or corner, break point."""
+    loop = loop_words(view.loop, view.rotor) if view.loop else ""
+    cut = f"cut at the {POINTS.get(view.cut, view.cut)}" if view.cut else ""
+    return capital(", ".join(filter(None, (loop, view.place, cut))))
+
+
 def _nearness(item: VerdictItem) -> float:
     """What is left to the limit; without a distance the requirement is as good as far away."""
     if item["distance"] is None or item["value"] is None or item["limit"] is None:
@@ -115,15 +223,19 @@ def _nearness(item: VerdictItem) -> float:
     return reserve(item.get("quantity", ""), item["value"], item["limit"], item["distance"])
 
 
-def _pictures(figures: Mapping[str, LoopFigures]) -> list[Block]:
-    """Make one Bode and one step figure, of the outermost loop; none of a drive without loops."""
+def _pictures(figures: Mapping[str, LoopFigures], point: WeakPoint | None) -> list[Block]:
+    """Make the Bode figure of the weakest view and the step of its loop; none of a drive without loops."""
     if not figures:
         return []
-    name, result = list(figures.items())[-1]
-    blocks = [loop_section.open_bode(LOOPS[name], result, frequency_grid(result), name=name, small=True)]
-    if result.step is not None:
-        blocks.append(loop_section.step(LOOPS[name], result, None, name=name, small=True))
-    return blocks
+    view = point.view if point else None
+    name = view.loop if view and view.loop else list(figures)[-1]
+    result, seen = figures[name], view.found if view and view.found else figures[name]
+    own = seen is result
+    title = LOOPS[name] if own or view is None else weakest_label(view)
+    bode = loop_section.open_bode(title, seen, frequency_grid(seen), name=name if own else "", small=True)
+    if result.step is None:
+        return [bode]
+    return [bode, loop_section.step(LOOPS[name], result, None, name=name, small=True)]
 
 
 def unchecked() -> Finding:

@@ -83,7 +83,7 @@ def _result(rows: Sequence[_Linear], unit: str) -> str:
 
 
 def _noun(limiter: str) -> str:
-    return limiter if limiter.endswith("limit") or limiter == words_of("profile") else f"{limiter} limit"
+    return limiter if "limit" in limiter or limiter == words_of("profile") else f"{limiter} limit"
 
 
 def words_of(limiter: str) -> str:

@@ -19,7 +19,7 @@ from reports.numbers import seconds
 Curves = Sequence[tuple[str, Curve]]
 LABELLED = 3  # margins with words
 NICHOLS_DB, NICHOLS_SPAN_DB = 6.0, 60.0  # peak of S that most standards allow, and a usual one of T
-RED, GREEN = style.RED, style.GREEN
+RED, GREEN, ORANGE = style.RED, style.GREEN, style.ORANGE
 
 
 def bode(
@@ -35,10 +35,11 @@ def bode(
     inside = [(m, m.frequency_rad_s / (2.0 * math.pi)) for m in margins.gain_margins]
     gains = [(-m.db, f) for m, f in inside if first <= f <= 1.001 * last]
     low, high = top.y.span()
+    colour = RED if margins.stable is False else ORANGE
     for k, (level, f) in enumerate(gains):
         seen = min(max(level, low), high)
-        top.curve([f, f], [0.0, seen], colour=RED, width=2.6, read=False)
-        top.points([f], [seen], marker="s", colour=RED, size=6.0, read=False)
+        top.curve([f, f], [0.0, seen], colour=colour, width=2.6, read=False)
+        top.points([f], [seen], marker="s", colour=colour, size=6.0, read=False)
         if k < shown and (k == 0 or low < level < high):
             off = "" if low < level < high else " (off scale)"
             top.note(f"GM {_signed(-level)} dB{off}\n{style.hertz(f)}", (f, seen))
@@ -109,7 +110,7 @@ def closed_bode(curves: Curves, band: Bandwidth | None, nyquist_hz: float | None
         _mark(bottom, (lag, -90.0), "−90°", style.PURPLE, "D")
     if math.isfinite(band.resonance_peak_db) and band.resonance_hz and band.resonance_peak_db > 0.05:
         words = f"peak {band.resonance_peak_db:.2f} dB"
-        _mark(top, (band.resonance_hz, band.resonance_peak_db + dc_db), words, RED, "^")
+        _mark(top, (band.resonance_hz, band.resonance_peak_db + dc_db), words, ORANGE, "^")
     return chart
 
 
@@ -144,7 +145,7 @@ def nyquist(
             panel.points([closest.real], [closest.imag], marker="D", size=6.0, **look)
     for m in margins.gain_margins:
         if m.ratio > 0:
-            panel.points([-1.0 / m.ratio], [0.0], marker="s", colour=RED, size=6.0, read=False)
+            panel.points([-1.0 / m.ratio], [0.0], marker="s", colour=ORANGE, size=6.0, read=False)
     for point in on_circle:
         panel.points([point.real], [point.imag], colour=GREEN, size=6.5, read=False)
     panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
@@ -216,7 +217,7 @@ def sensitivity(
     if limit_db is not None:
         low, high = panel.y.span()
         panel.y.limits(high=max(high, limit_db + 0.2 * (limit_db - low)))
-        panel.rule_y(limit_db, f"limit of |S|: {limit_db:g} dB", colour=RED, width=1.2, dash=1)
+        panel.rule_y(limit_db, f"limit of |S|: {limit_db:g} dB", colour=style.INK, width=1.2, dash=1)
     return chart
 
 
@@ -236,21 +237,25 @@ def step(responses: Sequence[Response], figures: StepFigures, held: bool, loop: 
     lowest = min(style.known(y for _, _, response in responses for y in response), default=0.0)
     panel.y.limits(low=min(0.0, 1.05 * lowest))
     if math.isfinite(figures.final_value):
-        _step_figures(panel, figures, last, scale)
+        _step_figures(panel, figures, responses[0], scale, held and len(responses[0][1]) < 80)
     return chart
 
 
-def _step_figures(panel: Panel, figures: StepFigures, last: float, scale: float) -> None:
-    """Draw the 2 % band, the 10-90 % rise and the settling time."""
+def _step_figures(panel: Panel, figures: StepFigures, drawn: Response, scale: float, stairs: bool) -> None:
+    """Draw the 2 % band, the 10-90 % rise on the curve as it is drawn, and the settling time."""
     final, words = float(figures.final_value), []
+    _, time, response = drawn
+    last = float(time[-1])
     panel.band_y(0.98 * final, 1.02 * final, colour=GREEN)
     panel.rule_y(final)
     part = np.asarray(figures.response) / final
     if (part >= 0.9).any():
         start = float(figures.time_s[int(np.argmax(part >= 0.1))])
-        for t, level in ((start, 0.1 * final), (start + float(figures.rise_time_s), 0.9 * final)):
+        for t in (start, start + float(figures.rise_time_s)):
             if t <= last:
-                panel.points([t * scale], [level], colour=GREEN, size=6.0, read=False)
+                there = response[np.searchsorted(time, t * (1.0 + 1e-12), side="right") - 1]
+                level = there if stairs else np.interp(t, time, response)
+                panel.points([t * scale], [float(level)], colour=GREEN, size=6.0, read=False)
         words.append(f"rise 10–90 %: {seconds(float(figures.rise_time_s))}")
     if math.isfinite(figures.overshoot_percent):
         words.append(f"overshoot: {figures.overshoot_percent:.1f} %")

@@ -13,13 +13,14 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Section, VerdictItem
+from reports.numbers import significant
 from reports.sections.margins import finite
 from reports.sections.names import unit_words
 from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
 
 if TYPE_CHECKING:
-    from analyses.monte_carlo import ColumnStatistics, MonteCarloResult, Odds, WorstCase
+    from analyses.monte_carlo import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
     from analyses.specification.verdicts import RequirementVerdict
 
 _SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
@@ -33,6 +34,8 @@ def section(result: MonteCarloResult) -> Section:
     if result.odds:
         blocks.append(_odds_table(result))
         blocks += _figures(result)
+    if result.drivers:
+        blocks.append(_driver_table(result))
     blocks.append(_figure_table(result.columns.values()))
     if result.worst:
         blocks.append(doc.details("Parameters of the worst cases", [_worst_table(result)]))
@@ -220,8 +223,34 @@ def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: Colum
             panel.x.see([value])
             panel.rule_x(value, label="limit", colour=style.RED, dash=2, width=1.7)
         elif value is not None:
-            panel.note(f"{name} {value:g} {unit}: off scale", corner="top left", colour=style.RED)
-    panel.x.label, panel.y.ticks, panel.x.grid = unit, [], False
+            panel.note(f"{name} {value:g} {unit}: off scale", corner="top left", colour=style.MUTED)
+    panel.x.label, panel.y.label, panel.x.grid = unit, "samples", False
+
+
+def _driver_table(result: MonteCarloResult) -> Block:
+    """Say of each required figure which tolerances move it most, and between which values."""
+    strongest: dict[str, list[Driver]] = {}
+    for one in result.drivers:
+        strongest.setdefault(one.column, []).append(one)
+    places = [("first", "Driven most by"), ("second", "then by"), ("third", "then by")]
+    columns = [
+        doc.of(lambda item: _words(item[0]), "figure", "Figure"),
+        *(doc.of(_driver(k), key, label) for k, (key, label) in enumerate(places)),
+        doc.of(lambda item: unit_words(result.columns[item[0]].unit), "unit", "Unit"),
+    ]
+    note = "The figure with that parameter alone at the low and the high end of its tolerance."
+    return doc.listing("Which tolerance drives which figure", strongest.items(), columns, note)
+
+
+def _driver(place: int) -> Callable[[tuple[str, list[Driver]]], str]:
+    def words(item: tuple[str, list[Driver]]) -> str:
+        if place >= len(item[1]) or item[1][place].swing == 0.0:
+            return ""
+        one = item[1][place]
+        ends = ["none" if value is None else significant(value, 3) for value in (one.low, one.high)]
+        return f"{one.path}: {ends[0]} to {ends[1]}"
+
+    return words
 
 
 def _worst_table(result: MonteCarloResult) -> Block:

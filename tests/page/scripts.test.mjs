@@ -1,13 +1,20 @@
 // Pure parts of the page's scripts, by node's own runner: make page.
 import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import { test } from "node:test";
 
-const row = { lines: [], row: [0, "inf", 2], requirements: [], loops: ["current"], quantities: [], places: {}, stages: {} };
+const row = { lines: [], relations: [], row: [0, "inf", 2], requirements: [], loops: ["current"], quantities: [], places: {}, stages: {} };
 const page = { "live-data": { textContent: JSON.stringify(row) }, "hands-on": {} };
 globalThis.document = { getElementById: (name) => page[name] ?? null };
 
 const { Axis } = await import("../../reports/templates/page/axis.js");
 const { recordOf } = await import("../../reports/templates/page/columns.js");
+const { commandOf, lengthOf, spansOf } = await import("../../reports/templates/page/commands.js");
+const { unified } = await import("../../reports/templates/page/diff.js");
+const { checkOf, general } = await import("../../reports/templates/page/relations.js");
 const { rowOf, statementOf } = await import("../../reports/templates/page/row.js");
 const { degreeTicks, linearTicks, logTicks } = await import("../../reports/templates/page/ticks.js");
 const { digits, show } = await import("../../reports/templates/page/words.js");
@@ -74,4 +81,49 @@ test("columns of a record are found by name and unit, or refused in words", () =
   assert.throws(() => recordOf("c.csv", "time,angle\n0,1\n1,2\n"), /command/);
   assert.throws(() => recordOf("d.csv", "time,command,angle\n1,0,0\n0,0,0\n"), /backwards/);
   assert.throws(() => recordOf("e.csv", "time,command,angle\n1,0,0\n"), /two rows/);
+});
+
+test("a check refuses in its words, with the values of then", () => {
+  // allowed: k[1] at most twice k[0]; where k[0] is 0, nothing is asked
+  const check = checkOf([
+    ["branch", 1, "!=", "k[0]", 0], ["allowed", 0, ""], ["end", 0, ""],
+    ["value", 1, "*", "k[0]", 2],
+    ["branch", 1, "<=", "k[1]", "v1"], ["refusal", 0, "b = %g: allowed: at most %.4g, 100 %% of it", "k[1]", "v1"], ["end", 0, ""],
+    ["allowed", 0, ""],
+  ]);
+  assert.equal(check([1, 2]), "");
+  assert.equal(check([0, 5]), "");
+  assert.equal(check([1 / 3, 1]), "b = 1: allowed: at most 0.6667, 100 % of it");
+});
+
+test("numbers in a refusal are written as by printf", () => {
+  for (const [value, count, words] of [[0.00001234, 6, "1.234e-05"], [1234567, 6, "1.23457e+06"], [123456, 6, "123456"], [0.1, 4, "0.1"], [-2.5e300, 4, "-2.5e+300"], [0, 6, "0"], [100, 4, "100"], [9.99999, 4, "10"]]) {
+    assert.equal(general(value, count), words);
+  }
+});
+
+test("a patch makes of the one text the other", () => {
+  const lines = [...Array(40).keys()].map((k) => `key${k} = ${k} # why\n`);
+  const changed = (at) => lines.map((line, k) => (at.includes(k) ? line.replace("= ", "= 1") : line));
+  const texts = [lines.join(""), changed([0]).join(""), changed([39]).join(""), changed([3, 5, 20, 21]).join(""), lines.join("").trimEnd(), ["new = 1\n", ...lines].join(""), lines.filter((_, k) => k % 7).join("")];
+  for (const before of texts) for (const after of texts) {
+    const patch = unified(before, after, "drive.toml");
+    if (before === after) { assert.equal(patch, ""); continue; }
+    const folder = mkdtempSync(join(tmpdir(), "patch-")), file = join(folder, "drive.toml");
+    writeFileSync(file, before);
+    execFileSync("git", ["apply", "-"], { cwd: folder, input: patch, env: { ...process.env, GIT_DIR: join(folder, "none"), GIT_CEILING_DIRECTORIES: folder } });
+    assert.equal(readFileSync(file, "utf8"), after);
+  }
+});
+
+test("commands go where they are told, in the time that is said", () => {
+  near(commandOf({ kind: "sine", size: 2, hertz: 5 })(0.05), 2);
+  for (const size of [3, -3]) {
+    const ramp = commandOf({ kind: "ramp", size, rate: 6 }), back = commandOf({ kind: "back", size, rate: 6 });
+    assert.deepEqual([0, 0.25, 0.5, 2].map((t) => ramp(t) + 0), [0, size / 2, size, size]);
+    assert.deepEqual([0, 0.25, 0.5, 1, 1.25, 1.5, 9].map((t) => Math.abs(back(t))), [0, 1.5, 3, 3, 1.5, 0, 0]);
+    near(lengthOf({ kind: "back", size, rate: 6 }, 0.5), 2);
+  }
+  assert.deepEqual(spansOf([0, 1, 1, 0, 3, 0, 0, 0, 1], 1, 1), [[1, 5], [8, 9]]);
+  assert.deepEqual(spansOf([0, 1, 1, 0, 3], 2, 1), [[4, 5]]);
 });

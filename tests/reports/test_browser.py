@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import unicodedata
 from typing import TYPE_CHECKING, Any
 
 import pypdf
@@ -11,6 +12,9 @@ from built_report import Built
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
+
+
+OPEN_ALL = "document.querySelectorAll('main details').forEach((fold) => { fold.open = true; })"
 
 
 def opened(browser: Browser, built: Built, **context: Any) -> tuple[Page, list[str]]:
@@ -43,6 +47,7 @@ def test_no_error_no_request_and_no_sideways_scrolling(browser: Browser, built: 
 @pytest.mark.parametrize("screen", SCREENS)
 def test_every_figure_is_seen_with_ink_in_it(browser: Browser, built: Built, screen: str) -> None:
     page, _ = opened(browser, built, **SCREENS[screen])
+    page.evaluate(OPEN_ALL)
     figures = page.locator("figure svg.plot")
     assert figures.count() == built.page.read_text(encoding="utf-8").count('<svg class="plot"') > 10
     for k in range(figures.count()):
@@ -97,6 +102,74 @@ def test_dark_and_light_differ(browser: Browser, built: Built) -> None:
     assert len(colours) == 4
 
 
+FIRST = (".overall", ".weakest", ".said", ".bars", "#answer figure.half", ".findings")
+
+
+def test_the_first_screen_is_one_screen_and_the_open_page_few(browser: Browser, built: Built) -> None:
+    page, _ = opened(browser, built, viewport={"width": 1400, "height": 900})
+    for selector in FIRST:
+        for part in page.locator(selector).all():
+            box = part.bounding_box()
+            assert box is not None
+            assert 0 <= box["y"] <= 900 - box["height"], (selector, box)
+    assert page.locator(".findings li").count() <= 3
+    page.wait_for_selector("#hands-on[data-ready]")
+    assert page.evaluate("document.documentElement.scrollHeight") <= 6.1 * 900
+
+
+def test_a_bar_is_as_long_as_its_figure(browser: Browser, built: Built) -> None:
+    """Bar and limit stand on one scale from 0: their ratio is that of the numbers."""
+    page, _ = opened(browser, built, viewport={"width": 1400, "height": 900})
+    bars = next(one for one in built.document["sections"][0]["blocks"] if one["kind"] == "glance")["bars"]
+    assert len(bars) == page.locator(".bar-row").count() == 12
+    for bar, row in zip(bars, page.locator(".bar-row").all(), strict=True):
+        places = row.evaluate(
+            "row => ['.found', '.limit', '.gauge'].map(s => row.querySelector(s).getBoundingClientRect())"
+            ".map(box => [box.left, box.right])"
+        )
+        (start, now), (low, high), _ = places
+        assert (now - start) / ((low + high) / 2 - start) == pytest.approx(
+            bar["value"] / bar["limit"], rel=0.02
+        )
+
+
+def test_a_link_opens_the_fold_that_it_leads_into(browser: Browser, built: Built) -> None:
+    page, _ = opened(browser, built, viewport={"width": 1360, "height": 900})
+    assert page.locator("#limits figure").is_hidden()
+    assert page.locator("#limits .result").is_visible()
+    page.locator('.said a[href="#limits"]').click()
+    assert page.locator("#limits figure").is_visible()
+    page.goto(built.page.as_uri() + "#margins")
+    page.reload()
+    assert page.locator("#margins table").first.is_visible()
+    assert page.locator("#limits figure").is_hidden()
+
+
+def test_the_summary_prints_on_four_pages(browser: Browser, built: Built) -> None:
+    page, _ = opened(browser, built)
+    page.emulate_media(media="print")
+    sheets = pypdf.PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True))).pages
+    assert len(sheets) <= 4
+    printed = unicodedata.normalize(
+        "NFKC", "".join("".join(sheet.extract_text().split()) for sheet in sheets)
+    )
+    for part in built.document["sections"]:
+        assert "".join(part["title"].split()) in printed or part["id"] == "answer"
+
+
+def test_the_buttons_choose_what_is_printed_and_put_the_folds_back(browser: Browser, built: Built) -> None:
+    page, _ = opened(browser, built, viewport={"width": 1360, "height": 900})
+    page.evaluate(
+        "window.seen = [];"
+        "window.print = () => seen.push(document.querySelectorAll('main details[open]').length); null"
+    )
+    folds = page.locator("main details").count()
+    for name in ("Print summary", "Print all"):
+        page.get_by_role("button", name=name).click()
+        page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate("seen") == [0, folds]
+
+
 def test_contents_lead_to_the_sections(browser: Browser, built: Built) -> None:
     page, _ = opened(browser, built, viewport={"width": 1360, "height": 900})
     page.locator('.toc a[href="#limits"]').click()
@@ -114,6 +187,7 @@ def test_the_keyboard_reaches_the_content(browser: Browser, built: Built) -> Non
 
 def test_paper_is_white_short_and_ends_no_page_with_a_heading(browser: Browser, built: Built) -> None:
     page, trouble = opened(browser, built, color_scheme="dark")
+    page.evaluate(OPEN_ALL.replace("main details", ".claim > details"))
     page.emulate_media(media="print", color_scheme="dark")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     assert not page.locator(".toc").is_visible()

@@ -7,6 +7,7 @@ import pytest
 from built_report import Built
 
 from actuator_lti import load_design
+from analyses.corners import corners
 from analyses.large_signal.by_amplitude import AmplitudeMargin
 from reports import document as doc
 from reports.build import design_report
@@ -38,6 +39,36 @@ def test_every_loop_shows_five_figures_and_the_distance_to_its_own_requirement(b
     bandwidths = [row["figures"][-1]["distance"] for row in result["loops"]]
     assert bandwidths[:2] == [None, None]  # required of the position loop only
     assert bandwidths[2] == pytest.approx(items["position-bandwidth"]["value"] - 15.0)
+
+
+def test_the_first_screen_says_how_far_it_is_believed_and_where_it_is_linear(built: Built) -> None:
+    result = glance(built.document)
+    assert result["believed"].startswith("Linear equals simulated to 10⁻⁹; ")
+    assert result["believed"].endswith("checks by simulation met; nothing unproven.")
+    assert (
+        result["linear"]
+        == "A sine of full deflection (10 deg) stays linear up to 0.362 Hz; above, the speed limit acts."
+    )
+    assert len(result["findings"]) == 3
+    assert result["linear"] not in [item["text"] for item in result["findings"]]
+
+
+def test_a_bar_has_the_band_of_the_corners(built: Built) -> None:
+    result = {bar["id"]: bar for bar in glance(built.document)["bars"]}
+    values = [
+        one.value
+        for corner in corners(load_design("ilr33-amber")).corners
+        for one in corner.verdicts
+        if one.id == "gain-margin/current"
+    ]
+    assert result["gain-margin/current"]["band"] == pytest.approx([min(values), max(values)], rel=1e-6)
+    assert result["gain-margin/current"]["limit"] == 6.0
+
+
+def test_the_pictures_are_of_the_weakest_view(built: Built) -> None:
+    _, bode, step = built.document["sections"][0]["blocks"]
+    assert bode["caption"].startswith(glance(built.document)["weakest"]["label"])
+    assert step["caption"].startswith("Position loop")
 
 
 def test_findings_come_from_the_sections_gravest_first_and_once() -> None:

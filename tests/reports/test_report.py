@@ -139,7 +139,7 @@ def test_a_time_that_is_none_is_refused(monkeypatch) -> None:
 
 def test_the_page_asks_no_network_and_is_small(built: Built) -> None:
     content = built.page.read_text(encoding="utf-8")
-    assert len(content) < 3_000_000
+    assert len(content) < 1_300_000
     for tag, attributes in Page(content).tags:
         for key in ("src", "href", "xlink:href", "action", "data"):
             value = attributes.get(key)

@@ -11,9 +11,11 @@ from hypothesis import strategies as st
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.asked.quantities import CUSTOMARY, distance_from_minus_one, reserve
+from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from analyses.corners import corners
 from analyses.linear.loop_survey import LoopSurvey, operating_points, survey_loops
+from analyses.specification.mending import mending
 from analyses.specification.weakest import spread, views, weakest
 from reports.cli.main import main
 from reports.sections.answer import weakest as words_of
@@ -108,3 +110,39 @@ def test_margins_shows_the_spread_and_names_the_points(capsys) -> None:
     said = capsys.readouterr().out
     for name in ("sliding", "rest", "describing-function", "driving", "driven", "gap"):
         assert name in said
+
+
+def test_the_move_that_mends_brings_the_weakest_margin_just_within_its_limit() -> None:
+    """Judged by the exact loops: with the move it is within, with a fifth of it less it is not."""
+    design = load_design("ilr33-amber")
+    seen = survey_loops(design)
+    point = weakest(seen)
+    assert point is not None
+    assert (point.view.kind, point.view.load_Nm, point.quantity) == ("rest", 8.0, "phase_margin")
+    move = mending(point, seen)
+    assert move is not None
+    for part, inside in ((1.0, True), (0.8, False)):
+        value = move.was + part * (move.value - move.was)
+        loops = assemble_loops(with_values(design, {move.path: value}), operating_point="rest", load_Nm=8.0)
+        assert loops.position is not None
+        margins = stability_margins(loops.position.open_loop)
+        found = {
+            "phase_margin": abs(margins.phase_margin_deg), "gain_margin": abs(margins.gain_margin_db),
+            "modulus_margin": margins.modulus_margin,
+        }  # fmt: skip
+        assert all(found[name] >= limit for name, limit in CUSTOMARY.items()) is inside
+    mended = weakest(survey_loops(with_values(design, {move.path: move.value})))
+    assert mended is not None
+    assert mended.reserve >= 0.0
+
+
+def test_no_move_that_costs_a_requirement(fin: Design, survey: LoopSurvey) -> None:
+    """Less position gain mends the fin at its worst tolerances; with the bandwidth required, nothing does."""
+    bounds = corners(fin)
+    point = weakest(survey, bounds)
+    assert point is not None
+    free = mending(point, survey, bounds)
+    assert free is not None
+    assert free.path == "control.position.gain"
+    whole = load_design("fin")
+    assert mending(point, replace(survey, design=whole), bounds) is None

@@ -52,6 +52,19 @@ def test_requirements_are_counted_as_all_verdicts_count_them(study, design):
     assert study.tally.total == len(judged)
 
 
+def test_a_tolerance_drives_what_it_is_in_the_formula_of(study):
+    """i = (C0 + CM M + Cv w)/kM: the coefficient moves the current between its ends; resistance does not."""
+    first, *rest = [one for one in study.drivers if one.column == "drive.motor_current@8"]
+    assert (first.path, first.low_value, first.high_value) == (
+        "friction.load_coefficient", pytest.approx(0.4 * 1.34e-3), pytest.approx(1.6 * 1.34e-3)
+    )  # fmt: skip
+    ends = [(2.25e-3 + part * 1.34e-3 * 8 + 5.25e-6 * 942.5) / 5.9e-3 for part in (0.4, 1.6)]
+    assert [first.low, first.high] == pytest.approx(ends, rel=1e-9)
+    still = {one.path: one.swing for one in rest}
+    assert still["motor.resistance"] == 0.0
+    assert all(one.swing <= first.swing for one in rest)
+
+
 def test_the_worst_case_lies_beyond_the_worst_sample_in_the_corner(study, design):
     case = next(w for w in study.worst if w.requirement == "motor-current")
     corner = (2.25e-3 + 1.6 * 1.34e-3 * 8 + 5.25e-6 * 942.5) / 5.9e-3

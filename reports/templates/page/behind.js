@@ -19,7 +19,8 @@ const nextPiece = () => {
 export const fillBehind = () => {
   clearTimeout(waits);
   root.dataset.behind = "waits";
-  pieces = [...timedPieces(desk.now), ...periodicPieces(desk.before), ...(desk.now === desk.before ? [] : periodicPieces(desk.now)), table, ...mapPieces(desk.now)];
+  pieces = [...(desk.late ? [desk.late] : []), ...timedPieces(desk.now), ...periodicPieces(desk.before), ...(desk.now === desk.before ? [] : periodicPieces(desk.now)), table, ...mapPieces(desk.now)];
+  desk.late = null;
   waits = setTimeout(nextPiece, QUIET);
 };
 const mapPieces = (found) => {

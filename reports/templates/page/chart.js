@@ -2,6 +2,7 @@
 // The SVG is the data: a panel says its axes (data-x, data-y: kind, ends, pixels), a curve is its path.
 import { holdCurve, putMarks } from "./grips.js";
 import { Panel } from "./panel.js";
+import { saveAs } from "./picture.js";
 import { key, listen, wheel } from "./pointer.js";
 import { make } from "./svg.js";
 import { html } from "./words.js";
@@ -43,6 +44,7 @@ export class Chart {
     root.addEventListener("chart:axes", (event) => this.rescale(event.detail));
   }
   legend() {
+    for (const list of this.root.querySelectorAll(".keys ul")) list.setAttribute("role", "presentation"); // its items are switches
     for (const item of this.root.querySelectorAll(".keys li")) {
       const key = item.dataset.k;
       this.labels[key] = item.textContent;
@@ -62,6 +64,11 @@ export class Chart {
       });
     }
   }
+  // a legend names no curve that is not there
+  name(key) {
+    const there = this.panels.some((p) => p.curves.some((curve) => curve.key === key && curve.points.length));
+    this.root.querySelector(`.keys li[data-k="${key}"]`).hidden = !there;
+  }
   tools() {
     const bar = html("div", "tools");
     const add = (text, words, run) => {
@@ -76,6 +83,12 @@ export class Chart {
     add("+", "Zoom in", () => this.step(1.5));
     add("−", "Zoom out", () => this.step(1 / 1.5));
     add("⤢", "Show everything", () => this.reset());
+    const menu = html("details", "save-as"), words = html("summary", "", "↓");
+    words.title = "Save this figure";
+    words.setAttribute("aria-label", words.title);
+    menu.append(words);
+    bar.append(menu);
+    for (const kind in saveAs) menu.append(add(kind, `Save this figure as ${kind}`, () => { menu.open = false; saveAs[kind](this); }));
     this.root.append(bar);
   }
   step(factor) { for (const p of this.pictures) this.zoom(p.panels[0], (p.panels[0].left + p.panels[0].right) / 2, (p.panels[0].top + p.panels[0].bottom) / 2, factor); }
@@ -187,8 +200,9 @@ export class Chart {
       pen = there;
     }
     known.node.setAttribute("d", d);
-    known.grab?.setAttribute("d", d);
     known.points = points;
+    if (key !== undefined) this.name(key);
+    known.grab?.setAttribute("d", d);
     if (parameter) known.parameter = parameter.filter((_, k) => Number.isFinite(x[k]) && Number.isFinite(y[k]));
     this.hide();
   }

@@ -1,6 +1,6 @@
 // Every figure of the page is made to live, and a row of a table that names a crossing shows it there.
 import { Chart } from "./chart.js";
-import { all, html } from "./words.js";
+import { all, html, unfold } from "./words.js";
 
 const charts = all(".chart").map((root) => new Chart(root));
 for (const row of all("tr[data-loop][data-hz]")) {
@@ -19,6 +19,7 @@ for (const row of all("tr[data-loop][data-hz]")) {
   button.addEventListener("click", () => {
     kept = true;
     const main = own.find((c) => c.root.closest("section[id^=loop]")) || own[0];
+    unfold(main.root);
     main.root.scrollIntoView({ block: "center", behavior: "auto" });
     show();
   });

@@ -1,7 +1,8 @@
-// The changed design as a file, a text, a link.
+// The changed design as a file, a patch, a text.
 import { data, find } from "./desk.js";
 import { inUnit, keys, past, start } from "./history.js";
-import { html } from "./words.js";
+import { unified } from "./diff.js";
+import { give } from "./give.js";
 
 export const changedText = () => {
   const places = data.patches.map((patch, k) => [patch, k]).filter(([, k]) => past.values[k] !== start[k]).sort((a, b) => a[0][0] - b[0][0] || a[0][1] - b[0][1]);
@@ -14,13 +15,9 @@ export const changedText = () => {
   }
   return text + letters.slice(at).join("");
 };
-export const save = () => {
-  const link = html("a"), address = URL.createObjectURL(new Blob([changedText()], { type: "text/plain" }));
-  link.href = address;
-  link.download = `${data.name.replace(/[^\w.-]/g, "_") || "design"}-changed.toml`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(address), 1000);
-};
+const named = (tail) => `${data.name.replace(/[^\w.-]/g, "_") || "design"}${tail}`;
+export const save = () => give(named("-changed.toml"), changedText());
+export const savePatch = () => give(named(".patch"), unified(data.text, changedText(), named(".toml")));
 export const sheet = (text) => {
   const box = find(".sheet"), area = box.querySelector("textarea");
   area.value = text;

@@ -8,7 +8,7 @@ export const start = keys.map((key) => key.value);
 export const past = { values: start.slice(), settled: start.slice(), back: [], forth: [] };
 let waiting = false;
 const same = (a, b) => a.every((value, k) => value === b[k]);
-export const allowed = (key, value) => Number.isFinite(value) && (key.low > 0 ? value > 0 : key.low < 0 || value >= 0) && (!key.whole || Number.isInteger(value));
+export const allowed = (key, value) => Number.isFinite(value) && (key.open ? value > key.least : value >= (key.least ?? -Infinity)) && value <= (key.most ?? Infinity) && (!key.whole || Number.isInteger(value));
 export const inUnit = (key, value) => value / key.factor;
 
 export const preview = (k, value) => {

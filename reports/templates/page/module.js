@@ -61,20 +61,26 @@ export const borderOf = (row, hertz) => {
   const each = data.limits.map(([name, place, line]) => [name, hertz.map((f, k) => row[place] / (input * sizes[line * count + k]) / data.step.factor / (data.map ? Math.abs(meanAt(row, f * period)[0]) : 1))]);
   return { each, lowest: hertz.map((_, k) => Math.min(...each.map(([, values]) => values[k]))) };
 };
-// the drive with all its limits and its friction, from rest; command and output as shares of the scale
+// the drive with all its limits and its friction, from rest: y, the output as a share of the scale; motor speed,
+// current, voltage, and the flags of every tick
 export const run = (count, command, scale, moment) => {
   desk.acted = 0;
   if (!x.start()) return null;
-  const at = data.places, io = view(x.io_at(), x.io_length()), out = new Float64Array(count);
+  const at = data.places, io = view(x.io_at(), x.io_length()), flags = new Int32Array(count);
+  const [y, speed, current, voltage] = [0, 1, 2, 3].map(() => new Float64Array(count));
   const ratio = view(x.p_at(), at.ratio + 1)[at.ratio];
   const place = { output: at.output, speed: at.speed, current: at.current }[data.step.of];
   const over = data.step.of === "speed" ? ratio * scale : scale;
   for (let k = 0; k < count; k++) {
     io[at.command] = command(k);
     io[at.moment] = moment;
-    if (x.tick() !== 0) return out.subarray(0, k);
+    if (x.tick() !== 0) return { y: y.subarray(0, k), speed: speed.subarray(0, k), current: current.subarray(0, k), voltage: voltage.subarray(0, k), flags: flags.subarray(0, k) };
     desk.acted |= io[at.flags];
-    out[k] = io[place] / over;
+    flags[k] = io[at.flags];
+    y[k] = io[place] / over;
+    speed[k] = io[at.speed];
+    current[k] = io[at.current];
+    voltage[k] = io[at.voltage];
   }
-  return out;
+  return { y, speed, current, voltage, flags };
 };

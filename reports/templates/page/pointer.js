@@ -45,6 +45,10 @@ export const listen = (chart, picture) => {
     const pinned = chart.pinned;
     chart.hide();
     if (read(chart, picture, event) && !pinned) chart.pinned = true;
+    const found = placeOf(picture, event);
+    if (!found) return;
+    const [px, py] = found.panel.back(found.x, found.y);
+    chart.root.dispatchEvent(new CustomEvent("chart:click", { detail: { x: found.panel.x.value(px), y: found.panel.y.value(py) } }));
   };
   for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, release);
   svg.addEventListener("pointerleave", () => {
@@ -52,6 +56,7 @@ export const listen = (chart, picture) => {
     chart.hide();
     chart.root.dispatchEvent(new CustomEvent("chart:at", { detail: { hertz: null } }));
   });
+  svg.addEventListener("mousedown", (event) => { if (event.detail > 1) event.preventDefault(); }); // no text is selected
   svg.addEventListener("dblclick", (event) => {
     const found = placeOf(picture, event);
     if (found) chart.zoom(found.panel, found.x, found.y, 2);

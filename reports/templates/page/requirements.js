@@ -29,7 +29,7 @@ export const state = (refused) => {
   else if (!data.apart.length) words.push("The design states no requirements.");
   if (data.apart.length) words.push(`${data.apart.length} found by a simulation of its own ${data.apart.length === 1 ? "does" : "do"} not follow: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
   if (refused) words.push(refused);
-  line.className = `state ${unstable.length || fails.length ? "fail" : unknown.length || open.length ? "warn" : total ? "pass" : "info"}`;
+  line.className = `state ${refused || unstable.length || fails.length ? "fail" : unknown.length || open.length ? "warn" : total ? "pass" : "info"}`;
   line.textContent = words.filter(Boolean).join(" ");
   line.dataset.failing = fails.length;
   demands(all, was);

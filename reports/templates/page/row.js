@@ -7,7 +7,7 @@ const DOES = {
   "<": (a, b) => +(a < b), "<=": (a, b) => +(a <= b), ">": (a, b) => +(a > b), ">=": (a, b) => +(a >= b),
   "==": (a, b) => +(a === b), "!=": (a, b) => +(a !== b), "&&": (a, b) => +(a && b), "||": (a, b) => +(a || b),
   pow: Math.pow, tan: Math.tan, sqrt: Math.sqrt, sin: Math.sin, cos: Math.cos, exp: Math.exp, log: Math.log,
-  floor: Math.floor, ceil: Math.ceil, fabs: Math.abs, zero_below: (a, least) => (Math.abs(a) < least ? 0 : a),
+  floor: Math.floor, ceil: Math.ceil, fmod: (a, b) => a % b, fabs: Math.abs, zero_below: (a, least) => (Math.abs(a) < least ? 0 : a),
   where: (condition, yes, no) => (condition ? yes : no), "": (a) => a,
 };
 const term = (told) => {

@@ -54,14 +54,20 @@ const makeSlider = (key, k) => {
   range.addEventListener("dblclick", () => { preview(k, key.value); commit(); });
   field.addEventListener("change", () => {
     const typed = Number(field.value.replace(",", ".").replace("−", "-"));
-    if (field.value.trim() !== "" && allowed(key, typed * key.factor)) { preview(k, typed === inUnit(key, key.value) ? key.value : typed * key.factor); commit(); }
-    else { const words = field.value; show(); was.textContent = `"${words}": ${wanted(key)}`; }
+    if (field.value.trim() !== "" && allowed(key, typed * key.factor)) { slider.wrong = ""; preview(k, typed === inUnit(key, key.value) ? key.value : typed * key.factor); commit(); }
+    else {
+      slider.wrong = `"${field.value}": allowed: ${key.whole ? "a whole number, " : ""}${key.allowed}`;
+      show();
+    }
   });
+  field.addEventListener("input", () => { slider.wrong = ""; });
   const was = html("span", "was");
   row.append(label, field, html("span", "unit", key.unit), track, was);
-  return { key, row, range, field, was };
+  was.id = `said-${k}`;
+  field.setAttribute("aria-describedby", was.id);
+  const slider = { key, row, range, field, was, wrong: "" };
+  return slider;
 };
-const wanted = (key) => `a ${key.whole ? "whole number" : "number"}${key.low > 0 ? " above 0" : key.low < 0 ? "" : ", 0 or more"}`;
 export const makePanel = () => {
   const groups = new Map();
   keys.forEach((key, k) => {
@@ -96,7 +102,9 @@ export const show = () => {
     slider.range.setAttribute("aria-valuetext", `${said(key, value)} ${key.unit}`);
     if (document.activeElement !== slider.field) slider.field.value = said(key, value).replace("−", "-");
     slider.row.classList.toggle("moved", moved);
-    slider.was.textContent = moved ? `was ${said(key, key.value)}` : "";
+    slider.was.textContent = slider.wrong || (moved ? `was ${said(key, key.value)}` : "");
+    slider.was.classList.toggle("wrong", Boolean(slider.wrong));
+    slider.field.setAttribute("aria-invalid", String(Boolean(slider.wrong)));
   });
   const doing = { undo: past.back.length, redo: past.forth.length, reset: changes().length };
   for (const name in doing) find(`[data-do="${name}"]`).disabled = !doing[name];

@@ -4,8 +4,9 @@ import { stageOf, x } from "./module.js";
 import { calm, judged } from "./requirements.js";
 import { digits, html } from "./words.js";
 
-const cell = (now, was, factor, loop, name, unit) => {
-  const made = html("td", "right"), value = calm(now * factor, unit), old = calm(was * factor, unit);
+// of a loop that is not stable no figure is shown
+const cell = (now, was, factor, loop, name, unit, stable) => {
+  const made = html("td", "right"), value = stable ? calm(now * factor, unit) : NaN, old = calm(was * factor, unit);
   made.dataset.loop = loop;
   made.dataset.figure = name;
   made.dataset.value = now;
@@ -51,7 +52,7 @@ export const table = () => {
           row.append(html("td", "right", "…"));
           continue;
         }
-        const k = PLACE[quantity], td = cell(own.figures[k], old.figures[k], factor, name, quantity, unit);
+        const k = PLACE[quantity], td = cell(own.figures[k], old.figures[k], factor, name, quantity, unit, own.figures[STABLE] === 1);
         if (bad.has(name + " " + quantity)) td.classList.add("bad");
         row.append(td);
       }

@@ -1,12 +1,16 @@
-// The run with limits and friction: a step, or the command of a record.
-import { data, desk, find, tell } from "./desk.js";
+// The run with limits and friction: a step, a sine, a ramp, or the command of a record.
+import { KINDS, commandOf, lengthOf, spansOf } from "./commands.js";
 import { thinned } from "./curves.js";
+import { PLACE, data, desk, find, outer, tell } from "./desk.js";
 import { start } from "./history.js";
 import { compute, run, view, x } from "./module.js";
 import { digits, html } from "./words.js";
 
+const { size: usual, unit: unitIn, factor } = data.step;
 /** @type {any} */
-export const trial = { size: data.step.size, moment: 0, length: 0, designed: null };
+export const trial = { kind: "step", size: usual, hertz: 1, rate: 1, moment: 0, chosen: 0, length: 0, designed: null };
+const TRACES = ["output", "speed", ...(data.electrical ? ["current"] : []), "voltage"];
+const MOST = 60000, GROWTH = 6; // ticks of a run; how far beyond the run as designed the axes follow one that grows
 const held = (rec, T) => {
   let place = 0;
   return (k) => {
@@ -15,39 +19,73 @@ const held = (rec, T) => {
     return rec.command[place];
   };
 };
+const scaleOf = () => (desk.record ? desk.record.scale : trial.size);
 export const tried = (row) => {
   view(x.p_at(), row.length).set(row);
-  const T = row[data.places.period], scale = desk.record ? desk.record.scale : trial.size;
-  const count = Math.min(Math.max(Math.ceil(trial.length / T), 2), 60000);
-  return { T, y: run(count, desk.record ? held(desk.record, T) : () => trial.size, scale, trial.moment) };
+  const T = row[data.places.period], command = commandOf(trial);
+  const count = Math.min(Math.max(Math.ceil(trial.length / T), 2), MOST);
+  return { T, ...run(count, desk.record ? held(desk.record, T) : (k) => command(k * T), scaleOf(), trial.moment) };
 };
-const measure = () => { // how long the run as designed takes
+const measure = () => { // how long the run takes: that of a step, as designed, till it has settled
   const T = desk.before.row[data.places.period];
   if (desk.record) { trial.length = desk.record.time[desk.record.time.length - 1]; return; }
+  if (trial.chosen) { trial.length = trial.chosen; return; }
   view(x.p_at(), desk.before.row.length).set(desk.before.row);
-  const y = run(Math.min(Math.ceil(6 / T), 6000), () => trial.size, trial.size, trial.moment) || [];
+  const y = run(Math.min(Math.ceil(6 / T), 6000), () => trial.size, trial.size, trial.moment)?.y || [];
   let last = 0;
   for (let k = 0; k < y.length; k++) if (Math.abs(y[k] - 1) > 0.02) last = k;
-  trial.length = Math.max(1.4 * last, 60) * T;
-};
-export const drawRun = (label, part, unit) => {
-  if (!part.y) return;
-  const stride = thinned(part.y.length, 900), at = [];
-  for (let k = 0; k < part.y.length; k += stride) at.push(k);
-  tell("run", "chart:redraw", { panel: 0, curve: label, x: at.map((k) => k * part.T * unit), y: at.map((k) => part.y[k]) });
+  trial.length = Math.min(lengthOf(trial, Math.max(1.4 * last, 60) * T), MOST * T);
 };
 /** @type {() => [number, string]} */
 export const unitOf = () => (trial.length < 2 ? [1e3, "ms"] : [1, "s"]);
+const traceOf = (part, name) => (name === "output" ? part.y.map((value) => value * scaleOf() / factor) : part[name]);
+const rangeOf = (lists) => lists.reduce(([low, high], list) => list.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [low, high]), [0, 0]);
+const draw = (label, part, panel, values) => {
+  const [unit] = unitOf(), stride = thinned(values.length, 700), at = [];
+  for (let k = 0; k < values.length; k += stride) at.push(k);
+  tell("run", "chart:redraw", { panel, curve: label, x: at.map((k) => k * part.T * unit), y: at.map((k) => values[k]) });
+};
+// where a limit acts is shaded in the panel of what it limits, where the motor sticks in that of the speed
+const PLACES = { w_ref: "speed", i_ref: "current", i: "current", u: "voltage" };
+const shade = (part, ends) => {
+  const [unit] = unitOf(), gap = Math.ceil(part.flags.length / 400), cells = TRACES.map(() => []);
+  const acting = [...data.limiters, ["stick", data.places.stick, "motor sticks", "w_ref"]];
+  for (const [name, bit, words, signal] of acting) {
+    const panel = Math.max(TRACES.indexOf(PLACES[signal]), name === "profile" ? 0 : 1);
+    for (const [from, to] of spansOf(part.flags, bit, gap)) cells[name === "profile" ? 0 : panel].push({
+      x: [from * part.T * unit, to * part.T * unit], y: ends[name === "profile" ? 0 : panel], colour: name === "stick" ? "muted" : data.map?.colours[name] ?? "c5", words,
+    });
+  }
+  cells.forEach((list, panel) => tell("run", "chart:cells", { panel, cells: list }));
+};
+export const drawRuns = (part) => {
+  const { designed } = trial, [unit, words] = unitOf(), command = commandLine();
+  if (!part.y || !designed.y) return;
+  const ends = TRACES.map((name, panel) => {
+    const known = traceOf(designed, name), own = traceOf(part, name), first = panel === 0;
+    const [low, high] = rangeOf([known, ...(first ? [command[1], ...(desk.record ? [desk.record.angle.map((value) => value / factor)] : [])] : [])]), span = high - low || 1;
+    const [least, most] = rangeOf([[low, high], own]).map((value) => Math.min(Math.max(value, low - GROWTH * span), high + GROWTH * span));
+    const room = 0.08 * (most - least || 1), y = [least - room, most + room];
+    tell("run", "chart:axes", { panel, x: [0, trial.length * unit], y, words: panel === TRACES.length - 1 ? words : undefined });
+    draw("as designed", designed, panel, known);
+    draw("as changed", part, panel, own);
+    return y;
+  });
+  tell("run", "chart:redraw", { panel: 0, curve: "command", x: command[0], y: command[1] });
+  const dots = desk.record ? [desk.record.time.map((t) => t * unit), desk.record.angle.map((value) => value / factor)] : [[], []];
+  tell("run", "chart:redraw", { panel: 0, curve: "measured record", x: dots[0], y: dots[1] });
+  shade(part, ends);
+  find(".hands-run").dataset.last = JSON.stringify(Object.fromEntries([["ticks", part.y.length], ...TRACES.map((name) => [name, traceOf(part, name)[part.y.length - 1]])]));
+};
+const commandLine = () => {
+  const [unit] = unitOf(), rec = desk.record;
+  if (rec) return [rec.time.map((t) => t * unit), rec.command.map((value) => value / factor)];
+  const at = Array.from({ length: 401 }, (_, k) => k * trial.length / 400), command = commandOf(trial);
+  return [at.map((t) => t * unit), at.map((t) => command(t) / factor)];
+};
 export const runStart = () => {
   measure();
   trial.designed = tried(desk.before.row);
-  const [unit, words] = unitOf(), top = desk.record ? 1.35 : Math.max(1.3, ...(trial.designed.y || [1])) + 0.1, low = desk.record ? desk.record.low - 0.15 : -0.1;
-  tell("run", "chart:axes", { panel: 0, x: [0, trial.length * unit], y: [low, top], words });
-  drawRun("as designed", trial.designed, unit);
-  const line = desk.record ? [desk.record.time.map((t) => t * unit), desk.record.command.map((value) => value / desk.record.scale)] : [[0, trial.length * unit], [1, 1]];
-  tell("run", "chart:redraw", { panel: 0, curve: "command", x: line[0], y: line[1] });
-  const dots = desk.record ? [desk.record.time.map((t) => t * unit), desk.record.angle.map((value) => value / desk.record.scale)] : [[], []];
-  tell("run", "chart:redraw", { panel: 0, curve: "measured record", x: dots[0], y: dots[1] });
 };
 export const misfit = (part) => {
   let sum = 0, n = 0;
@@ -58,24 +96,60 @@ export const misfit = (part) => {
   return n ? 100 * Math.sqrt(sum / n) : NaN;
 };
 
+const again = () => {
+  compute(start);
+  runStart();
+  desk.follow();
+};
+const fields = {};
+const show = () => {
+  find(".run-kind").value = trial.kind;
+  for (const [name, { label, field, read }] of Object.entries(fields)) {
+    label.hidden = (name === "hertz" && trial.kind !== "sine") || (name === "rate" && !["ramp", "back"].includes(trial.kind));
+    field.value = trial[name] || name === "moment" ? digits(read(trial[name]), 4).replace("−", "-") : "";
+  }
+};
+// the sine of a place on the map of limits
+export const playSine = (hertz, amplitude) => {
+  Object.assign(trial, { kind: "sine", hertz, size: amplitude * factor });
+  desk.record = null;
+  show();
+  again();
+};
 export const runKeys = () => {
-  const box = find(".run-keys"), { unit, factor } = data.step;
-  const make = (words, value, apply) => {
-    const label = html("label", "", words + " "), field = html("input", "field");
+  const box = find(".run-keys"), choice = html("label", "", "Command: "), kinds = html("select", "run-kind field");
+  for (const kind in KINDS) {
+    const one = html("option", "", KINDS[kind]);
+    one.value = kind;
+    kinds.append(one);
+  }
+  kinds.addEventListener("change", () => { trial.kind = kinds.value; show(); again(); });
+  choice.append(kinds);
+  box.append(choice);
+  trial.rate = Math.abs(trial.size) * 5;
+  const band = desk.before.loops[outer].figures?.[PLACE.bandwidth];
+  if (band > 0 && Number.isFinite(band)) trial.hertz = Number((band / 3).toPrecision(2));
+  const make = (name, words, over, fits) => {
+    const label = html("label", "", words + " "), field = html("input", "field"), wrong = html("span", "wrong");
     field.type = "text";
     field.inputMode = "decimal";
-    field.value = digits(value, 4);
     field.addEventListener("change", () => {
-      const typed = Number(field.value.replace(",", "."));
-      if (!Number.isFinite(typed)) return;
-      apply(typed);
-      compute(start);
-      runStart();
-      desk.follow();
+      const typed = field.value.trim() === "" && name === "chosen" ? 0 : Number(field.value.trim() === "" ? NaN : field.value.replace(",", ".").replace("−", "-"));
+      const good = Number.isFinite(typed) && fits(typed);
+      wrong.textContent = good ? "" : `"${field.value}": a number${fits(-1) ? fits(0) ? "" : " that is not 0" : " above 0"}`;
+      field.setAttribute("aria-invalid", String(!good));
+      if (!good) return;
+      trial[name] = typed * over;
+      again();
     });
-    label.append(field);
+    label.append(field, " ", wrong);
     box.append(label);
+    fields[name] = { label, field, read: (value) => value / over };
   };
-  make(`Command, ${unit}:`, trial.size / factor, (value) => { if (value !== 0) trial.size = value * factor; });
-  if (data.step.of === "output") make(data.axis === "linear" ? "Load force, N:" : "Load torque, N m:", 0, (value) => { trial.moment = value; });
+  make("size", `Size, ${unitIn}:`, factor, (value) => value !== 0);
+  make("hertz", "Frequency, Hz:", 1, (value) => value > 0);
+  make("rate", `Rate, ${unitIn}/s:`, factor, (value) => value > 0);
+  if (data.step.of === "output") make("moment", data.axis === "linear" ? "Load force, N:" : "Load torque, N m:", 1, () => true);
+  make("chosen", "Duration, s:", 1, (value) => value >= 0);
+  show();
 };

@@ -9,6 +9,10 @@ export const html = (name, className, text) => {
   if (text !== undefined) made.textContent = text;
   return made;
 };
+// opens every fold that holds an element
+export const unfold = (target) => {
+  for (let node = target; node; node = node.parentElement) if (node.tagName === "DETAILS") node.open = true;
+};
 export const minus = (text) => text.replace(/-/g, "−");
 export const raised = (power) => minus(String(power)).replace(/[−\d]/g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["−0123456789".indexOf(c)]);
 export const show = (value, digits = 4) => {

@@ -1,0 +1,142 @@
+"""The move that mends the weakest point of a drive: one gain, the least change, nothing else made worse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from math import inf, log
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_lti.asked.quantities import CUSTOMARY, LOOP_QUANTITIES, judged_loops, reserve
+from actuator_lti.batch import Population, linear_figures
+from actuator_lti.design import parameter_value
+from actuator_lti.errors import InputError
+from analyses.monte_carlo.judging import in_populations
+from analyses.specification.weakest import View, limit_of, views
+from analyses.tuning.objects import allowed_range
+from analyses.tuning.problem import GAINS
+
+if TYPE_CHECKING:
+    from actuator_lti.batch.figures import LinearFigures
+    from actuator_lti.design.model import Design
+    from analyses.corners import Corners
+    from analyses.linear.loop_survey import LoopSurvey
+    from analyses.specification.weakest import WeakPoint
+
+FURTHEST = 4.0  # a gain goes to a quarter of what it is, or to four times it
+STEPS = 12  # on either side, and once more between the last that does not mend and the first that does
+
+
+@dataclass(frozen=True)
+class Move:
+    """A gain, from what it is to where the weakest point is within its limit, SI."""
+
+    path: str
+    was: float
+    value: float
+
+    @property
+    def change(self) -> float:
+        """How far the gain goes, as a logarithm."""
+        return abs(log(self.value / self.was))
+
+
+def mending(point: WeakPoint, survey: LoopSurvey, corners: Corners | None = None) -> Move | None:
+    """Find the least move of one gain that brings every margin of the weakest view within its limit.
+
+    No other view of a loop goes beyond its limits, or further beyond them, and no requirement on a loop that
+    is met is lost. ``None`` where no single gain does, or the view is no loop of `linear_figures`.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> from analyses.linear.loop_survey import survey_loops
+    >>> from analyses.specification.weakest import weakest
+    >>> survey = survey_loops(load_design("ilr33-amber"))
+    >>> mending(weakest(survey), survey).path
+    'control.velocity.gain'
+    """
+    if not point.view.loop or point.view.rotor == "locked":
+        return None
+    others = [each for each in views(survey, corners) if each.loop and each.rotor != "locked"]
+    found = sorted(_moves(point.view, survey.design), key=lambda move: move.change)
+    return next((move for move in found if _harmless(move, others, survey.design)), None)
+
+
+def _moves(view: View, design: Design) -> Iterator[Move]:
+    """For each gain the least change either way that mends the view."""
+    for path in GAINS:
+        if path not in design.parameters or not (was := parameter_value(design, path)):
+            continue
+        low, high = allowed_range(design, path)
+        for end in (max(was / FURTHEST, low), min(was * FURTHEST, high)):
+            steps = np.geomspace(was, end, STEPS + 1)
+            first = _first(view, design, path, steps)
+            if first is not None and first > 0:
+                between = np.geomspace(steps[first - 1], steps[first], STEPS + 1)
+                place = _first(view, design, path, between) or STEPS
+                yield Move(path, was, _written(float(between[place]), was))
+
+
+def _first(view: View, design: Design, path: str, values: np.ndarray) -> int | None:
+    inside = np.flatnonzero(_reserves(view, design, path, values) >= 0.0)
+    return int(inside[0]) if inside.size else None
+
+
+def _written(value: float, was: float) -> float:
+    """A value of three digits, away from what it was."""
+    unit = 10.0 ** (np.floor(np.log10(abs(value))) - 2)
+    return float(f"{unit * (np.ceil if value > was else np.floor)(value / unit * (1.0 - 1e-12)):.3g}")
+
+
+def _figures(view: View, design: Design, path: str, values: np.ndarray) -> LinearFigures:
+    population = Population(view.design or design, {path: values}, len(values))
+    return linear_figures(population, operating_point=view.kind, load_Nm=view.load_Nm, held=True)
+
+
+def _reserves(view: View, design: Design, path: str, values: np.ndarray) -> np.ndarray:
+    """The least reserve of a view for each value of a gain; minus infinity where the loop is not stable."""
+    try:
+        found = _figures(view, design, path, values)
+    except InputError:
+        return np.full(len(values), -inf)
+    columns = {name: np.abs(found.quantity(name, view.loop)) for name in CUSTOMARY}
+    limits = {name: limit_of(design, name, view)[0] for name in CUSTOMARY}
+    least = [
+        min(
+            reserve(name, columns[name][k], limits[name], columns[name][k] - limits[name]) for name in columns
+        )
+        for k in range(len(values))
+    ]
+    return np.where(found.stable(view.loop), np.nan_to_num(least, nan=-inf), -inf)
+
+
+def _harmless(move: Move, others: Iterable[View], design: Design) -> bool:
+    """Whether no view goes further beyond its limits, and no requirement that is met is lost."""
+    both = np.array([move.was, move.value])
+    for view in others:
+        before, after = _reserves(view, design, move.path, both)
+        if after < min(before, 0.0):
+            return False
+    return _requirements_kept(design, move.path, both)
+
+
+def _requirements_kept(design: Design, path: str, both: np.ndarray) -> bool:
+    asked = [
+        one for one in design.requirements if one.quantity in LOOP_QUANTITIES and in_populations(one, design)
+    ]
+    found = linear_figures(Population(design, {path: both}, 2), time_figures=True, held=True)
+    for item in asked:
+        for loop in judged_loops(item.loop, found.loops):
+            if loop not in found.loops:
+                continue
+            values = found.quantity(item.quantity, loop)
+            values = np.abs(values) if LOOP_QUANTITIES[item.quantity].absolute else values
+            met = (values >= (-inf if item.minimum is None else item.minimum)) & (
+                values <= (inf if item.maximum is None else item.maximum)
+            )
+            if met[0] and not met[1]:
+                return False
+    return True

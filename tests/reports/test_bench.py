@@ -1,0 +1,137 @@
+"""The run in the page is that of the simulator: every trace and command, under load, from a click."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import pytest
+from live_page import opened, settled, type_value, written
+
+from actuator_lti import load_design
+from actuator_lti.design import with_values
+from nonlinear import simulate
+from nonlinear.commands import Command, ramp, sine, step
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+DESIGN = "ilr33-amber"
+
+
+@pytest.fixture(scope="module")
+def page(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+    trouble: list[str] = []
+    made = opened(browser, written(load_design(DESIGN), tmp_path_factory.mktemp("bench")), trouble)
+    yield made
+    made.context.close()
+    assert trouble == []
+
+
+def ask(page: Page, kind: str, **values: float) -> dict[str, float]:
+    """Choose a command and fill in its fields; gives the last values of the run."""
+    if page.input_value(".run-kind") != kind:
+        settled(page, lambda: page.select_option(".run-kind", kind))
+    for label, value in values.items():
+        field = page.locator(".run-keys label", has_text=label).locator("input")
+        if field.input_value().replace(".", "").strip("0") != repr(value).replace(".", "").strip("0"):
+            settled(page, lambda field=field, value=value: (field.fill(repr(value)), field.press("Enter")))
+    return last(page)
+
+
+def last(page: Page) -> dict[str, float]:
+    page.wait_for_selector("#hands-on[data-behind=done]")
+    found: dict[str, float] = json.loads(page.get_attribute(".hands-run", "data-last") or "{}")
+    return found
+
+
+def agree(found: dict[str, float], command: Command, load_Nm: float = 0.0, **changes: float) -> None:
+    """Run the same command in the simulator as long, and compare the end of every trace."""
+    design = with_values(load_design(DESIGN), changes) if changes else load_design(DESIGN)
+    ticks = int(found["ticks"])
+    run = simulate(design, command, load_Nm=load_Nm, duration_s=ticks * design.controller.period_s)
+    k = ticks - 1
+    assert found["output"] == pytest.approx(math.degrees(run.output_angle_rad[k]), rel=1e-9, abs=1e-12)
+    assert found["speed"] == pytest.approx(run.motor_speed_rad_s[k], rel=1e-7, abs=1e-9)
+    assert found["current"] == pytest.approx(run.current_A[k], rel=1e-7, abs=1e-9)
+    assert found["voltage"] == pytest.approx(run.voltage_V[k], rel=1e-7, abs=1e-9)
+
+
+def test_step_sine_and_ramp_are_those_of_the_simulator(page: Page) -> None:
+    agree(ask(page, "step", Size=4.0, Duration=0.05), step(math.radians(4.0)))
+    agree(ask(page, "sine", Size=2.0, Frequency=7.0, Duration=0.2), sine(math.radians(2.0), 7.0))
+    agree(ask(page, "ramp", Size=3.0, Rate=25.0, Duration=0.1), ramp(math.radians(25.0)))
+
+
+def test_the_load_and_the_changed_design_are_in_the_run(page: Page) -> None:
+    type_value(page, "control.position.gain", 80.0)
+    found = ask(page, "step", Size=4.0, Duration=0.05, Load=5.0)
+    agree(found, step(math.radians(4.0)), 5.0, **{"control.position.gain": 80.0})
+    ask(page, "step", Load=0.0)
+    settled(page, lambda: page.click('[data-do="reset"]'))
+
+
+def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
+    """A step of 8 deg runs at the speed limit: shaded in the panel of the speed, for as long as it acts."""
+    found = ask(page, "step", Size=8.0, Duration=0.6)
+    design = load_design(DESIGN)
+    run = simulate(
+        design, step(math.radians(8.0)), duration_s=int(found["ticks"]) * design.controller.period_s
+    )
+    acting = run.limit_active("speed").mean()
+    boxes = page.eval_on_selector_all(
+        '[data-chart="run"] .panel:nth-of-type(2) .cells rect',
+        "all => all.filter(r => r.textContent === 'speed limit').map(r => +r.getAttribute('width'))",
+    )
+    ends = page.locator('[data-chart="run"] .panel').nth(1).get_attribute("data-x")
+    assert ends is not None
+    left, right = map(float, ends.split(" ")[3:])
+    assert 0.1 < acting < 0.99
+    assert sum(boxes) / (right - left) == pytest.approx(acting, abs=0.01)
+    assert "speed limit" in page.inner_text(".acting")
+
+
+def test_a_click_on_the_map_plays_that_sine(page: Page) -> None:
+    svg = page.locator('[data-chart="border"] .plot')
+    svg.scroll_into_view_if_needed()
+    box = svg.bounding_box()
+    assert box is not None
+    ask(page, "step", Duration=0.0)
+    at = (box["x"] + 0.35 * box["width"], box["y"] + 0.4 * box["height"])
+    settled(page, lambda: page.mouse.click(*at))
+    assert page.input_value(".run-kind") == "sine"
+    trial = page.evaluate(
+        "() => Object.fromEntries([...document.querySelectorAll('.run-keys label')]"
+        ".map(l => [l.textContent.split(',')[0], l.querySelector('input,select').value]))"
+    )
+    hertz, size = float(trial["Frequency"]), float(trial["Size"])
+    assert 1.0 < hertz < 300.0
+    found = ask(page, "sine", Size=size * 1.001, Frequency=hertz * 1.001)
+    agree(found, sine(math.radians(size * 1.001), hertz * 1.001))
+
+
+def test_what_is_no_number_is_said_beside_its_field(page: Page) -> None:
+    before = ask(page, "step", Size=4.0, Duration=0.05)
+    for label, words in (("Size", "0"), ("Size", "x"), ("Duration", "-1")):
+        field = page.locator(".run-keys label", has_text=label)
+        field.locator("input").fill(words)
+        field.locator("input").press("Enter")
+        assert f'"{words}": a number' in field.inner_text()
+    assert last(page) == before
+
+
+def test_growth_of_an_unstable_drive_is_seen(page: Page) -> None:
+    type_value(page, "control.position.gain", 3600.0)
+    ask(page, "step", Size=4.0, Duration=0.5)
+    assert "unstable" in page.inner_text("table.now")
+    cells = page.locator('table.now tr:has(th[data-loop="position"]) td b').all_inner_texts()
+    assert set(cells[:4]) == {"–"}
+    swings = []
+    for path in page.locator('[data-chart="run"] .panel').first.locator(".curve").all()[-2:]:
+        points = (path.get_attribute("d") or "")[1:].split("L")
+        late = [float(point.split(" ")[1]) for point in points[len(points) // 2 :]]
+        swings.append(max(late) - min(late))
+    assert swings[1] > 5.0 > 10.0 * swings[0]  # as changed it goes on, as designed it rests
+    settled(page, lambda: page.click('[data-do="reset"]'))
