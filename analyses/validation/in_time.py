@@ -37,7 +37,7 @@ SETTLINGS = 1.2  # of the settling time that a step is shown for
 BESIDE = 0.01  # of a margin
 CHANGE = 3.0  # times which a run beside a margin grows or shrinks
 LONGEST, SHORTEST = 5000, 50  # periods of such a run; as many are shown
-SIZES = 10.0 ** -np.arange(0.0, 13.0)  # of a large signal
+SIZES = 10.0 ** -np.arange(1.0, 14.0)  # of a large signal
 
 
 @dataclass(frozen=True)
