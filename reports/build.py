@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.design import design_hash, warnings_of
+from actuator_lti.design.loader import as_design, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_together
@@ -26,6 +29,71 @@ if TYPE_CHECKING:
     from analyses.specification.weakest import Spread, WeakPoint
 
 Progress = Callable[[int, int], None]
+Step = Callable[[str], AbstractContextManager[Progress | None]]
+
+
+def _unseen(_words: str) -> AbstractContextManager[None]:
+    return nullcontext()
+
+
+def report(
+    design: Design | str | PathLike[str],
+    out: str | PathLike[str] | None = None,
+    *,
+    validation: bool = True,
+    also: Sequence[str] = (),
+    added: Sequence[doc.Section] = (),
+    source: str | None = None,
+    step: Step = _unseen,
+) -> Document:
+    """Compute the whole report of a design, as the command of the same name does.
+
+    Parameters
+    ----------
+    design : Design, str or path
+    out : path, optional
+        Folder of ``report.html`` and ``report.json``; nothing is written where it is left out.
+    validation : bool
+        Check every linear prediction by simulation, too.
+    also : sequence of str
+        Further sections, of `reports.analyses.FURTHER`.
+    added : sequence of section
+        Sections of other documents, put at the end.
+    source : str, optional
+        See `design_report`; the file's text where ``design`` is a name or a path.
+    step : callable, optional
+        Gives a context, and in it a function for (done, all), for each step named to it.
+
+    Returns
+    -------
+    dict
+        The document of `reports.document`: plain JSON.
+
+    Raises
+    ------
+    InputError
+        For a design, section or folder that cannot be taken.
+
+    Examples
+    --------
+    >>> made = report("ctms-motor-position", validation=False)
+    >>> made["verdict"]["verdict"]
+    'met'
+    """
+    drive = as_design(design)
+    if source is None and not isinstance(design, Design):
+        source = design_text(design)
+    with step(f"further sections of {drive.name}"):
+        parts = [*further_sections(drive, also), *added]
+    if validation:
+        with step(f"validating {drive.name}") as validating:
+            parts = [*validation_sections(drive, validating), *parts]
+    with step(f"computing {drive.name}") as computing:
+        made = design_report(drive, parts, progress=computing, source=source)
+    if out is not None:
+        with step("drawing figures") as drawing:
+            write_report(made, out, progress=drawing)
+    return made
 
 
 def design_report(
@@ -270,7 +338,7 @@ def design_head(design: Design) -> Tree:
 
 
 def write_report(
-    made: Mapping[str, Any], folder: str | Path, *, progress: Progress | None = None
+    made: Mapping[str, Any], folder: str | PathLike[str], *, progress: Progress | None = None
 ) -> tuple[Path, Path]:
     """Write ``report.html`` and ``report.json``; both or neither.
 

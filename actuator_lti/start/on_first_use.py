@@ -40,6 +40,7 @@ def on_first_use(
         return value
 
     def known() -> list[str]:
-        return sorted({*vars(sys.modules[package]), *names, *modules})
+        own = (name for name in vars(sys.modules[package]) if name.startswith("__"))
+        return sorted({*own, *names, *modules})
 
     return load, known

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -60,7 +61,7 @@ def report(
     """
     from actuator_lti.asked.verdict import Verdict
     from actuator_lti.design.loader import design_text
-    from reports.build import design_report, further_sections, validation_sections, write_report
+    from reports import build
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
     from reports.cli.progress import progress
@@ -69,18 +70,16 @@ def report(
     from reports.verdict_summary import verdict_words
 
     drive = load_drive(design, changes)
-    added = [part for path in include or () for part in load(path)["sections"] if part["id"] != "provenance"]
-    wanted = FURTHER if also and "all" in also else also or ()
-    with progress(f"further sections of {drive.name}", quiet=quiet):
-        added += further_sections(drive, wanted)
-    if validation:
-        with progress(f"validating {drive.name}", quiet=quiet) as validating:
-            added = [*validation_sections(drive, validating), *added]
-    with progress(f"computing {drive.name}", quiet=quiet) as computing:
-        source = None if changes else design_text(design)
-        made = design_report(drive, added, progress=computing, source=source)
-    with progress("drawing figures", quiet=quiet) as drawing:
-        written: tuple[Path, ...] = write_report(made, out, progress=drawing)
+    made = build.report(
+        drive,
+        out,
+        validation=validation,
+        also=FURTHER if also and "all" in also else also or (),
+        added=[p for path in include or () for p in load(path)["sections"] if p["id"] != "provenance"],
+        source=None if changes else design_text(design),
+        step=partial(progress, quiet=quiet),
+    )
+    written: tuple[Path, ...] = (out / "report.html", out / "report.json")
     if pdf:
         from reports.pdf import write_pdf
 

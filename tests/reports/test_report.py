@@ -10,6 +10,10 @@ import numpy as np
 import pytest
 from built_report import HOSTILE, SEEN, Built, validated
 
+import actuator_lti
+import analyses
+import nonlinear
+import reports
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.errors import InputError
 from reports import document as doc
@@ -17,6 +21,7 @@ from reports.build import design_report, write_report
 from reports.certain import certain
 from reports.charts.chart import Chart, Curve, Panel
 from reports.charts.data import chart_data, chart_of
+from reports.cli.main import main
 from reports.drawing import draw_svg
 from reports.html import page
 from reports.numbers import show
@@ -127,6 +132,23 @@ def test_the_same_input_gives_the_same_bytes(built: Built, tmp_path, monkeypatch
     page_path, data = write_report(document, tmp_path)
     assert data.read_bytes() == built.data.read_bytes()
     assert page_path.read_bytes() == built.page.read_bytes()
+
+
+def test_report_in_python_is_the_command(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1000000000")
+    arguments = ["report", "ctms-motor-position", "--no-validation", "--also", "duty", "--quiet"]
+    main([*arguments, "--out", str(tmp_path / "command")])
+    made = reports.report("ctms-motor-position", tmp_path / "python", validation=False, also=["duty"])
+    for name in ("report.html", "report.json"):
+        assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "command" / name).read_bytes()
+    assert reports.report("ctms-motor-position", validation=False, also=["duty"]) == made
+    with pytest.raises(InputError, match="section 'all'"):
+        reports.report("ctms-motor-position", also=["all"])
+
+
+@pytest.mark.parametrize("package", [actuator_lti, analyses, nonlinear, reports])
+def test_a_package_shows_its_public_names(package) -> None:
+    assert [name for name in dir(package) if not name.startswith("__")] == sorted(package.__all__)
 
 
 def test_a_time_that_is_none_is_refused(monkeypatch) -> None:
