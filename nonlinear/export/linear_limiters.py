@@ -73,6 +73,12 @@ def outer_stage(q):
 
 
 @kernel
+def of_command(q, stage):
+    """The reference of a command of one: that of a speed drive is the motor's, its command the output's."""
+    return q[layout.RATIO] if stage == VELOCITY else 1.0
+
+
+@kernel
 def outer_interval(q):
     """Ticks between two commands."""
     if q[layout.HAS_POSITION] > 0.0:
@@ -101,7 +107,7 @@ def limiters_assembled(p, q, s, io, a, b, places, column, seen):
         at_rest(q, s)
         if j < n:
             put_unit(q, s, places, j, angles)
-        size = 0.0 if j < n else 1.0
+        size = 0.0 if j < n else of_command(q, stage)
         to = j if j < n else MOST
         done = noted_column(q, s, io, stage, every, size, places, n, angles, column, seen, to)
         if done == 0:

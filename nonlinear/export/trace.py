@@ -150,9 +150,15 @@ class Traced:
         return self.tape.value("pow", (self, power), self.number ** _number(power))
 
     def __mod__(self, other: Any) -> Traced:
+        return self._remainder(self, other)
+
+    def __rmod__(self, other: Any) -> Traced:
+        return self._remainder(other, self)
+
+    def _remainder(self, of: Any, by: Any) -> Traced:
         if not self.tape.loose:
             raise NotTraceable("a remainder")
-        return self.tape.value("fmod", (self, other), math.fmod(self.number, _number(other)))
+        return self.tape.value("fmod", (of, by), math.fmod(_number(of), _number(by)))
 
     def __format__(self, form: str) -> str:
         """Stands in a message for the value that it will have."""

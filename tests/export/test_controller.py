@@ -56,7 +56,7 @@ def worst_of(folder: Path) -> dict[str, tuple[float, float]]:
     done = subprocess.run([str(folder / "run")], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
     rows = [line.split(",") for line in done.stdout.splitlines()[2:-1]]
-    assert int(done.stdout.splitlines()[-1].split()[0]) > 20
+    assert int(done.stdout.splitlines()[-1].split()[0]) > 10
     return {f"{name}{k}": (float(a), float(b)) for k, (name, a, b) in enumerate(rows)}
 
 
@@ -85,7 +85,10 @@ def test_vectors_of_the_simulator_hold_and_no_library_is_called(
 @pytest.mark.parametrize("seed", [1, 2, 6, 12])
 @pytest.mark.parametrize("make", [random_drive, random_elastic_drive])
 def test_vectors_hold_for_random_drives(make: object, seed: int, tmp_path: Path) -> None:
-    design = make(np.random.default_rng(seed))  # type: ignore[operator]
+    rng = np.random.default_rng(seed)
+    while (design := make(rng)).controller.own_law is not None:  # type: ignore[operator]
+        with pytest.raises(InputError, match="a law of one's own is not exported alone; allowed: export c"):
+            controller_export(design)
     folder = written(tmp_path, design, single=bool(seed % 2))
     assert without_library(folder) <= MATHEMATICS
     worst_of(folder)

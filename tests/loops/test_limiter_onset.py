@@ -137,7 +137,7 @@ def test_onset_is_that_of_the_difference_of_a_sine(n_v: int) -> None:
     path = assemble_loops(design).limiters["current-rate"]
     assert (path.limit, path.unit) == (150.0, "A/s")
     for w in (20.0, 700.0, 0.9 * pi / T):
-        expected = 150.0 * T / (2.0 * velocity.gain * sin(w * T / 2.0))
+        expected = 150.0 * T / (2.0 * velocity.gain * design.total_ratio * sin(w * T / 2.0))
         assert path.onset_amplitude_rad(w)[0] == pytest.approx(expected, rel=1e-9)
 
 

@@ -143,7 +143,8 @@ def test_a_value_that_is_too_much_is_said_and_undone(
 ) -> None:
     before = read(page)
     type_value(page, "control.computing_delay", delay_us)
-    assert words in page.inner_text(place)
+    has = "([place, words]) => document.querySelector(place).innerText.includes(words)"
+    page.wait_for_function(has, arg=[place, words])
     settled(page, lambda: page.click('[data-do="undo"]'))
     assert read(page) == before
 
