@@ -35,7 +35,7 @@ class ExportedDrive:
         path = folder / f"drive-{hashlib.sha256(data).hexdigest()[:16]}.so"
         if not path.exists():  # a library that is loaded must not be written again
             path.write_bytes(data)
-        self._c: Any = ctypes.CDLL(str(path))
+        self._c: Any = ctypes.CDLL(str(path.resolve()))  # a name alone is sought elsewhere
         header = texts["drive_design.h"]
         self._p = np.zeros(_length(header, "DRIVE_P_LENGTH"))
         self._s = np.zeros(_length(header, "DRIVE_S_LENGTH"))
