@@ -58,7 +58,7 @@ def report(
     also : sequence of str
         Further sections, of `reports.analyses.FURTHER`.
     added : sequence of section
-        Sections of other documents, put at the end.
+        Sections of other documents, put before the further ones.
     source : str, optional
         See `design_report`; the file's text where ``design`` is a name or a path.
     step : callable, optional
@@ -84,7 +84,7 @@ def report(
     if source is None and not isinstance(design, Design):
         source = design_text(design)
     with step(f"further sections of {drive.name}"):
-        parts = [*further_sections(drive, also), *added]
+        parts = [*added, *further_sections(drive, also)]
     if validation:
         with step(f"validating {drive.name}") as validating:
             parts = [*validation_sections(drive, validating), *parts]

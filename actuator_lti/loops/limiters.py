@@ -203,9 +203,8 @@ def limiter_paths(
 ) -> dict[str, LimiterPath]:
     """All limiter paths; ``evaluate(signals, every, rate)`` gives the function of frequency."""
     time = wired.design.limits.overload_time_s
-    geared = (
-        wired.design.total_ratio if wired.outermost == "velocity" else 1.0
-    )  # its reference is the motor's
+    # the reference of a speed drive is the motor's, its command the output's
+    geared = wired.design.total_ratio if wired.outermost == "velocity" else 1.0
 
     def from_output(place: Place) -> Callable[[np.ndarray], np.ndarray]:
         response = evaluate(place.signals, place.every, place.limiter.kind == "rate")

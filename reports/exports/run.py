@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -50,19 +51,16 @@ def export_c(design: Design, asked: AskedC) -> Exported:
     InputError
         If there are such files already, or the folder cannot be written.
     """
-    from actuator_lti.files.atomic import write_together
     from nonlinear.export import c_export
     from reports.export_check import check_text
 
     folder = asked.target
     folder_for_results(folder)
     texts = c_export(design, single_precision=asked.single)
-    for name in texts:
-        refuse_existing(folder / name, asked.force)
+    _refuse_any(folder, texts, asked.force)
     check = _checked(design) if asked.check else None
     texts["README.md"] += "\n" + check_text(check, single_precision=asked.single)
-    write_together({folder / name: text.encode() for name, text in texts.items()})
-    return Exported(tuple(str(folder / name) for name in texts), f"{folder}: {', '.join(texts)}", check)
+    return _put(folder, texts, check)
 
 
 def export_controller(design: Design, asked: AskedController) -> Exported:
@@ -73,16 +71,13 @@ def export_controller(design: Design, asked: AskedController) -> Exported:
     InputError
         If there are such files already, or the prefix is no name.
     """
-    from actuator_lti.files.atomic import write_together
     from nonlinear.export import controller_export
 
     folder = asked.target
     folder_for_results(folder)
     texts = controller_export(design, single_precision=asked.number == "float", prefix=asked.prefix)
-    for name in texts:
-        refuse_existing(folder / name, asked.force)
-    write_together({folder / name: text.encode() for name, text in texts.items()})
-    return Exported(tuple(str(folder / name) for name in texts), f"{folder}: {', '.join(texts)}")
+    _refuse_any(folder, texts, asked.force)
+    return _put(folder, texts)
 
 
 def export_fmu(design: Design, asked: AskedFmu) -> Exported:
@@ -135,6 +130,18 @@ def export_linear(design: Design, asked: AskedLinear) -> Exported:
     write_bytes(target, data)
     named = [*tree["sampled"]["loops"], *tree["sampled"]["break_points"], *tree["sampled"]["responses"]]
     return Exported((str(target),), f"{target}: {', '.join(named)}, {' and '.join(FORMS)}, {len(data)} bytes")
+
+
+def _refuse_any(folder: Path, names: Iterable[str], force: bool) -> None:
+    for name in names:
+        refuse_existing(folder / name, force)
+
+
+def _put(folder: Path, texts: Mapping[str, str], check: CodeCheck | None = None) -> Exported:
+    from actuator_lti.files.atomic import write_together
+
+    write_together({folder / name: text.encode() for name, text in texts.items()})
+    return Exported(tuple(str(folder / name) for name in texts), f"{folder}: {', '.join(texts)}", check)
 
 
 def _checked(design: Design) -> CodeCheck:

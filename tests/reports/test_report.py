@@ -142,6 +142,10 @@ def test_report_in_python_is_the_command(tmp_path, monkeypatch) -> None:
     for name in ("report.html", "report.json"):
         assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "command" / name).read_bytes()
     assert reports.report("ctms-motor-position", validation=False, also=["duty"]) == made
+    mine = doc.section("mine", "Mine", [doc.text("of a record")])
+    parts = reports.report("ctms-motor-position", validation=False, also=["duty"], added=[mine])["sections"]
+    order = [part["id"] for part in parts]
+    assert order.index("mine") < order.index("duty")  # as the command puts what it includes
     with pytest.raises(InputError, match="section 'all'"):
         reports.report("ctms-motor-position", also=["all"])
 
