@@ -77,10 +77,6 @@ class Rows:
     structs: Mapping[str, Struct]
     counts_per_unit: float = math.nan
 
-    def owner(self, row: str, index: ast.expr) -> object:
-        """What the state's element belongs to, for `without_unread`; None for every other row's."""
-        return self.structs[row].member(index)[0] if row == "s" else None
-
 
 class _Members(Expressions):
     """Expressions whose rows are structures."""

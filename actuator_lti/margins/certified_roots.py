@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, TypeVar
 
 from flint import acb, arb, arb_poly, ctx, fmpq_poly, fmpz_poly
@@ -64,12 +63,6 @@ def all_roots(p: fmpz_poly) -> list[tuple[acb, int]]:
         return []
     result: Any = (p // p.content()).complex_roots()
     return [(acb(root), times) for root, times in result]
-
-
-def sign_changes(p: fmpz_poly) -> int:
-    """Descartes' bound of the number of positive roots."""
-    signs = [c > 0 for c in p.coeffs() if c != 0]
-    return sum(a != b for a, b in pairwise(signs))
 
 
 def positive_roots(roots: list[tuple[acb, int]]) -> list[tuple[arb, int]]:

@@ -70,11 +70,6 @@ class OperatingMotion:
         if self.extra_Nm:
             rows["torque_table"], rows["torque_table_length"] = rows.tables.add(np.array([self.extra_Nm]))
 
-    @property
-    def delicate(self) -> bool:
-        """Whether a reversal or a parting of the coupling would change what is tested."""
-        return self.friction_on or self.coupling_Nm != 0.0
-
     def output_rad(self, design: Design) -> float:
         """Output angle where the motor is at zero, which is where a drive stands."""
         return -self.twist_rad / design.ratio_behind_coupling

@@ -262,9 +262,7 @@ def _unit(design: Design, name: str) -> str:
         stage for stage in _STAGES if stage == "voltage" or getattr(design.controller, stage) is not None
     ]
     if name in _COMMAND:
-        return (
-            stage_words(design)[1].replace("m", "rad") if design.axis == "linear" else stage_words(design)[1]
-        )
+        return stage_words(design)[1]
     if name == "S_PROFILE_SPEED":
         return f"{_UNITS[stages[0]]}/s".replace("/s/s", "/s2")
     for stage, names in _BEHIND.items():
