@@ -142,6 +142,16 @@ def started(processes: list, *command: str, **environment: str) -> None:
     )  # fmt: skip
 
 
+def address_in(file: Path) -> str:
+    """What a scheduler wrote of itself; it puts the file down before it has written all of it."""
+    end = time.monotonic() + 120.0
+    while time.monotonic() < end:
+        with contextlib.suppress(FileNotFoundError, json.JSONDecodeError):
+            return json.loads(file.read_text())["address"]
+        time.sleep(0.05)
+    raise TimeoutError(file)
+
+
 @pytest.fixture
 def bare(tmp_path, monkeypatch):
     """A scheduler alone, which can be killed; its address, and a function that starts a worker."""
@@ -151,17 +161,14 @@ def bare(tmp_path, monkeypatch):
     processes: list = []
     file = tmp_path / "scheduler.json"
     common = ("--no-dashboard", "--host", "127.0.0.1")
-    started(processes, "dask_scheduler", *common, "--port", "0", "--scheduler-file", str(file))
-    end = time.monotonic() + 60.0
-    while not file.exists():
-        assert time.monotonic() < end
-        time.sleep(0.05)
     worker = ("dask_worker", *common, "--no-nanny", "--nthreads", "1", "--scheduler-file", str(file))
-    address = json.loads(file.read_text())["address"]
-    yield address, processes, lambda **environment: started(processes, *worker, **environment)
-    for process in processes:
-        process.kill()
-        process.wait()
+    try:
+        started(processes, "dask_scheduler", *common, "--port", "0", "--scheduler-file", str(file))
+        yield address_in(file), processes, lambda **environment: started(processes, *worker, **environment)
+    finally:  # also where it did not come up: a process left behind is seen by the next test
+        for process in processes:
+            process.kill()
+            process.wait()
 
 
 @pytest.mark.parametrize(
