@@ -187,7 +187,7 @@ ANALYSES = (
         name="stiffness",
         group="Linear loops",
         words="""
-        Dynamic and static stiffness and lost motion, checked by an injected moment.
+        Dynamic and static stiffness and lost motion, checked by the simulator.
 
         The exit status is 1 where the simulator does not confirm the linear stiffness.
         """,

@@ -65,7 +65,7 @@ class LostMotion:
 
 @dataclass(frozen=True)
 class Check:
-    """One frequency, a small moment injected in the simulator, without dry friction, play or quantisation."""
+    """One frequency, by the simulator's own derivative at rest, without dry friction and play."""
 
     frequency_hz: float
     foreseen_Nm_rad: complex

@@ -63,7 +63,7 @@ def _result(result: Stiffness, unit: str) -> str:
     if result.checks:
         most = max(check.difference for check in result.checks)
         said = "confirms" if result.passed else "does not confirm"
-        words += f"; an injected moment {said} it (relative difference up to {most:.1e})"
+        words += f"; the simulator {said} it (relative difference up to {most:.1e})"
     return f"{words}."
 
 
@@ -141,9 +141,9 @@ def _at_rest(result: Stiffness, unit: str) -> Block:
 
 def _checks(result: Stiffness, unit: str) -> Block:
     note = (
-        "A small moment injected in the simulator, without play, quantisation, dry friction or friction by "
-        "load: predicted here is the linear stiffness of that drive, without the friction by load "
-        "that the curves have."
+        "The simulator's own derivative from a moment, at rest, without play, counts, dry friction or "
+        "friction by load: predicted here is the linear stiffness of that drive, without that "
+        "friction, which the curves have."
     )
     columns = [
         doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:4"),
@@ -151,4 +151,4 @@ def _checks(result: Stiffness, unit: str) -> Block:
         doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Simulated", unit, format="sig:6"),
         doc.of("difference", "difference", "Relative difference", format="sig:2"),
     ]
-    return doc.listing("Injected moment", result.checks, columns, note)
+    return doc.listing("Small moments", result.checks, columns, note)
