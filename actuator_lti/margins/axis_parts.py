@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.axis_search import Found, passages, search
+from actuator_lti.margins.axis_search import Found, nearest, passages, search
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.factored import Response
 from actuator_lti.margins.factors_on_axis import Factored
 from actuator_lti.margins.loop import Mask, Real
-from actuator_lti.margins.nearest import nearest
 from actuator_lti.margins.trust import Doubtful
 
 _LOW, _HIGH = 1e-3, 1e3  # of the smallest and largest root: where the ends of the axis begin
@@ -149,7 +148,7 @@ def distances_over(
         for d in distances
     ]
     for part in parts:
-        found = nearest(part.factors, part.found.known, distances, best)
+        found = nearest(part.factors, part.found, distances, best)
         best = [
             (new[0], 1.0 / new[1] if part.beyond else new[1]) if new[0] < old[0] else old
             for new, old in zip(found, best, strict=True)
