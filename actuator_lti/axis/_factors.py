@@ -1,7 +1,7 @@
 """Gain and phase of a factored loop at one frequency, and their range over an interval, compiled.
 
-Rows are flat. ``factors`` holds `FACTOR` numbers a root, ``constants`` those of the loop. What is known at a
-frequency fills a slot of ``parts``: gain, turn and their rates of every factor, those of L, and w itself.
+Rows are flat. ``factors`` holds `FACTOR` numbers a root, then those of the loop. What is known at a frequency
+fills a slot of ``parts``: gain, turn and their rates of every factor, those of L, and w itself.
 """
 
 # mypy: disallow-untyped-defs=False
@@ -25,10 +25,11 @@ def slot(m):
 
 
 @kernel
-def evaluated(m, factors, constants, w, parts, at):
+def evaluated(m, factors, w, parts, at):
     """Fill the slot that begins at ``at``."""
-    gain, phase = constants[LOG_GAIN], constants[PHASE] - constants[DELAY] * w
-    gain_rate, phase_rate = 0.0, -constants[DELAY]
+    delay = factors[FACTOR * m + DELAY]
+    gain, phase = factors[FACTOR * m + LOG_GAIN], factors[FACTOR * m + PHASE] - delay * w
+    gain_rate, phase_rate = 0.0, -delay
     for k in range(m):
         own, to = FACTOR * k, at + 4 * k
         y, off = w - factors[own + IMAGINARY], factors[own + OFF_AXIS]
@@ -48,7 +49,7 @@ def evaluated(m, factors, constants, w, parts, at):
 
 
 @kernel
-def bounded(m, factors, constants, parts, left, right, bounds):
+def bounded(m, factors, parts, left, right, bounds):
     """Least and most of log gain, phase and their rates between two slots, between places.
 
     By what the factors change, each one way; gain and phase by the rate of their sum besides.
@@ -61,7 +62,7 @@ def bounded(m, factors, constants, parts, left, right, bounds):
             change = parts[right + 4 * k + kind] - parts[left + 4 * k + kind]
             spread += abs(factors[FACTOR * k + WEIGHT] * change)
         if kind == 1:
-            spread += constants[DELAY] * width
+            spread += factors[FACTOR * m + DELAY] * width
         middle = parts[a + kind] + parts[b + kind]
         bounds[kind], bounds[MOST + kind] = 0.5 * (middle - spread), 0.5 * (middle + spread)
     for kind in range(2):
@@ -85,13 +86,13 @@ def halved(low, high):
 
 
 @kernel
-def root(m, factors, constants, kind, level, parts, left, right, at):
+def root(m, factors, kind, level, parts, left, right, at):
     """Where gain (0) or phase (1), monotone between two slots, takes a level: Newton held by bisection."""
     low, high = parts[left + 4 * m + 4], parts[right + 4 * m + 4]
     first, last = parts[left + 4 * m + kind] - level, parts[right + 4 * m + kind] - level
     w = low + (high - low) * (first / (first - last))
     for _round in range(STEPS):
-        evaluated(m, factors, constants, w, parts, at)
+        evaluated(m, factors, w, parts, at)
         here = parts[at + 4 * m + kind] - level
         if (here > 0.0 and first > 0.0) or (not here > 0.0 and not first > 0.0):
             low = w
@@ -108,10 +109,10 @@ def root(m, factors, constants, kind, level, parts, left, right, at):
 
 
 @kernel
-def gain_bounds(m, factors, constants, count, low, high, least, most, parts, bounds):
+def gain_bounds(m, factors, count, low, high, least, most, parts, bounds):
     """Fill the range of the gain over each of many intervals, between places."""
     for k in range(count):
-        evaluated(m, factors, constants, low[k], parts, 0)
-        evaluated(m, factors, constants, high[k], parts, slot(m))
-        bounded(m, factors, constants, parts, 0, slot(m), bounds)
+        evaluated(m, factors, low[k], parts, 0)
+        evaluated(m, factors, high[k], parts, slot(m))
+        bounded(m, factors, parts, 0, slot(m), bounds)
         least[k], most[k] = math.exp(bounds[0]), math.exp(bounds[MOST])

@@ -87,11 +87,11 @@ def _newton(m, factors, form, parts, at):
 
 
 @kernel
-def _polished(m, factors, constants, form, start, value, parts, at):
+def _polished(m, factors, form, start, value, parts, at):
     """The smallest distance next to a place, and where; never farther than there."""
     best, place, w = value, start, start
     for _round in range(NEWTON_STEPS):
-        evaluated(m, factors, constants, w, parts, at)
+        evaluated(m, factors, w, parts, at)
         here = _distance(form, parts[at + 4 * m], parts[at + 4 * m + 1])
         if here < best:
             best, place = here, w
@@ -103,9 +103,9 @@ def _polished(m, factors, constants, form, start, value, parts, at):
 
 
 @kernel
-def _below(form, constants, value, w):
+def _below(m, factors, form, value, w):
     """(u, v, x): another place is nearer where u abs(L)^2 + v Re L + x < 0, but for rounding of the phase."""
-    rounding = 4.0 * EPS * constants[DELAY] * w if w < math.inf else 0.0
+    rounding = 4.0 * EPS * factors[FACTOR * m + DELAY] * w if w < math.inf else 0.0
     less = value * (1.0 - FINEST) - rounding
     square = less * less
     return (
@@ -172,26 +172,26 @@ def _bends_in(m, factors, u, v, x, parts, left, right, middle):
 
 
 @kernel
-def _within(m, factors, constants, form, best, parts, bounds):
+def _within(m, factors, form, best, parts, bounds):
     """Settle the interval between the first two slots; the status. ``best`` is value and place."""
     size = slot(m)
     depth = 1
     while depth > 0:
         right, middle = size * depth, size * (depth + 1)
         low, high = parts[size - 1], parts[right + size - 1]
-        u, v, x = _below(form, constants, best[0], best[1])
-        bounded(m, factors, constants, parts, 0, right, bounds)
+        u, v, x = _below(m, factors, form, best[0], best[1])
+        bounded(m, factors, parts, 0, right, bounds)
         inside = _may_reach(u, v, x, bounds[0], bounds[1], bounds[MOST], bounds[MOST + 1])
         if inside:
             if depth == DEEPEST or high - low <= NARROWEST * high:
                 return UNSETTLED
             cut = low < best[1] and best[1] < high
             at = best[1] if cut else halved(low, high)
-            evaluated(m, factors, constants, at, parts, middle)
+            evaluated(m, factors, at, parts, middle)
             if not cut:
                 here = _distance(form, parts[middle + 4 * m], parts[middle + 4 * m + 1])
                 if here < best[0] * (1.0 - FINEST):
-                    value, place = _polished(m, factors, constants, form, at, here, parts, middle + size)
+                    value, place = _polished(m, factors, form, at, here, parts, middle + size)
                     best[0], best[1] = value, place
                     if value < SMALL:
                         return MEETS
@@ -207,7 +207,7 @@ def _within(m, factors, constants, form, best, parts, bounds):
 
 
 @kernel
-def nearest(m, factors, constants, count, known, form, best, parts, bounds):
+def nearest(m, factors, count, known, form, best, parts, bounds):
     """The smallest distance over ``count`` known intervals, if it is less than ``best``; the status."""
     size = slot(m)
     value, place = best[0], best[1]
@@ -216,17 +216,17 @@ def nearest(m, factors, constants, count, known, form, best, parts, bounds):
         if here < value * (1.0 - FINEST):
             value, place = here, known[KNOWN * k]
     if value < best[0]:
-        value, place = _polished(m, factors, constants, form, place, value, parts, 0)
+        value, place = _polished(m, factors, form, place, value, parts, 0)
         best[0], best[1] = value, place
     if best[0] < SMALL:
         return MEETS
     for k in range(count):
         at = KNOWN * k
-        u, v, x = _below(form, constants, best[0], best[1])
+        u, v, x = _below(m, factors, form, best[0], best[1])
         if _may_reach(u, v, x, known[at + 3], known[at + 4], known[at + 5], known[at + 6]):
-            evaluated(m, factors, constants, known[at], parts, 0)
-            evaluated(m, factors, constants, known[at + KNOWN], parts, size)
-            status = _within(m, factors, constants, form, best, parts, bounds)
+            evaluated(m, factors, known[at], parts, 0)
+            evaluated(m, factors, known[at + KNOWN], parts, size)
+            status = _within(m, factors, form, best, parts, bounds)
             if status != DONE:
                 return status
     return DONE

@@ -11,7 +11,7 @@ import math
 
 from actuator_lti.compiled.kernel import kernel
 
-from ._factors import MOST, SLACK, bounded, evaluated, halved, one_way, root, slot
+from ._factors import FACTOR, MOST, SLACK, bounded, evaluated, halved, one_way, root, slot
 
 DONE, FULL, TOO_NEAR = range(3)  # status
 INTERVALS, GAINS, REALS, FAR, TURNS, RATE, WHERE, FOUND = range(8)  # places in ``found``
@@ -50,7 +50,7 @@ def _first_turns(m, parts, from_zero):
 
 
 @kernel
-def _levels(m, factors, constants, kind, level, parts, right, room, gains, found):
+def _levels(m, factors, kind, level, parts, right, room, gains, found):
     """Keep the one place of the interval at which gain or phase passes a level."""
     first, last = parts[4 * m + kind] > level, parts[right + 4 * m + kind] > level
     if (first and last) or (not first and not last):
@@ -58,13 +58,13 @@ def _levels(m, factors, constants, kind, level, parts, right, room, gains, found
     count = int(found[GAINS])
     if count == room:
         return FULL
-    gains[count] = root(m, factors, constants, kind, level, parts, 0, right, right + slot(m))
+    gains[count] = root(m, factors, kind, level, parts, 0, right, right + slot(m))
     found[GAINS] += 1.0
     return DONE
 
 
 @kernel
-def _turned(m, factors, constants, listed_to, from_zero, parts, right, bounds, room, reals, found):
+def _turned(m, factors, listed_to, from_zero, parts, right, bounds, room, reals, found):
     """Keep every place of the interval at which the phase passes an odd multiple of pi, or count them."""
     low = parts[4 * m + 4]
     first = _first_turns(m, parts, from_zero and found[INTERVALS] == 0.0)
@@ -83,7 +83,7 @@ def _turned(m, factors, constants, listed_to, from_zero, parts, right, bounds, r
             return FULL
         turns = first + 1.0 + number if step > 0.0 else first - number
         level = 2.0 * math.pi * turns - math.pi
-        reals[2 * count] = root(m, factors, constants, 1, level, parts, 0, right, right + slot(m))
+        reals[2 * count] = root(m, factors, 1, level, parts, 0, right, right + slot(m))
         reals[2 * count + 1] = step
         found[REALS] += 1.0
     return DONE
@@ -102,7 +102,7 @@ def _kept(m, parts, right, bounds, known, found):
 
 @kernel
 def search(
-    m, factors, constants, kind, level, listed_to, count, edges, room, known, gains, reals, found,
+    m, factors, kind, level, listed_to, count, edges, room, known, gains, reals, found,
     parts, bounds,
 ):  # fmt: skip
     """Find what is looked for from the first to the last of the edges, places among them; the status.
@@ -112,29 +112,29 @@ def search(
     ``reals`` for as many with the way in which the phase turns there. ``parts`` lends `DEEPEST` + 2 slots.
     """
     size = slot(m)
-    evaluated(m, factors, constants, edges[0], parts, 0)
+    evaluated(m, factors, edges[0], parts, 0)
     found[RATE] = parts[4 * m + 3]
     for n in range(1, count):
-        evaluated(m, factors, constants, edges[n], parts, size)
+        evaluated(m, factors, edges[n], parts, size)
         depth = 1
         while depth > 0:
             right = size * depth
             low, high = parts[size - 1], parts[right + size - 1]
-            bounded(m, factors, constants, parts, 0, right, bounds)
-            if not _clear(kind, level, listed_to, constants[SLACK], low, bounds):
+            bounded(m, factors, parts, 0, right, bounds)
+            if not _clear(kind, level, listed_to, factors[FACTOR * m + SLACK], low, bounds):
                 found[WHERE] = low
                 if depth == DEEPEST or high - low <= NARROWEST * high:
                     return TOO_NEAR
-                evaluated(m, factors, constants, halved(low, high), parts, right + size)
+                evaluated(m, factors, halved(low, high), parts, right + size)
                 depth += 1
                 continue
             if int(found[INTERVALS]) == room:
                 return FULL
             one = level if kind != CIRCLE else 0.0
-            status = _levels(m, factors, constants, max(kind, 0), one, parts, right, room, gains, found)
+            status = _levels(m, factors, max(kind, 0), one, parts, right, room, gains, found)
             if kind == CIRCLE and status == DONE:
                 status = _turned(
-                    m, factors, constants, listed_to, edges[0] == 0.0, parts, right, bounds, room, reals,
+                    m, factors, listed_to, edges[0] == 0.0, parts, right, bounds, room, reals,
                     found,
                 )  # fmt: skip
             if status != DONE:

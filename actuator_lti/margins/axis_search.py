@@ -128,8 +128,8 @@ def gain_bounds(loop: Factored, low: Real, high: Real) -> tuple[Real, Real]:
     return least, most
 
 
-def _row(loop: Factored) -> tuple[int, Real, Real]:
-    return loop.roots.size, loop.table, loop.constants
+def _row(loop: Factored) -> tuple[int, Real]:
+    return loop.roots.size, loop.table
 
 
 def _lent(loop: Factored) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from actuator_lti.axis.library import LIBRARY
 from actuator_lti.margins.loop import Complex, Real
 
 _NEXT_TO_AXIS = 1e-14  # relative: a root on the axis itself is held this far from it
@@ -79,21 +80,18 @@ class Factored:
 
     @cached_property
     def table(self) -> Real:
-        """What the compiled search knows of each factor, see `actuator_lti.axis`."""
+        """What the compiled search knows of each factor, then of the loop, see `actuator_lti.axis`."""
         columns = (self.roots.real, self.roots.imag, self._off_axis, self.weights, self._turning)
-        return np.array(columns).T.ravel()
-
-    @cached_property
-    def constants(self) -> Real:
-        """What it knows of the loop."""
-        return np.array((self.log_gain, self.phase, self.delay, self.slack))
+        loop = (self.log_gain, self.phase, self.delay, self.slack)
+        return np.append(np.array(columns).T, loop)
 
     @cached_property
     def places(self) -> Real:
         """Frequencies w > 0 between which every factor is monotone."""
         im = self.roots.imag
         w = np.concatenate((im - self._off_axis, im, im + self._off_axis))
-        return np.unique(w[w > 0.0])
+        w = np.sort(w[w > 0.0])
+        return np.asarray(w[np.diff(w, prepend=0.0) > 0.0])
 
     def log_value(self, w: Real) -> Real:
         """Log gain and phase (continuous, less whole turns), shape (2, points)."""
@@ -103,7 +101,9 @@ class Factored:
 
     def log_at(self, w: float) -> tuple[float, float]:
         """The same at one frequency."""
-        gain, phase = self.log_value(np.array([w]))[:, 0].tolist()
+        parts = np.empty(4 * self.roots.size + 5)
+        LIBRARY.functions.evaluated(self.roots.size, self.table, w, parts, 0)
+        gain, phase = parts[-5:-3].tolist()
         return gain, phase
 
 
