@@ -61,6 +61,7 @@ def report(
     """
     from actuator_lti.asked.verdict import Verdict
     from actuator_lti.design.loader import design_text
+    from actuator_lti.errors import InputError
     from reports import build
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
@@ -69,6 +70,8 @@ def report(
     from reports.terminal import print_verdict
     from reports.verdict_summary import verdict_words
 
+    if summary and not pdf:
+        raise InputError("--summary: allowed with --pdf, of which it makes a short one")
     drive = load_drive(design, changes)
     made = build.report(
         drive,

@@ -11,6 +11,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section, Status
+from reports.numbers import short
 from reports.sections.names import load_unit, output_unit
 
 if TYPE_CHECKING:
@@ -58,8 +59,9 @@ def _result(result: Stiffness, unit: str) -> str:
     if np.isfinite(powered.stiffness_Nm_rad).any():
         least, at = powered.least
         static = powered.static_Nm_rad
-        words = f"{static:.4g} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
-        words = f"Powered, the static stiffness is {words}; the least is {least:.4g} {unit} at {at:.3g} Hz"
+        words = f"{short(static, 4)} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
+        words = f"Powered, the static stiffness is {words}"
+        words += f"; the least is {short(least, 4)} {unit} at {at:.3g} Hz"
     return "; ".join(filter(None, (words, _compared(result)))) + "."
 
 
