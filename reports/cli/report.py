@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from actuator_lti.errors import InputError
 from reports.analyses import FURTHER
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import (
@@ -61,7 +62,6 @@ def report(
     """
     from actuator_lti.asked.verdict import Verdict
     from actuator_lti.design.loader import design_text
-    from actuator_lti.errors import InputError
     from reports import build
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
