@@ -75,18 +75,19 @@ def _live(made: Mapping[str, Any]) -> Tree:
     }
 
 
-def render(template: str, **context: Any) -> str:
-    """Fill a template that extends ``base.html``; every page gets the same style, script and policy.
+def render(template: str, *, style: str = "", code: str = "", **context: Any) -> str:
+    """Fill a template that extends ``base.html``; every page gets the same style (and ``style``) and policy.
 
-    A page with sliders (``live`` is given) has one script more, and may compile WebAssembly.
+    The script is ``code``, else that of every report. A page with sliders (``live`` is given) has one script
+    more, and may compile WebAssembly.
     """
     counter = itertools.count(1)
-    code = script(live="live" in context)
+    code = code or script(live="live" in context)
     return (
         environment()
         .get_template(template)
         .render(
-            stylesheet=Markup(asset("style.css")),
+            stylesheet=Markup(asset("style.css") + style),
             script=Markup(code),
             security_policy=security_policy(code, wasm="live" in context),
             verdict_lines=verdict_lines,

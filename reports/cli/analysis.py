@@ -77,7 +77,9 @@ def command(one: Analysis) -> Callable[..., None]:
         _parameter("quiet", QuietOption, False),
         *([_parameter("example", _example(one), False)] if one.example else []),
     ]
-    left_out = ("design", "changes") * one.alone + ("out", "quiet") * (one.alone or not one.page)
+    paged = one.page and not one.alone
+    left_out = ("design", "changes") * one.alone + ("out",) * (not paged)
+    left_out += ("quiet",) * (not paged and not one.doing)
     parameters = [each for each in parameters if each.name not in left_out]
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}

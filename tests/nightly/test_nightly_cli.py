@@ -47,7 +47,8 @@ def built(tmp_path_factory):
 def test_the_first_night_names_the_broken_variant_and_builds_the_others(built) -> None:
     folder, done = built
     assert done.returncode == 1, done.stderr
-    assert "no result  no <b>motor</b>: " in done.stdout
+    assert done.stdout.startswith("FAIL  night 1: 1 no result")
+    assert "no <b>motor</b>" in done.stdout
     assert "motor.resistance = " in done.stdout
     assert "allowed: above 0" in done.stdout
     summary = json.loads((folder / "site" / "summary.json").read_text())
@@ -94,10 +95,10 @@ def test_bad_usage_is_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys,
 @pytest.mark.parametrize(
     ("table", "expected"),
     [
-        ("nightly = 1", "nightly: allowed: a table"),
-        ("[nightly]\npdff = true", "unknown key; allowed: pdf, tolerance"),
-        ("[nightly]\npdf = 1", "allowed: true or false"),
-        ("[nightly]\ntolerance = 3", "a table of name pattern"),
+        ("nightly = 1", "nightly: must be a table"),
+        ("[nightly]\npdff = true", "nightly.pdff: unknown key"),
+        ("[nightly]\npdf = 1", "nightly.pdf = 1: true or false"),
+        ("[nightly]\ntolerance = 3", "nightly.tolerance: must be a table"),
         ('[nightly.tolerance]\n"*" = "much"', "a number of at least 0"),
     ],
 )
