@@ -160,12 +160,13 @@ def _study(path: str | None, changes: list[str] | None) -> Study | None:
 def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, quiet: bool) -> list[str]:
     """Write page and JSON."""
     from reports.cli.progress import progress
-    from reports.study_pages import study_document, write_pages
+    from reports.html import write_report
+    from reports.study_pages import study_document
 
     title = f"{drive.title or drive.name}: {parts[0]['title']}"
     made = study_document(drive, parts, title=title, subtitle=parts[0]["result"], kind=one.name)
     with progress("drawing figures", quiet=quiet) as drawing:
-        return [str(path) for path in write_pages(made, out, one.stem or one.name, progress=drawing)]
+        return [str(path) for path in write_report(made, out, one.stem or one.name, progress=drawing)]
 
 
 def _print(

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 from site_checks import check_whole
 
+from actuator_lti.errors import InputError
 from reports.cli.main import main
+from reports.nightly.source import read_study
 
 STUDY = """
 [study]
@@ -34,14 +36,9 @@ def built(tmp_path_factory):
     """A first night of a small study, on real worker processes."""
     folder = tmp_path_factory.mktemp("cli")
     (folder / "study.toml").write_text(STUDY)
-    command = (
-        [sys.executable, "-m", "reports.cli.main"]
-        if False
-        else [str(Path(sys.executable).with_name("actuator-lti"))]
-    )
-    arguments = ["nightly", str(folder / "study.toml"), "--site", str(folder / "site"), "--no-validation"]
-    done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False, timeout=300)
-    return folder, done
+    command = [str(Path(sys.executable).with_name("actuator-lti")), "nightly", str(folder / "study.toml")]
+    command += ["--site", str(folder / "site"), "--no-validation"]
+    return folder, subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
 
 
 def test_the_first_night_names_the_broken_variant_and_builds_the_others(built) -> None:
@@ -103,14 +100,8 @@ def test_bad_usage_is_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys,
     ],
 )
 def test_a_wrong_nightly_table_is_told_in_one_line(tmp_path, table: str, expected: str) -> None:
-    from actuator_lti.errors import InputError
-    from reports.nightly.source import read_study
-
     path = tmp_path / "s.toml"
-    path.write_text(
-        f'{table if "nightly = " in table else ""}\n[study]\nbase = "emps"\n'
-        + (table if "[" in table else "")
-    )
+    path.write_text(f'{table}\n[study]\nbase = "emps"\n')
     with pytest.raises(InputError, match=r"s\.toml") as caught:
         read_study(str(path))
     assert expected in str(caught.value)
