@@ -113,7 +113,7 @@ class Asked:
         first = self.files[0]
         if self.frequency_response or len(self.files) != 1 or first.suffix.lower() != ".toml":
             return False
-        from analyses.records.toml_tables import read_toml
+        from analyses.toml_tables import read_toml
 
         return "file" not in read_toml(first)
 
