@@ -39,19 +39,28 @@ def section(result: LargeSignals) -> Section:
         table = _shift_table(result.shift, design, scale, unit)
         blocks.append(doc.details("The linear limit in numbers", [table]))
     blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
-    blocks += [_bode_table(result.bode, scale, unit), *_sawtooth_blocks(result.sawtooth, design, scale, unit)]
+    blocks += [
+        _bode_table(result.bode, scale, unit, _linear(design)),
+        *_sawtooth_blocks(result.sawtooth, design, scale, unit),
+    ]
     intro = (
         "Each point of the map is one sine command, simulated until steady. Below the lines the linear "
         "model holds. Above them the limit that is reached first determines the output."
     )
-    words = _result(result.bode, scale, unit)
+    words = _result(result.bode, scale, unit, _linear(design))
     status: Status = tally(items).role
     return doc.section(
         "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, told="info"
     )
 
 
-def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> str:
+def _linear(design: Design) -> str:
+    """Which linear response the map is beside: friction by load that changes sign with the motion is out."""
+    by_load = design.friction.load_coefficient > 0.0 and bool(design.coupling or design.load.acting())
+    return "linear, without friction by load" if by_load else "linear"
+
+
+def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str = "linear") -> str:
     """Say how far the bandwidth falls with the amplitude."""
     largest, fraction = max(
         zip(amplitude_bode.amplitude_rad, amplitude_bode.fractions, strict=True), default=(math.nan, 0.0)
@@ -65,12 +74,12 @@ def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> str:
     if not math.isfinite(value):
         found = _between(amplitude_bode, place)
         if amplitude_bode.below_from_start[place]:
-            return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to {found} at {size}."
-        return f"The −3 dB bandwidth is {linear:.3g} Hz (linear); at {size} it is {found}."
+            return f"The −3 dB bandwidth falls from {linear:.3g} Hz ({model}) to {found} at {size}."
+        return f"The −3 dB bandwidth is {linear:.3g} Hz ({model}); at {size} it is {found}."
     if f"{value:.3g}" == f"{linear:.3g}":
         return f"The −3 dB bandwidth stays at {linear:.3g} Hz up to {size}."
     does = "falls" if value < linear else "rises"
-    return f"The −3 dB bandwidth {does} from {linear:.3g} Hz (linear) to {value:.3g} Hz at {size}."
+    return f"The −3 dB bandwidth {does} from {linear:.3g} Hz ({model}) to {value:.3g} Hz at {size}."
 
 
 def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
@@ -210,7 +219,7 @@ def _bandwidths(panel: Panel, result: AmplitudeBode, scale: float, unit: str, fu
     panel.y.label = "frequency, Hz"
 
 
-def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block:
+def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str) -> Block:
     """List both bandwidths at the design's amplitudes."""
     columns = [
         doc.column("fraction", "of full deflection", "%", format="sig:3"),
@@ -230,7 +239,7 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block
         corners = (amplitude_bode.minus3db_hz[k], amplitude_bode.minus90deg_hz[k])
         rows.append((100.0 * fraction, scale * amplitude, *corners, note))
     corners = (amplitude_bode.linear_minus3db_hz, amplitude_bode.linear_minus90deg_hz)
-    rows.append((None, None, *corners, "linear loop"))
+    rows.append((None, None, *corners, model))
     return doc.table(
         "Bandwidth against amplitude", columns, [dict(zip(keys, row, strict=True)) for row in rows]
     )

@@ -96,7 +96,7 @@ minimum = "10 dB"
 
 @pytest.mark.parametrize(("text", "message"), [
     ("[study]\nname = 's'\n", "study.base"),
-    (HEAD + "[[varient]]\n", 'nearest known: "variant"'),
+    (HEAD + "[[varient]]\n", 'did you mean "variant"'),
     (HEAD + "[[variant]]\nname = 'a'\n[[variant]]\nname = 'a'\n", "twice"),
     (HEAD + "[[variant]]\nname = 'a'\noverride = { 'motor.resistence' = '1 ohm' }\n", "resistence"),
     (HEAD + "[[variant]]\nname = 'a'\noverride = { 'motor.resistance' = '1 V' }\n", "motor.resistance"),
