@@ -54,6 +54,7 @@ class Bench:
     model: Design
     _assembled: dict[tuple[Operating, bool], Loops] = field(default_factory=dict, init=False, repr=False)
     _setups: dict[str, LoopSetup] = field(default_factory=dict, init=False, repr=False)
+    _tangents: dict[object, Tangent] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def drive(self) -> Design:
@@ -126,7 +127,7 @@ class Bench:
     def place(self, name: str) -> Place:
         """One place, its tangent measured."""
         setup = self.setup(name)
-        found = tangent(self.drive, name, setup=setup)
+        found = self._tangent(name, setup)
         if name in self.figures:
             own = self.figures[name]
             closed = own.loop.plain_closed
@@ -139,6 +140,15 @@ class Bench:
             response, poles = self._path(name, loops)
             return Place(name=name, condition=setup.condition, tangent=found, predicted=response, poles=poles)
         return self._point(name, setup, found, loops)
+
+    def _tangent(self, name: str, setup: LoopSetup) -> Tangent:
+        """The tangent of a place; the outermost loop and the break point that it drives are one place."""
+        if name in PATHS:
+            return tangent(self.drive, name, setup=setup)
+        key = (setup.outer, setup.point, setup.bias, setup.held)
+        if key not in self._tangents:
+            self._tangents[key] = tangent(self.drive, name, setup=setup)
+        return replace(self._tangents[key], place=name)
 
     def onsets(self) -> Iterator[Place]:
         """From the command to what stands in front of each limiter, at its last update before the next one.
@@ -194,12 +204,15 @@ class Bench:
             delayed=(lambda delay_s: self._delayed(delay_s)) if name == "u" else None,
         )  # fmt: skip
 
-    def _delayed(self, more_s: float) -> tuple[Tangent, Complexes]:
+    def _delayed(self, more_s: float) -> tuple[Tangent, Callable[[], Complexes]]:
         """Tangent at the voltage, and predicted poles over a base period, under a longer computing delay."""
         longer = Bench(_later(self.design, more_s), _later(self.model, more_s))
         setup = longer.setup("u")
-        predicted = periodic_loop_of(wire(longer.linear, setup.bias.operating(longer.drive)), "u")
-        return tangent(longer.drive, "u", setup=setup), predicted.modes()
+
+        def poles() -> Complexes:
+            return periodic_loop_of(wire(longer.linear, setup.bias.operating(longer.drive)), "u").modes()
+
+        return tangent(longer.drive, "u", setup=setup), poles
 
 
 def _later(design: Design, more_s: float) -> Design:
