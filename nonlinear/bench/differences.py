@@ -44,7 +44,7 @@ class Differences:
         Places of the numbers of the state that take part.
     """
 
-    def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched] = ()) -> None:
+    def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched | None] = (None,)) -> None:
         self.where = f"{setup.design.name}: {place}"
         self.injected = Injection(setup, place, watched)
         self.drive = self.injected.rows.running()
