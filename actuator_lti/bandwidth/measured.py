@@ -11,9 +11,15 @@ import numpy as np
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Range
 from actuator_lti.errors import InputError
 from actuator_lti.margins.loop import Complex, Real
-from actuator_lti.margins.measured import Group, measured_points, passed, refuse_coarse, single_passages
-from actuator_lti.margins.measured_bounds import Bounds, Strip, bounds
-from actuator_lti.margins.measured_data import MeasuredResponse, at_once, measured_response
+from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds
+from actuator_lti.margins.measured.data import MeasuredResponse, at_once, measured_response
+from actuator_lti.margins.measured.margins import (
+    Group,
+    measured_points,
+    passed,
+    refuse_coarse,
+    single_passages,
+)
 
 
 @dataclass(frozen=True)

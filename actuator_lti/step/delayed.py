@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
-from actuator_lti.margins.collocation import open_loop_matrix
-from actuator_lti.margins.delay_form import DelayForm, characteristic, delay_form
-from actuator_lti.margins.delay_response import DelayResponse
+from actuator_lti.margins.delays.collocation import open_loop_matrix
+from actuator_lti.margins.delays.form import DelayForm, characteristic, delay_form
+from actuator_lti.margins.delays.response import DelayResponse
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import Motion

@@ -10,7 +10,8 @@ from functools import cached_property
 from flint import acb, arb, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.certified_roots import (
+from actuator_lti.margins.exact.loop import ExactLoop
+from actuator_lti.margins.exact.roots import (
     HalfPlanes,
     Split,
     all_roots,
@@ -19,7 +20,6 @@ from actuator_lti.margins.certified_roots import (
     positive_roots,
     split,
 )
-from actuator_lti.margins.exact_loop import ExactLoop
 from actuator_lti.margins.trust import TOUCH
 
 _FIRST_BITS, _MOST_BITS = 96, 1 << 14

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
-from actuator_lti.margins.determined import FAR_DB, Settled, settled
 from actuator_lti.margins.distances import DISK, MODULUS
-from actuator_lti.margins.exact_extremes import smallest
-from actuator_lti.margins.exact_findings import Crossing, Findings
-from actuator_lti.margins.exact_loop import ExactLoop, exact_loop, neighbours
+from actuator_lti.margins.exact.crossings import Crossing, Findings
+from actuator_lti.margins.exact.determined import FAR_DB, Settled, settled
+from actuator_lti.margins.exact.extremes import smallest
+from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.given import ULP, Given
 from actuator_lti.margins.results import (
     Agreement,

@@ -8,12 +8,12 @@ from flint import acb, arb, ctx
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
-from actuator_lti.margins.delay_nearest import smallest
-from actuator_lti.margins.determined import difference
+from actuator_lti.margins.delays.axis import GAIN, IMAGINARY, Axis, turn, zeros
+from actuator_lti.margins.delays.exact import ExactDelayLoop
+from actuator_lti.margins.delays.nearest import smallest
 from actuator_lti.margins.distances import DISK, MODULUS
-from actuator_lti.margins.exact_axis import GAIN, IMAGINARY, Axis, turn, zeros
-from actuator_lti.margins.exact_delay import ExactDelayLoop
-from actuator_lti.margins.exact_findings import Crossing
+from actuator_lti.margins.exact.crossings import Crossing
+from actuator_lti.margins.exact.determined import difference
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
 from actuator_lti.margins.trust import TOUCH

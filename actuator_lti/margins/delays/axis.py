@@ -10,7 +10,7 @@ from itertools import pairwise
 from flint import acb, arb, fmpq, fmpq_poly
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.exact_delay import HIGHEST_ORDER, ExactDelayLoop, Quasi, at
+from actuator_lti.margins.delays.exact import HIGHEST_ORDER, ExactDelayLoop, Quasi, at
 
 _MOST_INTERVALS = 60_000
 _NARROWEST = 1e-13
