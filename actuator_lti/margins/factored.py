@@ -158,7 +158,8 @@ def factored(response: Response, poles: SortedPoles) -> Factored:
     delay = response.delay
     if delay and loop.period_s is not None:
         roots, weights, delay = np.append(roots, (1.0, -1.0)), np.append(weights, (delay, -delay)), 0.0
-    return _fitted(Factored(roots, weights, delay), response, below)
+    with np.errstate(all="ignore"):
+        return _fitted(Factored(roots, weights, delay), response, below)
 
 
 def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
