@@ -13,12 +13,11 @@ from actuator_lti.design import design_hash, warnings_of
 from actuator_lti.design.loader import as_design, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.files.atomic import write_together
-from actuator_lti.files.tree import Tree
 from analyses.corners import corners
 from reports import document as doc
 from reports.analyses import BY_NAME, FURTHER, Analysis
 from reports.document_schema import Document
+from reports.study_pages import design_head, write_pages
 
 if TYPE_CHECKING:
     from analyses.corners import Corners
@@ -92,7 +91,7 @@ def report(
         made = design_report(drive, parts, progress=computing, source=source)
     if out is not None:
         with step("drawing figures") as drawing:
-            write_report(made, out, progress=drawing)
+            write_pages(made, Path(out), "report", progress=drawing)
     return made
 
 
@@ -324,33 +323,3 @@ def closing_sections(
 
     findings = () if checked else (answer.unchecked(),)
     return [parameters.section(design, warnings), provenance.section(head, origin, findings)]
-
-
-def design_head(design: Design) -> Tree:
-    """Give what a document says of its design."""
-    return {
-        "name": design.name,
-        "title": design.title,
-        "revision": design.revision,
-        "origin": design.origin,
-        "axis": design.axis,
-    }
-
-
-def write_report(
-    made: Mapping[str, Any], folder: str | PathLike[str], *, progress: Progress | None = None
-) -> tuple[Path, Path]:
-    """Write ``report.html`` and ``report.json``; both or neither.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written.
-    """
-    from reports.html import page
-
-    content = doc.dumps(made)
-    html = page(doc.loads(content), progress=progress)
-    paths = (Path(folder) / "report.html", Path(folder) / "report.json")
-    write_together({paths[0]: html.encode(), paths[1]: content.encode()})
-    return paths

@@ -1,4 +1,4 @@
-"""Pages of studies (tolerances, variants, tuning): one document, one page and its JSON, both or neither."""
+"""Pages: one document, its page and its JSON, both or neither; documents of studies (tolerances, tuning)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.design import design_hash
 from actuator_lti.files.atomic import write_together
+from actuator_lti.files.tree import Tree
 from reports import document as doc
 from reports.document_schema import Document
 
@@ -15,41 +17,39 @@ if TYPE_CHECKING:
     from reports.drawing import Progress
 
 
+def design_head(design: Design) -> Tree:
+    """Give what a document says of its design."""
+    return {name: getattr(design, name) for name in ("name", "title", "revision", "origin", "axis")}
+
+
 def study_document(
     design: Design, sections: Sequence[doc.Section], *, title: str, subtitle: str, kind: str
 ) -> Document:
     """Put a document of a study of a design together."""
-    from actuator_lti.design import design_hash
-    from reports.build import design_head
     from reports.provenance import provenance
     from reports.sections import provenance as provenance_section
 
     head, origin = design_head(design), provenance(design_hash(design))
+    parts = [*sections, provenance_section.section(head, origin)]
     return doc.document(
-        title=title,
-        subtitle=subtitle,
-        design=head,
-        provenance=origin,
-        sections=[*sections, provenance_section.section(head, origin)],
-        kind=kind,
+        title=title, subtitle=subtitle, design=head, provenance=origin, sections=parts, kind=kind
     )
 
 
 def write_pages(
-    made: Mapping[str, Any],
-    folder: Path,
-    stem: str,
-    *,
-    progress: Progress | None = None,
-    beside: Mapping[str, str] | None = None,
+    made: Mapping[str, Any], folder: Path, stem: str, *, progress: Progress | None = None
 ) -> tuple[Path, Path]:
-    """Write ``<stem>.html`` and ``<stem>.json``, and the texts that go with them by file name."""
+    """Write ``<stem>.html`` and ``<stem>.json``; both or neither.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
     from reports.html import page
 
     content = doc.dumps(made)
     html = page(doc.loads(content), progress=progress)
     paths = (folder / f"{stem}.html", folder / f"{stem}.json")
-    texts = {paths[0]: html, paths[1]: content}
-    texts |= {folder / name: text for name, text in (beside or {}).items()}
-    write_together({path: text.encode() for path, text in texts.items()})
+    write_together({paths[0]: html.encode(), paths[1]: content.encode()})
     return paths

@@ -10,7 +10,8 @@ from live_page import opened, written
 
 from actuator_lti import load_design
 from actuator_lti.design.model import Design
-from reports.build import design_report, write_report
+from reports.build import design_report
+from reports.study_pages import write_pages
 
 
 @pytest.fixture(scope="session")
@@ -19,7 +20,7 @@ def built(tmp_path_factory) -> Built:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
         document = design_report(load_design("ilr33-amber"), validated())
-    page, data = write_report(document, tmp_path_factory.mktemp("report"))
+    page, data = write_pages(document, tmp_path_factory.mktemp("report"), "report")
     return Built(document, page, data)
 
 
