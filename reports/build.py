@@ -6,18 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.design import design_hash, warnings_of
 from actuator_lti.design.loader import as_design, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.files.tree import Tree
 from analyses.corners import corners
 from reports import document as doc
 from reports.analyses import BY_NAME, FURTHER, Analysis
 from reports.document_schema import Document
-from reports.study_pages import design_head, write_pages
 
 if TYPE_CHECKING:
     from analyses.corners import Corners
@@ -79,6 +78,8 @@ def report(
     >>> made["verdict"]["verdict"]
     'met'
     """
+    from reports.html import write_report
+
     drive = as_design(design)
     if source is None and not isinstance(design, Design):
         source = design_text(design)
@@ -91,7 +92,7 @@ def report(
         made = design_report(drive, parts, progress=computing, source=source)
     if out is not None:
         with step("drawing figures") as drawing:
-            write_pages(made, Path(out), "report", progress=drawing)
+            write_report(made, out, progress=drawing)
     return made
 
 
@@ -323,3 +324,8 @@ def closing_sections(
 
     findings = () if checked else (answer.unchecked(),)
     return [parameters.section(design, warnings), provenance.section(head, origin, findings)]
+
+
+def design_head(design: Design) -> Tree:
+    """Give what a document says of its design."""
+    return {name: getattr(design, name) for name in ("name", "title", "revision", "origin", "axis")}

@@ -169,7 +169,7 @@ def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
         else np.array([0.5, 2.0])
     )
     L = response.at(w)
-    gain, phase, *_ = factors.log_value(w)
+    gain, phase = factors.log_value(w)
     off = np.log(np.abs(L)) - gain
     turned = np.angle(L * np.exp(-1j * phase))
     seen = (np.abs(L) > _SEEN) & (np.abs(L) < 1.0 / _SEEN)

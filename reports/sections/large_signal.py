@@ -1,4 +1,4 @@
-"""Large signals: verdicts on the border, the map, the amplitude Bode, the sawtooth."""
+"""Large signals: the map, the amplitude Bode, the sawtooth."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.large_signal import LargeSignals
     from analyses.large_signal.bode import AmplitudeBode
-    from analyses.large_signal.border import BorderCheck
+    from analyses.large_signal.border import LimitShift
     from analyses.large_signal.map import AmplitudeMap
     from analyses.large_signal.sawtooth import Sawtooth, SawtoothRun
 
@@ -32,11 +32,12 @@ def section(result: LargeSignals) -> Section:
 
     design = result.design
     scale, unit = output_unit(design.axis)
-    items = [*_border_verdict(result.border), *_sawtooth_verdicts(result.sawtooth)]
+    items = _sawtooth_verdicts(result.sawtooth)
     rules = doc.details("How the map is read", [doc.text(words) for words in (CAUSE_RULE, CRITERIA)])
     blocks = [doc.verdicts(items, what="checks"), _map_figure(result, scale, unit), rules]
-    if result.border is not None and np.isfinite(result.border.predicted_rad).any():
-        blocks.append(doc.details("The linear limit in numbers", [_border_table(result, scale, unit)]))
+    if result.shift is not None:
+        table = _shift_table(result.shift, design, scale, unit)
+        blocks.append(doc.details("The linear limit in numbers", [table]))
     blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
     blocks += [
         _bode_table(result.bode, scale, unit, _linear(design)),
@@ -97,28 +98,6 @@ def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
     return f"between {low:.3g} and {high:.3g} Hz{unsteady}" if math.isfinite(high) else f"above {low:.3g} Hz"
 
 
-def _border_verdict(border: BorderCheck | None) -> list[VerdictItem]:
-    """Judge the simulated border against the smallest A_k; a drive without limits has none."""
-    from analyses.large_signal.border import TOLERANCE
-
-    what = {
-        "id": "validation-border",
-        "label": "Onset of saturation: difference between simulation and linear model, friction off",
-    }
-    common: dict[str, Any] = {**what, "limit": 100.0 * TOLERANCE, "unit": "%", "comparison": "<="}
-    if border is None:
-        return [doc.verdict(**common, value=None, distance=None, passed=None, reason="the loop is unstable")]
-    error = border.largest_error
-    if error is None:
-        return []
-    same, count = sum(border.same_limiter), len(border.same_limiter)
-    reason = f"largest of {count} frequencies; the predicted limiter acts at {same} of {count}"
-    reason += f"; without {border.left_out}" if border.left_out else ""
-    reason += f"; {border.reason}" if border.reason else ""
-    common |= {"distance": 100.0 * (TOLERANCE - error), "passed": border.passed}
-    return [doc.verdict(**common, value=100.0 * error, reason=reason)]
-
-
 def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
     """Judge the rate-limit formulas, where they apply."""
     from analyses.large_signal.sawtooth import GAIN_TOLERANCE, LAG_TOLERANCE_DEG
@@ -147,11 +126,11 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
 
 
 def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
-    """Make the map with the linear onset lines and the simulated border."""
+    """Make the map with the linear onset lines, and where limits are first reached with friction."""
     caption = (
         "What limits a sine command, at no load, with friction. Colour: limit that acts longest. Marks: "
         "waveform of the output; a sine has none. Lines: amplitude at which the linear loop reaches each "
-        "limit. Diamonds and triangles: where the simulation first reaches it."
+        "limit. Diamonds: where the simulation with friction first reaches one."
     )
     if result.design.command != Command():
         caption += " Simulated behind the profile and filter of the command, drawn in front of them."
@@ -172,26 +151,21 @@ def _map_words(amplitude_map: AmplitudeMap) -> str:
     return "Map of amplitude and frequency; share of the points by what acts: " + ", ".join(parts)
 
 
-def _border_table(result: LargeSignals, scale: float, unit: str) -> Block:
-    """List the border frequency by frequency."""
-    border, shifted = result.border, result.border_with_friction
-    assert border is not None
+def _shift_table(shift: LimitShift, design: Design, scale: float, unit: str) -> Block:
+    """List the linear limit and what friction makes of it, frequency by frequency."""
     small: dict[str, Any] = {"unit": unit, "scale": scale, "format": "sig:4"}
     columns = [
-        doc.of(lambda k: border.frequency_hz[k], "hz", "Frequency", "Hz", format="sig:3"),
-        doc.of(lambda k: border.predicted_rad[k], "predicted", "Smallest A_k", **small),
-        doc.of(lambda k: border.simulated_rad[k], "simulated", "Simulated, friction off", **small),
-        doc.of(lambda k: 100.0 * (border.ratio[k] - 1.0), "error", "Difference", "%", format="fix:3"),
-        doc.of(lambda k: words_of(border.predicted_limiter[k]), "limiter", "Predicted limiter"),
-        doc.of(lambda k: words_of(border.simulated_limiter[k]), "acts", "Acting limiter"),
+        doc.of(lambda k: shift.frequency_hz[k], "hz", "Frequency", "Hz", format="sig:3"),
+        doc.of(lambda k: shift.linear_rad[k], "linear", "Smallest A_k", **small),
+        doc.of(lambda k: shift.simulated_rad[k], "simulated", "Simulated, with friction", **small),
+        doc.of(lambda k: 100.0 * (shift.ratio[k] - 1.0), "shift", "Shift by friction", "%", format="fix:2"),
+        doc.of(lambda k: words_of(shift.linear_limiter[k]), "limiter", "Predicted limiter"),
+        doc.of(lambda k: words_of(shift.simulated_limiter[k]), "acts", "Acting limiter"),
     ]
-    if shifted is not None:
-        shift = 100.0 * (shifted.ratio - 1.0)
-        columns.append(doc.of(lambda k: shift[k], "shift", "Shift by friction", "%", format="fix:2"))
     note = "The shift by friction is shown, not judged."
-    if result.design.command != Command():
+    if design.command != Command():
         note += " Amplitudes behind the profile and filter of the command."
-    places = range(len(border.frequency_hz))
+    places = range(len(shift.frequency_hz))
     return doc.listing("Amplitude at which a limit is first reached", places, columns, note)
 
 

@@ -11,7 +11,7 @@ from live_page import opened, written
 from actuator_lti import load_design
 from actuator_lti.design.model import Design
 from reports.build import design_report
-from reports.study_pages import write_pages
+from reports.html import write_report
 
 
 @pytest.fixture(scope="session")
@@ -20,7 +20,7 @@ def built(tmp_path_factory) -> Built:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
         document = design_report(load_design("ilr33-amber"), validated())
-    page, data = write_pages(document, tmp_path_factory.mktemp("report"), "report")
+    page, data = write_report(document, tmp_path_factory.mktemp("report"))
     return Built(document, page, data)
 
 

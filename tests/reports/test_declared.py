@@ -25,7 +25,7 @@ COMMANDS = APP.commands  # type: ignore[attr-defined]
 def test_every_field_of_a_request_is_an_option_of_the_command(one: Analysis) -> None:
     command = reduce(lambda group, word: group.commands[word], one.name.split(), APP)  # type: ignore[attr-defined]
     given = {parameter.name: parameter for parameter in command.params}
-    common = {"as_json", *(["example"] if one.example else [])}
+    common = {"as_json", *(["example"] if one.example else []), *(["quiet"] if one.doing else [])}
     common |= set() if one.alone else {"design", "changes"} | ({"out", "quiet"} if one.page else set())
     if one.request is None:
         assert set(given) == common

@@ -23,10 +23,9 @@ from reports.charts.chart import Chart, Curve, Panel
 from reports.charts.data import chart_data, chart_of
 from reports.cli.main import main
 from reports.drawing import draw_svg
-from reports.html import page
+from reports.html import page, write_report
 from reports.numbers import show
 from reports.sections.names import loop_words
-from reports.study_pages import write_pages
 from tests.nightly.site_checks import Page
 
 
@@ -130,7 +129,7 @@ def test_parameters_come_with_source_and_grade(built: Built) -> None:
 def test_the_same_input_gives_the_same_bytes(built: Built, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     document = design_report(load_design("ilr33-amber"), validated())
-    page_path, data = write_pages(document, tmp_path, "report")
+    page_path, data = write_report(document, tmp_path)
     assert data.read_bytes() == built.data.read_bytes()
     assert page_path.read_bytes() == built.page.read_bytes()
 
