@@ -231,7 +231,7 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
 
     for name in names:
         if name not in FURTHER:
-            raise InputError(f"section {name!r}: allowed: {', '.join(FURTHER)}")
+            raise InputError(f"also = {name!r}: allowed: {', '.join(FURTHER)}, all")
     made: list[doc.Section] = []
     with isolated() as missing:
         for name in dict.fromkeys(names):
@@ -239,7 +239,7 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
             try:
                 part = attempt(f"section {name}", partial(_further, one, design), None)
             except InputError as error:
-                part = doc.section(name, name.capitalize(), [doc.text(f"Not for this drive: {error}")])
+                part = doc.section(name, name.capitalize(), [], result=f"Not for this drive: {error}.")
             made += [part] if part is not None else []
     return [*made, *notices(missing, "further")]
 

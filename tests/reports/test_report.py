@@ -146,7 +146,7 @@ def test_report_in_python_is_the_command(tmp_path, monkeypatch) -> None:
     parts = reports.report("ctms-motor-position", validation=False, also=["duty"], added=[mine])["sections"]
     order = [part["id"] for part in parts]
     assert order.index("mine") < order.index("duty")  # as the command puts what it includes
-    with pytest.raises(InputError, match="section 'all'"):
+    with pytest.raises(InputError, match="also = 'all'"):
         reports.report("ctms-motor-position", also=["all"])
 
 
