@@ -145,11 +145,7 @@ def design_report(
     ]
     doc.waived(sections, design)
     with isolated() as unanswered:
-        items = (
-            [item for block in doc.walk(loops[0]) if block["kind"] == "verdicts" for item in block["items"]]
-            if loops
-            else []
-        )
+        items = doc.judged(doc.walk(loops[0])) if loops else []
         answered = attempt(
             "first screen",
             lambda: answer.section(
