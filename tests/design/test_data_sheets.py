@@ -319,10 +319,9 @@ def test_a_phase_margin_that_no_operating_point_bounds_is_infinite(
 ) -> None:
     """A current loop by a gain below R never crosses 0 dB, at no operating point."""
     file = tmp_path / "mine.toml"
-    file.write_text(
-        SHEET
-        + '[control.current]\ngain = "0.1 V/A"\n[control.velocity]\ngain = "0.02 As/rad"\nintegral_time = "20 ms"\n[control.position]\ngain = "40/s"\n'
-    )
+    velocity = '[control.velocity]\ngain = "0.02 As/rad"\nintegral_time = "20 ms"\n'
+    position = '[control.position]\ngain = "40/s"\n'
+    file.write_text(f'{SHEET}[control.current]\ngain = "0.1 V/A"\n{velocity}{position}')
     assert main(["margins", str(file)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "Phase margin, operating ∞" in said
