@@ -138,7 +138,7 @@ class Asked(Settings):
         alone = len(self.files) == 1 and not (self.frequency_response or self.plan)
         if not alone or first.suffix.lower() != ".toml":
             return False
-        from analyses.records.toml_tables import read_toml
+        from analyses.toml_tables import read_toml
 
         return "file" not in read_toml(first)
 

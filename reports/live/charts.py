@@ -13,6 +13,8 @@ from reports.charts.svg import page_svg
 
 NOW = {"colour": style.BLUE, "width": 2.0}
 BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}
+PINNED = tuple(zip("ABC", style.SERIES[1:], strict=False))
+FOLLOWED = "live"  # what the figures say of the loop that they share a cursor for
 FRAME = 1.6
 BORDERS = tuple(limiter.words for limiter in LIMITERS.values() if line_of(limiter) is not None)
 
@@ -44,10 +46,17 @@ def _both(panel: Panel, ends: tuple[float, float] = (0.0, 1.0)) -> None:
     panel.curve(ends, (0.0, 0.0), "as changed", **NOW)
 
 
+def _pinned(panel: Panel, of: str = "", **look: float) -> None:
+    """Put in a curve of each pinned variant, which the script fills."""
+    for letter, colour in PINNED:
+        panel.curve((), (), of + letter, colour=colour, **{"width": 1.5, **look})
+
+
 def _bode() -> Chart:
-    chart = Chart(width=style.HALF, height=370.0)
+    chart = Chart(width=style.HALF, height=370.0, loop=FOLLOWED)
     top, bottom = chart.column(1.15, 1.0)
     for panel in (top, bottom):
+        _pinned(panel)
         _both(panel, (1.0, 1000.0))
     style.frequency(bottom, (1.0, 1000.0))
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
@@ -59,7 +68,7 @@ def _bode() -> Chart:
 
 
 def _nyquist() -> Chart:
-    chart = Chart(width=style.HALF, height=370.0)
+    chart = Chart(width=style.HALF, height=370.0, loop=FOLLOWED)
     panel = chart.panel()
     panel.equal = panel.by_point = True
     panel.rule_y(0.0)
@@ -73,6 +82,7 @@ def _nyquist() -> Chart:
         width=1.0,
         read=False,
     )
+    _pinned(panel)
     _both(panel)
     panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
     panel.note("−1", (-1.0, 0.0))
@@ -83,10 +93,11 @@ def _nyquist() -> Chart:
 
 
 def _sensitivity() -> Chart:
-    chart = Chart(width=style.HALF, height=250.0)
+    chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
     panel = chart.panel()
     ends = (1.0, 1000.0)
     for name, colour in (("S", style.ORANGE), ("T", style.GREEN)):
+        _pinned(panel, f"{name} ", dash=4 if name == "T" else 0)
         panel.curve(ends, (0.0, 0.0), f"{name} as designed", **{**BEFORE, "colour": colour, "opacity": 0.6})
         panel.curve(ends, (0.0, 0.0), f"{name} as changed", colour=colour, width=2.0)
     style.frequency(panel, ends)
@@ -96,11 +107,12 @@ def _sensitivity() -> Chart:
 
 
 def _step() -> Chart:
-    chart = Chart(width=style.HALF, height=250.0)
+    chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
     panel = chart.panel()
     panel.curve((0.0, 1.0), (1.0, 1.0), "command", colour=style.INK, width=1.0)
+    _pinned(panel)
     _both(panel)
-    panel.x.label, panel.y.label = "time, ms", "response to a unit step, linear"
+    panel.x.label, panel.y.label = "time, ms", "linear response to a unit step"
     panel.x.limits(0.0, 1.0)
     panel.y.limits(-0.1, 1.5)
     return chart

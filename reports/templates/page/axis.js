@@ -24,6 +24,8 @@ export class Axis {
     const part = (px - this.from) / (this.to - this.from);
     return this.log ? this.low * (this.high / this.low) ** part : this.low + part * (this.high - this.low);
   }
+  // seconds in its unit, of an axis of time
+  get seconds() { return this.name === "time" ? { s: 1, ms: 1e-3, "µs": 1e-6 }[this.unit] : undefined; }
   words(value) {
     if (this.days) return new Date(Math.round(value * 1440) * 6e4).toISOString().slice(0, 10);
     return reading(value, this.unit) + (this.unit ? " " + this.unit : "");

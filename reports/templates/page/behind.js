@@ -5,6 +5,7 @@ import { figures, stageOf, view, x } from "./module.js";
 import { state } from "./requirements.js";
 import { cell, linearAt, startUp, toneOf } from "./sines.js";
 import { table } from "./table.js";
+import { sideBySide } from "./variants.js";
 import { html } from "./words.js";
 
 // what takes too long for a moving slider: once nothing has moved for a moment, one piece at a time
@@ -19,7 +20,7 @@ const nextPiece = () => {
 export const fillBehind = () => {
   clearTimeout(waits);
   root.dataset.behind = "waits";
-  pieces = [...(desk.late ? [desk.late] : []), ...timedPieces(desk.now), ...periodicPieces(desk.before), ...(desk.now === desk.before ? [] : periodicPieces(desk.now)), table, ...mapPieces(desk.now)];
+  pieces = [...(desk.late ? [desk.late] : []), ...timedPieces(desk.now), ...periodicPieces(desk.before), ...(desk.now === desk.before ? [] : periodicPieces(desk.now)), table, sideBySide, ...mapPieces(desk.now)];
   desk.late = null;
   waits = setTimeout(nextPiece, QUIET);
 };

@@ -35,12 +35,11 @@ export class Chart {
     for (const picture of this.pictures) listen(this, picture);
     this.plots.addEventListener("keydown", (event) => key(this, event));
     this.plots.addEventListener("wheel", (event) => wheel(this, event), { passive: false });
-    this.plots.addEventListener("blur", () => this.hide());
+    this.plots.addEventListener("blur", () => this.leave());
     root.addEventListener("chart:redraw", (event) => this.redraw(event.detail));
     root.addEventListener("chart:cells", (event) => this.cells(event.detail));
     root.addEventListener("chart:hold", (event) => holdCurve(this, event.detail));
     root.addEventListener("chart:marks", (event) => putMarks(this, event.detail));
-    root.addEventListener("chart:show", (event) => this.show(event.detail.hertz));
     root.addEventListener("chart:axes", (event) => this.rescale(event.detail));
   }
   legend() {
@@ -132,14 +131,23 @@ export class Chart {
     this.readout.hidden = true;
     for (const p of this.panels) p.clear();
   }
-  // shows a frequency that is pointed at in another figure; null: no more
+  // nothing is pointed at any more, here and in what follows this figure
+  leave() {
+    this.hide();
+    this.root.dispatchEvent(new CustomEvent("chart:at", { detail: {} }));
+  }
+  // shows a frequency that is pointed at in another figure of the loop; undefined: no more
   show(hertz) {
     if (this.pinned) return;
     for (const p of this.panels) {
       p.clear();
-      if (hertz === null) continue;
-      if (p.x.log && p.x.unit === "Hz") p.cursor(p.x.px(hertz), "cursor");
-      else for (const curve of p.seen(this)) if (curve.parameter) p.dot(curve.points[closest(curve.parameter, hertz)]);
+      if (hertz === undefined) continue;
+      const at = p.x.unit === "Hz" ? hertz : p.x.seconds ? 0.5 / (hertz * p.x.seconds) : NaN;
+      if (Number.isFinite(at)) p.cursor(p.x.px(at), "cursor");
+      for (const curve of p.seen(this)) {
+        const q = curve.parameter ? curve.points[closest(curve.parameter, hertz)] : Number.isFinite(at) && p.at(curve, p.x.px(at));
+        if (q) p.dot(q);
+      }
     }
   }
   // shows a crossing: a frequency in every panel that has one

@@ -8,7 +8,7 @@ const grid = (name) => {
   for (let k = 0; k <= 320; k++) points.push(low * (top / low) ** (k / 320));
   return points;
 };
-const unwrapped = (re, im, hertz) => {
+export const unwrapped = (re, im, hertz) => {
   const phase = [];
   let last = null, turn = 0;
   const slope = Math.round(Math.log(Math.hypot(re[1], im[1]) / Math.hypot(re[0], im[0])) / Math.log(hertz[1] / hertz[0])) || 0;
@@ -42,12 +42,20 @@ export const designed = (name) => {
   const hertz = grid(name), own = desk.before.loops[name];
   const settling = own.figures[PLACE.settling_time], end = Number.isFinite(settling) && settling > 0 ? 2.2 * settling : 400 * own.period;
   const count = Math.min(Math.max(Math.ceil(end / own.period), 40), 3000);
-  kept[name] = { hertz, curves: curvesOf(name, hertz), step: stepOf(name, count), count };
+  kept[name] = { hertz, curves: curvesOf(name, hertz), step: stepOf(name, count), count, period: own.period };
   return kept[name];
 };
+// curves of another drive beside it, whose loops the module has just computed
+export const beside = (label, name, { period }) => {
+  const { hertz, count } = kept[name], curves = curvesOf(name, hertz);
+  draw(label, { curves, step: stepOf(name, Math.min(Math.ceil(count * kept[name].period / period), 3000)), period }, name);
+  return curves;
+};
+const CURVES = [["bode", 0, ""], ["bode", 1, ""], ["nyquist", 0, ""], ["sensitivity", 0, "S "], ["sensitivity", 0, "T "], ["step", 0, ""]];
+export const without = (label) => { for (const [figure, panel, of] of CURVES) tell(figure, "chart:redraw", { panel, curve: of + label, x: [], y: [] }); };
 export const thinned = (count, most = 700) => Math.max(1, Math.ceil(count / most));
-export const draw = (label, part, name) => {
-  const { hertz } = kept[name], { curves, step } = part, keep = curves && near(curves);
+export const draw = (label, { curves, step, period }, name) => {
+  const { hertz } = kept[name], keep = curves && near(curves);
   if (curves) {
     tell("bode", "chart:redraw", { panel: 0, curve: label, x: hertz, y: curves.gain });
     tell("bode", "chart:redraw", { panel: 1, curve: label, x: hertz, y: curves.phase });
@@ -57,7 +65,7 @@ export const draw = (label, part, name) => {
     tell("sensitivity", "chart:redraw", { panel: 0, curve: "T " + label, x: hertz, y: curves.t });
   }
   if (!step) return;
-  const T = (label === "as designed" ? desk.before : desk.now).loops[name].period * 1e3, stride = thinned(step.length);
+  const T = period * 1e3, stride = thinned(step.length);
   const at = step.map((_, k) => k).filter((k) => k % stride === 0);
   tell("step", "chart:redraw", { panel: 0, curve: label, x: at.map((k) => k * T), y: at.map((k) => step[k]) });
 };

@@ -3,6 +3,10 @@ import { Chart } from "./chart.js";
 import { all, html, unfold } from "./words.js";
 
 const charts = all(".chart").map((root) => new Chart(root));
+// one cursor through all figures of a loop
+for (const one of charts) if (one.loop) one.root.addEventListener("chart:at", (/** @type {any} */ { detail }) => {
+  for (const other of charts) if (other !== one && other.loop === one.loop) other.show(detail.hertz);
+});
 for (const row of all("tr[data-loop][data-hz]")) {
   const own = charts.filter((c) => c.loop === row.dataset.loop && c.panels.some((p) => p.x.log && p.x.unit === "Hz"));
   if (!own.length) continue;

@@ -1,28 +1,27 @@
 // The sliders: keys of the design -> row of the simulator -> loops, margins, curves and a run, all in the module.
 import { fillBehind, watchMap } from "./behind.js";
 import { border, borderStart, drawBorder } from "./border.js";
-import { curvesOf, designed, draw, frame, kept } from "./curves.js";
-import { LOOP_NAMES, chart, data, desk, find, root, tell } from "./desk.js";
+import { beside, designed, draw, frame, kept } from "./curves.js";
+import { LOOP_NAMES, chart, data, desk, find, root } from "./desk.js";
 import { holdCurves, marginMarks, stepGain } from "./drag.js";
 import { changedText, copy, save, savePatch, sheet } from "./file.js";
-import { fragment, fromFragment, keys, past, redo, reset, start, undo } from "./history.js";
-import { borderOf, compute, load, slow, stepOf } from "./module.js";
+import { fragment, free, fromFragment, keys, past, pin, redo, reset, restore, start, undo, unpin } from "./history.js";
+import { borderOf, compute, load, slow } from "./module.js";
 import { take } from "./record.js";
 import { refusalOf } from "./relations.js";
 import { state } from "./requirements.js";
 import { makePanel, show } from "./sliders.js";
 import { table } from "./table.js";
 import { drawRuns, misfit, playSine, runKeys, runStart, trial, tried } from "./trial.js";
+import { drawPins, sideBySide } from "./variants.js";
 import { all, digits, html } from "./words.js";
 
 let lastGood = start.slice();
 const drawLoop = (name) => {
-  const own = desk.now.loops[name], seen = kept[name];
-  if (!own.figures || !seen) return;
-  const count = Math.min(Math.ceil(seen.count * desk.before.loops[name].period / own.period), 3000);
-  const curves = curvesOf(name, seen.hertz);
-  draw("as changed", { curves, step: stepOf(name, count) }, name);
-  if (curves) marginMarks(seen.hertz, curves);
+  const own = desk.now.loops[name];
+  if (!own.figures || !kept[name]) return;
+  const curves = beside("as changed", name, own);
+  if (curves) marginMarks(kept[name].hertz, curves);
 };
 const LONG_RUN = 20; // ms
 let runTook = 0;
@@ -37,6 +36,7 @@ const runNow = () => {
 const update = () => {
   const began = performance.now();
   let refused = "";
+  drawPins();
   const why = refusalOf(past.values), apart = why && `Refused, nothing follows: ${why}.`, found = apart ? null : compute(past.values);
   if (found && data.loops.every((name) => found.loops[name].n !== 0)) { desk.now = found; lastGood = past.values; } else {
     refused = apart || "The last value needs another structure of the drive: save the file and make a new report.";
@@ -44,7 +44,9 @@ const update = () => {
   }
   show();
   table();
+  sideBySide();
   state(refused);
+  find('[data-do="pin"]').disabled = Boolean(refused) || !free();
   drawLoop(desk.shown);
   drawBorder("as changed", borderOf(desk.now.row, border.grid));
   if (runTook < LONG_RUN) runNow();
@@ -87,22 +89,19 @@ const begin = () => {
     event.preventDefault();
     stepGain(by);
   });
-  for (const name of ["bode", "nyquist", "sensitivity"]) chart(name).addEventListener("chart:at", (/** @type {any} */ event) => {
-    for (const other of ["bode", "nyquist", "sensitivity"]) if (other !== name) tell(other, "chart:show", event.detail);
-  });
   chart("border").addEventListener("chart:click", (/** @type {any} */ { detail }) => playSine(detail.x, detail.y));
   runKeys();
   runStart();
   borderStart();
   choose(desk.shown);
   const acts = {
-    undo, redo, reset,
+    undo, redo, reset, pin, unpin, restore,
     save, patch: savePatch, file: () => sheet(changedText()), link: () => sheet((location.protocol === "file:" ? location.pathname.split("/").pop() : location.href.split("#")[0]) + fragment()),
     copy, close: () => { find(".sheet").hidden = true; },
   };
   root.addEventListener("click", (/** @type {any} */ event) => {
     const button = event.target.closest("[data-do]");
-    if (button) acts[button.dataset.do]();
+    if (button) acts[button.dataset.do](button.dataset.letter);
   });
   root.addEventListener("keydown", (/** @type {any} */ event) => {
     if (!(event.ctrlKey || event.metaKey) || event.target.matches("textarea, .field")) return;

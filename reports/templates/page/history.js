@@ -1,11 +1,11 @@
-// Values of the keys: moved, undone, said in the address.
+// Values of the keys, now and in pinned variants: moved, undone, said in the address.
 import { data, desk, root } from "./desk.js";
 
 export const keys = data.keys;
 export const start = keys.map((key) => key.value);
-// values of the keys, those before the move under way, and the ways back and forth
+// values of the keys and pinned variants (values by letter), both before the move under way, and the ways back and forth
 /** @type {any} */
-export const past = { values: start.slice(), settled: start.slice(), back: [], forth: [] };
+export const past = { values: start, pins: {}, settled: { values: start, pins: {} }, back: [], forth: [] };
 let waiting = false;
 const same = (a, b) => a.every((value, k) => value === b[k]);
 export const allowed = (key, value) => Number.isFinite(value) && (key.open ? value > key.least : value >= (key.least ?? -Infinity)) && value <= (key.most ?? Infinity) && (!key.whole || Number.isInteger(value));
@@ -17,27 +17,31 @@ export const preview = (k, value) => {
   later();
 };
 export const commit = () => {
-  if (same(past.values, past.settled)) return;
+  if (same(past.values, past.settled.values) && past.pins === past.settled.pins) return;
   past.back.push(past.settled);
   past.forth = [];
-  past.settled = past.values.slice();
+  past.settled = { values: past.values, pins: past.pins };
   later();
   remember();
 };
 const go = (from, to) => {
   if (!from.length) return;
   to.push(past.settled);
-  past.settled = from.pop();
-  past.values = past.settled.slice();
+  Object.assign(past, past.settled = from.pop());
   later();
   remember();
 };
 export const undo = () => go(past.back, past.forth);
 export const redo = () => go(past.forth, past.back);
-export const reset = () => {
-  past.values = start.slice();
+const set = (changed) => {
+  Object.assign(past, changed);
   commit();
 };
+export const reset = () => set({ values: start });
+export const free = () => ["A", "B", "C"].find((letter) => !past.pins[letter]);
+export const pin = () => set({ pins: { ...past.pins, [free()]: past.values } });
+export const unpin = (letter) => set({ pins: Object.fromEntries(Object.entries(past.pins).filter(([each]) => each !== letter)) });
+export const restore = (letter) => set({ values: past.pins[letter] });
 const later = () => {
   if (waiting) return;
   waiting = true;
@@ -46,7 +50,7 @@ const later = () => {
     desk.follow();
   });
 };
-export const changes = () => keys.map((key, k) => [key, past.values[k]]).filter(([key, value]) => value !== key.value);
+export const changes = (values = past.values) => keys.map((key, k) => [key, values[k]]).filter(([key, value]) => value !== key.value);
 export const fragment = () => "#hands-on" + (changes().length ? "?" + changes().map(([key, value]) => `${encodeURIComponent(key.path)}=${value}`).join("&") : "");
 const remember = () => { try { history.replaceState(null, "", changes().length ? fragment() : location.pathname + location.search); } catch { /* a place without a history */ } };
 export const fromFragment = () => {
@@ -54,7 +58,6 @@ export const fromFragment = () => {
   if (!text.startsWith("#hands-on?")) return;
   let told;
   try { told = new Map(text.slice(10).split("&").map((part) => part.split("=")).map(([path, value]) => [decodeURIComponent(path), Number(value || NaN)])); } catch { return; }
-  past.values = keys.map((key) => (allowed(key, told.get(key.path)) ? told.get(key.path) : key.value));
-  commit();
+  set({ values: keys.map((key) => (allowed(key, told.get(key.path)) ? told.get(key.path) : key.value)) });
   root.scrollIntoView();
 };

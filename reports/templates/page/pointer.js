@@ -52,9 +52,7 @@ export const listen = (chart, picture) => {
   };
   for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, release);
   svg.addEventListener("pointerleave", () => {
-    if (chart.pinned) return;
-    chart.hide();
-    chart.root.dispatchEvent(new CustomEvent("chart:at", { detail: { hertz: null } }));
+    if (!chart.pinned) chart.leave();
   });
   svg.addEventListener("mousedown", (event) => { if (event.detail > 1) event.preventDefault(); }); // no text is selected
   svg.addEventListener("dblclick", (event) => {

@@ -12,8 +12,7 @@ export const readAt = (chart, picture, panel, px, py) => {
   const rows = panel.byPoint ? point(chart, panel, px, py) : level(chart, picture, panel, px);
   if (rows.length < 2) { chart.readout.hidden = true; return false; }
   fill(chart, rows);
-  const hertz = hertzAt(chart, panel, px, py);
-  if (hertz) chart.root.dispatchEvent(new CustomEvent("chart:at", { detail: { hertz } }));
+  chart.root.dispatchEvent(new CustomEvent("chart:at", { detail: { hertz: hertzAt(chart, panel, px, py), x: panel.x.value(panel.back(px, 0)[0]) } }));
   const box = picture.svg.getBoundingClientRect(), own = chart.root.getBoundingClientRect();
   const scale = box.width / picture.svg.viewBox.baseVal.width;
   const x = box.left - own.left + px * scale, y = box.top - own.top + py * scale;
@@ -22,15 +21,18 @@ export const readAt = (chart, picture, panel, px, py) => {
   chart.readout.style.top = `${Math.max(0, y - chart.readout.offsetHeight - 10)}px`;
   return true;
 };
-// the frequency that is pointed at, along an axis or along a curve
+// the frequency that is pointed at, along an axis or a curve; a time in a loop's step is half a period: a wave that begins there has its peak then
 const hertzAt = (chart, panel, px, py) => {
   if (panel.byPoint) { const best = panel.nearest(chart, px, py); return best?.curve.parameter?.[best.k]; }
-  return panel.x.unit === "Hz" ? panel.x.value(panel.back(px, 0)[0]) : undefined;
+  const at = panel.x.value(panel.back(px, 0)[0]);
+  if (panel.x.unit === "Hz") return at;
+  return chart.loop && panel.x.seconds && at > 0 ? 0.5 / (at * panel.x.seconds) : undefined;
 };
 const level = (chart, picture, panel, px) => {
   const [origin] = panel.back(px, 0);
   const value = panel.x.value(origin);
-  const rows = [["", panel.x.name || "x", panel.x.words(value)]];
+  const rows = [["", panel.x.name || "x", panel.x.words(value)]], wave = panel.x.unit !== "Hz" && hertzAt(chart, panel, px, 0);
+  if (wave) rows.push(["", "half a period of", show(wave) + " Hz"]);
   for (const p of chart.linked(panel)) {
     p.cursor(origin, "cursor");
     if (!picture.panels.includes(p)) continue;

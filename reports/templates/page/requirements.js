@@ -1,7 +1,7 @@
 // What the design asks for: as found, met or not, in words.
 import { DOUBT, LOOP_NAMES, PLACE, STABLE, data, desk, find } from "./desk.js";
 import { changes } from "./history.js";
-import { digits, html, minus } from "./words.js";
+import { digits, fill, heading, html, minus } from "./words.js";
 
 // a requirement as found: its value (NaN: none), and whether it is met (null: not proven)
 export const judged = (found) => data.requirements.map((item, k) => {
@@ -38,15 +38,9 @@ const placed = (item) => (item.loop ? LOOP_NAMES[item.loop] : item.load ? `at ${
 const demands = (all, was) => {
   const box = find("table.demands");
   box.closest(".scroll").hidden = !all.length;
-  const top = html("tr"), limit = ({ minimum, maximum }) => [minimum !== null ? `≥ ${minus(String(minimum))}` : "", maximum !== null ? `≤ ${minus(String(maximum))}` : ""].filter(Boolean).join(", ");
-  for (const [words, side] of [["Requirement", "left"], ["Where", "left"], ["Limit", "right"], ["As designed", "right"], ["As changed", "right"], ["Verdict", "left"]]) {
-    const th = html("th", side, words);
-    th.scope = "col";
-    top.append(th);
-  }
+  const limit = ({ minimum, maximum }) => [minimum !== null ? `≥ ${minus(String(minimum))}` : "", maximum !== null ? `≤ ${minus(String(maximum))}` : ""].filter(Boolean).join(", ");
   const rest = all.map(({ item, value, met, words }, k) => {
-    const row = html("tr"), th = html("th", "left", item.words[0].toUpperCase() + item.words.slice(1)), last = html("td", "left");
-    th.scope = "row";
+    const row = html("tr"), th = heading(item.words[0].toUpperCase() + item.words.slice(1), "left", "row"), last = html("td", "left");
     th.title = item.id;
     const found = (one) => one.words || `${digits(calm(one.value, one.item.unit), 4)} ${one.item.unit}`;
     const cellNow = html("td", met === false ? "right bad" : "right", found({ item, value, words }));
@@ -58,8 +52,5 @@ const demands = (all, was) => {
     row.append(th, html("td", "left", placed(item)), html("td", "right", `${limit(item)} ${item.unit}`), html("td", "right", found(was[k])), cellNow, last);
     return row;
   });
-  const head = html("thead"), body = html("tbody");
-  head.append(top);
-  body.append(...rest);
-  box.replaceChildren(box.querySelector("caption"), head, body);
+  fill(box, [...["Requirement", "Where"].map((words) => heading(words)), ...["Limit", "As designed", "As changed"].map((words) => heading(words, "right")), heading("Verdict")], rest);
 };

@@ -2,7 +2,7 @@
 import { BEHIND, DOUBT, LOOP_NAMES, PLACE, POINT_NAMES, STABLE, data, desk, find } from "./desk.js";
 import { stageOf, x } from "./module.js";
 import { calm, judged } from "./requirements.js";
-import { digits, html } from "./words.js";
+import { digits, fill, heading, html } from "./words.js";
 
 // of a loop that is not stable no figure is shown
 const cell = (now, was, factor, loop, name, unit, stable) => {
@@ -16,18 +16,11 @@ const cell = (now, was, factor, loop, name, unit, stable) => {
 };
 const NONE = { "-1": "not followed here: too many states for this page", [DOUBT]: "stability not known: rounding decides its figures", [BEHIND]: "follows in a moment" };
 export const table = () => {
-  const head = html("tr");
-  const heading = (words, side, scope) => {
-    const th = html("th", side, words);
-    th.scope = scope;
-    return th;
-  };
-  head.append(heading("Loop", "left", "col"));
-  for (const { label, unit } of data.figures) {
-    const th = heading(label + " ", "right", "col");
+  const head = data.figures.map(({ label, unit }) => {
+    const th = heading(label + " ", "right");
     th.append(html("span", "unit", unit));
-    head.append(th);
-  }
+    return th;
+  });
   const body = [], bad = new Set(judged(desk.now).filter(({ met }) => met === false).map(({ item }) => item.loop + " " + item.quantity));
   for (const name of [...data.loops, ...Object.keys(data.points)]) {
     const own = desk.now.loops[name] || desk.now.points[name], old = desk.before.loops[name] || desk.before.points[name];
@@ -59,9 +52,5 @@ export const table = () => {
     }
     body.push(row);
   }
-  const top = html("thead"), rest = html("tbody");
-  top.append(head);
-  rest.append(...body);
-  const box = find("table.now");
-  box.replaceChildren(box.querySelector("caption"), top, rest);
+  fill(find("table.now"), [heading("Loop"), ...head], body);
 };

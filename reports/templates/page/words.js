@@ -9,6 +9,15 @@ export const html = (name, className, text) => {
   if (text !== undefined) made.textContent = text;
   return made;
 };
+export const heading = (words, side = "left", scope = "col") => Object.assign(html("th", side, words), { scope });
+// fills a table anew: its headings, its rows
+export const fill = (box, headings, rows) => {
+  const head = html("thead"), top = html("tr"), body = html("tbody");
+  top.append(...headings);
+  head.append(top);
+  body.append(...rows);
+  box.replaceChildren(box.querySelector("caption"), head, body);
+};
 // opens every fold that holds an element
 export const unfold = (target) => {
   for (let node = target; node; node = node.parentElement) if (node.tagName === "DETAILS") node.open = true;
