@@ -71,12 +71,13 @@ def test_motions_keep_off_the_limits(plan: Plan) -> None:
 def test_half_the_interval_takes_four_times_the_motion() -> None:
     """White noise: the variance falls with the time; and what is measured already need not be again."""
     coarse, fine = (plan_motions(BASE, within=within, noise=NOISE_A) for within in (0.002, 0.001))
-    assert len(fine.segments) == pytest.approx(4 * len(coarse.segments), abs=2)
+    some = len(coarse.segments)  # of which the last may hardly be needed
+    assert 4 * (some - 1) <= len(fine.segments) <= 4 * some
     _, record = _measured(coarse, 1)
     model = identify_bench(BASE, [record]).model
     rest = plan_motions(BASE, within=0.001, noise=NOISE_A, measured=model)
     assert rest.measured == 1
-    assert len(rest.segments) == pytest.approx(len(fine.segments) - len(coarse.segments), abs=2)
+    assert len(rest.segments) == pytest.approx(len(fine.segments) - some, abs=2)
 
 
 def test_what_cannot_be_planned_is_refused() -> None:
