@@ -14,7 +14,10 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 
-OPEN_ALL = "document.querySelectorAll('main details').forEach((fold) => { fold.open = true; })"
+OPEN_ALL = (
+    "document.querySelectorAll('main details, figure[hidden]').forEach((one) => {"
+    " one.open = true; one.hidden = false; })"
+)
 
 
 def opened(browser: Browser, built: Built, **context: Any) -> tuple[Page, list[str]]:

@@ -18,7 +18,7 @@ from built_report import HOSTILE
 from live_page import FIGURES, agree, command_line, read, saved, settled, type_value, written
 from typer.testing import CliRunner
 
-from actuator_lti import load_design
+from actuator_lti import assemble_loops, load_design
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import with_values
 from actuator_lti.design.checks import check_design
@@ -31,6 +31,12 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 DESIGN = "ilr33-amber"
+DROP = """([name, text]) => {
+    const data = new DataTransfer();
+    data.items.add(new File([text], name));
+    const drop = new DragEvent("drop", { dataTransfer: data, bubbles: true });
+    document.querySelector("#hands-on").dispatchEvent(drop);
+}"""
 
 
 @pytest.fixture(scope="module")
@@ -187,16 +193,10 @@ def record_of(design: Design, path: Path) -> None:
 
 
 def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path) -> None:
-    """The record is a run of another gain: the model meets it once that gain is set."""
+    """The record is a run of another gain: the model meets it once that gain is set; then it is removed."""
     record_of(with_values(load_design(DESIGN), {"control.position.gain": 80.0}), tmp_path / "bench.csv")
     text = (tmp_path / "bench.csv").read_text()
-    drop = """(text) => {
-        const data = new DataTransfer();
-        data.items.add(new File([text], "bench.csv"));
-        const drop = new DragEvent("drop", { dataTransfer: data, bubbles: true });
-        document.querySelector("#hands-on").dispatchEvent(drop);
-    }"""
-    settled(page, lambda: page.evaluate(drop, text))
+    settled(page, lambda: page.evaluate(DROP, ["bench.csv", text]))
     page.wait_for_selector("#hands-on[data-behind=done]")
     words = page.inner_text(".record")
     assert "bench.csv" in words
@@ -207,6 +207,43 @@ def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path) -> None:
     words = page.inner_text(".record")
     fits = words.split("as changed: ")[1].split(" %")[0].replace("−", "-")
     assert float(fits) < 1e-6
+    assert "fit 100.0" in words
+    settled(page, lambda: page.get_by_label("Measured in").select_option("mrad"))
+    page.wait_for_selector("#hands-on[data-behind=done]")
+    assert "fit 100.0" not in page.inner_text(".record")
+    settled(page, lambda: page.click(".dropped button"))
+    page.wait_for_selector("#hands-on[data-behind=done]")
+    assert page.inner_text(".record") == ""
+    assert page.locator('[data-chart="run"] .keys li', has_text="record").is_hidden()
+    page.evaluate(DROP, ["bench.png", "\0PNG"])
+    page.wait_for_function("() => document.querySelector('.record').innerText.includes('bench.png: no text')")
+
+
+def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
+    """Measured as the closed loop 2 dB and 5 deg beside the model's own open loop, with its coherence."""
+    model = assemble_loops(load_design(DESIGN)).velocity.open_loop
+    hertz = np.geomspace(2.0, 400.0, 40)
+    open_loop = model(np.exp(2j * np.pi * hertz * model.dt)) * 10.0**0.1 * np.exp(1j * np.radians(5.0))
+    closed = open_loop / (1.0 + open_loop)
+    rows = zip(hertz, 20.0 * np.log10(abs(closed)), np.degrees(np.angle(closed)), strict=True)
+    lines = [
+        "frequency_Hz;mag_dB;phase_deg;coherence",
+        *(f"{f:.15g};{m:.15g};{p:.15g};0.9" for f, m, p in rows),
+    ]
+    settled(page, lambda: page.locator(".tabs button", has_text="Velocity").click())
+    settled(page, lambda: page.evaluate(DROP, ["sweep.csv", "\n".join(lines)]))
+    settled(page, lambda: page.get_by_label("of", exact=True).select_option("T"))
+    words = page.inner_text(".record .told")
+    assert "by coherence: 2.00 dB rms, at most 2.00" in words
+    assert "5.00 deg rms, at most 5.00" in words
+    for figure in ("bode", "nyquist"):
+        assert page.locator(f'[data-chart="{figure}"] .keys li', has_text="measured").is_visible()
+    assert page.locator('[data-chart="difference"]').is_visible()
+    type_value(page, "control.velocity.gain", 0.12 * 10.0**0.1)
+    rest = page.inner_text(".record .told").split("coherence: ")[1].split(" dB rms")[0]
+    assert float(rest.replace("−", "-")) < 1e-9
+    settled(page, lambda: page.click(".dropped button"))
+    assert page.locator('[data-chart="difference"]').is_hidden()
 
 
 def test_nothing_of_a_design_becomes_markup(opens) -> None:

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 import pytest
-from live_page import FIGURES, command_line, read, saved, settled, type_value
+from live_page import FIGURES, command_line, saved, settled, type_value
 
 from actuator_lti import load_design
 
