@@ -30,10 +30,11 @@ class WithKernels(build_py):
         super().run()
         if self.editable_mode:
             return
+        from actuator_lti.axis.library import LIBRARY as axis
         from actuator_lti.batch.library import LIBRARY as figures
         from nonlinear.native import LIBRARY as run
 
-        for library in (run, figures):
+        for library in (run, figures, axis):
             package = Path(self.build_lib) / library.folder.relative_to(Path(__file__).parent)
             shutil.rmtree(package / "_native", ignore_errors=True)
             library.write(package, TARGET)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import re
 
-_LONGEST = 60
-
 
 def slug(name: str) -> str:
     """A file name part for any text: lower-case letters, digits and hyphens, never empty, never a path.
@@ -20,8 +18,18 @@ def slug(name: str) -> str:
     >>> slug("slow"), ".." in slug("../../etc/passwd")
     ('slow', False)
     """
-    plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:_LONGEST].strip("-")
-    if plain == name and plain:
-        return plain
-    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:6]
-    return f"{plain}-{digest}" if plain else digest
+    made = hashed(name, 60, 6)
+    return name if made[:-7] == name else made
+
+
+def hashed(name: str, longest: int = 40, digits: int = 10) -> str:
+    """As `slug`, always with so many digits of its hash: names of different texts are never alike.
+
+    Examples
+    --------
+    >>> hashed("../../etc/passwd"), hashed("é")[:-10]
+    ('etc-passwd-3754d6cb3a', 'design-')
+    """
+    plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:longest].strip("-") or "design"
+    digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()
+    return f"{plain}-{digest[:digits]}"

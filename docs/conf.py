@@ -51,10 +51,10 @@ html_theme = "pydata_sphinx_theme"
 html_title = "actuator-lti"
 html_show_sourcelink = False
 html_copy_source = False
-html_sidebars = {"**": ["globaltoc.html"]}
+html_sidebars = {"index": []}  # elsewhere the theme's own: the pages of the part that one is in
 html_theme_options = {
     "show_prev_next": True,
-    "navbar_center": [],  # the whole contents stand at the side
+    "navbar_align": "left",
     "navbar_end": ["theme-switcher"],
     "footer_start": ["copyright"],
     "footer_end": [],

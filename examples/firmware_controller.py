@@ -37,11 +37,11 @@ MOVE = 1e-6  # of a number, SI
 DECAYED = 1e-9  # share of its largest at which a response has ended
 
 
-def output_angle_rad(drive: Drive) -> float:
-    """Of a drive, now."""
+def output_of(drive: Drive, name: Literal["angle", "speed"]) -> float:
+    """Angle or speed of the output of a drive, now."""
     if is_elastic(drive.design):
-        return drive.value("output")
-    return drive.value("angle") / drive.design.total_ratio
+        return drive.value("output" if name == "angle" else "output_speed")
+    return drive.value(name) / drive.design.total_ratio
 
 
 class Plant:
@@ -63,13 +63,14 @@ class Plant:
     @property
     def output_angle_rad(self) -> float:
         """Now."""
-        return output_angle_rad(self._drive)
+        return output_of(self._drive, "angle")
 
     def measured(self, name: str, counts_per_rad: dict[str, float]) -> float:
         """What a member of the controller's input is."""
         angle, output = self._drive.value("angle"), self.output_angle_rad
         known = {"motor_angle": angle, "output_angle": output, "motor_speed": self._drive.value("speed"),
-                 "motor_current": self._drive.value("current")}  # fmt: skip
+                 "motor_current": self._drive.value("current"),
+                 "output_speed": output_of(self._drive, "speed")}  # fmt: skip
         if name == "motor_counts":
             return floor(angle * counts_per_rad["COUNTS_PER_RAD"])
         if name == "output_counts":
@@ -164,7 +165,7 @@ def closed(design: Design, commands: np.ndarray, number: Number) -> Outcome:
         plant.step(firmware.step(command, plant))
         drive.step(command)
         rounding = np.maximum(rounding, np.abs(firmware.numbers - twin.numbers))
-        worst = max(worst, abs(plant.output_angle_rad - output_angle_rad(drive)))
+        worst = max(worst, abs(plant.output_angle_rad - output_of(drive, "angle")))
     return Outcome(worst, rounding)
 
 

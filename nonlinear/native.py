@@ -1,7 +1,7 @@
 """The compiled tick: runs, single ticks and signals, by the library of the kernels.
 
-``python -m nonlinear.native`` compiles it, and the library of many designs' figures beside it; an
-installation does so (`actuator_lti.compiled.library`).
+``python -m nonlinear.native`` compiles it, and the libraries of many designs' figures and of margins
+beside it; an installation does so (`actuator_lti.compiled.library`).
 """
 
 from __future__ import annotations
@@ -93,16 +93,17 @@ def fill(signal: Floats, table: Floats, period_s: float, out: Floats) -> None:
 
 
 def build() -> tuple[Path, ...]:
-    """Compile what is not there yet: this library, and that of many designs' figures.
+    """Compile what is not there yet: this library, those of many designs' figures and of margins.
 
     Raises
     ------
     InputError
         Without a C compiler, or where the package cannot be written.
     """
+    from actuator_lti.axis.library import LIBRARY as axis
     from actuator_lti.batch.library import LIBRARY as figures
 
-    return LIBRARY.build(), figures.build()
+    return tuple(library.build() for library in (LIBRARY, figures, axis))
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from analyses.validation.asked import Asked as ValidationAsked
 from reports.design_files.keys import Asked as KeysAsked
 from reports.design_files.start import Asked as StartAsked
 from reports.exports.asked import AskedC, AskedController, AskedFmu, AskedLinear
+from reports.nightly.asked import Asked as NightlyAsked
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -189,7 +190,8 @@ ANALYSES = (
         words="""
         Dynamic and static stiffness and lost motion, checked by an injected moment.
 
-        The exit status is 1 where the simulator does not confirm the linear stiffness.
+        Met where the simulator, with moments injected, agrees; not proven where no position loop holds the
+        output. The exit status is 1 where it is not met, or not proven.
         """,
     ),
     Analysis(
@@ -392,6 +394,22 @@ ANALYSES = (
 
         Writes tuned.toml (a design), tune.html and tune.json. Exit status 1 where the requirements
         cannot be met.
+        """,
+    ),
+    Analysis(
+        name="nightly",
+        group="Variants and history",
+        alone=True,
+        request=NightlyAsked,
+        function="reports.nightly.command.nightly",
+        shown="nightly",
+        doing="building",
+        words="""
+        Build every design and variant of a study, keep every figure, and publish a site of it.
+
+        What has not changed is not computed again. Exit status 1 where a requirement fails, a design has no
+        result, or a figure is worse than the approved baseline. `nightly approve STUDY --site DIR --by NAME
+        --reason TEXT` makes the last night the baseline.
         """,
     ),
     Analysis(

@@ -6,14 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.design import design_hash, warnings_of
 from actuator_lti.design.loader import as_design, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.files.atomic import write_together
 from actuator_lti.files.tree import Tree
 from analyses.corners import corners
 from reports import document as doc
@@ -80,6 +78,8 @@ def report(
     >>> made["verdict"]["verdict"]
     'met'
     """
+    from reports.html import write_report
+
     drive = as_design(design)
     if source is None and not isinstance(design, Design):
         source = design_text(design)
@@ -231,7 +231,7 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
 
     for name in names:
         if name not in FURTHER:
-            raise InputError(f"section {name!r}: allowed: {', '.join(FURTHER)}")
+            raise InputError(f"also = {name!r}: allowed: {', '.join(FURTHER)}, all")
     made: list[doc.Section] = []
     with isolated() as missing:
         for name in dict.fromkeys(names):
@@ -239,7 +239,7 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
             try:
                 part = attempt(f"section {name}", partial(_further, one, design), None)
             except InputError as error:
-                part = doc.section(name, name.capitalize(), [doc.text(f"Not for this drive: {error}")])
+                part = doc.section(name, name.capitalize(), [], result=f"Not for this drive: {error}.")
             made += [part] if part is not None else []
     return [*made, *notices(missing, "further")]
 
@@ -335,22 +335,3 @@ def design_head(design: Design) -> Tree:
         "origin": design.origin,
         "axis": design.axis,
     }
-
-
-def write_report(
-    made: Mapping[str, Any], folder: str | PathLike[str], *, progress: Progress | None = None
-) -> tuple[Path, Path]:
-    """Write ``report.html`` and ``report.json``; both or neither.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written.
-    """
-    from reports.html import page
-
-    content = doc.dumps(made)
-    html = page(doc.loads(content), progress=progress)
-    paths = (Path(folder) / "report.html", Path(folder) / "report.json")
-    write_together({paths[0]: html.encode(), paths[1]: content.encode()})
-    return paths

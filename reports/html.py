@@ -12,13 +12,16 @@ import itertools
 import json
 from collections.abc import Mapping
 from functools import cache
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
+from actuator_lti.files.atomic import write_together
 from actuator_lti.files.tree import Tree
-from reports.document import figures
+from reports.document import dumps, figures, loads
 from reports.drawing import Progress, draw_all
 from reports.glossary import meaning
 from reports.numbers import MISSING, show, significant
@@ -30,23 +33,29 @@ LONG_TABLE = 13  # rows; longer tables fold
 KICKERS = {"report": "Loop analysis report"}
 
 
-def page(
+def write_report(
     made: Mapping[str, Any],
+    folder: str | PathLike[str],
+    stem: str = "report",
     *,
-    template: str = "report.html",
     progress: Progress | None = None,
-) -> str:
-    """Make the page of a document.
+) -> tuple[Path, Path]:
+    """Write a document as ``<stem>.html`` and ``<stem>.json``; both or neither.
 
-    Parameters
-    ----------
-    made : mapping
-        A document of `reports.document`.
-    template : str
-        The template that lays it out; it gets the document as ``doc``.
-    progress : callable, optional
-        Called with (figures drawn, figures in all).
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
     """
+    content = dumps(made)
+    html = page(loads(content), progress=progress)
+    paths = (Path(folder) / f"{stem}.html", Path(folder) / f"{stem}.json")
+    write_together({paths[0]: html.encode(), paths[1]: content.encode()})
+    return paths
+
+
+def page(made: Mapping[str, Any], *, progress: Progress | None = None) -> str:
+    """Make the page of a document (of `reports.document`); ``progress``: (figures drawn, figures in all)."""
     blocks = figures(made)
     drawings = dict(zip(map(id, blocks), draw_all(blocks, progress), strict=True))
 
@@ -54,7 +63,7 @@ def page(
         return Markup(drawings[id(block)])
 
     kicker = KICKERS.get(made.get("kind", "report"), "Report")
-    return render(template, doc=made, drawn=drawn, kicker=kicker, **_live(made))
+    return render("report.html", doc=made, drawn=drawn, kicker=kicker, **_live(made))
 
 
 def _live(made: Mapping[str, Any]) -> Tree:
@@ -75,18 +84,19 @@ def _live(made: Mapping[str, Any]) -> Tree:
     }
 
 
-def render(template: str, **context: Any) -> str:
-    """Fill a template that extends ``base.html``; every page gets the same style, script and policy.
+def render(template: str, *, style: str = "", code: str = "", **context: Any) -> str:
+    """Fill a template that extends ``base.html``; every page gets the same style (and ``style``) and policy.
 
-    A page with sliders (``live`` is given) has one script more, and may compile WebAssembly.
+    The script is ``code``, else that of every report. A page with sliders (``live`` is given) has one script
+    more, and may compile WebAssembly.
     """
     counter = itertools.count(1)
-    code = script(live="live" in context)
+    code = code or script(live="live" in context)
     return (
         environment()
         .get_template(template)
         .render(
-            stylesheet=Markup(asset("style.css")),
+            stylesheet=Markup(asset("style.css") + style),
             script=Markup(code),
             security_policy=security_policy(code, wasm="live" in context),
             verdict_lines=verdict_lines,

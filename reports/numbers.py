@@ -58,6 +58,11 @@ def significant(value: float, digits: int = 3) -> str:
     return to_minus(f"{mantissa}×10") + str(int(power)).translate(_SUPERSCRIPT)
 
 
+def or_none(value: float | None, digits: int = 4) -> str:
+    """Write a number within a sentence; "none" where there is none."""
+    return "none" if value is None else significant(value, digits)
+
+
 def seconds(value: float) -> str:
     """Write a duration with the unit that suits it.
 

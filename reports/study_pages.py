@@ -1,18 +1,15 @@
-"""Pages of studies (tolerances, variants, tuning): one document, one page and its JSON, both or neither."""
+"""Documents of studies (tolerances, variants, tuning)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from actuator_lti.files.atomic import write_together
 from reports import document as doc
 from reports.document_schema import Document
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
-    from reports.drawing import Progress
 
 
 def study_document(
@@ -33,23 +30,3 @@ def study_document(
         sections=[*sections, provenance_section.section(head, origin)],
         kind=kind,
     )
-
-
-def write_pages(
-    made: Mapping[str, Any],
-    folder: Path,
-    stem: str,
-    *,
-    progress: Progress | None = None,
-    beside: Mapping[str, str] | None = None,
-) -> tuple[Path, Path]:
-    """Write ``<stem>.html`` and ``<stem>.json``, and the texts that go with them by file name."""
-    from reports.html import page
-
-    content = doc.dumps(made)
-    html = page(doc.loads(content), progress=progress)
-    paths = (folder / f"{stem}.html", folder / f"{stem}.json")
-    texts = {paths[0]: html, paths[1]: content}
-    texts |= {folder / name: text for name, text in (beside or {}).items()}
-    write_together({path: text.encode() for path, text in texts.items()})
-    return paths

@@ -54,11 +54,10 @@ def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequen
         out.print(Text(f"note: {note}", style="yellow"))
 
 
-def print_verdict(passed: bool | Verdict, words: str, *, failed: str = "FAIL") -> None:
-    """Print the first line of an answer: a verdict, or whether all is well (else ``failed``), and why."""
+def print_verdict(passed: bool | Verdict, words: str) -> None:
+    """Print the first line of an answer: a verdict, or whether all is well, and why."""
     verdict = passed if isinstance(passed, Verdict) else Verdict.of(passed)
-    head = failed if passed is False else HEADS[verdict]
-    line = Text().append(head, style=COLOURS[verdict.role()])
+    line = Text().append(HEADS[verdict], style=COLOURS[verdict.role()])
     console().print(line.append(f"  {printable(words)}"), soft_wrap=True)
 
 

@@ -233,11 +233,11 @@ def emit_structs(
 
 
 def struct_text(struct: Struct, words: Mapping[str, str]) -> str:
-    """The structure as C, each member with what it is."""
+    """The structure as C, each member with what it is (``""``: nothing)."""
     types: dict[Kind, str] = {"float": "double", "int": "int32_t", "count": "int32_t"}
     lines = [
         f"{INDENT}{types[each.kind]} {each.name}{f'[{each.length}]' if each.length else ''};"
-        f" /* {words[each.name]} */"
+        + (f" /* {words[each.name]} */" if words[each.name] else "")
         for each in struct.members
     ]
     return "\n".join(["typedef struct {", *lines, f"}} {struct.type};"])

@@ -100,8 +100,16 @@ class _Shorter(ast.NodeTransformer):
             return node
         return ast.Expr(node.value) if _writing(self.functions, node.value) else None
 
-    def _tuple(self, node: ast.Assign, target: ast.Tuple) -> ast.stmt:
-        """Results of a call, those that nobody reads with a name that says so."""
+    def _tuple(self, node: ast.Assign, target: ast.Tuple) -> ast.stmt | None:
+        """Several assignments at once; results of a call that nobody reads get a name that says so."""
+        if isinstance(node.value, ast.Tuple):
+            pairs = [
+                (each, value)
+                for each, value in zip(target.elts, node.value.elts, strict=True)
+                if self._is_read(each) or _writing(self.functions, value)
+            ]
+            node.value.elts, target.elts = [value for _, value in pairs], [each for each, _ in pairs]
+            return node if pairs else None
         for each in target.elts:
             if isinstance(each, ast.Name) and not self._is_read(each):
                 each.id = "_" + each.id.lstrip("_")

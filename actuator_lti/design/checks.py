@@ -7,13 +7,13 @@ from math import inf, log
 
 import numpy as np
 
+from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.checks_control import CONTROL_CHECKS
 from actuator_lti.design.checks_elastic import check_elastic, check_place
 from actuator_lti.design.fields import Structure, fields_in
 from actuator_lti.design.mistakes import Findings, Refusal
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
-from actuator_lti.design.quantities import QUANTITIES
 from actuator_lti.design.sections import parts_of
 from actuator_lti.files.reading import shown
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+from actuator_lti.design.data_sheet import FROM
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Design
 
@@ -47,5 +48,6 @@ def explained(design: Design) -> tuple[Explained, ...]:
             value = getattr(design.effective_motor, field.attribute)
         unit = "" if item.unit == "1" else f" {item.unit}"
         symbol = f"{item.symbol} = " if item.symbol else ""
-        result.append(Explained(path, item.text, f"{item.value:.9g}{unit}", f"{symbol}{value:.9g}{unit}"))
+        written = item.source if item.source.startswith(FROM) else item.text
+        result.append(Explained(path, written, f"{item.value:.9g}{unit}", f"{symbol}{value:.9g}{unit}"))
     return tuple(result)

@@ -6,6 +6,7 @@ from dataclasses import MISSING, dataclass, fields
 from math import inf
 from typing import Annotated
 
+from actuator_lti.design.data_sheet import SHEET
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import ALL_FIELDS
 from actuator_lti.design.model import Axis
@@ -39,7 +40,9 @@ def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
     """
     kinds = {section.template: section.kind for section in SECTIONS}
     structure = Structure(axis)
-    return tuple(_entry(field, kinds.get(field.section), structure) for field in ALL_FIELDS)
+    order = list(dict.fromkeys(field.section for field in ALL_FIELDS))
+    listed = sorted((*ALL_FIELDS, *SHEET), key=lambda field: order.index(field.section))
+    return tuple(_entry(field, kinds.get(field.section), structure) for field in listed)
 
 
 def _entry(field: Field, kind: type | None, structure: Structure) -> KeyEntry:

@@ -12,17 +12,18 @@ from datetime import date
 from math import pi, sqrt
 from typing import Any
 
+from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design import model
+from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import Findings, nearest
 from actuator_lti.design.parameters import FrozenMap
-from actuator_lti.design.quantities import QUANTITIES, parse_limit
 from actuator_lti.design.sections import RECORDS, Section, children
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.tolerances import read_tolerance
-from actuator_lti.design.units import parse_quantity, si_text
+from actuator_lti.design.units import parse_limit, parse_quantity, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
@@ -53,16 +54,19 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     parts = reader.tables("", tree, meant)
     records = {record.attribute: reader.items(record, tree.get(record.key, [])) for record in RECORDS}
     objects = reader.objects(tree.get("objects"))
+    sheet = DataSheet(reader.stated, tree)
+    findings.extend(sheet.refusals())
     findings.refuse()
     # 10 deg (0.01 m) without a load where the file does not say what to validate
     fallback = model.Validation(full_deflection_rad=model.default_deflection(reader.structure.axis))
     values["title"] = values.get("title") or values["name"]
-    return model.Design(
+    design = model.Design(
         **{**values, "validation": fallback, **parts, **records},
         objects=objects,
         origin=origin,
         parameters=FrozenMap(reader.parameters),
     )
+    return sheet.read_into(design)
 
 
 class Reader:
@@ -71,6 +75,7 @@ class Reader:
     def __init__(self, tree: Tree, findings: Findings) -> None:
         self.findings = findings
         self.parameters: dict[str, model.Parameter] = {}
+        self.stated: dict[str, model.Parameter] = {}
         head, control = (
             tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control")
         )
@@ -107,8 +112,12 @@ class Reader:
         if not isinstance(table, dict):
             self.missing(path) if table is None else self.refuse(path, table, "allowed: a table")
             return {}
-        fields = fields_in(template)
-        meant = self.known(table, (*(field.key for field in fields), *inner), path)
+        fields, stated = fields_in(template), sheet_fields(template)
+        meant = self.known(table, (*(field.key for field in (*fields, *stated)), *inner), path)
+        for field in stated:
+            where = f"{path}.{field.key}"
+            if field.key in table and self.entry(field, table[field.key], where) is not None:
+                self.stated[where] = self.parameters.pop(where)
         values: Tree = {}
         for field in fields:
             where = f"{path}.{field.key}"

@@ -22,14 +22,19 @@ def read_settings_xml(text: str, where: str, velocity_gain_factor: float | None 
 
     No DTD, no entities and no external references are accepted.
     """
-    root = _parsed(text, where)
-    values = tuple(item for item, _ in _objects_in(root, where))
+    values = objects_of_xml(text, where)
     if not values:
         raise InputError("holds no CANopenObject with an actualValue", where=where)
     return checked_objects(values, 1.0 if velocity_gain_factor is None else velocity_gain_factor, where)
 
 
-def _parsed(text: str, where: str) -> Element:
+def objects_of_xml(text: str, where: str) -> tuple[ControllerObject, ...]:
+    """The objects of a device configuration that have an actual value."""
+    return tuple(item for item, _ in _objects_in(parsed_xml(text, where), where))
+
+
+def parsed_xml(text: str, where: str) -> Element:
+    """Plain XML; no DTD, no entities, at most 1 MiB."""
     from defusedxml import DefusedXmlException
     from defusedxml.ElementTree import fromstring
 
@@ -144,7 +149,7 @@ def update_settings_xml(
     for prefix, uri in re.findall(r'xmlns(?::([A-Za-z][\w.-]*))?\s*=\s*"([^"]*)"', text):
         if not re.fullmatch(r"ns[0-9]+", prefix):
             register_namespace(prefix, uri)
-    root = _parsed(text, where)
+    root = parsed_xml(text, where)
     values = {(item.index, item.subindex): item.value for item in objects.values}
     for item, element in _objects_in(root, where):
         value = values.pop((item.index, item.subindex), item.value)

@@ -351,9 +351,20 @@ def si_text(value: float, unit: str) -> str:
     return repr(value) if unit == "1" else f"{value!r} {unit}"
 
 
-def convert(value: float, unit: str, to: str) -> float:
-    """A value in one unit, in another of the same dimension."""
-    source, target = parse_unit(unit), parse_unit(to)
-    if source.dimension != target.dimension:
-        raise InputError(f'"{unit}" cannot be converted to "{to}"')
-    return value * source.factor / target.factor
+def parse_limit(text: str | float | int, unit: str) -> float:
+    """A limit as written, in the unit in which its quantity is reported.
+
+    Examples
+    --------
+    >>> parse_limit("6 dB", "dB"), parse_limit("90 rpm", "Hz")
+    (6.0, 1.5)
+    """
+    try:
+        number, written = split_quantity(str(text))
+    except ValueError as error:
+        raise InputError(f"{error}; allowed: a number with a unit like {unit}") from None
+    if written == unit:
+        return number
+    if unit == "dB":
+        raise InputError('allowed: a number in dB such as "6 dB"')
+    return parse_quantity(text, unit) / parse_unit(unit).factor

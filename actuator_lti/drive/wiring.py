@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -43,6 +43,8 @@ class Drive:
         Ticks between two updates of each stage, and of the speed measurement (``"speed"``).
     target : dict
         The signal that each stage drives: ``"u"``, ``"i_ref"`` or ``"w_ref"``.
+    blocks_at : dict
+        Loops cut at a break point, kept by `actuator_lti.loops.periodic`.
     """
 
     design: Design
@@ -50,6 +52,7 @@ class Drive:
     stages: tuple[str, ...]
     interval: dict[str, int]
     target: dict[str, str]
+    blocks_at: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def plant(self) -> Plant:

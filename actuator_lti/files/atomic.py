@@ -12,14 +12,15 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 from actuator_lti.errors import InputError
 
+Name = TypeVar("Name", bound=str | os.PathLike[str])
 _PART = ".part"
 _STANDARD = ("stdin", "stdout", "stderr")
 _OPEN_FILE = re.compile(r"/(?:(?:dev|proc/self)/fd/(\d{1,6})|dev/(stdin|stdout|stderr))\Z")
@@ -43,36 +44,40 @@ def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
 
 def write_stream(path: str | os.PathLike[str], write: Callable[[BinaryIO], None]) -> None:
     """Let ``write`` fill a file that need not fit in memory; see `write_text`."""
-    _write_all({path: write})
+    _write_all([(path, write)])
 
 
-def write_together(files: Mapping[str | os.PathLike[str], bytes]) -> None:
+def write_together(files: Mapping[Name, bytes] | Iterable[tuple[Name, bytes]]) -> None:
     """Write several files: none is moved into place before all are on disk.
 
     Parameters
     ----------
-    files : mapping of path to bytes
-        Missing folders are made.
+    files : mapping of path to bytes, or pairs of them
+        Missing folders are made. Pairs are taken one by one: many files need not be in memory together.
 
     Raises
     ------
     InputError
         If a folder cannot be made or written; nothing is left behind then.
     """
-    _write_all({path: partial(_put, data) for path, data in files.items()})
+    pairs = files.items() if isinstance(files, Mapping) else files
+    _write_all((path, partial(_put, data)) for path, data in pairs)
 
 
 def _put(data: bytes, file: BinaryIO) -> None:
     file.write(data)
 
 
-def _write_all(files: Mapping[str | os.PathLike[str], Callable[[BinaryIO], object]]) -> None:
-    """Fill every file beside its place, then move all into place; devices and pipes are written to last."""
+def _write_all(files: Iterable[tuple[str | os.PathLike[str], Callable[[BinaryIO], object]]]) -> None:
+    """Fill every file beside its place, then move all into place; devices and pipes are written to last.
+
+    The disk is waited for when all are written: many files then reach it in few turns.
+    """
     staged: list[tuple[Path, Path]] = []
     through: list[tuple[BinaryIO, Path]] = []
     path = Path()
     try:
-        for name, write in files.items():
+        for name, write in files:
             path = Path(name)
             target = _target(path)
             if target is None:
@@ -81,10 +86,18 @@ def _write_all(files: Mapping[str | os.PathLike[str], Callable[[BinaryIO], objec
                 staged.append((_stage(target, write), target))
         for held, path in through:
             _write_through(held, path)
+        for temporary, target in staged:
+            path = target
+            _sync(temporary)
+            os.chmod(temporary, 0o666 & ~_umask())
+        folders = {path.parent for _, path in staged}
         while staged:
             temporary, path = staged[0]
             os.replace(temporary, path)
             staged.pop(0)
+        for folder in folders if os.name == "posix" else ():
+            with suppress(OSError):  # not every file system can: the files themselves are there
+                _sync(folder)
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
@@ -147,20 +160,26 @@ def _write_through(held: BinaryIO, path: Path) -> None:
 
 
 def _stage(path: Path, write: Callable[[BinaryIO], object]) -> Path:
-    """Fill a file beside its place, flushed to disk, and give the temporary path."""
+    """Fill a file beside its place, and give the temporary path."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=".", suffix=_PART, dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as file:
             write(file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(name, 0o666 & ~_umask())
     except BaseException:
         with suppress(OSError):
             os.unlink(name)
         raise
     return Path(name)
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file, or the names in a folder, are on the disk (Windows asks for the right to write)."""
+    handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 def _reason(error: OSError | ValueError) -> str:

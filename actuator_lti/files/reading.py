@@ -143,7 +143,10 @@ def read_campaign_toml(path: str | PathLike[str], what: str = "campaign file") -
 def read_json(path: str | PathLike[str], what: str = "report.json") -> Any:
     """The value of a JSON file, checked like a TOML file; NaN and Infinity are refused."""
     where = shown_path(path)
-    return parse_json(decode(read_bytes(path, what, REPORT_BYTES), where), where)
+    text = decode(read_bytes(path, what, REPORT_BYTES), where)
+    if not text.strip():
+        raise InputError(f"is empty; allowed: a {what}", where=where)
+    return parse_json(text, where)
 
 
 def parse_toml(text: str, where: str, *, size: Bound = TOML_BYTES, values: Bound = TOML_VALUES) -> Tree:

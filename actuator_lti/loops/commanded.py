@@ -17,13 +17,13 @@ from scipy.optimize import brentq
 
 from actuator_lti.bandwidth import Bandwidth, closed_loop_bandwidth
 from actuator_lti.drive.profile import CommandMean
+from actuator_lti.margins.axis_search import gain_bounds
 from actuator_lti.margins.delay_form import delay_form
 from actuator_lti.margins.delay_response import DelayResponse
 from actuator_lti.margins.distances import INVERSE
 from actuator_lti.margins.factored import Response, factored
-from actuator_lti.margins.factors_on_axis import Intervals
 from actuator_lti.margins.given import given_of
-from actuator_lti.margins.loop import Mask, Real, loop_of, rational_loop
+from actuator_lti.margins.loop import Real, loop_of, rational_loop
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step import StepFigures
 
@@ -102,10 +102,10 @@ class _Gain:
         own = abs(complex(self._response.at(np.array([w]))[0]))
         return own / self.dc * abs(complex(self.mean.response(self.omega(np.array([w])))[0]))
 
-    def bounds(self, here: Intervals) -> tuple[Real, Real]:
+    def bounds(self, low_w: Real, high_w: Real) -> tuple[Real, Real]:
         """No less and no more than this inside each interval: the mean falls up to its first zero."""
-        own = np.exp(np.array([bound[0] for bound in here.bounds])) / self.dc
-        low, high = self.omega(here.low), self.omega(here.high)
+        own = np.array(gain_bounds(self.factors, low_w, high_w)) / self.dc
+        low, high = self.omega(low_w), self.omega(high_w)
         before = high <= self.mean.first_zero_rad_s
         least = np.where(before, np.abs(self.mean.response(high)), 0.0)
         half = 0.5 * low * self.mean.period_s
@@ -114,16 +114,27 @@ class _Gain:
         most = np.where(before, np.abs(self.mean.response(low)), np.minimum(lobe, 1.0))
         return own[0] * least, own[1] * most
 
-    def _split(self, end: float, resolved: Any) -> Intervals:
-        def narrow_or(here: Intervals) -> Mask:
-            return np.asarray(resolved(*self.bounds(here)) | (here.high - here.low < _NARROW * here.high))
-
-        return self.factors.covered([0.0, self.w(end)], narrow_or)
+    def _split(self, end: float, resolved: Any) -> Real:
+        """Intervals up to there, resolved or narrow: low, high and most gain, in order; shape (3, k)."""
+        places = self.factors.places
+        edges = np.concatenate(([0.0], places[places < self.w(end)], [self.w(end)]))
+        low, high, done = edges[:-1], edges[1:], []
+        while low.size:
+            least, most = self.bounds(low, high)
+            good = resolved(least, most) | (high - low < _NARROW * high)
+            done.append(np.array((low, high, most))[:, good])
+            low, high = low[~good], high[~good]
+            middle = 0.5 * (low + high)
+            low, high = np.append(low, middle), np.append(middle, high)
+        found = np.concatenate(done, axis=1)
+        return found[:, found[0].argsort()]
 
     def crossings(self, level: float) -> list[float]:
         """Where the gain passes a level, rad/s, up to the first zero of the mean; at least one."""
-        known = self._split(self.mean.first_zero_rad_s, lambda least, most: (least > level) | (most < level))
-        edges = [0.0, *known.high.tolist()]
+        _, high, _ = self._split(
+            self.mean.first_zero_rad_s, lambda least, most: (least > level) | (most < level)
+        )
+        edges = [0.0, *high.tolist()]
         pairs = [(a, b) for a, b in pairwise(edges) if (self.at(a) > level) != (self.at(b) > level)]
         found = [brentq(lambda w: self.at(w) - level, *pair, xtol=1e-300, rtol=1e-14) for pair in pairs]
         return self.omega(np.array(found)).tolist()
@@ -132,13 +143,12 @@ class _Gain:
         """The largest gain up to there and where, rad/s; (1, 0) where it only falls."""
         best = [1.0]
 
-        def beaten(least: Real, most: Real) -> Mask:
+        def beaten(least: Real, most: Real) -> Any:
             best[0] = max(best[0], float(least.max(initial=0.0)))
-            return np.asarray(most <= best[0])
+            return most <= best[0]
 
-        known = self._split(end, beaten)
-        _, most = self.bounds(known)
-        near = 0.5 * (known.low + known.high)[most >= best[0]]
+        low, high, most = self._split(end, beaten)
+        near = 0.5 * (low + high)[most >= best[0]]
         w = max(near.tolist(), key=self.at, default=0.0)
         return (self.at(w), float(self.omega(np.array(w)))) if w and self.at(w) > 1.0 else (1.0, 0.0)
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from actuator_lti.loops.result import Loops
 
 _GAINS = np.geomspace(1.0, 1e4, 401)
+_AT_ONCE = 50
 _DELAY_STEPS_A_TICK = 4
 AT_REST = 1e-12  # from 1: an eigenvalue that no gain of those tried moves away is a mode at rest
 TRIED_GAINS = (0.37, 1.0, 2.9)
@@ -45,8 +46,10 @@ def phase_blocks(program: TickProgram, every: int, source: str, signal: str, sca
 
 def point_blocks(wired: Drive, point: str) -> list[Block]:
     """The loop cut at a break point, y over e, one block for each update of it within one period."""
-    program = TickProgram(wired, wired.outermost, cut=point)
-    return phase_blocks(program, wired.interval[wired.producer(point)], "cut", point, scale=-1.0)
+    if point not in wired.blocks_at:
+        program, every = TickProgram(wired, wired.outermost, cut=point), wired.interval[wired.producer(point)]
+        wired.blocks_at[point] = phase_blocks(program, every, "cut", point, scale=-1.0)
+    return wired.blocks_at[point]
 
 
 def cyclic(blocks: Sequence[Block]) -> Block:
@@ -123,21 +126,23 @@ class PeriodicLoop:
     dt: float
     hidden: int = 0
 
-    def modes(self, gain: float = 1.0) -> np.ndarray:
-        """Eigenvalues over one period with the loop closed through a gain."""
+    def modes(self, gain: npt.ArrayLike = 1.0) -> np.ndarray:
+        """Eigenvalues over one period with the loop closed through a gain, or through each of several."""
         modes = np.asarray(np.linalg.eigvals(self._over(gain)), dtype=complex)
-        return modes[np.argsort(np.abs(modes - 1.0))[self.hidden :]] if self.hidden else modes
+        if not self.hidden:
+            return modes
+        return np.take_along_axis(modes, np.argsort(np.abs(modes - 1.0))[..., self.hidden :], axis=-1)
 
-    def _over(self, gain: float) -> np.ndarray:
+    def _over(self, gain: npt.ArrayLike) -> np.ndarray:
         """What one period does to the states with the loop closed through a gain."""
-        over = np.eye(self.systems[0][0].shape[0])
+        over, gains = np.eye(self.systems[0][0].shape[0]), np.asarray(gain)[..., None, None]
         for A, B, C in self.systems:
-            over = (A - gain * B @ C) @ over
+            over = (A - gains * B @ C) @ over
         return over
 
-    def radius(self, gain: float = 1.0) -> float:
-        """Largest magnitude of a mode."""
-        return float(np.max(np.abs(self.modes(gain)), initial=0.0))
+    def radius(self, gain: npt.ArrayLike = 1.0) -> Any:
+        """Largest magnitude of a mode, of the shape of the gains."""
+        return np.max(np.abs(self.modes(gain)), axis=-1, initial=0.0)
 
     def hidden_at_rest(self) -> int:
         """How many modes stand at 1 at all gains tried: what rounding leaves of a rest that the loop keeps.
@@ -178,7 +183,13 @@ class PeriodicLoop:
 
 def periodic_loop(loops: Loops, point: str) -> PeriodicLoop:
     """The loop at a break point of sampled loops, what no gain moves left out."""
-    return periodic_loop_of(wire(loops.design, loops.operating), point)
+    return periodic_loop_of(_wired(loops), point)
+
+
+def _wired(loops: Loops) -> Drive:
+    """The drive that sampled loops are of."""
+    ticks = loops.tick_system
+    return wire(loops.design, loops.operating) if ticks is None else ticks.program.drive
 
 
 def periodic_loop_of(wired: Drive, point: str) -> PeriodicLoop:
@@ -226,15 +237,16 @@ def _without_rest(systems: list[System]) -> list[System]:
     return systems
 
 
-def _first_border(excess: Callable[[float], float], grid: Sequence[float], none: float) -> float:
-    """First root of ``excess`` (negative at grid[0]) along a grid."""
+def _first_border(excess: Callable[[Any], Any], grid: np.ndarray, none: float, at_once: int = 1) -> float:
+    """First root of ``excess`` (negative at grid[0]) along a grid, so many of its values asked at once."""
     from scipy.optimize import brentq
 
-    last = grid[0]
-    for value in grid[1:]:
-        if excess(value) >= 0:
-            return float(brentq(excess, last, value, xtol=1e-15, rtol=1e-13))
-        last = value
+    for start in range(1, len(grid), at_once):
+        part = grid[start : start + at_once] if at_once > 1 else grid[start]
+        over = np.flatnonzero(excess(part) >= 0)
+        if over.size:
+            first = start + int(over[0])
+            return float(brentq(excess, grid[first - 1], grid[first], xtol=1e-15, rtol=1e-13))
     return none
 
 
@@ -252,14 +264,14 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
         raise InputError(f"form = {loops.form!r}: exact_margins needs form='sampled'")
     if point not in loops.break_points:
         raise InputError(f"break point {point!r}: one of {', '.join(loops.break_points)}")
-    wired = wire(loops.design, loops.operating)
+    wired = _wired(loops)
     moved, others = (_moved(part, wired.tick_s) for part in _parts(point_blocks(wired, point)))
-    radius = max(moved.radius(), others.radius())
+    radius = float(max(moved.radius(), others.radius()))
     nan = float("nan")
     if radius >= 1:
         return ExactMargins(False, nan, nan, nan if point == "u" else None, radius)
-    upper = _first_border(lambda g: moved.radius(g) - 1, list(_GAINS), float("inf"))
-    lower = _first_border(lambda g: moved.radius(g) - 1, list(1 / _GAINS), 0.0)
+    upper = _first_border(lambda g: moved.radius(g) - 1, _GAINS, float("inf"), _AT_ONCE)
+    lower = _first_border(lambda g: moved.radius(g) - 1, 1 / _GAINS, 0.0, _AT_ONCE)
     delay = _delay_border(wired, longest_delay_ticks, moved) if point == "u" else None
     return ExactMargins(True, upper, lower, delay, radius)
 
@@ -276,10 +288,10 @@ def _delay_border(wired: Drive, longest_ticks: float, now: PeriodicLoop) -> floa
 
     def excess(ticks: float) -> float:
         updates, rest = divmod(ticks, every)
-        return PeriodicLoop(_queued(part(rest), int(updates)), Ts, now.hidden).radius() - 1
+        return float(PeriodicLoop(_queued(part(rest), int(updates)), Ts, now.hidden).radius()) - 1
 
     step = 1 / _DELAY_STEPS_A_TICK
-    grid = [0.0, *np.arange(step, longest_ticks, step)]
+    grid = np.array([0.0, *np.arange(step, longest_ticks, step)])
     return _first_border(excess, grid, float("inf")) * Ts
 
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.axis_search import Found, passages, search
+from actuator_lti.margins.axis_search import Found, nearest, passages, search
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.factored import Response
 from actuator_lti.margins.factors_on_axis import Factored
 from actuator_lti.margins.loop import Mask, Real
-from actuator_lti.margins.nearest import nearest
 from actuator_lti.margins.trust import Doubtful
 
 _LOW, _HIGH = 1e-3, 1e3  # of the smallest and largest root: where the ends of the axis begin
@@ -32,6 +30,14 @@ class Part:
     factors: Factored
     found: Found
     beyond: bool
+
+    @property
+    def in_w(self) -> tuple[Real, Real, Mask]:
+        """Its crossings in order of w, and which way they go."""
+        gain, real, rising = self.found.gain_w, self.found.real_w, self.found.rising
+        if not self.beyond:
+            return gain, real, rising
+        return np.divide(1.0, gain[::-1]), np.divide(1.0, real[::-1]), rising[::-1]
 
 
 def axis_parts(factors: Factored, band: tuple[float, float] | None) -> tuple[list[Part], float, float]:
@@ -122,17 +128,8 @@ def axis_ends(factors: Factored, response: Response) -> tuple[complex, complex]:
 def merged(parts: list[Part]) -> tuple[Real, Real, Mask, int]:
     """All crossings in order of w."""
 
-    def whole(name: str) -> Any:
-        return np.concatenate([getattr(part.found, name)[:: -1 if part.beyond else 1] for part in parts])
-
-    beyond = [part.beyond for part in parts]
-
-    def in_w(name: str) -> Real:
-        late = np.repeat(beyond, [getattr(part.found, name).size for part in parts])
-        values = whole(name)
-        return np.asarray(np.where(late, 1.0 / values, values))
-
-    return in_w("gain_w"), in_w("real_w"), whole("rising"), sum(part.found.far for part in parts)
+    gain, real, rising = map(np.concatenate, zip(*(part.in_w for part in parts), strict=True))
+    return gain, real, rising, sum(part.found.far for part in parts)
 
 
 def distances_over(
@@ -149,13 +146,14 @@ def distances_over(
         for d in distances
     ]
     for part in parts:
-        found = nearest(part.factors, part.found.known, distances, best)
+        found = nearest(part.factors, part.found, distances, best)
         best = [
             (new[0], 1.0 / new[1] if part.beyond else new[1]) if new[0] < old[0] else old
             for new, old in zip(found, best, strict=True)
         ]
-    out = []
-    for d, (value, w) in zip(distances, best, strict=True):
-        inside = 0.0 < w < math.inf
-        out.append((d.at(complex(response.at(np.array([w]))[0])) if inside else value, response.frequency(w)))
-    return out
+    inside = [w for _, w in best if 0.0 < w < math.inf]
+    L = dict(zip(inside, response.at(np.array(inside)).tolist(), strict=True)) if inside else {}
+    return [
+        (d.at(L[w]) if w in L else value, response.frequency(w))
+        for d, (value, w) in zip(distances, best, strict=True)
+    ]

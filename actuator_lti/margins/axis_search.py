@@ -1,25 +1,27 @@
-"""Every crossing of a factored loop between two frequencies: nothing left out.
+"""What a factored loop does on the axis: every crossing and passage of a level, its smallest distance to -1.
 
-Intervals are split until in each of them the bounds of `factors_on_axis` say that the loop stays off the
-line, or moves over it one way.
+The search is compiled (`actuator_lti.axis`); here it is called, with as much room as it needs.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from actuator_lti.margins.assemble import FARTHEST
-from actuator_lti.margins.factors_on_axis import Factored, Intervals, half_turns, halves
+from actuator_lti.axis import _nearest, _search
+from actuator_lti.axis._factors import BOUNDS
+from actuator_lti.axis.library import LIBRARY
+from actuator_lti.margins.distances import Distance
+from actuator_lti.margins.factors_on_axis import Factored
 from actuator_lti.margins.loop import Mask, Real
+from actuator_lti.margins.trust import Doubtful
 
-FAR_LOG = math.log(FARTHEST)
-_REAL = 1e-9  # rad
-_STEPS = 60
-_STEP = 1e-5  # relative: near enough for the loop itself to go on
+_ROOM, _MORE, _MOST = 1 << 11, 8, 1 << 23  # intervals: asked for first, each time more, and no more than that
+Place = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -36,8 +38,13 @@ class Found:
         Crossings of the negative real axis with a gain below -200 dB, which are not listed.
     turns : int
         Rising less falling ones among those not listed where the gain is above one.
-    known : Intervals
-        They cover all that was searched, in order.
+    rate : float
+        Of the phase, at the beginning.
+    intervals : int
+        Into how many the axis was split.
+    known : array (intervals + 1, 7)
+        For each where it begins, log gain and phase there, and inside their least, then their most; the last
+        row is the end.
     """
 
     gain_w: Real
@@ -45,7 +52,9 @@ class Found:
     rising: Mask
     far: int
     turns: int
-    known: Intervals
+    rate: float
+    intervals: int
+    known: Real
 
 
 def search(loop: Factored, low: float, high: float, listed_to: float = math.inf) -> Found:
@@ -59,82 +68,69 @@ def search(loop: Factored, low: float, high: float, listed_to: float = math.inf)
         The loop comes so near to a line that its side could not be told.
     """
     ends = [low, *([listed_to] if low < listed_to < high else []), high]
-    known = loop.covered(ends, lambda here: _clear(here, listed_to, loop.slack))
-    return _read(loop, known, low == 0.0, listed_to)
+    return _searched(loop, ends, _search.CIRCLE, 0.0, listed_to)
 
 
-def passages(loop: Factored, low: float, high: float, level: float, kind: int = 0) -> Real:
+def passages(loop: Factored, low: float, high: float, level: float, kind: int = _search.GAIN_LEVEL) -> Real:
     """Every w between two at which the log gain (0) or the phase (1) passes a level, in order."""
-
-    def clear(here: Intervals) -> Mask:
-        one_way = (here.least[kind + 2] > 0.0) | (here.most[kind + 2] < 0.0)
-        least, most = here.bounds
-        return np.asarray(one_way | (least[kind] > level) | (most[kind] < level))
-
-    known = loop.covered([low, high], clear)
-    hit = np.flatnonzero((known.first[kind] > level) != (known.last[kind] > level))
-    return _roots(loop, np.full(hit.size, kind), known, hit, np.full(hit.size, level))
+    return _searched(loop, [low, high], kind, level, math.inf).gain_w
 
 
-def _clear(here: Intervals, listed_to: float, slack: float) -> Mask:
-    one_way = (here.least[2:] > 0.0) | (here.most[2:] < 0.0)
-    least, most = here.bounds
-    off_circle = (least[0] > slack) | (most[0] < -slack)
-    off_axis = half_turns(least[1] - slack) == half_turns(most[1] + slack)
-    out_of_sight = (most[0] < -FAR_LOG) | (here.low >= listed_to)
-    clear: Mask = (one_way[0] | off_circle) & (one_way[1] | off_axis | out_of_sight)
-    return clear
-
-
-def _read(loop: Factored, known: Intervals, from_zero: bool, listed_to: float) -> Found:
-    first, last = half_turns(known.first[1]), half_turns(known.last[1])
-    if from_zero and abs(math.sin(known.first[1, 0])) < _REAL:  # it leaves the real axis there, one way
-        first[0] = half_turns(known.first[1, 0] + math.copysign(2.0 * _REAL, known.first[3, 0]))
-    listed = known.low < listed_to
-    least, most = known.bounds
-    seen = (most[0] >= -FAR_LOG) & listed
-    step = (last - first).astype(int)
-    hit = ((known.first[0] > 0.0) != (known.last[0] > 0.0)).nonzero()[0]
-    turned = (seen & (step != 0)).nonzero()[0]
-    which = turned.repeat(np.abs(step[turned]))
-    rising = step[which] > 0
-    number = np.arange(which.size) - np.searchsorted(which, which)
-    level = np.where(rising, first[which] + 1 + number, first[which] - number) * 2.0 * math.pi - math.pi
-    kind = np.zeros(hit.size + which.size, dtype=int)
-    kind[hit.size :] = 1
-    level = np.concatenate((np.zeros(hit.size), level))
-    w = _roots(loop, kind, known, np.concatenate((hit, which)), level)
-    gain_w, real_w = w[: hit.size], w[hit.size :]
-    gain_w.sort()
-    order = real_w.argsort()
-    return Found(
-        gain_w,
-        real_w[order],
-        rising[order],
-        int(np.abs(step[~seen & listed]).sum()),
-        int(step[~seen & (least[0] > 0.0)].sum()),
-        known,
-    )
-
-
-def _roots(loop: Factored, kind: Any, known: Intervals, which: Any, level: Real) -> Real:
-    """Where gain (0) or phase (1), monotone in each interval, takes a level: Newton held by bisection."""
-    low, high = known.low[which], known.high[which]
-    if not low.size:
-        return low
-    each = np.arange(which.size)
-    first, last = known.first[kind, which] - level, known.last[kind, which] - level
-    above = first > 0.0
-    at = low + (high - low) * (first / (first - last))
-    for _ in range(_STEPS):
-        total = loop.log_value(at)
-        here = total[kind, each] - level
-        before = (here > 0.0) == above
-        low, high = np.where(before, at, low), np.where(before, high, at)
-        ahead = at - here / total[kind + 2, each]
-        ahead = np.where((ahead >= low) & (ahead <= high), ahead, halves(low, high))
-        small = np.abs(ahead - at) <= _STEP * at
-        at = ahead
-        if small.all():
+def _searched(loop: Factored, ends: list[float], kind: int, level: float, listed_to: float) -> Found:
+    places = loop.places
+    edges = np.sort(np.concatenate((ends, places[(places > ends[0]) & (places < ends[-1])])))
+    room = _ROOM
+    while True:
+        known, gains, reals = np.empty((room + 1, _search.KNOWN)), np.empty(room), np.empty((room, 2))
+        found = np.zeros(_search.FOUND)
+        status = LIBRARY.functions.search(
+            *_row(loop), kind, level, listed_to, edges.size, edges, room, known.reshape(-1), gains,
+            reals.reshape(-1), found, *_lent(loop),
+        )  # fmt: skip
+        if status != _search.FULL or room > _MOST:
             break
-    return at
+        room *= _MORE
+    if status != _search.DONE:
+        raise Doubtful(f"the loop comes too near to a line at {found[_search.WHERE]:.6g} to tell its side")
+    intervals, crossed, turned, far, turns = found[: _search.RATE].astype(int).tolist()
+    return Found(gains[:crossed], reals[:turned, 0], reals[:turned, 1] > 0.0, far, turns,
+                 float(found[_search.RATE]), intervals, known[: intervals + 1])  # fmt: skip
+
+
+def nearest(
+    loop: Factored, found: Found, distances: tuple[Distance, ...], start: Sequence[Place]
+) -> list[Place]:
+    """Smallest values of distances, each with its w.
+
+    Parameters
+    ----------
+    found : Found
+        Its intervals cover the axis but for what ``start``, a place for each distance, stands for.
+    """
+    out = []
+    for d, place in zip(distances, start, strict=True):
+        best, form = np.array(place), np.array((d.a, d.b, d.c, d.e), dtype=float)
+        status = LIBRARY.functions.nearest(
+            *_row(loop), found.intervals, found.known.reshape(-1), form, best, *_lent(loop)
+        )
+        if status == _nearest.MEETS:
+            raise Doubtful("the loop all but meets -1")
+        if status != _search.DONE:
+            raise Doubtful("the smallest distance to -1 was not settled")
+        out.append((float(best[0]), float(best[1])))
+    return out
+
+
+def gain_bounds(loop: Factored, low: Real, high: Real) -> tuple[Real, Real]:
+    """The least and the greatest gain in each of many intervals, between places."""
+    least, most = np.empty(low.size), np.empty(low.size)
+    LIBRARY.functions.gain_bounds(*_row(loop), low.size, low, high, least, most, *_lent(loop))
+    return least, most
+
+
+def _row(loop: Factored) -> tuple[int, Real]:
+    return loop.roots.size, loop.table
+
+
+def _lent(loop: Factored) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    return np.empty((_search.DEEPEST + 2) * (4 * loop.roots.size + 5)), np.empty(BOUNDS)

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
+from actuator_lti.axis._search import FAR_LOG
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, out_of_sight, within
 from actuator_lti.margins.axis_parts import axis_ends, axis_parts, distances_over, merged
-from actuator_lti.margins.axis_search import FAR_LOG
 from actuator_lti.margins.collocation import closed_loop_matrix, points_for
 from actuator_lti.margins.delay_form import in_series
 from actuator_lti.margins.distances import DISK, MODULUS

@@ -27,14 +27,14 @@ def chebyshev_differentiation(points: int) -> Real:
 
 def points_for(form: DelayForm, fastest: float) -> int | None:
     """Collocation points for poles up to the frequency ``fastest`` (rad/s); ``None`` where too many."""
-    longest = max([form.series_s, *form.delays.tolist()], default=0.0)
+    longest = max([form.series_s, *form.delays_s.tolist()], default=0.0)
     points = 12 + 1.3 * fastest * longest
     return None if points > _MOST else int(max(points, _FEWEST))
 
 
 def open_loop_matrix(form: DelayForm, points: int) -> Real:
     """State matrix of the loop, not closed, its inner delays collocated (a delay in series has no poles)."""
-    return _collocated(form.A, form.B2, form.C2, form.D22, form.delays, points)
+    return _collocated(form.A, form.B2, form.C2, form.D22, form.delays_s, points)
 
 
 def closed_loop_matrix(form: DelayForm, points: int) -> Real:
@@ -43,14 +43,14 @@ def closed_loop_matrix(form: DelayForm, points: int) -> Real:
         B2 = np.column_stack((form.B2, -form.B1))
         C2 = np.vstack((form.C2, form.C1))
         D22 = np.block([[form.D22, -form.D21[:, None]], [form.D12[None, :], np.array([[-form.D11]])]])
-        return _collocated(form.A, B2, C2, D22, np.append(form.delays, form.series_s), points)
+        return _collocated(form.A, B2, C2, D22, np.append(form.delays_s, form.series_s), points)
     gain = 1.0 / (1.0 + form.D11)
     return _collocated(
         form.A - gain * np.outer(form.B1, form.C1),
         form.B2 - gain * np.outer(form.B1, form.D12),
         form.C2 - gain * np.outer(form.D21, form.C1),
         form.D22 - gain * np.outer(form.D21, form.D12),
-        form.delays,
+        form.delays_s,
         points,
     )
 

@@ -10,14 +10,15 @@ from scipy.linalg.lapack import dgebal
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
+from actuator_lti.systems.plain_delays import descriptor
 
 
 @dataclass(frozen=True)
 class DelayForm:
     """Linear fractional form with exact delays, balanced.
 
-    dx/dt = A x + B1 u + B2 z, y = C1 x + D11 u + D12 z, v = C2 x + D21 u + D22 z, z_k(t) = v_k(t - delays_k),
-    and all of it behind one more delay ``series_s``.
+    dx/dt = A x + B1 u + B2 z, y = C1 x + D11 u + D12 z, v = C2 x + D21 u + D22 z, z_k(t) =
+    v_k(t - delays_s_k), and all of it behind one more delay ``series_s``.
     """
 
     A: Real
@@ -29,7 +30,7 @@ class DelayForm:
     D12: Real
     D21: Real
     D22: Real
-    delays: Real
+    delays_s: Real
     series_s: float = 0.0
 
 
@@ -68,47 +69,17 @@ def _form(whole: Real, n: int, delays: Real, series_s: float) -> DelayForm:
         M[m, m] = whole[m, m]
     return DelayForm(
         A=M[:n, :n], B1=M[:n, m], B2=M[:n, n:m], C1=M[m, :n], C2=M[n:m, :n], D11=float(M[m, m]),
-        D12=M[m, n:m], D21=M[n:m, m], D22=M[n:m, n:m], delays=delays, series_s=series_s,
+        D12=M[m, n:m], D21=M[n:m, m], D22=M[n:m, n:m], delays_s=delays, series_s=series_s,
     )  # fmt: skip
-
-
-def border_values(form: DelayForm, x: Real) -> Complex:
-    """The loop on s = j x."""
-    F, lag = _matrix(form, 1j * x)
-    right = np.concatenate((form.B1, form.D21)).astype(complex)
-    X = np.linalg.solve(F, right[:, None])[..., 0] if right.size else np.zeros((x.size, 0))
-    return (form.D11 + (_output(form, lag) * X).sum(axis=1)) * np.exp(-1j * x * form.series_s)
-
-
-def _matrix(form: DelayForm, points: Complex) -> tuple[Complex, Complex]:
-    n, q = form.B1.size, form.delays.size
-    F = np.zeros((points.size, n + q, n + q), dtype=complex)
-    F[:, :n, :n] = -form.A
-    index = np.arange(n)
-    F[:, index, index] += points[:, None]
-    lag = np.exp(-points[:, None] * form.delays)
-    if q:
-        F[:, :n, n:] = -form.B2 * lag[:, None, :]
-        F[:, n:, :n] = -form.C2
-        F[:, n:, n:] = np.eye(q) - form.D22 * lag[:, None, :]
-    return F, lag
 
 
 def characteristic(form: DelayForm, s: complex) -> tuple[Complex, Complex, Complex, Complex]:
     """At one point: F(s), dF/ds, and the row and column of L = D11 + row F^-1 column."""
-    F, lag = _matrix(form, np.array([s]))
-    n, q = form.B1.size, form.delays.size
-    slope = np.zeros_like(F[0])
+    F = descriptor(form, np.array([s]))[0]
+    n, lag = form.B1.size, np.exp(-s * form.delays_s)
+    slope = np.zeros_like(F)
     slope[:n, :n] = np.eye(n)
-    late = form.delays * lag[0]
+    late = form.delays_s * lag
     slope[:n, n:], slope[n:, n:] = form.B2 * late, form.D22 * late
-    column = np.concatenate((form.B1, form.D21)).astype(complex)
-    return F[0], slope, _output(form, lag)[0], column if q else column[:n]
-
-
-def _output(form: DelayForm, lag: Complex) -> Complex:
-    n = form.B1.size
-    row = np.empty((lag.shape[0], n + form.delays.size), dtype=complex)
-    row[:, :n] = form.C1
-    row[:, n:] = form.D12 * lag
-    return row
+    row = np.concatenate((form.C1, form.D12 * lag))
+    return F, slope, row, np.concatenate((form.B1, form.D21)).astype(complex)

@@ -139,7 +139,7 @@ def neighbour(form: DelayForm, way: float) -> DelayForm:
         y = x + way * ULP * np.spacing(x) * rng.choice([-1.0, 1.0], x.shape) * (x != 0.0)
         return y if y.ndim else float(y)
 
-    names = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays", "series_s")
+    names = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays_s", "series_s")
     values = {name: getattr(form, name) for name in DelayForm.__dataclass_fields__}
     return DelayForm(**{**values, **{name: moved(values[name]) for name in names}})
 
@@ -178,10 +178,10 @@ def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop
     InputError
         Too many delays, or a neutral loop.
     """
-    q, n = form.delays.size, form.B1.size
+    q, n = form.delays_s.size, form.B1.size
     if q > _MOST_DELAYS:
         raise InputError(f"exact arithmetic takes at most {_MOST_DELAYS} inner delays; this loop has {q}")
-    delays = [_exact(tau) for tau in form.delays]
+    delays = [_exact(tau) for tau in form.delays_s]
     late = [sum((tau for k, tau in enumerate(delays) if mask >> k & 1), fmpq(0)) for mask in range(1 << q)]
     whole = _exact_matrix(np.block([[form.A, form.B2], [form.C2, form.D22]]))
     column = _exact_matrix(np.concatenate((form.B1, form.D21))[:, None])

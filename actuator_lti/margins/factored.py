@@ -169,13 +169,13 @@ def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
         else np.array([0.5, 2.0])
     )
     L = response.at(w)
-    gain, phase, *_ = factors.log_value(w)
+    gain, phase = factors.log_value(w)
     off = np.log(np.abs(L)) - gain
     turned = np.angle(L * np.exp(-1j * phase))
     seen = (np.abs(L) > _SEEN) & (np.abs(L) < 1.0 / _SEEN)
     k = int(np.argmin(np.where(seen, np.abs(np.log(np.abs(L))), np.inf)))
     apart = np.hypot(off - off[k], np.angle(np.exp(1j * (turned - turned[k]))))
-    if not (apart[seen] <= _SAME).all() or not np.isfinite(off[k]):
+    if not seen.any() or not (apart[seen] <= _SAME).all() or not np.isfinite(off[k]):
         raise Doubtful("the factors do not make up the loop")
     turn = half_turn(float(turned[k]))
     if not abs(turn - turned[k]) <= _SAME:

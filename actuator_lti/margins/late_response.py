@@ -12,7 +12,7 @@ from actuator_lti.margins.axis_parts import axis_ends, axis_parts, distances_ove
 from actuator_lti.margins.axis_search import passages
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.factored import Response, factored
-from actuator_lti.margins.factors_on_axis import half_turn
+from actuator_lti.margins.factors_on_axis import Factored, half_turn
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.margins.poles import sorted_poles
 
@@ -30,9 +30,8 @@ def nearest_behind_delay(
     Doubtful
         They could not be checked.
     """
+    response, factors = _factors(loop, delay_s)
     with np.errstate(all="ignore"):
-        response = Response(loop, delay_s / (loop.period_s or 1.0))
-        factors = factored(response, sorted_poles(loop.A, loop.in_z))
         parts, _, _ = axis_parts(factors, None)
         return distances_over(factors, response, parts, axis_ends(factors, response), distances)
 
@@ -45,9 +44,8 @@ def first_turn(loop: RationalLoop, delay_s: float, floor: float) -> float | None
     Doubtful
         It could not be checked.
     """
+    response, factors = _factors(loop, delay_s)
     with np.errstate(all="ignore"):
-        response = Response(loop, delay_s / (loop.period_s or 1.0))
-        factors = factored(response, sorted_poles(loop.A, loop.in_z))
         level = half_turn(factors.log_at(0.0)[1]) - 0.5 * math.pi
         if factors.delay:  # no factor turns by more than half a turn
             top = (factors.roots.size + 1.0) * math.pi / factors.delay
@@ -65,3 +63,9 @@ def first_turn(loop: RationalLoop, delay_s: float, floor: float) -> float | None
         near = float(turns[0])
         w = brentq(beyond, near * (1.0 - _NEAR), near * (1.0 + _NEAR), xtol=1e-300, rtol=1e-14)
         return response.frequency(float(w))
+
+
+def _factors(loop: RationalLoop, delay_s: float) -> tuple[Response, Factored]:
+    response = Response(loop, delay_s / (loop.period_s or 1.0))
+    with np.errstate(all="ignore"):
+        return response, factored(response, sorted_poles(loop.A, loop.in_z))

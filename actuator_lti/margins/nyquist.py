@@ -35,7 +35,7 @@ def _from_zero(factors: Factored, response: Response, found: Found, dc: complex)
     """The turn of 1 + L up to just above zero frequency, and its angle there."""
     if not factors.at_zero < 0.0:
         return 0.0, _leaving(1.0 + dc.real, found)
-    low = float(found.known.low[0])
+    low = float(found.known[0, 0])
     on_real, on_axis = response.real_point(low), complex(response.at(np.array([low]))[0])
     turn, about = _angle_between(1.0 + on_real, 1.0 + on_axis), 0.5 * math.pi * factors.at_zero
     turn += 2.0 * math.pi * round((about - turn) / (2.0 * math.pi))
@@ -51,7 +51,7 @@ def _leaving(F: float, found: Found) -> float:
     """The angle of 1 + L beside an end of the axis, where it is F."""
     if F >= 0.0:
         return 0.0
-    return -math.pi if found.known.first[3, 0] > 0.0 else math.pi
+    return -math.pi if found.rate > 0.0 else math.pi
 
 
 def _to_end(response: Response, part: Part, end: complex) -> tuple[float, float]:

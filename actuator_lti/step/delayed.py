@@ -12,16 +12,17 @@ from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.collocation import open_loop_matrix
-from actuator_lti.margins.delay_form import DelayForm, border_values, characteristic, delay_form
+from actuator_lti.margins.delay_form import DelayForm, characteristic, delay_form
 from actuator_lti.margins.delay_response import DelayResponse
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import Motion
 from actuator_lti.step.rational import NO_FINAL, UNSTABLE, free_motion
 from actuator_lti.step.stepped import Stepped
+from actuator_lti.systems.delay_stepper import step_of
 from actuator_lti.systems.exact_fraction import product
+from actuator_lti.systems.plain_delays import response
 
-_FEWEST = 12  # steps to the shortest delay
 _FIRST = 10.0  # longest delays to step at first
 _MEET = 1e-5
 _POINTS = 32
@@ -50,10 +51,10 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     if at_rest.order > 0 or poles.unstable or poles.border > 1:
         raise InputError(UNSTABLE)
     final = 0.0 if at_rest.order else at_rest.lead
-    _refuse_no_final(form, final, poles.values)
-    head = _FIRST * float(form.delays.max())
+    _refuse_no_final(system, final, poles.values)
+    head = _FIRST * float(form.delays_s.max())
     while True:
-        h = _grid_step(form.delays, head)
+        h = _grid_step(form.delays_s, head)
         values = _stepped(form, h, int(np.ceil(head / h))) / final - 1.0
         exact, weights = _modes(form, poles.values, head)
         late = np.arange(len(values) * 3 // 4, len(values))
@@ -64,9 +65,9 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
         head *= 2.0
 
 
-def _refuse_no_final(form: DelayForm, final: float, poles: Complex) -> None:
-    around = np.abs(poles[np.abs(poles) > 0.0])
-    largest = float(np.abs(border_values(form, around)).max(initial=0.0))
+def _refuse_no_final(system: Any, final: float, poles: Complex) -> None:
+    around = 1j * np.abs(poles[np.abs(poles) > 0.0])
+    largest = float(np.abs(response(system, around)).max(initial=0.0))
     if abs(final) <= _ZERO * largest:
         raise InputError(NO_FINAL)
 
@@ -125,14 +126,8 @@ def _motion(poles: Complex, weights: Complex, start: float) -> Motion:
 
 
 def _grid_step(delays: Real, horizon: float) -> float:
-    """A step of which every delay is a multiple, where there is one; else a fine one."""
-    shortest = float(delays.min())
-    for parts in range(1, 65):
-        ratio = delays * parts / shortest
-        if (np.abs(ratio - np.round(ratio)) < 1e-9 * ratio).all():
-            break
-    refine = max(int(np.ceil(_FEWEST / parts)), 1)
-    h = shortest / (parts * refine)
+    """A step of which every delay is a multiple, where there is one; longer where it would take too many."""
+    shortest, (h, _) = float(delays.min()), step_of(delays)
     if horizon / h > _MOST:
         h = shortest / max(int(shortest * _MOST / horizon), 1)
         if horizon / h > 4 * _MOST:
@@ -176,13 +171,13 @@ def _stepped(form: DelayForm, h: float, steps: int) -> Real:
 
     Returns y at the start, at each quarter and at the end of each step (shape (steps + 1, 5)).
     """
-    n, q = form.B1.size, form.delays.size
+    n, q = form.B1.size, form.delays_s.size
     M = np.zeros((n + 3 * q + 1, n + 3 * q + 1))
     M[:n, :n], M[:n, n : n + q], M[:n, -1] = form.A, form.B2, form.B1
     M[n : n + q, n + q : n + 2 * q] = M[n + q : n + 2 * q, n + 2 * q : n + 3 * q] = np.eye(q)
     positions = np.arange(_PARTS + 1) / _PARTS
     inside = np.stack([expm(M * (h * part))[:n] for part in positions])
-    past = _Past(steps, _Lag.of(form.delays / h))
+    past = _Past(steps, _Lag.of(form.delays_s / h))
     x, y = np.zeros(n), np.empty((steps + 1, _PARTS + 1))
     for k in range(steps + 1):
         z = np.stack([past.at(k, part) for part in positions])

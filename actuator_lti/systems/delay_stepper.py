@@ -9,7 +9,7 @@ every sum of delays where these have a common measure.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ class DelayStepper:
 
     def __init__(self, system: DelaySystem, start_s: float, state: Real, u: Real) -> None:
         self.system, self.start_s = system, start_s
-        self.step_s, self._block = _step(system.delays_s)
+        self.step_s, self._block = step_of(system.delays_s)
         self._inputs = np.hstack([system.B1, system.B2])
         self._moves = {count: _many(system.A, self._inputs, self.step_s, count) for count in (1, self._block)}
         self._node, self._state, self._u = 0, state.copy(), u.copy()
@@ -122,7 +122,7 @@ class DelayStepper:
         return np.where(np.abs(part) <= _SAME, kept[row, self._columns], between)
 
 
-def _step(delays_s: Real) -> tuple[float, int]:
+def step_of(delays_s: NDArray[np.floating[Any]]) -> tuple[float, int]:
     """Distance of the nodes, and how many of it are no longer than the shortest delay.
 
     The coarsest distance on which all delays fall, a part of the shortest in any case.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import degrees, isnan, pi
+from math import isnan, pi
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.drive_figure import drive_figure
@@ -12,6 +12,7 @@ from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES, drive_cas
 from actuator_lti.batch import Population
 from actuator_lti.errors import InputError
 from analyses.specification.drive_figures import drive_figures
+from nonlinear.runs.trajectory import COMMAND_UNITS
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -87,7 +88,7 @@ class LargeSignal:
         from actuator_lti.loops.limiters import onset
         from analyses.monte_carlo.stepping import StepCheck, step_columns
 
-        shown = 1.0 if design.axis == "linear" else degrees(1.0)
+        shown = COMMAND_UNITS[design.axis, design.controller.outermost][1]
         figures: dict[str, float | None] = {}
         for frequency in self.frequencies_hz:
             try:
@@ -120,7 +121,8 @@ def _name(key: str, design: Design) -> FigureName:
     if known is not None:
         unit, better = known.unit_for(design.axis), int(known.better)
     else:  # of the large signal
-        unit, better = ("m" if design.axis == "linear" else "deg", 1) if quantity == "onset" else ("A", -1)
+        command = COMMAND_UNITS[design.axis, design.controller.outermost][0]
+        unit, better = (command, 1) if quantity == "onset" else ("A", -1)
     words = quantity.replace("_", " ")
     if quantity == "onset":
         words, at = "linear up to", f"{at} Hz"

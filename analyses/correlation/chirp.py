@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from actuator_lti.errors import InputError
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.voltage_motor import GRID_S, VoltageMotor
+from analyses.estimation.arrays import FloatArray
 from analyses.records.record import Record
 
-FloatArray = NDArray[np.float64]
 TOLERANCE = 0.01  # of the amplitude: the law holds
 EDGES_HZ = (4, 8, 16, 32)  # of the bands
 

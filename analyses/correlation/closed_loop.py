@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import motor_torque_Nm
@@ -22,6 +21,7 @@ from analyses.correlation.driving import (
     needed_command,
     supply_of,
 )
+from analyses.estimation.arrays import FloatArray
 from analyses.records.consistency import Finding, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
@@ -31,7 +31,6 @@ from analyses.records.record import Record
 if TYPE_CHECKING:
     from nonlinear import Trajectory
 
-FloatArray = NDArray[np.float64]
 
 UNITS = {
     "angle": "rad",

@@ -6,12 +6,10 @@ from dataclasses import dataclass, field
 from math import isnan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.means import best_lag
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,12 +9,12 @@ from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Command as CommandShape
 from actuator_lti.design.model import Controller, Design
 from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.records.record import Record
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from nonlinear.commands import Command
     from nonlinear.loads import LoadMoment
 
-FloatArray = NDArray[np.float64]
 
 LOADS = {"rotary": "torque", "linear": "load_force"}
 STAGES = ("position", "velocity", "current", "voltage")
@@ -170,7 +169,7 @@ def _smooth(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatAr
     return np.asarray(min(curves, key=missed)(time_s, values)(inside), dtype=np.float64)
 
 
-def steps_of(values: FloatArray) -> NDArray[np.bool_]:
+def steps_of(values: FloatArray) -> BoolArray:
     """For each interval between two samples, whether the values jump there from standstill to standstill.
 
     Examples

@@ -10,15 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import by_record, correlated_covariance
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
 
 ESTIMATOR_RAD_S = 1000.0
 GRID_S = 1.0 / 16000.0

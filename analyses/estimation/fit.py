@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from analyses.estimation.arrays import FloatArray
 
 COVERAGE = 1.959963984540054
 """Standard errors of a normal value in half of its 95 % interval."""

@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.means import autocovariance
-
-FloatArray = NDArray[np.float64]
 
 LEAST_OWN_SHARE = 0.03
 """A column of which less than this is its own, beside those before it, is not told apart from them."""

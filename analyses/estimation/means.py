@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-FloatArray = NDArray[np.float64]
+from analyses.estimation.arrays import FloatArray
 
 BATCH_TIMES = 5.0
 MIN_BATCHES, MAX_BATCHES = 8, 64

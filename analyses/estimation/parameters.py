@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import sqrt
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
 
 
 @dataclass(frozen=True)
@@ -68,3 +73,11 @@ def parameter(name: str, axis: str = "rotary") -> Parameter:
     if axis != "linear":
         return one
     return Parameter(one.linear or one.label, ON_A_LINE.get(one.unit, one.unit), one.key, scale=one.scale)
+
+
+def own_std(design: Design, key: str) -> float:
+    """Standard deviation of a design's own value, from its tolerance; 0 where none is stated."""
+    one = design.parameters.get(key)
+    if one is None or one.tolerance is None:
+        return 0.0
+    return float(one.tolerance.std or (one.tolerance.half_width or 0.0) / sqrt(3.0))

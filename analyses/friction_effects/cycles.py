@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass, replace
 
 from actuator_lti.design.model import Design, Instruments
-from actuator_lti.drive.operating import dry_torque
 from analyses.friction_effects.stick_slip import StickSlipCycle
-from analyses.limit_cycles.friction import cycles_of_friction
+from analyses.limit_cycles.describing import without_counts
+from analyses.limit_cycles.friction import cycles_of_friction, dry_Nm
 from analyses.limit_cycles.result import Confirmation, Cycle
 from analyses.limit_cycles.run import confirm
 from analyses.motion.settling import Settling, largest_swing, settle
@@ -83,23 +83,13 @@ def limit_cycles(
     foreseen : tuple of Cycle, optional
         By describing function, if known already.
     """
-    design = replace(  # what noise or counts keep moving, friction does not
-        design,
-        instruments=Instruments(),
-        encoder=replace(design.encoder, counts_per_rev=None),
-        output_encoder=replace(design.output_encoder, counts_per_rev=None),
-    )
+    design = without_counts(replace(design, instruments=Instruments()))  # they keep moving, friction does not
     if foreseen is None:
         foreseen = described_cycles(design, load_Nm)
     checked = tuple(confirm(design, cycle) for cycle in foreseen)
     sizes = [step_rad, 0.1 * step_rad] + ([BELOW * threshold_rad] if threshold_rad else [])
     sizes += [stick_slip.output_amplitude_rad] if stick_slip is not None else []
     return LimitCycles(checked, stick_slip, tuple(settle(design, load_Nm, size) for size in sizes))
-
-
-def dry_Nm(design: Design, load_Nm: float) -> float:
-    """Dry friction at the motor, forward and backward together; of a friction map that at its first point."""
-    return float(dry_torque(design, load_Nm, 1) + dry_torque(design, load_Nm, -1))
 
 
 def described_cycles(design: Design, load_Nm: float) -> tuple[Cycle, ...]:

@@ -12,11 +12,11 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import dry_torque
 from actuator_lti.loops import assemble_loops
 from analyses.friction_effects.breakaway import Threshold, threshold
-from analyses.friction_effects.cycles import LimitCycles, described_cycles, dry_Nm, limit_cycles
+from analyses.friction_effects.cycles import LimitCycles, described_cycles, limit_cycles
 from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
 from analyses.friction_effects.stick_slip import stick_slip_cycle
 from analyses.large_signal.steady_start import linear_steady_state
-from analyses.limit_cycles.friction import at_load
+from analyses.limit_cycles.friction import at_load, dry_Nm
 from analyses.limit_cycles.result import Cycle
 
 if TYPE_CHECKING:

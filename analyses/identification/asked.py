@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from actuator_lti.errors import InputError
+from analyses.estimation.parameters import parameter
 from analyses.request import Option
 
 if TYPE_CHECKING:
@@ -19,39 +20,13 @@ Criterion = Literal["margins", "D"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
-    """Files, and what is looked for in them: friction of a campaign, a motion's model, or two masses."""
+class Settings:
+    """What is looked for in records of a motion, and how."""
 
-    files: Annotated[
-        list[Path],
-        Option(
-            words="A campaign file (TOML), or records: CSV, Parquet, .mat, record files (TOML).",
-            metavar="FILE...",
-            argument=True,
-        ),
-    ]
-    validate: Annotated[
-        list[Path] | None,
-        Option(words="A record the fit does not see; repeatable.", metavar="RECORD"),
-    ] = None
-    frequency_response: Annotated[
-        bool, Option(words="Of one record with a periodic excitation: a compliant two-mass drive.")
-    ] = False
-    play: Annotated[
-        Path | None,
-        Option(words="With --frequency-response: a reversing motion, both angles.", metavar="RECORD"),
-    ] = None
-    period_s: Annotated[
-        float | None,
-        Option(words="Period of the excitation (default: found from the command).", metavar="s"),
-    ] = None
     fix: Annotated[
         list[str] | None,
         Option(words="Hold a value, such as friction.load_coefficient=0; repeatable.", metavar="KEY=VALUE"),
     ] = None
-    accept: Annotated[
-        bool, Option(words="Write the design even where a check fails (the status stays 1).")
-    ] = False
     residual_limit: Annotated[
         float,
         Option(words="Largest relative residual for which a design is written; 20.", metavar="PERCENT"),
@@ -87,6 +62,38 @@ class Asked:
     decimation: Annotated[
         int | None, Option(words="Of records: decimation (default: to the cut-off).", metavar="N")
     ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked(Settings):
+    """Files, and what is looked for in them: friction of a campaign, a motion's model, or two masses."""
+
+    files: Annotated[
+        list[Path],
+        Option(
+            words="A campaign file (TOML), or records: CSV, Parquet, .mat, record files (TOML).",
+            metavar="FILE...",
+            argument=True,
+        ),
+    ]
+    validate: Annotated[
+        list[Path] | None,
+        Option(words="A record the fit does not see; repeatable.", metavar="RECORD"),
+    ] = None
+    frequency_response: Annotated[
+        bool, Option(words="Of one record with a periodic excitation: a compliant two-mass drive.")
+    ] = False
+    play: Annotated[
+        Path | None,
+        Option(words="With --frequency-response: a reversing motion, both angles.", metavar="RECORD"),
+    ] = None
+    period_s: Annotated[
+        float | None,
+        Option(words="Period of the excitation (default: found from the command).", metavar="s"),
+    ] = None
+    accept: Annotated[
+        bool, Option(words="Write the design even where a check fails (the status stays 1).")
+    ] = False
     suggest: Annotated[int, Option(words="Suggest so many further runs of a campaign; 6.", metavar="N")] = 6
     criterion: Annotated[Criterion, Option(words="What suggested runs serve: margins (default), or D.")] = (
         "margins"
@@ -113,7 +120,7 @@ class Asked:
         first = self.files[0]
         if self.frequency_response or len(self.files) != 1 or first.suffix.lower() != ".toml":
             return False
-        from analyses.records.toml_tables import read_toml
+        from analyses.toml_tables import read_toml
 
         return "file" not in read_toml(first)
 
@@ -156,3 +163,20 @@ def fixed_values(design: Design, texts: Sequence[str] | None) -> dict[str, float
             except InputError as error:
                 raise InputError(f"--fix {key} = {value}: {error.message}") from None
     return result
+
+
+def held_by_name(
+    fixed: Mapping[str, float], names: Sequence[str], more: Mapping[str, str] | None = None
+) -> dict[str, float]:
+    """Fixed keys by the names of a fit; ``more`` are keys that no single name has.
+
+    Raises
+    ------
+    InputError
+        For a key that none of them has.
+    """
+    known = {parameter(name).key: name for name in names if parameter(name).key} | dict(more or {})
+    for key in fixed:
+        if key not in known:
+            raise InputError(f"--fix {key}: can be fixed here: {', '.join(sorted(known))}")
+    return {known[key]: value for key, value in fixed.items()}

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, replace
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.driving import command_of
-from analyses.estimation.parameters import parameter
+from analyses.identification.asked import Settings, fixed_values, held_by_name
 from analyses.identification.design_values import DesignValue, design_values
 from analyses.identification.diagnosis import diagnosed
 from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
 from analyses.identification.following_error import following_item
 from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
-from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, Recipe
+from analyses.identification.joint_model import NAMES, JointModel, Recipe
 from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.own_bias import without_bias
 from analyses.identification.refinement import refine_records
@@ -31,7 +30,6 @@ from analyses.identification.to_design import (
     with_structure,
 )
 from analyses.identification.verdict import (
-    RESIDUAL_LIMIT,
     Identified,
     Item,
     held_out_item,
@@ -49,26 +47,6 @@ from analyses.records.record import Record
 
 
 @dataclass(frozen=True, kw_only=True)
-class BenchSettings:
-    """What was asked of an identification; ``fixed`` by key of the design, in SI.
-
-    ``form`` "map": friction maps with break points are tried, and one is taken where it is clearly better.
-    ``gravity``: a pendulum at the output is looked for (it is where the design has one). ``electrical``: R
-    and the motor's constant come from the voltage equation first.
-    """
-
-    form: FrictionForm | Literal["map"] = "symmetric"
-    gravity: bool = False
-    electrical: bool = False
-    cutoff_hz: float | None = None
-    decimation: int | None = None
-    fixed: Mapping[str, float] = field(default_factory=dict)
-    inertia_to: str = INERTIAS[0]
-    refine: bool = False
-    residual_limit: float = RESIDUAL_LIMIT
-
-
-@dataclass(frozen=True, kw_only=True)
 class BenchResult(Identified):
     """Everything that the records told: the fit, the design that would be written, and whether it may be."""
 
@@ -78,7 +56,7 @@ class BenchResult(Identified):
     model: JointModel
     refined: OutputErrorResult | None
     resimulated: tuple[Resimulated, ...]
-    settings: BenchSettings
+    settings: Settings
     design_values: tuple[DesignValue, ...] = ()
     laws: tuple[LawChoice, ...] = ()
     electrical: ElectricalFit | None = None
@@ -95,7 +73,7 @@ def identify_bench(
     records: Sequence[Record],
     *,
     validation: Sequence[Record] = (),
-    settings: BenchSettings | None = None,
+    settings: Settings | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> BenchResult:
     """Identify a drive from records of its motion, and hold the design that comes of it against them.
@@ -105,11 +83,12 @@ def identify_bench(
     InputError
         If a record lacks a signal, a key cannot be fixed, or no design can be made of the result.
     """
-    settings = BenchSettings() if settings is None else settings
+    settings = Settings() if settings is None else settings
+    fixed, limit = fixed_values(design, settings.fix), settings.residual_limit / 100.0
     used = tuple(prepared(record) for record in records)
     unseen = tuple(prepared(record) for record in validation)
     findings = {record.name: check_record(design, record) for record in (*used, *unseen)}
-    start, electrical = with_fixed(design, settings.fixed), None
+    start, electrical = with_fixed(design, fixed), None
     if settings.electrical:
         electrical = fit_electrical(start, used)
         told = f"voltage equation of {', '.join(record.name for record in records)}"
@@ -118,7 +97,7 @@ def identify_bench(
 
     def fit(records: Sequence[Record]) -> tuple[JointModel, tuple[Record, ...]]:
         nonlocal laws
-        model, laws = _fitted(start, records, settings)
+        model, laws = _fitted(start, records, settings, fixed)
         return _unbiased(start, _with_commands(start, model, records), records, settings)
 
     right = diagnosed(start, used, fit, _recipe(used[0], settings))
@@ -131,7 +110,7 @@ def identify_bench(
     size = size_item(
         design, compared, kept_constants=electrical is None, loaded=any(is_loaded(record) for record in used)
     )
-    items = (*_fit_items(findings, size, model, settings.residual_limit), *sampled, *filter(None, lags))
+    items = (*_fit_items(findings, size, model, limit), *sampled, *filter(None, lags))
     try:
         values = joint_values(start, model, inertia_to=settings.inertia_to)
         made = design_with_fit(with_structure(start, model), values, source)
@@ -153,7 +132,7 @@ def identify_bench(
         design=made,
         text=text,
         resimulated=again,
-        items=(*items, *_held_out(start, model, unseen, settings), *_again(again, settings)),
+        items=(*items, *_held_out(start, model, unseen, limit), *_again(again, limit)),
         settings=settings,
         design_values=compared,
         laws=laws,
@@ -162,15 +141,15 @@ def identify_bench(
 
 
 def _fitted(
-    start: Design, used: Sequence[Record], settings: BenchSettings
+    start: Design, used: Sequence[Record], settings: Settings, asked: Mapping[str, float]
 ) -> tuple[JointModel, tuple[LawChoice, ...]]:
     """The joint model, and the friction laws that were tried."""
-    recipe, fixed = _recipe(used[0], settings), _held(start, settings)
+    recipe, fixed = _recipe(used[0], settings), _held(start, asked, settings.friction)
     gravity = settings.gravity or start.load.gravity is not None
-    if settings.form == "map":
+    if settings.friction == "map":
         fit = fit_map(start, used, recipe=recipe, fixed=fixed, gravity=gravity)
         return fit.model, fit.laws
-    model = fit_records(start, used, form=settings.form, recipe=recipe, fixed=fixed, gravity=gravity)
+    model = fit_records(start, used, form=settings.friction, recipe=recipe, fixed=fixed, gravity=gravity)
     return model, ()
 
 
@@ -185,7 +164,7 @@ def _with_commands(start: Design, model: JointModel, used: Sequence[Record]) -> 
 
 
 def _unbiased(
-    start: Design, model: JointModel, used: Sequence[Record], settings: BenchSettings
+    start: Design, model: JointModel, used: Sequence[Record], settings: Settings
 ) -> tuple[JointModel, tuple[Record, ...]]:
     """The model less its own bias, where a design can be made of it and simulated; the simulated records."""
 
@@ -196,26 +175,17 @@ def _unbiased(
     return without_bias(start, make, model, used, _recipe(used[0], settings))
 
 
-def _recipe(record: Record, settings: BenchSettings) -> Recipe | None:
+def _recipe(record: Record, settings: Settings) -> Recipe | None:
     if settings.cutoff_hz is None and settings.decimation is None:
         return None
     return recipe_for(record, settings.cutoff_hz, settings.decimation)
 
 
-def _held(design: Design, settings: BenchSettings) -> dict[str, float]:
+def _held(design: Design, asked: Mapping[str, float], form: str) -> dict[str, float]:
     """Fixed keys by the model's names; a fixed rotor or load inertia fixes the whole."""
-    held = {}
-    names = [*NAMES["per-direction" if settings.form == "per-direction" else "symmetric"], "load_coefficient"]
-    of_key = {parameter(name).key: name for name in names if parameter(name).key}
-    for path, value in settings.fixed.items():
-        if path in INERTIAS:
-            held["inertia"] = design.inertia_kgm2
-        elif path in of_key:
-            held[of_key[path]] = value
-        else:
-            known = ", ".join(sorted({*of_key, *INERTIAS}))
-            raise InputError(f"--fix {path}: can be fixed here: {known}")
-    return held
+    names = (*NAMES["per-direction" if form == "per-direction" else "symmetric"], "load_coefficient")
+    held = held_by_name(asked, names, dict.fromkeys(INERTIAS, "inertia"))
+    return held | ({"inertia": design.inertia_kgm2} if "inertia" in held else {})
 
 
 def _fit_items(
@@ -229,16 +199,12 @@ def _fit_items(
     )
 
 
-def _held_out(
-    start: Design, model: JointModel, unseen: Sequence[Record], settings: BenchSettings
-) -> tuple[Item, ...]:
-    fit, limit = model.relative_residual, settings.residual_limit
+def _held_out(start: Design, model: JointModel, unseen: Sequence[Record], limit: float) -> tuple[Item, ...]:
+    fit = model.relative_residual
     return tuple(
         held_out_item(record.name, held_out_residual(start, model, record), fit, limit) for record in unseen
     )
 
 
-def _again(again: Sequence[Resimulated], settings: BenchSettings) -> tuple[Item, ...]:
-    return tuple(
-        simulated_item(one.record, one.relative_error, settings.residual_limit, one.how) for one in again
-    )
+def _again(again: Sequence[Resimulated], limit: float) -> tuple[Item, ...]:
+    return tuple(simulated_item(one.record, one.relative_error, limit, one.how) for one in again)

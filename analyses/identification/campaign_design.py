@@ -6,14 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
 from analyses.identification.surface_fit import PATHS, SurfaceFit
-
-FloatArray = NDArray[np.float64]
 
 LOOPS = ("velocity", "position")
 STEP = 0.02

@@ -11,12 +11,13 @@ from scipy.stats import chi2
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
-from analyses.estimation.parameters import parameter
+from analyses.estimation.parameters import own_std, parameter
 from analyses.identification.electrical import fit_electrical
 from analyses.identification.joint_model import JointModel, default_value
 from analyses.records.factors import named_factor
-from analyses.records.record import FloatArray, Record
+from analyses.records.record import Record
 
 UNSTATED = 0.05
 """Relative standard deviation of a number of a design that states no tolerance."""
@@ -120,16 +121,13 @@ def _value(design: Design, fit: Fit, name: str, before: float, behind: float = 0
     before, found = before + behind, fit[name] + behind
     if before <= 0.0 or found <= 0.0:
         return None
-    own = design.parameters.get(parameter(name).key)
-    tolerance = None if own is None else own.tolerance
-    width = 0.0 if tolerance is None else tolerance.std or (tolerance.half_width or 0.0) / np.sqrt(3.0)
     return DesignValue(
         name=name,
         design=before,
         found=found,
         ratio=found / before,
         error=fit.std(name) / before,
-        allowed=float(width / before) or UNSTATED,
+        allowed=own_std(design, parameter(name).key) / before or UNSTATED,
     )
 
 

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.arrays import BoolArray, FloatArray, stretches
 from analyses.estimation.least_squares import covariance_of, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
@@ -17,7 +17,7 @@ from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows
 from analyses.identification.simultaneous import SURE, Lag, lag_of, shifted
 from analyses.records.consistency import Finding
-from analyses.records.record import FloatArray, Record
+from analyses.records.record import Record
 
 LEAST_RUN = 3
 """Samples in a row at the largest or smallest value of all: a flat top."""
@@ -140,7 +140,7 @@ def _drift(part: RecordFit, model: JointModel) -> tuple[Finding, FloatArray] | N
     return finding, moved
 
 
-def flat_tops(values: FloatArray) -> NDArray[np.bool_]:
+def flat_tops(values: FloatArray) -> BoolArray:
     """Where a signal stands at its largest or smallest value for three samples or more.
 
     Examples
@@ -151,8 +151,7 @@ def flat_tops(values: FloatArray) -> NDArray[np.bool_]:
     out = np.zeros(len(values), dtype=bool)
     for level in (np.max(values), np.min(values)):
         at = np.abs(values - level) <= 1e-9 * np.ptp(values)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], at.astype(np.int8), [0]])))
-        for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        for start, stop in stretches(at):
             out[start:stop] |= stop - start >= LEAST_RUN
     return out
 

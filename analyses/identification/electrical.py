@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import solve, told_apart
 from analyses.estimation.parameters import parameter
@@ -18,8 +18,6 @@ from analyses.identification.rows import motion_of, recipe_for
 from analyses.records.differentiation import central_difference
 from analyses.records.prepare import period_of
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
 
 NAMES = ("resistance", "back_emf", "inductance", "voltage_offset")
 SHOWN = 5.0

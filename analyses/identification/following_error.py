@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
+from analyses.estimation.arrays import FloatArray
 from analyses.identification.verdict import Item
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
 
 LARGEST_ERROR = 0.015
 LEAST_ALIKE = 0.9

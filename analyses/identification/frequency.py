@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import ComplexArray, FloatArray
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 MIN_PERIODS = 4
 TOP = 0.4  # of the sampling frequency: lines above are not looked at

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Coupling, Design, LoadFriction
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.parameters import parameter
+from analyses.estimation.parameters import own_std, parameter
+from analyses.identification.asked import held_by_name
 from analyses.identification.frequency import (
     Lines,
     excited_lines,
@@ -40,8 +41,6 @@ from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
 from analyses.records.prepare import prepared
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
 
 MISFIT_LIMIT = 3.0
 MISFIT_DOUBTED = 1.5
@@ -235,12 +234,7 @@ def _held_at_zero(fit: TwoMass, below: Sequence[str]) -> TwoMass:
 
 def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
     """Values of the design's keys by the names of the fit, at the motor and at the coupling."""
-    names = {parameter(name).key: name for name in NAMES}
-    held = {}
-    for path, value in fixed.items():
-        if path not in names:
-            raise InputError(f"--fix {path}: can be fixed here: {', '.join(names)}")
-        held[names[path]] = value
+    held = held_by_name(fixed, NAMES)
     if "motor_inertia" in held:
         held["motor_inertia"] += design.motor_side_inertia_kgm2 - design.motor.rotor_inertia_kgm2
     if "load_inertia" in held:
@@ -254,7 +248,8 @@ OF_THE_LOAD = ("stiffness", "load_inertia", "damping", "load_viscous")
 
 def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
     """The play, its error with what the errors of the frequency response make of it."""
-    dry, dry_std = _load_dry(design)
+    dry = 0.0 if design.load.friction is None else design.load.friction.dry_torque_Nm
+    dry_std = own_std(design, "load.friction.dry_torque")
     own = {**{name: fit[name] for name in OF_THE_LOAD}, "load_dry": dry}
     play = _play_at(design, record, fit, own)
     names = [name for name in OF_THE_LOAD if name in fit.names]
@@ -270,16 +265,6 @@ def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
         moved = _play_at(design, record, fit, {**own, "load_dry": dry + dry_std})
         passed_on = float(np.hypot(passed_on, moved.half_rad - play.half_rad))
     return replace(play, half_std_rad=float(np.hypot(play.half_std_rad, passed_on)))
-
-
-def _load_dry(design: Design) -> tuple[float, float]:
-    """The design's dry friction behind the coupling, which the play is found with, and its standard error."""
-    friction, parameter = design.load.friction, design.parameters.get("load.friction.dry_torque")
-    if friction is None:
-        return 0.0, 0.0
-    tolerance = None if parameter is None else parameter.tolerance
-    std = 0.0 if tolerance is None else tolerance.std or (tolerance.half_width or 0.0) / np.sqrt(3.0)
-    return friction.dry_torque_Nm, float(std)
 
 
 def _play_at(design: Design, record: Record, fit: TwoMass, values: Mapping[str, float]) -> Play:

@@ -6,17 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from actuator_lti.design.model import Design
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, linear_basis
 from analyses.identification.rows import Rows, record_rows
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
 
 MOST_BREAKS = 4
 GRID = 24

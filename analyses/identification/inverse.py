@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import (
     NotTold,
@@ -19,12 +19,10 @@ from analyses.estimation.least_squares import (
     solve,
     told_apart,
 )
-from analyses.estimation.parameters import parameter
+from analyses.estimation.parameters import own_std, parameter
 from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, RecordFit, default_value
-from analyses.identification.rows import Rows, record_rows
+from analyses.identification.rows import Rows, record_rows, rows_under
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
 
 GRAVITY_ROUNDS = 6
 
@@ -140,13 +138,8 @@ def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed])
     """What the design's own tolerances of the values kept add to the covariance of those that were found."""
     added = np.zeros((len(free), len(free)))
     for name, one in fixed.items():
-        own = design.parameters.get(parameter(name).key)
-        if own is None or own.tolerance is None:
-            continue
         moves = np.array([one.moves.get(other, 0.0) for other in free])
-        width = own.tolerance.half_width or 0.0
-        std = own.tolerance.std or width / np.sqrt(3.0)
-        added += std**2 * np.outer(moves, moves)
+        added += own_std(design, parameter(name).key) ** 2 * np.outer(moves, moves)
     return added
 
 
@@ -274,11 +267,6 @@ def _part(block: Rows, w: FloatArray, rest: FloatArray, own: FloatArray) -> Reco
 
 def held_out_residual(design: Design, model: JointModel, record: Record) -> float:
     """Relative residual of a record that the model has not seen."""
-    gravity = "gravity_sin" in model
-    knots = model.knots_rad_s
-    block = record_rows(design, record, model.form, None, gravity=gravity, knots_rad_s=knots)
-    if gravity:
-        moment = model["gravity_sin"] * block.sine + model["gravity_cos"] * block.cosine
-        block = record_rows(design, record, model.form, None, gravity=True, moment=moment, knots_rad_s=knots)
+    block = rows_under(design, record, model)
     rest = block.y - block.w @ np.array([model[name] for name in block.names])
     return float(np.linalg.norm(rest) / np.linalg.norm(block.y))

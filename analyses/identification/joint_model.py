@@ -11,14 +11,13 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.estimation.fit import Fit
 from analyses.records.differentiation import Motion
 
-FloatArray = NDArray[np.float64]
 FrictionForm = Literal["symmetric", "per-direction"]
 
 NAMES: Mapping[FrictionForm, tuple[str, ...]] = {
@@ -101,7 +100,7 @@ class RecordFit:
     w: FloatArray = field(repr=False)
     residual: FloatArray = field(repr=False)
     own_residual: FloatArray = field(repr=False)
-    keep: NDArray[np.bool_] = field(repr=False)
+    keep: BoolArray = field(repr=False)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lsim
 
 from actuator_lti.design.model import Design
+from analyses.estimation.arrays import FloatArray
 from analyses.identification.joint_model import Recipe
 from analyses.records.differentiation import Motion, filtered_motion
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
 
 ROUNDS = 4
 """Rounds in which the sign of the load's speed and its moment are found from the speed itself."""

@@ -6,16 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import correlated_covariance
-
-FloatArray = NDArray[np.float64]
 
 STEP = 1e-3
 TOLERANCE = 1e-6

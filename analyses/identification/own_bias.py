@@ -7,18 +7,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import command_of
+from analyses.estimation.arrays import FloatArray, picked
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of
 from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit, default_value
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
-from analyses.records.record import FloatArray, Record
+from analyses.records.record import Record
 
 MOST_TICKS = 2_000_000
 LARGEST_BIAS = 0.2
@@ -117,14 +117,8 @@ def _noise(measured: RecordFit, simulated: RecordFit) -> FloatArray:
     both = measured.keep[:count] & simulated.keep[:count]
     if len(measured.keep) < len(simulated.keep) or np.count_nonzero(both) < 2 * measured.w.shape[1]:
         return measured.own_residual
-    own, model = (_at(part, both) for part in (measured, simulated))
+    own, model = (picked(part.own_residual, part.keep, both) for part in (measured, simulated))
     return np.asarray(own - model)
-
-
-def _at(part: RecordFit, rows: NDArray[np.bool_]) -> FloatArray:
-    whole = np.zeros(len(part.keep))
-    whole[part.keep] = part.own_residual
-    return whole[: len(rows)][rows]
 
 
 def _alone(

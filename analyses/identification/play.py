@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.estimation.least_squares import solve, told_apart
-
-FloatArray = NDArray[np.float64]
 
 CONTACT = 0.25
 """Rows whose torque is above this share of its largest (95 % point) are taken as in contact."""
@@ -119,7 +117,7 @@ def find_play(
     )
 
 
-def _coarse(resolution_rad: float, touching: NDArray[np.bool_], smooth_samples: float) -> float:
+def _coarse(resolution_rad: float, touching: BoolArray, smooth_samples: float) -> float:
     """Error from a resolution: uniform, averaged over the independent rows of one cycle (two contacts)."""
     visits = max(int(np.count_nonzero(np.diff(touching.astype(np.int8)) == 1)), 2)
     independent = np.count_nonzero(touching) / (0.5 * visits) / max(smooth_samples, 1.0)
@@ -133,9 +131,7 @@ def _first_gap(twist: FloatArray, torque: FloatArray, stiffness: float) -> tuple
     return float(0.5 * (low + high)), max(0.5 * float(high - low) - elastic, 0.0)
 
 
-def _in_contact(
-    torque_Nm: FloatArray, twist: FloatArray, half: float, guard_samples: int
-) -> NDArray[np.bool_]:
+def _in_contact(torque_Nm: FloatArray, twist: FloatArray, half: float, guard_samples: int) -> BoolArray:
     """Rows beyond the gap on the side that the torque, well away from zero, pushes to."""
     side = np.sign(torque_Nm)
     pushed = np.abs(torque_Nm) > CONTACT * float(np.quantile(np.abs(torque_Nm), 0.95))

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.means import correlated_means
 from analyses.identification.steady import SteadyCriterion, SteadyWindow, find_steady_window
 from analyses.records.campaign_import import ImportedRun, SetAside
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.closed_loop import measured_signals, model_signals
 from analyses.correlation.driving import command_of
+from analyses.estimation.arrays import FloatArray
 from analyses.identification.output_error import OutputErrorResult, refine_by_output_error
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
 
 DRIVE_SIGNALS = ("force", "current", "voltage")
 MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analyses.estimation.arrays import BoolArray, FloatArray, IntArray
 from analyses.identification.outliers import with_shared
 from analyses.identification.surface_fit import SurfaceFit
 
-FloatArray = NDArray[np.float64]
 Terms = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 
 FOLDS = 9
@@ -102,7 +101,7 @@ def _plain(data: _Data) -> FloatArray:
     return np.column_stack([np.ones_like(data.speed), data.speed, data.load])
 
 
-def _folds(speed: FloatArray, load: FloatArray, side: FloatArray) -> NDArray[np.int64]:
+def _folds(speed: FloatArray, load: FloatArray, side: FloatArray) -> IntArray:
     """Fold of each run; neighbours in load and speed fall into different folds."""
     count = min(FOLDS, len(speed))
     order = np.lexsort((speed, np.round(load, 1), side))
@@ -111,7 +110,7 @@ def _folds(speed: FloatArray, load: FloatArray, side: FloatArray) -> NDArray[np.
     return folds
 
 
-def _errors(data: _Data, folds: NDArray[np.int64], table: FloatArray) -> FloatArray:
+def _errors(data: _Data, folds: IntArray, table: FloatArray) -> FloatArray:
     """Weighted prediction error of each run by the law that has not seen it."""
     out = np.empty(len(folds))
     for fold in range(int(folds.max()) + 1):
@@ -121,7 +120,7 @@ def _errors(data: _Data, folds: NDArray[np.int64], table: FloatArray) -> FloatAr
 
 
 def _predicted(
-    data: _Data, table: FloatArray, seen: NDArray[np.bool_], unseen: NDArray[np.bool_]
+    data: _Data, table: FloatArray, seen: BoolArray, unseen: BoolArray
 ) -> tuple[FloatArray, float]:
     """Weighted errors at the unseen runs of a law fitted to the seen ones, and what is left at those.
 
@@ -138,7 +137,7 @@ def _predicted(
     return errors, float(np.sum((b - a @ result) ** 2))
 
 
-def _stribeck_errors(data: _Data, folds: NDArray[np.int64]) -> FloatArray:
+def _stribeck_errors(data: _Data, folds: IntArray) -> FloatArray:
     speeds = np.geomspace(0.2 * data.speed.min(), data.speed.max(), STRIBECK_SPEEDS)
     tables = [np.column_stack([_plain(data), np.exp(-data.speed / ws)]) for ws in speeds]
     out = np.empty(len(folds))

@@ -6,19 +6,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.identification.joint_model import NAMES, FrictionForm, Recipe, base_columns, linear_basis
+from analyses.estimation.arrays import BoolArray, FloatArray, stretches
+from analyses.identification.joint_model import (
+    NAMES,
+    FrictionForm,
+    JointModel,
+    Recipe,
+    base_columns,
+    linear_basis,
+)
 from analyses.identification.load_side import TwoSides, two_sides
 from analyses.identification.sampled_current import mean_current
 from analyses.records.consistency import place_of
 from analyses.records.differentiation import Motion, decimated, filtered_motion
 from analyses.records.prepare import period_of, prepared
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
 
 REST_SHARE = 0.005
 REST_TIME_S = 0.03
@@ -40,7 +45,7 @@ class Rows:
     y: FloatArray
     sine: FloatArray
     cosine: FloatArray
-    keep: NDArray[np.bool_]
+    keep: BoolArray
     rows_in: int
     recipe: Recipe
     used: Mapping[str, str]
@@ -256,6 +261,16 @@ def record_rows(
     )
 
 
+def rows_under(design: Design, record: Record, model: JointModel, recipe: Recipe | None = None) -> Rows:
+    """The rows of one record as a model has them, its pendulum in the load's share of the friction."""
+    gravity, knots = "gravity_sin" in model, model.knots_rad_s
+    rows = record_rows(design, record, model.form, recipe, gravity=gravity, knots_rad_s=knots)
+    if not gravity:
+        return rows
+    moment = model["gravity_sin"] * rows.sine + model["gravity_cos"] * rows.cosine
+    return record_rows(design, record, model.form, recipe, gravity=True, moment=moment, knots_rad_s=knots)
+
+
 def _end_skip(motion: Motion, recipe: Recipe) -> int:
     """Samples to leave out at the end: those of the recipe, where the record ends in motion."""
     speed = np.abs(motion.velocity)
@@ -279,20 +294,19 @@ def _damping(design: Design) -> float:
     return constant * (constant if back is None else back) / ohm
 
 
-def _at_rest(velocity: FloatArray, period_s: float) -> NDArray[np.bool_]:
+def _at_rest(velocity: FloatArray, period_s: float) -> BoolArray:
     """Stretches of 30 ms or more below 0.5 % of the largest speed: there the friction is not that of
     sliding."""
     slow = np.abs(velocity) < REST_SHARE * float(np.max(np.abs(velocity), initial=0.0))
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], slow.astype(np.int8), [0]])))
     out = np.zeros(len(velocity), dtype=bool)
     least = max(round(REST_TIME_S / period_s), 6)
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in stretches(slow):
         if stop - start >= least:
             out[start:stop] = True
     return out
 
 
-def _kept_rows(moving: NDArray[np.bool_], factor: int) -> NDArray[np.bool_]:
+def _kept_rows(moving: BoolArray, factor: int) -> BoolArray:
     """Rows after decimation that no sample at rest lies close to."""
     count = -(-len(moving) // factor)
     first = len(moving) - factor * (count - 1) - 1

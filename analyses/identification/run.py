@@ -8,15 +8,14 @@ from dataclasses import dataclass, replace
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
-from analyses.identification.asked import Asked, fixed_values
-from analyses.identification.bench import BenchResult, BenchSettings, identify_bench
+from analyses.identification.asked import Asked, fixed_values, held_by_name
+from analyses.identification.bench import BenchResult, identify_bench
 from analyses.identification.campaign import CampaignResult, campaign_items, identify_campaign
 from analyses.identification.campaign_design import CampaignSuggestion, suggest_runs
 from analyses.identification.contributions import Contribution, contributions
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
 from analyses.identification.resimulation import steady_current_error
-from analyses.identification.surface_fit import NAMES, PATHS
+from analyses.identification.surface_fit import NAMES
 from analyses.identification.to_design import design_with_fit, with_fixed
 from analyses.identification.verdict import Identified
 from analyses.records import import_campaign, load_campaign, open_record
@@ -51,20 +50,9 @@ def identify(
 
 
 def _of_records(design: Design, asked: Asked, progress: Progress | None) -> BenchResult:
-    settings = BenchSettings(
-        form=asked.friction,
-        gravity=asked.gravity,
-        electrical=asked.electrical,
-        cutoff_hz=asked.cutoff_hz,
-        decimation=asked.decimation,
-        fixed=fixed_values(design, asked.fix),
-        inertia_to=asked.inertia_to,
-        refine=asked.refine,
-        residual_limit=asked.residual_limit / 100.0,
-    )
     records = named_apart([open_record(path) for path in asked.files])
     unseen = named_apart([open_record(path) for path in asked.validate or ()], [r.name for r in records])
-    return identify_bench(design, records, validation=unseen, settings=settings, progress=progress)
+    return identify_bench(design, records, validation=unseen, settings=asked, progress=progress)
 
 
 def _of_response(design: Design, asked: Asked, _: Progress | None) -> FrequencyResult:
@@ -77,12 +65,9 @@ def _of_response(design: Design, asked: Asked, _: Progress | None) -> FrequencyR
 def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> CampaignAnswer:
     listed = load_campaign(asked.files[0])
     fixed = fixed_values(design, asked.fix)
-    names = dict(zip(PATHS, NAMES, strict=True))
-    for key in fixed:
-        if key not in names:
-            raise InputError(f"--fix {key}: a campaign can fix {', '.join(PATHS)}")
+    held = held_by_name(fixed, NAMES)
     imported = import_campaign(listed, progress=progress)
-    result = identify_campaign(imported, design, fixed={names[key]: v for key, v in fixed.items()})
+    result = identify_campaign(imported, design, fixed=held)
     fit, count = result.fit, asked.suggest
     made = design_with_fit(
         with_fixed(design, fixed), fit.by_key(), f"identified from {len(fit.points)} runs, {listed.name}"

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
+from analyses.estimation.arrays import ComplexArray, FloatArray
 from analyses.records.record import Record
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 TICK_TOLERANCE = 1e-3
 LARGEST_CHANGE = 0.2

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.arrays import FloatArray, picked
 from analyses.estimation.least_squares import covariance_of, told_apart
 from analyses.identification.joint_model import JointModel, Recipe
-from analyses.identification.rows import Rows, drive_of, record_rows
-from analyses.records.record import FloatArray, Record
+from analyses.identification.rows import Rows, drive_of, rows_under
+from analyses.records.record import Record
 
 ROUNDS = 8
 SETTLED = 0.1
@@ -56,20 +56,20 @@ def lag_of(
     inertia and friction.
     """
     try:
-        own, other = (_rows(design, one, model, recipe) for one in (record, simulated))
+        own, other = (rows_under(design, one, model, recipe) for one in (record, simulated))
         slope = _slope(design, simulated, model, recipe)
         if len(other.keep) > len(own.keep):
             return None
         both = own.keep[: len(other.keep)] & other.keep
-        z = _at(other, both, np.column_stack([_columns(other, model), slope]))
+        z = picked(np.column_stack([_columns(other, model), slope]), other.keep, both)
         if len(z) <= z.shape[1] or len(told_apart(z, (*model.names, "lag"))[0]) < z.shape[1]:
             return None
         lag, error = 0.0, np.inf
         for _ in range(ROUNDS):
             late = shifted(design, record, lag)
-            y = _rows(design, late, model, recipe).y - _kept(own, model)
+            y = rows_under(design, late, model, recipe).y - _kept(own, model)
             table = np.column_stack([_columns(own, model), _slope(design, late, model, recipe)])
-            step, error = _step(z, _at(own, both, table), _at(own, both, y))
+            step, error = _step(z, picked(table, own.keep, both), picked(y, own.keep, both))
             lag += float(np.clip(step, -LARGEST_STEP_S, LARGEST_STEP_S))
             if abs(step) < SETTLED * error:
                 break
@@ -90,20 +90,10 @@ def _step(z: FloatArray, table: FloatArray, y: FloatArray) -> tuple[float, float
     return float(found[-1] / size[-1]), float(np.sqrt((back @ noise @ back.T)[-1, -1]) / size[-1])
 
 
-def _rows(design: Design, record: Record, model: JointModel, recipe: Recipe | None) -> Rows:
-    """The rows of one record as the model has them, with the moment of its pendulum."""
-    gravity, knots = "gravity_sin" in model, model.knots_rad_s
-    rows = record_rows(design, record, model.form, recipe, gravity=gravity, knots_rad_s=knots)
-    if not gravity:
-        return rows
-    moment = model["gravity_sin"] * rows.sine + model["gravity_cos"] * rows.cosine
-    return record_rows(design, record, model.form, recipe, gravity=True, moment=moment, knots_rad_s=knots)
-
-
 def _slope(design: Design, record: Record, model: JointModel, recipe: Recipe | None) -> FloatArray:
     """By how much the drive of each row falls with a shift, N m/s."""
     half = 0.5 * record.period_s
-    after, before = (_rows(design, shifted(design, record, s), model, recipe).y for s in (half, -half))
+    after, before = (rows_under(design, shifted(design, record, s), model, recipe).y for s in (half, -half))
     return np.asarray((before - after) / (2.0 * half))
 
 
@@ -116,10 +106,3 @@ def _kept(rows: Rows, model: JointModel) -> FloatArray:
     kept = [name for name in rows.names if name not in model.names]
     values = np.array([model[name] for name in kept])
     return np.asarray(rows.w[:, [rows.names.index(name) for name in kept]] @ values)
-
-
-def _at(rows: Rows, both: NDArray[np.bool_], values: FloatArray) -> FloatArray:
-    """Values of the rows that a record uses, at those that two records use."""
-    whole = np.zeros((len(rows.keep), *values.shape[1:]))
-    whole[rows.keep] = values
-    return whole[: len(both)][both]

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
-
-FloatArray = NDArray[np.float64]
+from analyses.estimation.arrays import FloatArray, longest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +75,7 @@ def find_steady_window(
     limit = max(criterion.relative_per_s * plateau, criterion.noise_factor * noise)
     half = samples // 2
     moving = np.abs(speed_rad_s[half : half + len(slope)]) >= criterion.least_share * plateau
-    start, stop = _longest((np.abs(slope) <= limit) & moving)
+    start, stop = longest((np.abs(slope) <= limit) & moving)
     trim = round(criterion.trim_s / period)
     start, stop = start + half + trim, stop + half - trim
     if stop - start < max(criterion.least_duration_s / period, 8.0):
@@ -123,12 +121,3 @@ def _noise(speed: FloatArray) -> float:
     steps = np.abs(np.diff(speed))
     calm = steps[steps <= np.quantile(steps, 0.99)]
     return float(np.sqrt(np.mean(calm**2) / 2.0))
-
-
-def _longest(good: NDArray[np.bool_]) -> tuple[int, int]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int8), [0]])))
-    if not len(edges):
-        return 0, 0
-    starts, stops = edges[::2], edges[1::2]
-    k = int(np.argmax(stops - starts))
-    return int(starts[k]), int(stops[k])

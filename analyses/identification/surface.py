@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fixed
 from analyses.estimation.least_squares import told_apart
 from analyses.identification.outliers import find_outliers
@@ -15,8 +16,6 @@ from analyses.identification.points import SteadyPoint
 from analyses.identification.surface_fit import NAMES, Outlier, SurfaceFit
 from analyses.identification.systematic import SharedError, draw_errors, effects_of, shared_errors
 from analyses.records.campaign_file import Instruments
-
-FloatArray = NDArray[np.float64]
 
 ITERATIONS = 6
 
@@ -174,9 +173,8 @@ def _free(x: FloatArray, y: FloatArray, held: Mapping[str, Fixed]) -> tuple[Floa
 def _ordinary(x: FloatArray, y: FloatArray, held: Mapping[str, Fixed]) -> FloatArray:
     free, rest = _free(x, y, held)
     theta = np.array([held[name].value if name in held else 0.0 for name in NAMES])
-    theta[[k for k, name in enumerate(NAMES) if name not in held]] = np.linalg.lstsq(free, rest, rcond=None)[
-        0
-    ]
+    told = [k for k, name in enumerate(NAMES) if name not in held]
+    theta[told] = np.linalg.lstsq(free, rest, rcond=None)[0]
     return theta
 
 
@@ -223,8 +221,5 @@ def _run_scatter(
     birge = float(np.sqrt(first / freedom))
     if first <= freedom:
         return 0.0, birge
-    low, high = 0.0, 10.0 * float(np.var(y - x @ np.linalg.lstsq(x, y, rcond=None)[0])) + float(np.max(own))
-    for _ in range(30):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if chi_square(middle) > freedom else (low, middle)
-    return 0.5 * (low + high), birge
+    most = 10.0 * float(np.var(y - x @ np.linalg.lstsq(x, y, rcond=None)[0])) + float(np.max(own))
+    return float(brentq(lambda extra: chi_square(extra) - freedom, 0.0, most, xtol=1e-9 * most)), birge

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
 from analyses.identification.points import SteadyPoint
 from analyses.identification.systematic import ErrorDraws
-
-FloatArray = NDArray[np.float64]
 
 NAMES = ("C0", "Cv", "CM")
 PATHS = tuple(parameter(name).key for name in NAMES)

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analyses.estimation.arrays import FloatArray
 from analyses.identification.points import SteadyPoint
 from analyses.records.campaign_file import Instruments
-
-FloatArray = NDArray[np.float64]
 
 DRAWS = 1 << 15
 

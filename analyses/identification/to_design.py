@@ -6,18 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design import with_values
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Correlation, Design, FrictionPoint, Gravity, Tolerance
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel
-
-FloatArray = NDArray[np.float64]
 
 LEAST_CORRELATION = 0.005
 TRUNCATION_STD = 6.5

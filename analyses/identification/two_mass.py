@@ -6,13 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.arrays import ComplexArray, FloatArray
 from analyses.estimation.fit import Fit, Fixed
-from analyses.identification.frequency import ComplexArray, Lines
-
-FloatArray = NDArray[np.float64]
+from analyses.identification.frequency import Lines
 
 NAMES = ("motor_inertia", "load_inertia", "stiffness", "damping", "viscous", "load_viscous")
 """J_m at the motor, J_l at its own shaft, k and c at the coupling, Cv at the motor, Cv_l behind."""

@@ -17,7 +17,7 @@ from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
-from analyses.large_signal.coherent import coherent
+from analyses.large_signal.grid import tone
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS, Rows
 from nonlinear.runs.reduced import BatchResult
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
 NO_MOTION = 1e-3  # of the command
+UPDATES = 400  # of the position loop in a window
 
 
 @dataclass(frozen=True)
@@ -86,25 +87,28 @@ def sweep_from_rest(
     asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
     if not (asked > 0.0).all() or not (asked < 0.5 / (n * tick_s)).all():
         raise InputError(f"frequency_hz: positive and below {0.5 / (n * tick_s):g} Hz (Nyquist)")
-    window = coherent(asked, tick_s, n, least_cycles=2)
+    tones = [tone(float(hz), design, UPDATES, least_cycles=2) for hz in asked]
+    hertz, ticks, cycles = (
+        np.array([getattr(t, k) for t in tones]) for k in ("frequency_hz", "ticks", "cycles")
+    )
     amplitude = np.broadcast_to(np.asarray(amplitude_rad, dtype=float), asked.shape).copy()
     rows = Rows.of(design, asked.size)
     rows["load"] = load_Nm
-    rows["ticks"] = settle_ticks + 2 * window.ticks + np.ceil(4 * window.ticks / window.cycles)
-    rows.window(window.ticks, window.cycles)
-    rows.sine("command", amplitude, window.frequency_hz)
+    rows["ticks"] = settle_ticks + 2 * ticks + np.ceil(4 * ticks / cycles)
+    rows.window(ticks, cycles)
+    rows.sine("command", amplitude, hertz)
     result = rows.run()
     measured = result.phasor("output_angle_rad") / amplitude
     speed = np.abs(result.phasor("motor_speed_rad_s"))
     moving = np.abs(measured) > NO_MOTION
     expected = np.full(asked.size, np.nan, complex)
     for k in np.flatnonzero(moving & described):
-        expected[k] = _linear(design, window.frequency_hz[k : k + 1], load_Nm, float(speed[k]))[0]
+        expected[k] = _linear(design, hertz[k : k + 1], load_Nm, float(speed[k]))[0]
     return RestSweep(
-        frequency_hz=window.frequency_hz,
+        frequency_hz=hertz,
         amplitude_rad=amplitude,
         measured=measured,
-        sliding=_linear(design, window.frequency_hz, load_Nm, None),
+        sliding=_linear(design, hertz, load_Nm, None),
         described=expected,
         speed_rad_s=speed,
         stick_fraction=result.window_stick_fraction,

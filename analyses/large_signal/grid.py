@@ -31,7 +31,9 @@ class Tone:
         return 2.0 * math.pi * self.frequency_hz
 
 
-def tone(frequency_hz: float, design: Design, least_updates: int = LEAST_UPDATES) -> Tone:
+def tone(
+    frequency_hz: float, design: Design, least_updates: int = LEAST_UPDATES, least_cycles: int = 1
+) -> Tone:
     """Choose the tone next to a frequency; off by less than one update over the window.
 
     Updates and periods of a window have no common factor, so that a sampled sinusoid is seen at as many
@@ -40,7 +42,7 @@ def tone(frequency_hz: float, design: Design, least_updates: int = LEAST_UPDATES
     control = design.controller
     every = control.position_loop.every
     T = every * control.period_s
-    cycles = max(1, math.ceil(least_updates * frequency_hz * T))
+    cycles = max(least_cycles, math.ceil(least_updates * frequency_hz * T))
     updates = round(cycles / (frequency_hz * T))
     while math.gcd(cycles, updates) > 1:
         updates += 1

@@ -12,9 +12,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
-from analyses.large_signal.border import slow_protection
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, not_linear, waveforms
-from analyses.large_signal.grid import amplitudes, tones
+from analyses.large_signal.grid import amplitudes, frequency_range_hz, tones
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
 from analyses.linear.static_threshold import static_threshold
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
 Progress = Callable[[int, int], None]
 AMPLITUDES, FREQUENCIES = 25, 40
 BELOW_ONSET = 0.95
+LONG = 0.1  # periods of the highest tone
 MOST_TICKS = 20_000_000  # of a map, its repetitions apart; a drive that settles slowly has a coarser grid
 
 
@@ -51,7 +51,7 @@ class AmplitudeMap:
         The same from the linear sampled loop, sliding.
     onset_rad : mapping of str to ndarray, shape (f,)
         A_k(w) of each limiter from the linear loop, no load; without protection that is slow against the
-        tones, which acts later than they are simulated (`analyses.large_signal.border.slow_protection`).
+        tones, which acts later than they are simulated (`slow_protection`).
     ticks : int
         Simulated in all.
     coarser : bool
@@ -190,3 +190,12 @@ def _within(design: Design, loops: Loops, counts: tuple[int, int]) -> tuple[int,
     work = counts[0] * sum(settling + 2 * tone.ticks for tone in frequencies)
     part = min(np.sqrt(MOST_TICKS / work), 1.0)
     return max(int(part * counts[0]), 2), max(int(part * counts[1]), 2)
+
+
+def slow_protection(design: Design, loops: Loops) -> list[str]:
+    """Limiters that average for longer than a tone is simulated: they act much later."""
+    limits = design.limits
+    if limits.peak_time_s is None or limits.overload_time_s is None:
+        return []
+    _, high = frequency_range_hz(design, loops)
+    return ["overload"] if limits.overload_time_s * high > LONG else []

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 from actuator_lti.design.model import Design
 from actuator_lti.loops import assemble_loops
 from analyses.large_signal.bode import AmplitudeBode, amplitude_bode
-from analyses.large_signal.border import BorderCheck, check_border
+from analyses.large_signal.border import LimitShift, limit_shift
 from analyses.large_signal.map import AMPLITUDES, FREQUENCIES, AmplitudeMap, amplitude_map
 from analyses.large_signal.sawtooth import Sawtooth, sawtooth
+from analyses.limit_cycles.friction import dry_Nm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,25 +24,22 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class LargeSignals:
-    """Map, border, amplitude Bode and sawtooth of a design.
+    """Map, shift of the linear limit, amplitude Bode and sawtooth of a design.
 
     Attributes
     ----------
     design : Design
     map : AmplitudeMap
         With friction, no load.
-    border : BorderCheck or None
-        Without dry friction: held to `border.TOLERANCE`. ``None`` where the loop is unstable.
-    border_with_friction : BorderCheck or None
-        The same with friction: how far it moves the border; ``None`` without dry friction.
+    shift : LimitShift or None
+        How far dry friction moves the linear limit; ``None`` without it, and where the loop is unstable.
     bode : AmplitudeBode
     sawtooth : Sawtooth
     """
 
     design: Design
     map: AmplitudeMap
-    border: BorderCheck | None
-    border_with_friction: BorderCheck | None
+    shift: LimitShift | None
     bode: AmplitudeBode
     sawtooth: Sawtooth
 
@@ -77,16 +75,13 @@ def large_signals(
 
     def step(done: int) -> None:
         if progress is not None:
-            progress(done, 4)
+            progress(done, 3)
 
     loops = assemble_loops(design) if loops is None else loops
     map_ = amplitude_map(design, loops, counts=counts)
     step(1)
-    border = check_border(design, loops)
+    shift = limit_shift(design, loops) if dry_Nm(design, 0.0) > 0.0 else None
     step(2)
-    dry = design.friction.dry_Nm(0.0, 1) + design.friction.dry_Nm(0.0, -1) > 0.0
-    shifted = check_border(design, loops, friction_on=True) if dry else None
-    step(3)
     teeth = sawtooth(design)
-    step(4)
-    return LargeSignals(design, map_, border, shifted, amplitude_bode(design, loops, map_), teeth)
+    step(3)
+    return LargeSignals(design, map_, shift, amplitude_bode(design, loops, map_), teeth)

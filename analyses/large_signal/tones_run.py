@@ -15,7 +15,6 @@ from nonlinear.runs.reduced import BatchResult
 
 Progress = Callable[[int, int], None]
 HARMONICS = 3
-SWELLING, LONGEST_RISE = 3, 2_000_000  # times; ticks
 BEYOND = 1.1  # of the amplitude of the linear start: only what is limited can end in a triangle
 LONGER, MORE_WINDOWS, MORE_TICKS = 4, 12, 24_000
 
@@ -32,7 +31,6 @@ def run_tones(
     friction_on: bool = True,
     harmonics: int = HARMONICS,
     insist: bool = False,
-    swelling: bool = False,
     progress: Progress | None = None,
 ) -> BatchResult:
     """Simulate one sine a run from its linear steady state.
@@ -47,9 +45,6 @@ def run_tones(
         Amplitude of the linear state that the run starts from (at most the onset of limiting).
     insist : bool
         Repeat what has not settled, with a start-up four times as long and several periods more.
-    swelling : bool
-        Whether the sine grows from nothing, over `SWELLING` times the settling time and window: slowly enough
-        for the drive to follow in its steady state.
     """
     rows = Rows.of(design, len(which), friction_on=friction_on)
     windows = np.array([t.ticks for t in tones])[which]
@@ -57,34 +52,11 @@ def run_tones(
     rows.sine("command", amplitude_rad, np.array([t.frequency_hz for t in tones])[which])
     rows.window(windows, cycles, harmonics)
     start.put(rows, which, start_amplitude_rad)
-    triangle_start(
-        design, rows, amplitude_rad, (amplitude_rad > BEYOND * start_amplitude_rad) & (not swelling)
-    )
+    triangle_start(design, rows, amplitude_rad, amplitude_rad > BEYOND * start_amplitude_rad)
     rows["load"] = load_Nm
     rows["ticks"] = start.settling_ticks + 2 * windows
-    if swelling:
-        rows = _swelling(rows, tones, which, amplitude_rad, start.settling_ticks)
     result = rows.run(progress=progress)
     return _again(rows, result, start.settling_ticks) if insist else result
-
-
-def _swelling(
-    rows: Rows, tones: tuple[Tone, ...], which: np.ndarray, amplitude_rad: np.ndarray, settling: int
-) -> Rows:
-    """The same runs, later by the time in which their sines swell."""
-    groups, order = [], []
-    for k in np.unique(which):
-        mine = np.flatnonzero(which == k)
-        group = rows.take(mine)
-        rise = min(SWELLING * max(settling, tones[k].ticks), LONGEST_RISE)
-        group["ticks"] += rise
-        t = np.arange(int(group["ticks"].max()) + 1)
-        size = np.sin(0.5 * np.pi * np.minimum(t / rise, 1.0)) ** 2
-        turn = tones[k].omega_rad_s * rows.design.controller.period_s
-        group.series("command", size * np.sin(turn * t), amplitude_rad[mine])
-        groups.append(group)
-        order.append(mine)
-    return Rows.join(groups).take(np.argsort(np.concatenate(order)))
 
 
 def _again(rows: Rows, result: BatchResult, settling_ticks: int) -> BatchResult:

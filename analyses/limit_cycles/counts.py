@@ -12,17 +12,17 @@ An angle of amplitude A about a bias d, counted in steps q, has the fundamental 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from math import inf, pi
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design
-from analyses.large_signal.coherent import coherent
+from actuator_lti.design.model import Design, Sensor
 from analyses.large_signal.conditional import step_rows
+from analyses.large_signal.grid import tone
 from analyses.large_signal.settling_ticks import LONGEST_TICKS, full_range
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
@@ -30,15 +30,15 @@ from nonlinear import Rows
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
-    from analyses.limit_cycles import Confirmation
+    from analyses.limit_cycles.result import Confirmation
 
-Sensor = Literal["motor", "output"]
 Floats = npt.NDArray[np.float64]
 WITHIN = 0.05  # of its value: a gain that is off by less counts as linear
 RATIOS, OFFSETS = np.geomspace(0.2, 60.0, 600), np.linspace(0.0, 1.0, 21)
 SPEEDS = (0.05, 0.382, 1.382, 5.1)  # counts a sample: few, and so that no pattern repeats soon
 PART = 0.3  # of the drive's speed: no faster is looked at
 SAMPLES = 2000  # of a window at constant speed
+UPDATES = 400  # of the position loop in a window of a sine
 TRIED = np.array([0.1, 0.3, 1.0, 2.0, 4.0, 16.0, 64.0, 256.0])  # of the amplitude from which it is linear
 
 
@@ -122,23 +122,14 @@ def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, 
     return tuple(_one(design, loops, sensor, settle_ticks) for sensor in there)
 
 
-def without_counts(design: Design, *sensors: Sensor) -> Design:
-    """The same drive with some encoders free of counts."""
-    if "motor" in sensors:
-        design = replace(design, encoder=replace(design.encoder, counts_per_rev=None))
-    if "output" in sensors:
-        design = replace(design, output_encoder=replace(design.output_encoder, counts_per_rev=None))
-    return design
-
-
 def _one(design: Design, loops: Loops, sensor: Sensor, settle_ticks: int) -> Counts:
-    from analyses.limit_cycles.describing import cycles_of_quantisation
+    from analyses.limit_cycles.describing import cycles_of_quantisation, without_counts
     from analyses.limit_cycles.run import confirm
 
     cause = "motor-quantisation" if sensor == "motor" else "quantisation"
     quantum = (design.angle_quantum_rad if sensor == "motor" else design.output_quantum_rad) or 0.0
     other: Sensor = "output" if sensor == "motor" else "motor"
-    alone, ideal = without_counts(design, other), without_counts(design, "motor", "output")
+    alone, ideal = without_counts(design, other), without_counts(design)
     ripple, at = _ripple(alone, ideal, sensor, quantum, settle_ticks)
     off = _linearity(alone, ideal, loops, sensor, quantum, settle_ticks)
     good = np.logical_and.accumulate((off <= WITHIN)[::-1])[::-1]  # here and at all that is larger
@@ -216,17 +207,16 @@ def _linearity(
     band = loop_figures(loops.present["position"], loops.plain_response).bandwidth
     if band is None or band.minus3db_hz is None:
         return np.full(TRIED.size, inf)
-    base = design.controller.position_loop.every
-    window = coherent([band.minus3db_hz], design.controller.period_s, base, least_cycles=8)
-    gain = abs(complex(response_at(loops.plain_response, 2.0 * pi * window.frequency_hz)[0]))
+    sine = tone(band.minus3db_hz, design, UPDATES, least_cycles=8)
+    gain = abs(complex(response_at(loops.plain_response, np.array([sine.omega_rad_s]))[0]))
     wanted = linear_ratio() * quantum / (design.total_ratio if sensor == "motor" else 1.0) / gain
     amplitude = wanted * TRIED
     seen, there = [], np.ones(TRIED.size, dtype=bool)
     for one in (design, ideal):  # nothing else that is not linear: no play, no friction
         rows = Rows.of(without_nonlinearities(one), TRIED.size, friction_on=False, limits_on=False)
-        rows.sine("command", amplitude, window.frequency_hz[0])
-        rows["ticks"] = settle_ticks + 2 * window.ticks[0]
-        rows.window(window.ticks[0], window.cycles[0])
+        rows.sine("command", amplitude, sine.frequency_hz)
+        rows["ticks"] = settle_ticks + 2 * sine.ticks
+        rows.window(sine.ticks, sine.cycles)
         run = rows.run()
         seen.append(run.phasor("output_angle_rad"))
         there &= run.ok  # without friction a drive may be unstable

@@ -14,15 +14,15 @@ border: ``A = 2 q/(pi g)``, stable.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from math import exp, log, pi
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import brentq
 
-from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction
+from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction, Sensor
 from actuator_lti.drive.operating import Operating, dead_zone, described_dry, slope_at
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import assemble_loops
@@ -32,6 +32,7 @@ from analyses.limit_cycles.result import Cause, Cycle
 
 LEAST, MOST, POINTS = 1.02, 300.0, 48  # of the half play: amplitudes of the twist that are looked at
 MOST_GAIN, GAINS = 1e3, 73  # of a speed made of counts
+RESOLVED = 1e-9  # of the radius
 _TURNS = 1e-6  # least angle of an eigenvalue that oscillates
 _STEPS = 60  # of the fixed point between the amplitudes of both speeds
 
@@ -52,38 +53,50 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
         return ()
     half = 0.5 * coupling.play_rad
     grid = np.geomspace(LEAST * half, MOST * half, POINTS)
-    modes: list[Mode | None] = []
-    for A in grid:
-        modes.append(_at_twist(design, float(A), friction, modes[-1] if modes else None))
-    result = []
-    for k in range(POINTS - 1):
-        a, b = modes[k], modes[k + 1]
-        if a is None or b is None or (a.radius - 1.0) * (b.radius - 1.0) >= 0.0:
-            continue
-        made = _border(design, friction, (float(grid[k]), float(grid[k + 1])), a)
-        if made is not None and made[1].frequency_hz > 0.0:
-            result.append(_cycle(design, *made, friction, stable=a.radius > 1.0))
-    return tuple(result)
 
-
-def _border(
-    design: Design, friction: bool, ends: tuple[float, float], near: Mode
-) -> tuple[float, Mode] | None:
-    """The twist between two amplitudes at which the oscillation keeps its size, and its shape there."""
-
-    def mode(log_A: float) -> Mode | None:
+    def mode(log_A: float, near: Mode | None) -> Mode | None:
         return _at_twist(design, exp(log_A), friction, near)
 
-    def excess(log_A: float) -> float:
-        result = mode(log_A)
-        return -1.0 if result is None else result.radius - 1.0
+    return tuple(
+        _cycle(design, exp(log_A), there, friction, stable=stable)
+        for log_A, there, stable in kept_up(mode, np.log(grid))
+    )
 
-    low, high = map(log, ends)
-    if excess(low) * excess(high) >= 0.0:
-        return None
-    root = float(brentq(excess, low, high, xtol=1e-8))
-    there = mode(root)
-    return None if there is None else (exp(root), there)
+
+def kept_up(
+    mode: Callable[[float, Mode | None], Mode | None], grid: npt.NDArray[np.float64]
+) -> Iterator[tuple[float, Mode, bool]]:
+    """Where along a grid the least damped oscillation keeps its size.
+
+    Gives value, oscillation, and whether it dies out beyond: an amplitude at which it attracts.
+
+    Parameters
+    ----------
+    mode : callable
+        The oscillation at a value, from one near it.
+    grid : ndarray
+    """
+    last: Mode | None = None
+    for k, value in enumerate(map(float, grid)):
+        now = mode(value, last)
+        if last is not None and now is not None and _changes(last.radius - 1.0, now.radius - 1.0):
+
+            def excess(x: float, near: Mode = last) -> float:
+                found = mode(x, near)
+                return -1.0 if found is None else found.radius - 1.0
+
+            low = float(grid[k - 1])
+            if _changes(excess(low), excess(value)):
+                root = float(brentq(excess, low, value, xtol=1e-12))
+                there = mode(root, last)
+                if there is not None and there.frequency_hz > 0.0:
+                    yield root, there, last.radius > 1.0
+        last = now
+
+
+def _changes(a: float, b: float) -> bool:
+    """Whether a sign changes by more than rounding of a mode that nothing moves."""
+    return a * b < 0.0 and max(abs(a), abs(b)) > RESOLVED
 
 
 def _at_twist(design: Design, A: float, friction: bool, near: Mode | None) -> Mode | None:
@@ -223,28 +236,17 @@ def _border_at_output(free: Design) -> tuple[float, Mode] | None:
 def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
     """Gain of the speed made of the motor's angle that brings the loop to its border."""
 
-    def mode(log_gain: float) -> Mode | None:
+    def mode(log_gain: float, _: Mode | None) -> Mode | None:
         velocity = free.controller.velocity
         assert velocity is not None
         gain = Filter(kind="biquad", on="speed", b=(exp(log_gain),), a=(0.0,))
         louder = replace(velocity, filters=(*velocity.filters, gain))
-        design = replace(free, controller=replace(free.controller, velocity=louder))
-        program = TickProgram(wire(design, Operating()), "position")
-        return _oscillation(_over_a_period(program), program.states, design)
+        return mode_at(replace(free, controller=replace(free.controller, velocity=louder)), Operating())
 
-    def excess(log_gain: float) -> float:
-        found = mode(log_gain)
-        return -1.0 if found is None else found.radius - 1.0
-
-    if excess(0.0) >= 0.0:
+    found = next(kept_up(mode, np.log(np.geomspace(1.0, MOST_GAIN, GAINS))), None)
+    if found is None or found[2]:  # unstable from the first
         return None
-    grid = np.log(np.geomspace(1.0, MOST_GAIN, GAINS))
-    for low, high in pairwise(map(float, grid)):
-        if excess(high) >= 0.0:
-            root = float(brentq(excess, low, high, xtol=1e-10))
-            there = mode(root)
-            return None if there is None else (exp(root), there)
-    return None
+    return exp(found[0]), found[1]
 
 
 def _oscillation(
@@ -275,3 +277,12 @@ def without_nonlinearities(design: Design) -> Design:
             friction=None if behind is None else LoadFriction(viscous_Nms_rad=behind.viscous_Nms_rad),
         ),
     )
+
+
+def without_counts(design: Design, *sensors: Sensor) -> Design:
+    """The same drive with some encoders free of counts, by default with both."""
+    if "motor" in sensors or not sensors:
+        design = replace(design, encoder=replace(design.encoder, counts_per_rev=None))
+    if "output" in sensors or not sensors:
+        design = replace(design, output_encoder=replace(design.output_encoder, counts_per_rev=None))
+    return design

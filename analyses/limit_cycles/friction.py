@@ -11,40 +11,28 @@ from dataclasses import replace
 from math import exp, log
 
 import numpy as np
-from scipy.optimize import brentq
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import Operating, dry_torque
-from analyses.limit_cycles.describing import Mode, mode_at, output_of
+from analyses.limit_cycles.describing import Mode, kept_up, mode_at, output_of
 from analyses.limit_cycles.result import Cycle
 
 POINTS = 36
 DECADES = 6.0
-RESOLVED = 1e-9  # of the radius: less is rounding of a mode that friction does not move
 
 
 def cycles_of_friction(design: Design, load_Nm: float, top_speed_rad_s: float) -> tuple[Cycle, ...]:
     """Every cycle with a motor speed up to ``top_speed_rad_s``, over six decades."""
 
-    def mode(log_speed: float) -> Mode | None:
+    def mode(log_speed: float, _: Mode | None) -> Mode | None:
         at = Operating(point="describing-function", load_Nm=load_Nm, speed_amplitude_rad_s=exp(log_speed))
         return mode_at(design, at)
 
-    def excess(log_speed: float) -> float:
-        found = mode(log_speed)
-        return -1.0 if found is None else found.radius - 1.0
-
     grid = log(top_speed_rad_s) - np.linspace(DECADES, 0.0, POINTS) * log(10.0)
-    values = [excess(float(point)) for point in grid]
-    result = []
-    for k in range(len(grid) - 1):
-        a, b = values[k], values[k + 1]
-        if a * b < 0.0 and max(abs(a), abs(b)) > RESOLVED:
-            root = float(brentq(excess, grid[k], grid[k + 1], xtol=1e-12))
-            there = mode(root)
-            assert there is not None
-            result.append(_cycle(design, load_Nm, exp(root), there, stable=a > 0.0))
-    return tuple(result)
+    return tuple(
+        _cycle(design, load_Nm, exp(log_speed), there, stable=stable)
+        for log_speed, there, stable in kept_up(mode, grid)
+    )
 
 
 def _cycle(design: Design, load_Nm: float, speed: float, mode: Mode, *, stable: bool) -> Cycle:
@@ -55,7 +43,7 @@ def _cycle(design: Design, load_Nm: float, speed: float, mode: Mode, *, stable: 
 
 def at_load(cycle: Cycle, design: Design, load_Nm: float) -> Cycle:
     """The same cycle at another load torque: the slope at the border is the same, so W goes with Tc."""
-    ratio = _mean_dry(design, load_Nm) / _mean_dry(design, cycle.load_Nm)
+    ratio = dry_Nm(design, load_Nm) / dry_Nm(design, cycle.load_Nm)
     return replace(
         cycle,
         inner_rad=ratio * cycle.inner_rad,
@@ -65,5 +53,6 @@ def at_load(cycle: Cycle, design: Design, load_Nm: float) -> Cycle:
     )
 
 
-def _mean_dry(design: Design, load_Nm: float) -> float:
-    return 0.5 * float(dry_torque(design, load_Nm, 1) + dry_torque(design, load_Nm, -1))
+def dry_Nm(design: Design, load_Nm: float) -> float:
+    """Dry friction at the motor, forward and backward together; of a friction map that at its first point."""
+    return float(dry_torque(design, load_Nm, 1) + dry_torque(design, load_Nm, -1))

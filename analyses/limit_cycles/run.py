@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Sensor
 from actuator_lti.errors import InputError
 from analyses.large_signal.steady_start import PLACES
 from analyses.limit_cycles.describing import (
     counts_matter,
     cycles_of_play,
     cycles_of_quantisation,
+    without_counts,
     without_nonlinearities,
 )
 from analyses.limit_cycles.result import Cause, Confirmation, Cycle, LimitCycles
@@ -104,13 +105,10 @@ def _centre(design: Design, cycle: Cycle) -> float:
 
 def _tried(design: Design, cycle: Cycle) -> Design:
     """The drive with the one nonlinearity that the cycle is of, and friction where it is in it."""
-    motor = replace(design, encoder=replace(design.encoder, counts_per_rev=None))
-    output = replace(design, output_encoder=replace(design.output_encoder, counts_per_rev=None))
-    if cycle.cause == "quantisation":
-        return without_nonlinearities(motor)
-    if cycle.cause == "motor-quantisation":
-        return without_nonlinearities(output)
-    ideal = replace(output, encoder=motor.encoder)
+    if cycle.cause in ("quantisation", "motor-quantisation"):
+        other: Sensor = "motor" if cycle.cause == "quantisation" else "output"
+        return without_nonlinearities(without_counts(design, other))
+    ideal = without_counts(design)
     if cycle.cause == "friction":
         return ideal
     return replace(ideal, friction=replace(design.friction, load_coefficient=0.0))

@@ -11,6 +11,14 @@ from analyses.request import LOAD, Option
 
 KINDS = "step, ramp, sine, stepped-sine, chirp, triangle, multisine, hold, recorded"
 PERIODIC = ("sine", "triangle", "stepped-sine")
+SETS = ("stepped-sine", "multisine")
+OF = {  # the commands that an option is for
+    "frequency": (*PERIODIC, "chirp", "multisine"),
+    "to": ("chirp", *SETS),
+    "count": SETS,
+    "seed": ("multisine",),
+    "cycles": PERIODIC,
+}
 USUAL_CYCLES = 5
 
 
@@ -78,8 +86,12 @@ class Asked:
             raise InputError("--command recorded: needs --record CSV")
         if self.start < 0.0 or not self.start < float("inf"):
             raise InputError(f"--start {self.start:g}: must be 0 or later")
-        if self.cycles is not None and self.command not in PERIODIC:
-            raise InputError(f"--cycles {self.cycles}: allowed with --command {', '.join(PERIODIC)}")
+        for name, kinds in OF.items():
+            value = getattr(self, name)
+            if value != getattr(type(self), name) and self.command not in kinds:
+                raise InputError(f"--{name} {value:g}: allowed with --command {', '.join(kinds)}")
+        if not self.frequency > 0.0:
+            raise InputError(f"--frequency {self.frequency:g}: must be positive")
         if self.cycles is not None and self.cycles < 1:
             raise InputError(f"--cycles {self.cycles}: must be at least 1")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analyses.records.record import FloatArray
+from analyses.estimation.arrays import FloatArray
 
 
 class BoundedRows:

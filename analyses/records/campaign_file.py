@@ -47,7 +47,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown_path
 from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
-from analyses.records.toml_tables import Table, key_of, read_toml
+from analyses.toml_tables import Table, key_of, read_toml
 
 Method = Literal["correlation", "event", "given"]
 

@@ -8,11 +8,12 @@ from types import MappingProxyType
 import numpy as np
 
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
 from analyses.records.campaign_file import Method
 from analyses.records.correlate_clocks import Fit, fit_by_correlation
 from analyses.records.events import motion_events
 from analyses.records.factors import named_factor
-from analyses.records.record import FloatArray, Record
+from analyses.records.record import Record
 
 RATE_SPREAD = 0.01
 """Two clocks are taken to differ by less than 1 % in rate; anything else is no clock error."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from math import inf, isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
+from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.records.factors import explaining, named_factor
-from analyses.records.record import FloatArray, Record
+from analyses.records.record import Record
 
 RATE_TOLERANCE = 0.02
 TICK_TOLERANCE = 1e-3
@@ -79,7 +79,7 @@ def _smooth(record: Record, values: FloatArray) -> FloatArray:
     return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values, padtype="even"), dtype=np.float64)
 
 
-def _moving(*signals: FloatArray) -> NDArray[np.bool_]:
+def _moving(*signals: FloatArray) -> BoolArray:
     """Where one of some signals is not small: in a long rest there is nothing but noise."""
     return np.any([np.abs(values) > IN_MOTION * np.max(np.abs(values)) for values in signals], axis=0)
 
@@ -151,7 +151,7 @@ def _clock(design: Design, record: Record) -> Finding | None:
     return Finding(subject=subject, passed=None, text=text)
 
 
-def _other(record: Record, name: str, rate: FloatArray, moves: NDArray[np.bool_]) -> str:
+def _other(record: Record, name: str, rate: FloatArray, moves: BoolArray) -> str:
     """The signal that is more like the rate, if there is one: two columns are swapped."""
     for other, values in record.signals.items():
         if other in (name, "angle", "output_angle", "position"):
@@ -265,21 +265,18 @@ def _command(design: Design, record: Record) -> Finding | None:
     return None
 
 
-def _within(subject: str, what: str, result: float, limit: float, unit: str) -> Finding | None:
-    """A largest value against a limit of the design."""
-    if not isfinite(limit) or limit <= 0.0:
+def _within(subject: str, record: Record, what: str, limit: float, unit: str) -> Finding | None:
+    """The largest value of a signal against a limit of the design."""
+    if what not in record.signals or not isfinite(limit) or limit <= 0.0:
         return None
+    result = float(np.quantile(np.abs(record[what]), 0.999))
     passed = result <= OVER * limit
-    text = f"{what} up to {result:.4g} {unit}, the design's limit is {limit:.4g} {unit}"
+    text = f"{subject.partition(' ')[0]} up to {result:.4g} {unit}, the design's limit is {limit:.4g} {unit}"
     if not passed:
         factor = explaining(result / limit, unit)
         times = f", {result / limit:.3g} times"
         text += times + (f": factor {factor}" if factor else "; is the unit right?")
     return Finding(subject=subject, passed=passed, text=text)
-
-
-def _largest(values: FloatArray) -> float:
-    return float(np.quantile(np.abs(values), 0.999))
 
 
 def _kind_of_current(design: Design, record: Record) -> Finding | None:
@@ -296,31 +293,23 @@ def _kind_of_current(design: Design, record: Record) -> Finding | None:
 
 
 def _current_limit(design: Design, record: Record) -> Finding | None:
-    if "current" not in record.signals:
-        return None
     motor, limits = design.effective_motor, design.limits
     limit = limits.peak_current_A if design.controller.current is not None else inf
     if not isfinite(limit) and motor.resistance_ohm is not None:
         limit = 2.0 * limits.voltage_V / motor.resistance_ohm
-    return _within("current against its limit", "current", _largest(record["current"]), limit, "A")
+    return _within("current against its limit", record, "current", limit, "A")
 
 
 def _speed_limit(design: Design, record: Record) -> Finding | None:
     name, unit = ("velocity", "m/s") if design.axis == "linear" else ("speed", "rad/s")
-    if name not in record.signals:
-        return None
     kE = design.effective_motor.back_emf_constant_Vs_rad
     limit = min(design.limits.speed_rad_s, inf if kE is None else design.limits.voltage_V / kE)
-    return _within(f"{name} against its limit", name, _largest(record[name]), limit, unit)
+    return _within(f"{name} against its limit", record, name, limit, unit)
 
 
 def _voltage_limit(design: Design, record: Record) -> Finding | None:
-    if "voltage" not in record.signals:
-        return None
-    limit = design.limits.voltage_V
-    if "supply" in record.signals:
-        limit = float(np.max(record["supply"]))
-    return _within("voltage against the supply", "voltage", _largest(record["voltage"]), limit, "V")
+    limit = float(np.max(record["supply"])) if "supply" in record.signals else design.limits.voltage_V
+    return _within("voltage against the supply", record, "voltage", limit, "V")
 
 
 def _supply(design: Design, record: Record) -> Finding | None:
@@ -336,6 +325,4 @@ def _supply(design: Design, record: Record) -> Finding | None:
 
 def _load(design: Design, record: Record) -> Finding | None:
     name, unit = ("load_force", "N") if design.axis == "linear" else ("torque", "N m")
-    if name not in record.signals:
-        return None
-    return _within("load", "load", _largest(record[name]), design.load.moment_max_Nm, unit)
+    return _within("load", record, name, design.load.moment_max_Nm, unit)

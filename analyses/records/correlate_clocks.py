@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.means import best_lag, correlation_time
-from analyses.records.record import FloatArray
 
 GRID = 4000
 MIN_QUALITY = 0.5

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
+from copy import deepcopy
+from dataclasses import dataclass, field, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
 from actuator_lti.start.extras import need
-from analyses.records.record import FloatArray, RowCounts
+from analyses.estimation.arrays import FloatArray, IntArray
+from analyses.records.record import RowCounts
 from analyses.records.spec import MISSING_TEXTS, CsvFormat, Policy
 
 _RUN_OF_BLANKS = re.compile(rb"[ \t]+")
@@ -28,27 +29,18 @@ class Account:
     rows_in: int = 0
     rows_out: int = 0
     dropped: dict[str, int] = field(default_factory=dict)
-    first: dict[str, str] = field(default_factory=dict)
+    first_dropped: dict[str, str] = field(default_factory=dict)
     columns: tuple[str, ...] = ()
 
     def drop(self, reason: str, where: str, count: int = 1) -> None:
         """Count rows that are left out, and where the first of them was."""
         if count:
             self.dropped[reason] = self.dropped.get(reason, 0) + count
-            self.first.setdefault(reason, where)
+            self.first_dropped.setdefault(reason, where)
 
     def frozen(self) -> RowCounts:
         """The final figures."""
-        return RowCounts(
-            lines=self.lines,
-            comments=self.comments,
-            blanks=self.blanks,
-            header=self.header,
-            rows_in=self.rows_in,
-            rows_out=self.rows_out,
-            dropped=dict(self.dropped),
-            first_dropped=dict(self.first),
-        )
+        return RowCounts(**deepcopy({one.name: getattr(self, one.name) for one in fields(RowCounts)}))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +57,7 @@ class Block:
     """Numbers of the wanted columns, shape (n, columns), NaN where missing, and the file line of each row."""
 
     values: FloatArray
-    lines: NDArray[np.int64]
+    lines: IntArray
 
 
 def clean(data: bytes, layout: CsvFormat) -> bytes:

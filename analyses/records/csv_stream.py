@@ -10,10 +10,11 @@ from typing import BinaryIO
 from actuator_lti.bounds import CSV_LINE_BYTES, CSV_ROWS
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import open_regular
+from analyses.estimation.arrays import FloatArray
 from analyses.records.bounded import BoundedRows
 from analyses.records.columns import find_columns, read_header
 from analyses.records.csv_rows import Account, Block, Columns, careful_rows, clean, fast_rows
-from analyses.records.record import FloatArray, Record
+from analyses.records.record import Record
 from analyses.records.spec import RecordSpec
 from analyses.records.table_record import in_si, record_of_rows
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
-
-FloatArray = NDArray[np.float64]
+from analyses.estimation.arrays import FloatArray
 
 LARGEST_DIRECT = 10
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analyses.records.record import FloatArray
+from analyses.estimation.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from actuator_lti.errors import InputError
-from analyses.records.record import FloatArray, RowCounts, line_error
+from analyses.estimation.arrays import FloatArray
+from analyses.records.record import RowCounts, line_error
 
 
 def filled(

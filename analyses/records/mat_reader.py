@@ -10,7 +10,8 @@ from actuator_lti.bounds import MAT_BYTES
 from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import MatContent, read_mat5
 from actuator_lti.files.reading import read_bytes
-from analyses.records.record import FloatArray, Record
+from analyses.estimation.arrays import FloatArray
+from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec
 from analyses.records.table_record import record_of_columns
 

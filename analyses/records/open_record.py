@@ -20,7 +20,7 @@ from analyses.records.parquet_reader import load_parquet
 from analyses.records.published import EMPS_SPEC, ODRIVE_SPEC
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec
-from analyses.records.toml_tables import Table, read_toml
+from analyses.toml_tables import Table, read_toml
 
 HEAD_BYTES = 1 << 16
 EMPS_COLUMNS = {"t", "qm", "qg", "vir", "gtau"}

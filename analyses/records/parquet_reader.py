@@ -13,7 +13,8 @@ from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import read_bytes, shown_path
 from actuator_lti.start.extras import need
-from analyses.records.record import FloatArray, Record
+from analyses.estimation.arrays import FloatArray
+from analyses.records.record import Record
 from analyses.records.spec import RecordSpec
 from analyses.records.table_record import record_of_columns
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import longest
 from analyses.records.record import Record
 
 
@@ -15,12 +16,9 @@ def prepared(record: Record) -> Record:
     record = record if record.is_regular else record.resampled()
     if "enable" not in record.signals:
         return record
-    on = np.concatenate([[0], (record["enable"] > 0.5).astype(np.int8), [0]])
-    edges = np.flatnonzero(np.diff(on))
-    if not len(edges):
+    start, stop = longest(record["enable"] > 0.5)
+    if start == stop:
         raise InputError("the drive is never enabled", where=record.name)
-    longest = int(np.argmax(edges[1::2] - edges[::2]))
-    start, stop = int(edges[::2][longest]), int(edges[1::2][longest])
     if stop - start == len(record):
         return record
     note = (

@@ -7,12 +7,9 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
-
-FloatArray = NDArray[np.float64]
-
+from analyses.estimation.arrays import BoolArray, FloatArray
 
 RESAMPLE_TOLERANCE = 0.05
 """Largest error of a resampled signal that is accepted without being told to, as a share of its range."""
@@ -79,7 +76,7 @@ class Record:
     notes: tuple[str, ...] = ()
     inputs: tuple[InputColumn, ...] = ()
     resample_tolerance: float = RESAMPLE_TOLERANCE
-    left_out: NDArray[np.bool_] | None = field(default=None, repr=False)
+    left_out: BoolArray | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -11,10 +11,11 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown_path
+from analyses.estimation.arrays import FloatArray
 from analyses.records.csv_rows import Account, Block
 from analyses.records.gaps import filled, several_rates
 from analyses.records.inputs import inputs_of
-from analyses.records.record import FloatArray, Record
+from analyses.records.record import Record
 from analyses.records.spec import RecordSpec
 from analyses.records.time_axis import TimeAxis
 from analyses.records.units import converter

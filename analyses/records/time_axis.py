@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import BoolArray, FloatArray, IntArray
 from analyses.records.csv_rows import Account, Block
-from analyses.records.record import FloatArray
 from analyses.records.spec import RecordSpec
 from analyses.records.units import unit_factor
 
@@ -42,20 +41,18 @@ class TimeAxis:
         time = self._unwrapped(values[:, 0]) * self._factor
         return self._increasing(time, values[:, 1:], lines)
 
-    def _without_missing(
-        self, values: FloatArray, lines: NDArray[np.int64]
-    ) -> tuple[FloatArray, NDArray[np.int64]]:
+    def _without_missing(self, values: FloatArray, lines: IntArray) -> tuple[FloatArray, IntArray]:
         looked_at = values
         if self._spec.missing == "interpolate":  # the signals are filled later, the time is not
             looked_at = values[:, : 0 if self._spec.time.period_s is not None else 1]
-        missing: NDArray[np.bool_] = np.asarray(np.isnan(looked_at).any(axis=1))
+        missing: BoolArray = np.asarray(np.isnan(looked_at).any(axis=1))
         if missing.any() and self._spec.missing == "error":
             raise InputError("a value is missing", where=f"{self._origin}:{lines[missing.argmax()]}")
         return self._keep(~missing, values, lines, "with a missing value")
 
     def _keep(
-        self, keep: NDArray[np.bool_], values: FloatArray, lines: NDArray[np.int64], reason: str
-    ) -> tuple[FloatArray, NDArray[np.int64]]:
+        self, keep: BoolArray, values: FloatArray, lines: IntArray, reason: str
+    ) -> tuple[FloatArray, IntArray]:
         if keep.all():
             return values, lines
         first = int(lines[np.argmin(keep)])
@@ -74,7 +71,7 @@ class TimeAxis:
         return unwrapped
 
     def _increasing(
-        self, time: FloatArray, values: FloatArray, lines: NDArray[np.int64]
+        self, time: FloatArray, values: FloatArray, lines: IntArray
     ) -> tuple[FloatArray, FloatArray]:
         if not len(time):
             return time, values

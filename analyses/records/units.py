@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from actuator_lti.design.units import compatible, parse_unit
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
 from analyses.records.naming import KNOWN_UNITS
-from analyses.records.record import FloatArray
 from analyses.records.spec import AC_FORMS, TO_LINE, SignalColumn
 
 

@@ -20,7 +20,8 @@ class CommandLimits:
 
     Attributes
     ----------
-    frequency_hz : float
+    frequency_hz, tone_hz : float
+        Asked for, and simulated: a whole number of ticks is a period.
     onset_rad : float
         Peak command from which on one of the two acts, output side.
     amplitude_rad : float
@@ -32,6 +33,7 @@ class CommandLimits:
     """
 
     frequency_hz: float
+    tone_hz: float
     onset_rad: float
     amplitude_rad: float
     gain_db: float | None
@@ -46,8 +48,8 @@ class CommandLimits:
         if self.gain_db is None:
             return f"{said}, beyond full deflection"
         return (
-            f"{said}; simulated at {scale * self.amplitude_rad:.3g} {unit}: {self.gain_db:.3g} dB, "
-            f"{100.0 * self.share:.0f} % of the time limited"
+            f"{said}; simulated at {scale * self.amplitude_rad:.3g} {unit} and {self.tone_hz:.3g} Hz: "
+            f"{self.gain_db:.3g} dB, {100.0 * self.share:.0f} % of the time limited"
         )
 
 
@@ -66,7 +68,7 @@ def command_limits(design: Design, frequency_hz: float) -> CommandLimits | None:
     if onset == inf:
         return None
     if onset >= full:
-        return CommandLimits(frequency_hz, onset, full, None, 0.0)
+        return CommandLimits(frequency_hz, frequency_hz, onset, full, None, 0.0)
     from analyses.large_signal.tones_run import run_tones
 
     chosen = tone(frequency_hz, design)
@@ -75,7 +77,8 @@ def command_limits(design: Design, frequency_hz: float) -> CommandLimits | None:
     run = run_tones(design, (chosen,), np.zeros(1, dtype=int), amplitude, start, nothing, insist=True)
     gain = float(abs(run.phasor("output_angle_rad")[0])) / full
     share = float(run.window_limit_fraction("profile")[0])
-    return CommandLimits(chosen.frequency_hz, onset, full, 20.0 * log10(gain) if gain else -inf, share)
+    gain_db = 20.0 * log10(gain) if gain else -inf
+    return CommandLimits(frequency_hz, chosen.frequency_hz, onset, full, gain_db, share)
 
 
 def said_of(design: Design, frequency_hz: float | None) -> str:

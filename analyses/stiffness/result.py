@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
 
 State = Literal["powered", "shorted", "open"]
@@ -65,7 +66,10 @@ class LostMotion:
 
 @dataclass(frozen=True)
 class Check:
-    """One frequency, a small moment injected in the simulator, without dry friction, play or quantisation."""
+    """One frequency, a moment injected in the simulator, without dry friction, play or quantisation.
+
+    Both are inf where the output does not move, as behind a gear that locks.
+    """
 
     frequency_hz: float
     foreseen_Nm_rad: complex
@@ -74,6 +78,8 @@ class Check:
     @property
     def difference(self) -> float:
         """Relative difference of the two compliances."""
+        if np.isinf(self.foreseen_Nm_rad):
+            return 0.0 if np.isinf(self.seen_Nm_rad) else np.inf
         return abs(self.foreseen_Nm_rad / self.seen_Nm_rad - 1.0)
 
 
@@ -88,20 +94,33 @@ class AtRest:
 
 @dataclass(frozen=True)
 class Stiffness:
-    """All of it for one design."""
+    """All of it for one design; ``unproven`` says why the simulator could not be asked."""
 
     design: Design
     curves: tuple[StiffnessCurve, ...]
     lost_motion: LostMotion | None
     checks: tuple[Check, ...] = ()
     at_rest: tuple[AtRest, ...] = ()
+    unproven: str = ""
+
+    @property
+    def lost_motion_difference(self) -> float | None:
+        """Relative difference of lost motion as predicted and as simulated; None where it was not read."""
+        lost = self.lost_motion
+        return None if lost is None or lost.seen_rad is None else abs(lost.seen_rad / lost.foreseen_rad - 1.0)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether every check agrees to `AGREED`, and lost motion to `READ`; not proven without a check."""
+        if not self.checks:
+            return Verdict.NOT_PROVEN
+        read = (self.lost_motion_difference or 0.0) <= READ
+        return Verdict.of(read and all(check.difference <= AGREED for check in self.checks))
 
     @property
     def passed(self) -> bool:
-        """Whether every check agrees to `AGREED`, and lost motion to `READ`."""
-        lost = self.lost_motion
-        read = lost is None or lost.seen_rad is None or abs(lost.seen_rad / lost.foreseen_rad - 1.0) <= READ
-        return read and all(check.difference <= AGREED for check in self.checks)
+        """Whether it is met."""
+        return self.verdict is Verdict.MET
 
 
 AGREED, READ = 1e-6, 1e-2

@@ -28,11 +28,15 @@ def stiffness(design: Design, *, simulated: bool = True) -> Stiffness:
     InputError
         For a loop that is not stable.
     """
-    curves = stiffness_curves(design)
-    moves = bool(np.isfinite(curves[0].stiffness_Nm_rad).all())
     held = design.controller.position is not None
-    checks = check_stiffness(design, CHECKED_HZ) if simulated and moves and held else ()
-    largest = design.load.moment_max_Nm
+    checks = check_stiffness(design, CHECKED_HZ) if simulated and held else ()
+    largest = design.load.moment_max_Nm if any(np.isfinite(one.foreseen_Nm_rad) for one in checks) else 0.0
     asked = [(f, share * largest) for f in REST_HZ for share in REST_FRACTIONS]
-    rest = stiffness_at_rest(design, asked) if checks and largest > 0.0 else ()
-    return Stiffness(design, curves, lost_motion(design, seen=simulated and held), checks, rest)
+    return Stiffness(
+        design,
+        stiffness_curves(design),
+        lost_motion(design, seen=simulated and held),
+        checks,
+        stiffness_at_rest(design, asked) if largest > 0.0 else (),
+        "no position loop holds the output" if simulated and not checks else "",
+    )

@@ -32,7 +32,7 @@ def is_open(address: str) -> bool:
     """Whether others than this machine may reach an address, and nobody is asked who he is."""
     scheme, _, rest = address.rpartition("://")
     host = rest.rpartition(":")[0].strip("[]")
-    return scheme in ("", "tcp") and host != "localhost" and not _is_loopback(host)
+    return scheme in ("", "tcp") and host not in ("", "localhost") and not _is_loopback(host)
 
 
 def _is_loopback(host: str) -> bool:

@@ -40,23 +40,23 @@ A study file is TOML and only data::
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain, product
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.bounds import GRID_AXES, SAMPLES, STUDY_VARIANTS
+from actuator_lti.design import design_tree, load_design, shipped_designs, with_overrides
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import read_toml, shown_path
+from actuator_lti.files.reading import read_toml, shown, shown_path
 from actuator_lti.files.tree import Tree
 from analyses.slugs import slug
 from analyses.studies.study_axes import Axis, read_axis
-from analyses.studies.study_reading import Reader
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
+from analyses.toml_tables import Table
 
 LONGEST_NAME = 200
 
@@ -89,8 +89,8 @@ class Variant:
 class MonteCarloPlan:
     """What a study asks of Monte Carlo."""
 
-    samples: int
-    seed: int
+    samples: int = 1000
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -161,60 +161,92 @@ def study_of(design: Design) -> Study:
 
 def study_from_tree(tree: Tree, where: str, folder: Path, *, keep_going: bool = False) -> Study:
     """Build a study from its parsed tree; designs are looked for beside the file."""
-    reader = Reader(where, folder)
-    reader.only(tree, "", {"study", "variant", "sweep", "grid", "requirement", "monte_carlo", "nightly"})
-    head = reader.table(tree, "study")
-    reader.only(head, "study", {"name", "title", "description", "base", "validation"})
-    base = reader.design(reader.text(head, "study", "base"))
-    extra = reader.tables(tree, "requirement")
-    base = _required(base, extra, reader)
-    maker = _Maker(base, reader, extra, keep_going)
-    variants = _bounded(chain(maker.variants(tree), maker.sweeps(tree), maker.grids(tree)), where)
-    name = reader.text(head, "study", "name", base.name, LONGEST_NAME)
-    first = Variant(base.name, slug(base.name), base)
-    _check_names((first, *variants), reader)
+    root = Table(tree, "", where)
+    root.only(("study", "variant", "sweep", "grid", "requirement", "monte_carlo", "nightly"))
+    head = root.table("study").read(_Head)
+    extra = [dict(table.data) for table in root.tables("requirement")]
+    maker = _Maker(_required(_design(head.base, folder), extra, where), where, folder, extra, keep_going)
+    variants = _bounded(chain(maker.variants(root), maker.sweeps(root), maker.grids(root)), where)
+    first = Variant(maker.base.name, slug(maker.base.name), maker.base)
+    for name, times in Counter(variant.name for variant in (first, *variants)).items():
+        if times > 1:
+            raise InputError(f"variant.name = {shown(name)}: twice; allowed: names that differ", where=where)
     return Study(
-        name,
-        reader.text(head, "study", "title", ""),
-        reader.text(head, "study", "description", ""),
+        _name(root.table("study"), head.name or maker.base.name),
+        head.title,
+        head.description,
         where,
         first,
         variants,
-        reader.flag(head, "study", "validation", False),
-        _plan(tree, reader),
+        head.validation,
+        _plan(root.table("monte_carlo")) if "monte_carlo" in root else None,
     )
 
 
-def _required(design: Design, extra: list[Tree], reader: Reader) -> Design:
-    """Add the study's requirements, in place of those with the same id."""
-    from actuator_lti.design import design_tree, with_overrides
+@dataclass(frozen=True, kw_only=True)
+class _Head:
+    """The table ``[study]``."""
 
+    base: str
+    name: str = ""
+    title: str = ""
+    description: str = ""
+    validation: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Written:
+    """A ``[[variant]]``; beside it stands ``override``."""
+
+    name: str
+    base: str | None = None
+    motor: str | None = None
+
+
+def _name(table: Table, name: str) -> str:
+    if not 0 < len(name.strip()) <= len(name) <= LONGEST_NAME:
+        raise table.fail("name", f"allowed: a text of 1 to {LONGEST_NAME} characters")
+    return name
+
+
+def _plan(table: Table) -> MonteCarloPlan:
+    plan = table.read(MonteCarloPlan)
+    for name, value, least, most in (
+        ("samples", plan.samples, 1, SAMPLES.most), ("seed", plan.seed, 0, 2**63 - 1),
+    ):  # fmt: skip
+        if not least <= value <= most:
+            raise table.fail(name, f"allowed: a whole number, {least} to {most}")
+    return plan
+
+
+def _design(name: str, folder: Path) -> Design:
+    """A shipped design by name, or a design file beside the study file."""
+    return load_design(name if name in shipped_designs() else folder / name)
+
+
+def _motor(name: str, folder: Path) -> Tree:
+    """The [motor] table of a file beside the study file."""
+    tree = read_toml(folder / name, "file with a [motor] table")
+    if not isinstance(tree.get("motor"), dict):
+        raise InputError("no [motor] table; allowed: a TOML file with one", where=shown_path(name))
+    return tree["motor"]
+
+
+def _located(place: str, where: str, make: Callable[[], Design]) -> Design:
+    """Call something whose errors shall name the study file and a place in it."""
+    try:
+        return make()
+    except InputError as error:
+        raise InputError(f"{place}: {error}", where=where) from error
+
+
+def _required(design: Design, extra: list[Tree], where: str) -> Design:
+    """Add the study's requirements, in place of those with the same id."""
     if not extra:
         return design
     replaced = [item.get("id") for item in extra]  # as written: what is no text is refused with its place
     kept = [item for item in design_tree(design).get("requirement", []) if item.get("id") not in replaced]
-    return reader.located("requirement", lambda: with_overrides(design, {"requirement": [*kept, *extra]}))
-
-
-def _plan(tree: Tree, reader: Reader) -> MonteCarloPlan | None:
-    if "monte_carlo" not in tree:
-        return None
-    table = reader.table(tree, "monte_carlo")
-    reader.only(table, "monte_carlo", {"samples", "seed"})
-    return MonteCarloPlan(
-        reader.integer(table, "monte_carlo", "samples", 1000, 1, SAMPLES.most),
-        reader.integer(table, "monte_carlo", "seed", 0, 0, 2**63 - 1),
-    )
-
-
-def _check_names(variants: tuple[Variant, ...], reader: Reader) -> None:
-    seen: set[str] = set()
-    for variant in variants:
-        if variant.name in seen:
-            raise reader.error(
-                f"variant.name = {reader.shown(variant.name)}: twice; allowed: names that differ"
-            )
-        seen.add(variant.name)
+    return _located("requirement", where, lambda: with_overrides(design, {"requirement": [*kept, *extra]}))
 
 
 def _bounded(variants: Iterator[Variant], where: str) -> tuple[Variant, ...]:
@@ -231,43 +263,32 @@ class _Maker:
     """Makes variants of a base."""
 
     base: Design
-    reader: Reader
+    where: str
+    folder: Path
     requirements: list[Tree]
     keep_going: bool
 
-    def variants(self, tree: Tree) -> Iterator[Variant]:
-        reader = self.reader
-        for place, table in enumerate(reader.tables(tree, "variant")):
-            where = f"variant[{place + 1}]"
-            reader.only(table, where, {"name", "base", "motor", "override"})
-            name = reader.text(table, where, "name", None, LONGEST_NAME)
-            overrides = dict(reader.table(table, "override", where, optional=True))
-            if "motor" in table:
-                overrides = {"motor": reader.motor(reader.text(table, where, "motor")), **overrides}
-            origin = None
-            if "base" in table:
-                origin = reader.text(table, where, "base")
-            yield self._made(name, overrides, origin)
+    def variants(self, root: Table) -> Iterator[Variant]:
+        for table in root.tables("variant"):
+            one = table.read(_Written, beside=("override",))
+            overrides = dict(table.table("override").data)
+            if one.motor is not None:
+                overrides = {"motor": _motor(one.motor, self.folder), **overrides}
+            yield self._made(_name(table, one.name), overrides, one.base)
 
-    def sweeps(self, tree: Tree) -> Iterator[Variant]:
-        for place, table in enumerate(self.reader.tables(tree, "sweep")):
-            axis = read_axis(table, f"sweep[{place + 1}]", self.base, self.reader)
+    def sweeps(self, root: Table) -> Iterator[Variant]:
+        for table in root.tables("sweep"):
+            axis = read_axis(table, self.base)
             yield from (self._point((axis,), (value,)) for value in axis.values)
 
-    def grids(self, tree: Tree) -> Iterator[Variant]:
-        reader = self.reader
-        for place, table in enumerate(reader.tables(tree, "grid")):
-            where = f"grid[{place + 1}]"
-            reader.only(table, where, {"axes"})
-            axes = tuple(
-                read_axis(item, f"{where}.axes[{k + 1}]", self.base, reader)
-                for k, item in enumerate(reader.tables(table, "axes", where))
-            )
+    def grids(self, root: Table) -> Iterator[Variant]:
+        for table in root.tables("grid"):
+            table.only(("axes",))
+            axes = tuple(read_axis(item, self.base) for item in table.tables("axes"))
             if not axes:
-                raise reader.error(f"{where}.axes: no axis; allowed: 1 to {GRID_AXES.most}")
-            GRID_AXES.check(len(axes), reader.where, name=f"{where}.axes")
-            size = prod(len(axis.values) for axis in axes)
-            STUDY_VARIANTS.check(size, reader.where, name=where)
+                raise InputError(f"{table.path}.axes: no axis; allowed: 1 to {GRID_AXES.most}", self.where)
+            GRID_AXES.check(len(axes), self.where, name=f"{table.path}.axes")
+            STUDY_VARIANTS.check(prod(len(axis.values) for axis in axes), self.where, name=table.path)
             for point in product(*(axis.values for axis in axes)):
                 yield self._point(axes, point)
 
@@ -276,16 +297,14 @@ class _Maker:
         return self._made(", ".join(f"{key} = {value}" for key, value in overrides.items()), overrides, None)
 
     def _made(self, name: str, overrides: Tree, origin: str | None) -> Variant:
-        from actuator_lti.design import with_overrides
-
         def make() -> Design:
             start = self.base
             if origin is not None:
-                start = _required(self.reader.design(origin), self.requirements, self.reader)
+                start = _required(_design(origin, self.folder), self.requirements, self.where)
             return with_overrides(start, overrides) if overrides else start
 
         try:
-            design = self.reader.located(f"variant {self.reader.shown(name)}", make)
+            design = _located(f"variant {shown(name)}", self.where, make)
         except InputError as error:
             if not self.keep_going:
                 raise

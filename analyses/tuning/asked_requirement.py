@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.model import Requirement
-from actuator_lti.design.quantities import QUANTITIES, parse_limit
+from actuator_lti.design.units import parse_limit
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.judging import loops_of
 

@@ -82,12 +82,12 @@ def checked(design: Design, wanted: tuple[str, ...]) -> tuple[Element, ...]:
     """
     for word in wanted:
         if word not in ELEMENTS:
-            raise InputError(f"place {word!r}: allowed: {', '.join(ELEMENTS)}")
+            raise InputError(f"place = {word!r}: allowed: {', '.join(ELEMENTS)}")
         if design.controller.velocity is None:
-            raise InputError(f"place {word}: the design {design.name} has no control.velocity to hold it")
+            raise InputError(f"place = {word}: the design {design.name} has no control.velocity to hold it")
         if word == "feedforward" and design.controller.position is None:
             raise InputError(
-                f"place {word}: the design {design.name} has no control.position, whose command it needs"
+                f"place = {word}: the design {design.name} has no control.position, whose command it needs"
             )
     return tuple(item for item in ELEMENTS if item in wanted)
 

@@ -24,6 +24,7 @@ from actuator_lti.loops.limiters import LimiterPath, limiter_places
 from analyses.linear.loop_figures import LoopFigures, loop_figures
 from analyses.validation.small_signal import Place
 from nonlinear import tangent
+from nonlinear.bench.derivative import tangents
 from nonlinear.bench.injection import Watched
 from nonlinear.bench.loop_setup import PATHS, LoopSetup, loop_setup, points_of, stages_of
 from nonlinear.bench.on_the_bench import on_the_bench
@@ -145,21 +146,25 @@ class Bench:
         The amplitude at which a limiter first acts is its limit over that response.
         """
         setup, loops = self.setup("command"), self.loops("command")
-        wired = wire(loops.design)
-        for limiter in limiter_places(wired):
-            if not isfinite(limiter.limit):
-                continue
-            path, signals = loops.limiters[limiter.limiter.name], limiter.signals
-            period_s = limiter.every * self.drive.controller.period_s
-            name = f"{limiter.limiter.name}_onset".replace("-", "_")
-            for k, signal in enumerate(signals, -len(signals)):
-                seen = Watched(signal, limiter.limiter.kind, limiter.every, period_s)
-                found = tangent(setup.design, "command", setup=setup, watched=seen)
-                yield Place(
-                    name="command", condition=setup.condition, tangent=found,
-                    predicted=partial(self._last, path, found.hold_s, k), poles=np.empty(0, complex),
-                    quantity=name if signal == signals[0] else f"{name}_integral",
-                )  # fmt: skip
+        limiters = [each for each in limiter_places(wire(loops.design)) if isfinite(each.limit)]
+        watched = [
+            (
+                each,
+                k,
+                Watched(signal, each.limiter.kind, each.every, each.every * setup.design.controller.period_s),
+            )
+            for each in limiters
+            for k, signal in enumerate(each.signals, -len(each.signals))
+        ]
+        found = tangents(setup, "command", [each[2] for each in watched]) if watched else iter(())
+        for (each, k, seen), one in zip(watched, found, strict=True):
+            name = f"{each.limiter.name}_onset".replace("-", "_")
+            path = loops.limiters[each.limiter.name]
+            yield Place(
+                name="command", condition=setup.condition, tangent=one,
+                predicted=partial(self._last, path, one.hold_s, k), poles=np.empty(0, complex),
+                quantity=name if seen.signal == each.signals[0] else f"{name}_integral",
+            )  # fmt: skip
 
     @staticmethod
     def _last(path: LimiterPath, hold_s: float, k: int, z: Complexes) -> Complexes:

@@ -288,9 +288,13 @@ def _exact_margins(place: Place, exact: ExactMargins) -> Iterator[Row]:
 
 
 def _angle_on_circle(poles: Complexes) -> float:
-    """Angle of the pole nearest to the unit circle, 0 to pi."""
+    """Angle of the pole nearest to the unit circle, 0 to pi.
+
+    A pole without its conjugate is real: with the mode at rest, which is none of the poles, it was a double
+    one, and rounding split the two into a pair.
+    """
     pole = poles[int(np.argmin(np.abs(np.abs(poles) - 1.0)))]
-    return float(abs(np.angle(pole)))
+    return float(abs(np.angle(pole if pole.conjugate() in poles else pole.real)))
 
 
 def _delay_row(place: Place, delay_s: float) -> Row:

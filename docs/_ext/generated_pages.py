@@ -1,4 +1,4 @@
-"""Pages made from the sources at each build: keys of a design file, commands, quantities, terms."""
+"""Pages made from the sources at each build: keys of a design file, commands, quantities, terms, pictures."""
 
 from __future__ import annotations
 
@@ -139,7 +139,15 @@ def glossary_page() -> str:
     return "\n".join(["# Glossary", "", intro, "", *table(["term", "meaning"], rows)])
 
 
+def diagram_page() -> str:
+    """The drive as a block diagram with its keys."""
+    from drive_diagram import diagram_page as page
+
+    return page()
+
+
 PAGES = {
+    "diagram": diagram_page,
     "keys": keys_page,
     "commands": commands_page,
     "quantities": quantities_page,
@@ -157,7 +165,27 @@ def write_pages(app: Any) -> None:
             path.write_text(text, encoding="utf-8")
 
 
+def write_pictures(app: Any) -> None:
+    """Write the landing page's pictures: the position loop with its margins, and the limiter map."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from actuator_lti import assemble_loops, load_design
+    from analyses.large_signal.map import amplitude_map
+
+    folder, design = Path(app.srcdir) / "generated", load_design("ilr33-amber")
+    loops = assemble_loops(design)
+    drawn = {
+        "bode": loops.position.plot_bode(),
+        "map": amplitude_map(design, loops, counts=(14, 24)).plot_map(),
+    }
+    for name, axes in drawn.items():
+        first = axes[0] if hasattr(axes, "__len__") else axes
+        first.figure.savefig(folder / f"{name}.svg", bbox_inches="tight", metadata={"Date": None})
+
+
 def setup(app: Any) -> dict[str, Any]:
     """Tell Sphinx to write the pages before it looks for pages."""
     app.connect("builder-inited", write_pages)
+    app.connect("builder-inited", write_pictures)
     return {"parallel_read_safe": True}

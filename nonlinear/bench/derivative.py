@@ -18,6 +18,7 @@ not.  It shares no code with the linear loops, so the two may be held against ea
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -130,7 +131,6 @@ def tangent(
     *,
     setup: LoopSetup | None = None,
     hold: bool = True,
-    watched: Watched | None = None,
 ) -> Tangent:
     """Measure the derivative of the running drive.
 
@@ -145,8 +145,6 @@ def tangent(
         Operating motion and test set-up; by default `nonlinear.bench.loop_setup.loop_setup` chooses one.
     hold : bool
         Whether the rotor is locked for the current loop, as on a bench.
-    watched : Watched, optional
-        What is read instead of what comes back: a signal in front of a limiter.
 
     Returns
     -------
@@ -176,15 +174,20 @@ def tangent(
     """
     if setup is None:
         setup = loop_setup(as_design(design), place, limits_on=False, held=hold and place == "current")
+    return next(tangents(setup, place))
+
+
+def tangents(setup: LoopSetup, place: str, watched: Sequence[Watched] = ()) -> Iterator[Tangent]:
+    """From a place to each of some signals that are watched, measured at once; else to what comes back."""
     measured, tick_s = Differences(setup, place, watched), setup.design.controller.period_s
-    parts, entry_errors, stated_error = measured.parts()
-    return Tangent(
-        place,
-        *parts,
-        period_s=setup.base_ticks * tick_s,
-        hold_s=measured.hold * tick_s,
-        states=measured.names,
-        stated_error=stated_error,
-        entry_errors=entry_errors,
-        places=measured.moved,
-    )
+    for parts, entry_errors, stated_error in measured.parts():
+        yield Tangent(
+            place,
+            *parts,
+            period_s=setup.base_ticks * tick_s,
+            hold_s=measured.hold * tick_s,
+            states=measured.names,
+            stated_error=stated_error,
+            entry_errors=entry_errors,
+            places=measured.moved,
+        )

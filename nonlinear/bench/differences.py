@@ -10,7 +10,7 @@ are not looked at.  The sum of these differences is the stated error.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ from actuator_lti.errors import NumericalError
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.state_kinds import CONTINUOUS, COUNTER, FLAG, names_of, places_of
 from nonlinear.bench.injection import Injection, Watched
-from nonlinear.bench.lifted import GRID, Floats, even, response, sensitivities, sized
+from nonlinear.bench.lifted import GRID, Floats, sensitivities, sized
 from nonlinear.bench.loop_setup import LoopSetup
 
 Parts = tuple[Floats, Floats, Floats, Floats]
@@ -44,7 +44,7 @@ class Differences:
         Places of the numbers of the state that take part.
     """
 
-    def __init__(self, setup: LoopSetup, place: str, watched: Watched | None = None) -> None:
+    def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched] = ()) -> None:
         self.where = f"{setup.design.name}: {place}"
         self.injected = Injection(setup, place, watched)
         self.drive = self.injected.rows.running()
@@ -71,15 +71,25 @@ class Differences:
         """Of the numbers of the state that take part."""
         return names_of(self.moved)
 
-    def parts(self) -> tuple[Parts, Floats, float]:
-        """A, B, C, D; stated errors of A over C beside B over D; the largest of the response, relative."""
-        left, right = self._felt(self._estimate())
-        sway = SWAY * self.kick * np.max(right, axis=0)
-        tried = self._tried(np.maximum(sway, LEAST * np.abs(self.start[self.places])), left, right)
-        for _ in range(2):  # what is felt of an error is known once the response is
-            whole, off = tried.best(left, right)
-            left, right = self._felt(whole)
-        return self._split(whole), off, float(np.max(np.einsum("zi,ik,zk->z", left, off, right)))
+    def parts(self) -> Iterator[tuple[Parts, Floats, float]]:
+        """A, B, C, D; stated errors of A over C beside B over D; the largest of the response, relative.
+
+        One after the other for each thing that is read.
+        """
+        estimate, n = self._estimate(), self.moved.size
+        rows = [
+            np.concatenate([np.arange(n), n + np.arange(k, self.updates * readings, readings)])
+            for readings in [self.injected.readings]
+            for k in range(readings)
+        ]
+        felt = [self._felt(estimate[each]) for each in rows]
+        sway = SWAY * self.kick * np.max(felt[0][1], axis=0)
+        tried = self._tried(np.maximum(sway, LEAST * np.abs(self.start[self.places])), rows, felt)
+        for columns, (left, right) in zip(tried, felt, strict=True):
+            first, _ = columns.best(left, right)
+            left, right = self._felt(first)  # what is felt of an error is known once the response is
+            whole, off = columns.best(left, right)
+            yield self._split(whole), off, float(np.max(np.einsum("zi,ik,zk->z", left, off, right)))
 
     def _split(self, whole: Floats) -> Parts:
         n = self.moved.size
@@ -87,14 +97,16 @@ class Differences:
 
     def _felt(self, whole: Floats) -> tuple[Floats, Floats]:
         """What errors of the entries do to the response, over its size, see `sensitivities`."""
-        z, parts = np.exp(1j * GRID), self._split(whole)
-        left, right = (np.abs(each) for each in sensitivities(*parts, z))
-        return left / sized(response(*even(*parts[:3]), parts[3], z))[:, None], right
+        n = self.moved.size
+        left, right = sensitivities(*self._split(whole), np.exp(1j * GRID))
+        answer = np.einsum("zi,ik,zk->z", left[:, n:], whole[n:], right)
+        return np.abs(left) / sized(answer)[:, None], np.abs(right)
 
     def _runs(self, rows: Floats) -> tuple[Floats, Floats, Floats]:
-        """States behind one base period, what came back at each update, and flags on the way."""
+        """States behind one base period, what is read at each update, and flags on the way."""
         states, injected = rows[:, : self.size].copy(), rows[:, self.size :]
-        back, flags = np.empty(injected.shape), np.empty((*injected.shape, self.watched.size))
+        back = np.empty((*injected.shape, self.injected.readings))
+        flags = np.empty((*injected.shape, self.watched.size))
         for k in range(self.updates):
             back[:, k] = self.injected.run(self.drive, states, injected[:, k])
             flags[:, k] = states[:, self.watched]
@@ -142,7 +154,8 @@ class Differences:
 
     def _estimate(self) -> Floats:
         """Columns by the largest step each, far beyond the kick's own motion, that ends in no event."""
-        steps, columns = FAR * self.scale, np.zeros((self.scale.size, self.scale.size))
+        steps, outputs = FAR * self.scale, self.updates * self.injected.readings
+        columns = np.zeros((steps.size, self.moved.size + outputs))
         free = np.zeros(steps.size, bool)
         for _ in range(MOST_DECADES):
             found = self._differences(steps)[0]
@@ -153,18 +166,32 @@ class Differences:
             steps = np.where(free, 0.0, 0.1 * steps)
         raise self._refused(free)
 
-    def _tried(self, largest: Floats, left: Floats, right: Floats) -> _Columns:
-        """Columns by steps that fall by tens, each until three had no event and the last did not bend."""
-        tried: list[tuple[Floats, Floats]] = []
+    def _tried(
+        self, largest: Floats, rows: list[npt.NDArray[np.intp]], felt: list[tuple[Floats, Floats]]
+    ) -> list[_Columns]:
+        """Columns by steps that differ by tens, of the rows of each thing that is read.
+
+        From small steps up, each column until larger ones do not count for it; then by smaller ones, until it
+        had three without an event and the last did not bend.
+        """
+        tried = [self._differences(largest * 10.0 ** (1 - DECADES))]
+        done: list[list[Floats]] = [[] for _ in rows]
         going = np.ones(largest.size, bool)
-        for decade in range(MOST_DECADES):
-            tried.append(self._differences(np.where(going, largest * 10.0**-decade, 0.0)))
-            if decade + 1 < DECADES:
-                continue
-            columns = _Columns(*zip(*tried, strict=True))
-            going = ~columns.free | columns.bend(left, right)
+        for decade in reversed(range(DECADES - 1)):
+            tried.insert(0, self._differences(np.where(going, largest * 10.0**-decade, 0.0)))
+            off = np.maximum(np.abs(tried[0][0] - tried[1][0]), tried[0][1])
+            for each, (left, right), below in zip(rows, felt, done, strict=True):
+                below.insert(0, _felt(off[:, each], left, right))
+            going = ~np.all([_upwards(np.stack(below))[1][-1] for below in done], axis=0)
+        for decade in range(DECADES, MOST_DECADES):
+            values, rounding = (np.stack(each) for each in zip(*tried, strict=True))
+            columns = [_Columns(values[:, :, each], rounding[:, :, each]) for each in rows]
+            going = ~columns[0].free
+            for one, (left, right) in zip(columns, felt, strict=True):
+                going = going | one.bend(left, right)
             if not going.any():
                 return columns
+            tried.append(self._differences(np.where(going, largest * 10.0**-decade, 0.0)))
         raise self._refused(~going)
 
     def _refused(self, free: npt.NDArray[np.bool_]) -> NumericalError:
@@ -182,7 +209,7 @@ class Differences:
         rows[both, places] += np.concatenate([steps, -steps])
         ends = rows[both, places]
         after, back, flags = self._runs(rows)
-        found = np.concatenate([after[:, self.moved], back], axis=1)
+        found = np.concatenate([after[:, self.moved], back.reshape(2 * K, -1)], axis=1)
         calm = (flags == self.calm).all(axis=(1, 2)) & np.isfinite(found).all(axis=1)
         width = ends[:K] - ends[K:]
         width = np.where(calm[:K] & calm[K:] & (width > 0.0), width, np.nan)[:, None]
@@ -193,9 +220,9 @@ class Differences:
 class _Columns:
     """All columns by steps that fall by tens, and what each differs in from that of the next smaller step."""
 
-    def __init__(self, values: Sequence[Floats], rounding: Sequence[Floats]) -> None:
-        self.values = np.stack(values[:-1])
-        self.off = np.maximum(np.abs(np.diff(np.stack(values), axis=0)), np.stack(rounding[:-1]))
+    def __init__(self, values: Floats, rounding: Floats) -> None:
+        self.values = values[:-1]
+        self.off = np.maximum(np.abs(np.diff(values, axis=0)), rounding[:-1])
 
     @property
     def free(self) -> npt.NDArray[np.bool_]:
@@ -203,29 +230,33 @@ class _Columns:
         there = np.asarray(np.isfinite(self.off).all(axis=2))
         return np.asarray((there[:-1] & there[1:]).any(axis=0))
 
-    def _felt(self, left: Floats, right: Floats) -> Floats:
-        """What the error of each column by each step does to the response."""
-        return np.asarray(np.max((self.off @ left.T) * right.T, axis=2))
-
     def bend(self, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
         """Of which truncation still falls with the smallest step."""
-        felt = self._felt(left, right)
+        felt = _felt(self.off[-2:], left, right)
         return np.asarray(felt[-1] * np.sqrt(TENFOLD) < felt[-2])
 
     def best(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:
-        """Each column by the step whose error does least to the response; and that error.
-
-        Of a step counts what its neighbours are off by as well: a step that is lost in rounding changes
-        nothing, and agrees with the next smaller one by that.  From small steps up, what lies beyond a rise
-        that truncation makes is left.
-        """
-        felt = self._felt(left, right)
-        larger = np.nan_to_num(np.vstack([0.0 * felt[:1], felt[:-1]]), nan=0.0)
-        smaller = np.vstack([felt[1:], np.full_like(felt[:1], np.inf)])
-        felt = np.maximum(np.maximum(felt, smaller), larger)
-        felt = np.where(np.isfinite(felt), felt, np.inf)[::-1]  # from small steps up
-        least = np.minimum.accumulate(felt, axis=0)
-        beyond = np.logical_or.accumulate(felt > TENFOLD**2 * least, axis=0)
+        """Each column by the step whose error does least to the response; and that error."""
+        felt, beyond = _upwards(_felt(self.off, left, right))
         chosen = len(felt) - 1 - np.argmin(np.where(beyond, np.inf, felt), axis=0)
         columns = np.arange(chosen.size)
         return self.values[chosen, columns].T, self.off[chosen, columns].T
+
+
+def _felt(off: Floats, left: Floats, right: Floats) -> Floats:
+    """What the error of each column by each step does to the response."""
+    return np.asarray(np.max((off @ left.T) * right.T, axis=-1))
+
+
+def _upwards(felt: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """What errors do to the response, from small steps up, and which steps lie beyond a rise.
+
+    Of a step counts what its neighbours are off by as well: a step that is lost in rounding changes nothing,
+    and agrees with the next smaller one by that.  What lies beyond a rise that truncation makes is left.
+    """
+    larger = np.nan_to_num(np.vstack([0.0 * felt[:1], felt[:-1]]), nan=0.0)
+    smaller = np.vstack([felt[1:], np.full_like(felt[:1], np.inf)])
+    felt = np.maximum(np.maximum(felt, smaller), larger)
+    felt = np.where(np.isfinite(felt), felt, np.inf)[::-1]
+    least = np.minimum.accumulate(felt, axis=0)
+    return felt, np.logical_or.accumulate(felt > TENFOLD**2 * least, axis=0)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
+
+import numpy as np
 
 from actuator_lti.drive.signals import Kind
 from nonlinear._kernels import layout as at
@@ -42,13 +45,17 @@ class Watched:
 
 
 class Injection:
-    """A place of a drive: where the signal is added, how much would be large there, and what is read."""
+    """A place of a drive: where the signal is added, how much would be large there, and what is read.
 
-    def __init__(self, setup: LoopSetup, place: str, watched: Watched | None = None) -> None:
+    Without signals that are watched one thing is read: what comes back.
+    """
+
+    def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched] = ()) -> None:
         design = setup.design
         self.place, self.rows, self.ratio = place, setup.row(), design.total_ratio
         self.at_start = place in ("command", "load")
         self.outermost, self.watched = design.controller.outermost, watched
+        self.readings = max(len(watched), 1)
         if place == "load":
             self.hold_ticks, self.at = 1, at.LOAD
         elif place == "command":
@@ -60,10 +67,9 @@ class Injection:
             probe = at.PROBES + at.POINTS.index(point) * at.PROBE_SIZE
             self.hold_ticks, self.at = setup.hold_ticks, probe + at.PROBE_SIGNAL + 1
             self.read_at = RETURNED[point]
-        if watched is not None:
-            there = {"i": at.S_CURRENT} | RETURNED | HELD
-            signal = target(design, "velocity") if watched.signal == "torque_command" else watched.signal
-            self.read_at = there[signal]
+        there = {"i": at.S_CURRENT} | RETURNED | HELD
+        signals = [target(design, "velocity") if x.signal == "torque_command" else x.signal for x in watched]
+        self.watched_at = [there[signal] for signal in signals]
         self.size = setup.range if isfinite(setup.range) and setup.range > 0.0 else 1.0
         self.steady = float(self.rows.values[0, self.at])
 
@@ -73,12 +79,12 @@ class Injection:
             p[at.RARE_LOAD] = 1.0
 
     def run(self, drive: Running, states: Floats, values: Floats) -> Floats:
-        """Run every state to the next update with its own value; what is read, one a state."""
-        if self.watched is not None:
-            return self._watch(drive, states, values, self.watched)
+        """Run every state to the next update with its own value; what is read, shape (states, readings)."""
+        if self.watched:
+            return self._watch(drive, states, values)
         early = self._read(states, drive.p)
         drive.each(states, self.hold_ticks, self.at, values)
-        return early if self.at_start else self._read(states, drive.p)
+        return (early if self.at_start else self._read(states, drive.p))[:, None]
 
     def _read(self, s: Floats, p: Floats) -> Floats:
         """What comes back, negated; the output itself for command and load."""
@@ -88,21 +94,28 @@ class Injection:
             return s[:, at.S_CURRENT if self.outermost == "current" else at.S_SPEED].copy()
         return s[:, at.S_OUTPUT].copy() if p[at.ELASTIC_DRIVE] > 0.0 else s[:, at.S_ANGLE] / self.ratio
 
-    def _watch(self, drive: Running, states: Floats, values: Floats, watched: Watched) -> Floats:
-        """What the signal is, or what it changed by, at its last update.
+    def _watch(self, drive: Running, states: Floats, values: Floats) -> Floats:
+        """What each signal is, or what it changed by, at its last update.
 
         What stands in front of the torque filters is no number of the state: that update is made once more
         without them.
         """
-        drive.each(states, self.hold_ticks - watched.every, self.at, values)
-        before = states[:, self.read_at].copy()
-        if watched.signal == "torque_command":
-            bare, filters = states.copy(), drive.p[at.TORQUE_FILTERS]
-            drive.p[at.TORQUE_FILTERS] = 0.0
-            drive.each(bare, 1, self.at, values)
-            drive.p[at.TORQUE_FILTERS] = filters
-        drive.each(states, watched.every, self.at, values)
-        if watched.signal == "torque_command":
-            return bare[:, self.read_at]
-        after = states[:, self.read_at].copy()
-        return {"value": after, "rate": (after - before) / watched.period_s, "rms": before}[watched.kind]
+        before, tick = np.empty((len(states), self.readings)), 0
+        for k in sorted(range(self.readings), key=lambda k: -self.watched[k].every):
+            watched, seen = self.watched[k], states
+            drive.each(states, self.hold_ticks - watched.every - tick, self.at, values)
+            tick = self.hold_ticks - watched.every
+            if watched.signal == "torque_command":
+                seen, filters = states.copy(), drive.p[at.TORQUE_FILTERS]
+                drive.p[at.TORQUE_FILTERS] = 0.0
+                drive.each(seen, 1, self.at, values)
+                drive.p[at.TORQUE_FILTERS] = filters
+            before[:, k] = seen[:, self.watched_at[k]]
+        drive.each(states, self.hold_ticks - tick, self.at, values)
+        for k, watched in enumerate(self.watched):
+            after = states[:, self.watched_at[k]]
+            if watched.kind == "rate":
+                before[:, k] = (after - before[:, k]) / watched.period_s
+            elif watched.kind == "value" and watched.signal != "torque_command":
+                before[:, k] = after
+        return before

@@ -13,9 +13,10 @@ from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
-from nonlinear.export.c_files import exported, exporter_version, plain
-from nonlinear.export.controller_cut import Controller, controller_of, member_words
-from nonlinear.export.controller_vectors import vectors_text
+from nonlinear.export.c_files import exporter_version, plain
+from nonlinear.export.controller_cut import Controller, begins, controller_of
+from nonlinear.export.controller_names import signal_words, state_words
+from nonlinear.export.controller_vectors import roundings, vectors_text
 from nonlinear.export.program import FLAGS, c_text, single, template
 
 _LIBRARY = re.compile(r"\b(sqrt|floor|fabs|exp|log|sin|cos|tan)\(")
@@ -39,13 +40,10 @@ def controller_export(
     Raises
     ------
     InputError
-        For a prefix that no name in C begins with, and for a law of one's own.
+        For a prefix that no name in C begins with.
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*_", prefix):
         raise InputError(f"prefix = {prefix!r}: allowed: letters, digits and _, a letter first, _ last")
-    if exported(design).row[at.OWN_STAGE] > 0.0:
-        message = "control: a law of one's own is not exported alone; allowed: export c, export fmu"
-        raise InputError(message, where=design.origin or design.name)
     ours = controller_of(design, prefix, single_precision=single_precision)
     values = {
         "PREFIX": prefix.upper(), "prefix": prefix, "namespace": prefix.removesuffix("_"),
@@ -54,14 +52,13 @@ def controller_export(
         "DESIGN_HASH": design_hash(design), "REAL": "float" if single_precision else "double",
         "PRECISION": "single" if single_precision else "double",
         "CONSTANTS": _constants(ours, prefix.upper()), "FLAGS": _flags(prefix.upper()),
-        "STRUCTS": "\n\n".join(
-            struct_text(each, member_words(ours)) for each in (ours.state, ours.measured, ours.out)
-        ),
+        "STRUCTS": _structs(ours),
         "DECLARATIONS": _declarations(ours.program),
     }  # fmt: skip
     source = _source(ours.program, prefix)
     values["SOURCE_HASH"] = hashlib.sha256(source.encode()).hexdigest()
     values["SIZES"], values["LIBRARY"] = _sizes(ours, single_precision), _library(source)
+    values["ROUNDINGS"] = str(roundings(ours))
     texts = {
         "controller.h": _filled("controller.h", values),
         "controller.c": source,
@@ -125,16 +122,21 @@ def _flags(upper: str) -> str:
 
 def _constants(ours: Controller, upper: str) -> str:
     """Numbers of the configuration that the program around the controller wants."""
-    p, names = ours.p, {each.name for each in ours.measured.members}
-    values = {"PERIOD_S": (at.PERIOD, "of a step, s")}
-    if "motor_counts" in names or "output_counts" in names:
-        values["COUNTS_PER_RAD"] = (at.COUNTS_PER_RAD, "of the angle that the speed is made of, motor side")
-    if p[at.POSITION_COUNTS] > 0.0:
-        values["OUTPUT_COUNTS_PER_RAD"] = (at.POSITION_COUNTS, "of the output's sensor")
-    return "\n".join(
-        f"#define {upper}CONTROLLER_{name} {c_float(float(p[place]))} /* {words} */"
-        for name, (place, words) in values.items()
-    )
+    upper += "CONTROLLER_"
+    lines = [f"#define {upper}PERIOD_S {c_float(float(ours.p[at.PERIOD]))} /* of a step, s */"]
+    for each in ours.measured.members:
+        if each.kind == "count":
+            name = each.name.replace("motor_", "").upper()
+            value = c_float(ours.counts_per_rad(each.first))
+            lines.append(f"#define {upper}{name}_PER_RAD {value} /* of {each.name} */")
+    return "\n".join(lines)
+
+
+def _structs(ours: Controller) -> str:
+    parts, signals = begins(ours.p), (ours.measured, ours.out)
+    said = {each.name: signal_words(each.first) for struct in signals for each in struct.members}
+    texts = [struct_text(ours.state, {m.name: state_words(parts[m.first]) for m in ours.state.members})]
+    return "\n\n".join([*texts, *(struct_text(each, said) for each in signals)])
 
 
 def _sizes(ours: Controller, single_precision: bool) -> str:

@@ -16,34 +16,19 @@ from actuator_lti.compiled.program import Program
 from actuator_lti.compiled.residual import Leftover, Residual, number
 from actuator_lti.compiled.structs import Member, Rows, Struct, emit_structs, split_index
 from actuator_lti.compiled.unread import without_unread
+from actuator_lti.design.law import LAW_INPUTS
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout
 from nonlinear._kernels.control import control
-from nonlinear._kernels.estimate import counted
-from nonlinear._kernels.position import position_feedback
+from nonlinear._kernels.estimate import counted, measured_speed
 from nonlinear._kernels.state_kinds import COUNTER, state_kinds
 from nonlinear._kernels.tick import init_command, init_controller, init_estimate
-from nonlinear.export.c_files import exported, stage_words
-from nonlinear.export.rows import unit_of, words
+from nonlinear.export.c_files import exported
+from nonlinear.export.controller_names import signal_name, state_name
 
 Floats = npt.NDArray[np.float64]
 MOTOR_COUNTS, OUTPUT_COUNTS = layout.IO_SIZE, layout.IO_SIZE + 1  # places of inputs that are whole numbers
 _SINGLE = {"STANDING": 1e-6}  # what is no change of a reference but rounding, in single precision
-_STAGES = ("position", "velocity", "current", "voltage")
-_UNITS = dict(zip(_STAGES, ("rad", "rad/s", "A", "V"), strict=True))
-_BEHIND = {  # numbers in the unit of what a stage commands
-    "velocity": ("S_VELOCITY_INTEGRATOR", "S_TORQUE_FEEDFORWARD", "S_TORQUE_CHAIN"),
-    "position": ("S_POSITION_INTEGRATOR",),
-}
-_COMMAND = ("S_PROFILE", "S_PROFILE_COMMAND", "AT_AVERAGE", "S_AVERAGE_SUM", "S_COMMAND_CHAIN", "IN_COMMAND")
-_ANGLES = ("S_REFERENCE", "S_REFERENCE_BEFORE", "S_ERROR", "AT_ANGLES", "ANGLE_START")
-_SPEEDS = ("S_ERROR_RATE", "S_SPEED_CHAIN", "IN_OUTPUT_SPEED")
-_NAMES = {  # inputs and outputs
-    "IN_COMMAND": "command", "IN_CURRENT": "motor_current", "IN_SPEED": "motor_speed",
-    "IN_ANGLE": "motor_angle", "ANGLE_START": "motor_angle", "IN_OUTPUT": "output_angle",
-    "IN_OUTPUT_SPEED": "output_speed", "IN_BUS": "bus_voltage", "IO_VOLTAGE": "voltage",
-    "IO_CURRENT_COMMAND": "current_command", "IO_SPEED_COMMAND": "speed_command", "IO_FLAGS": "flags",
-}  # fmt: skip
 
 
 @kernel
@@ -88,6 +73,15 @@ class Controller:
     measured: Struct
     out: Struct
 
+    def counts_per_rad(self, place: int) -> float:
+        """Of the motor's sensor or the output's, as `MOTOR_COUNTS` and `OUTPUT_COUNTS` are counted."""
+        p, at_output = self.p, place == OUTPUT_COUNTS
+        speed = p[layout.COUNTS_PER_RAD] if at_output == (p[layout.SPEED_SENSOR] > 0.0) else 0.0
+        angle = p[layout.POSITION_COUNTS] if at_output == (p[layout.OUTPUT_SENSOR] > 0.0) else 0.0
+        own = p[layout.OWN_OUTPUT_COUNTS if at_output else layout.OWN_COUNTS]
+        of_output = p[layout.RATIO] if at_output else 1.0
+        return float(angle or own or speed * of_output)
+
 
 def controller_of(design: Design, prefix: str, *, single_precision: bool = False) -> Controller:
     """Cut the controller out of the tick."""
@@ -109,7 +103,7 @@ def controller_of(design: Design, prefix: str, *, single_precision: bool = False
 
 def _followed(p: Floats, single_precision: bool) -> dict[str, Leftover]:
     """What is left of step and start, with the numbers of the state that never change in their places."""
-    bounds = _begins(p)
+    bounds = begins(p)
     constant: dict[int, float] = {}
     while True:
         residual = Residual(
@@ -136,11 +130,12 @@ def _look(p: Floats, constant: dict[int, float], row: str, place: int) -> float 
 
 def _counts(p: Floats, arguments: list[ast.expr], caller: Leftover) -> ast.expr | None:
     """The count that stands for an angle as counted."""
-    scale = arguments[1]
+    angle, scale = arguments
     if not isinstance(scale, ast.Constant) or number(scale) <= 0.0:
         return None
-    speed = caller.python is not position_feedback
-    place = OUTPUT_COUNTS if not speed or p[layout.SPEED_SENSOR] > 0.0 else MOTOR_COUNTS
+    speed = caller.python in (measured_speed, init_estimate)  # made of differences of counts
+    output = p[layout.SPEED_SENSOR] > 0.0 if speed else isinstance(angle, ast.Subscript)
+    place = OUTPUT_COUNTS if output else MOTOR_COUNTS
     row = ast.Name("io" if "io" in caller.arguments else "p", ast.Load())
     count = ast.Subscript(row, ast.Constant(place), ast.Load())
     if speed:
@@ -148,12 +143,18 @@ def _counts(p: Floats, arguments: list[ast.expr], caller: Leftover) -> ast.expr 
     return ast.BinOp(ast.Call(ast.Name("float", ast.Load()), [count], []), ast.Div(), scale)
 
 
-def _begins(p: Floats) -> dict[int, str]:
+def begins(p: Floats) -> dict[int, str]:
     """Name of each part of the state by its first place."""
     result = {
         value: name for name, value in vars(layout).items() if name.startswith("S_") and type(value) is int
     }
     result |= {int(p[getattr(layout, name)]): name for name in vars(layout) if name.startswith("AT_")}
+    if p[layout.OWN_STAGE] > 0.0:
+        own, work = int(p[layout.AT_OWN]), int(p[layout.AT_WORK])
+        result |= {work + j: f"LAW_{name.upper()}" for j, name in enumerate(LAW_INPUTS)}
+        result[work + layout.OWN_INPUTS] = "LAW_NEXT"
+        if p[layout.OWN_STATES] > 0.0:
+            result[own] = "LAW_STATES"
     return dict(sorted(result.items()))
 
 
@@ -216,7 +217,7 @@ def _structs(design: Design, p: Floats, prefix: str, functions: Iterable[Leftove
 
 
 def _state(design: Design, p: Floats, functions: list[Leftover]) -> Iterable[Member]:
-    bounds = _begins(p)
+    bounds = begins(p)
     ends = dict(zip(bounds, [*list(bounds)[1:], int(p[layout.STATE_SIZE])], strict=True))
     kinds = state_kinds(p)
     nodes = _elements(functions, "s")
@@ -229,62 +230,20 @@ def _state(design: Design, p: Floats, functions: list[Leftover]) -> Iterable[Mem
         length = (max(places) + 1 if whole else ends[begin]) - begin
         count = name == "AT_ANGLES" and p[layout.COUNTS_PER_RAD] > 0.0
         is_int = kinds[begin] == COUNTER or name.startswith("S_FLAGS_")
-        text = name.removeprefix("S_").removeprefix("AT_").lower()
         kind: Kind = "count" if count else "int" if is_int else "float"
-        several = ends[begin] - begin > 1
-        yield Member(_named(design, name, text, counts=count), begin, length if several else 0, kind)
+        several = ends[begin] - begin > 1 or name == "LAW_STATES"
+        yield Member(state_name(design, name, counts=count), begin, length if several else 0, kind)
 
 
 def _members(design: Design, functions: list[Leftover], row: str) -> Iterable[Member]:
     """Inputs or outputs that are used."""
     used = {_begin(node.slice) for node in _elements(functions, row)}
-    known = {getattr(layout, name): name for name in _NAMES}
     for place in sorted(used):
         if place in (MOTOR_COUNTS, OUTPUT_COUNTS):
             yield Member("motor_counts" if place == MOTOR_COUNTS else "output_counts", place, 0, "count")
         else:
-            name = known[place]
-            yield Member(
-                _named(design, name, _NAMES[name]), place, 0, "int" if name == "IO_FLAGS" else "float"
-            )
-
-
-def _named(design: Design, name: str, text: str, *, counts: bool = False) -> str:
-    """A member's name with its unit."""
-    unit = "counts" if counts else _unit(design, name)
-    if design.axis == "linear":
-        unit = unit.replace("rad", "m")
-    return f"{text}_{unit.replace('/', '_')}" if unit else text
-
-
-def _unit(design: Design, name: str) -> str:
-    stages = [
-        stage for stage in _STAGES if stage == "voltage" or getattr(design.controller, stage) is not None
-    ]
-    if name in _COMMAND:
-        return stage_words(design)[1]
-    if name == "S_PROFILE_SPEED":
-        return f"{_UNITS[stages[0]]}/s".replace("/s/s", "/s2")
-    for stage, names in _BEHIND.items():
-        if name in names:
-            behind = [each for each in stages if _STAGES.index(each) > _STAGES.index(stage)]
-            return _UNITS[behind[0]]
-    if name in _ANGLES:
-        return "rad"
-    return "rad/s" if name in _SPEEDS else unit_of(name)
-
-
-def member_words(controller: Controller) -> dict[str, str]:
-    """What each member is, as the layout of the kernels says it."""
-    said = words()
-    bounds = _begins(controller.p)
-    result = {each.name: said.get(bounds[each.first], "") for each in controller.state.members}
-    places = {getattr(layout, name): name for name in _NAMES}
-    for each in (*controller.measured.members, *controller.out.members):
-        result[each.name] = said.get(
-            places.get(each.first, ""), "count of the encoder; it may go round at 2**32"
-        )
-    return {name: text.partition(" [")[0] for name, text in result.items()}
+            kind: Kind = "int" if place == layout.IO_FLAGS else "float"
+            yield Member(signal_name(design, place), place, 0, kind)
 
 
 def _zeroed(start: Leftover, state: Struct) -> None:

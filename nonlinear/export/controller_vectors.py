@@ -22,7 +22,7 @@ STRETCHES, STEPS = 8, 12  # stretches of a run, and ticks of each
 APART = 40  # updates of the outermost stage from one stretch, and step of the command, to the next
 MOST_NUMBERS = 4000  # of the states in one stretch
 SEED = 1
-ROUNDINGS = 16.0  # one behind the other, on the way from an input to an output
+ROUNDINGS = 16  # one behind the other, on the way from an input to an output; and those of a law's sums
 LONG = 32  # an array of more numbers is moved as a whole
 _MOVE, _DOUBLE = 2.0**-24, 2.0**-29  # half an ulp of single precision; of double precision, of that
 _LARGEST, _TRIED = 2.0**30, 12
@@ -76,11 +76,17 @@ def _is_decided(ours: Controller, vector: Vector, rng: np.random.Generator, scal
     for _ in range(_TRIED):
         moved = vector
         for which, place in enumerate(places):
-            by = ROUNDINGS * _MOVE * scale * rng.uniform(-1.0, 1.0, place.size)
+            by = roundings(ours) * _MOVE * scale * rng.uniform(-1.0, 1.0, place.size)
             moved = _moved_at(ours, moved, which, place, by)
         if not np.array_equal(after(ours, moved)[whole], plain):
             return False
     return True
+
+
+def roundings(ours: Controller) -> int:
+    """Roundings one behind the other: a law of one's own adds a sum over its states and inputs."""
+    own = ours.design.controller.own_law
+    return ROUNDINGS + (len(own[1].A) + len(own[1].inputs) if own else 0)
 
 
 def _given(ours: Controller) -> tuple[Struct, Struct]:
@@ -113,9 +119,12 @@ def _value(ours: Controller, struct: Struct, member: Member, row: Floats) -> Flo
     if member.first == at.IO_FLAGS and struct is ours.out:
         return row[list(_FLAGS)].sum(keepdims=True)
     if struct is ours.measured and member.kind == "count":
-        motor, speed = member.first == MOTOR_COUNTS, p[at.SPEED_SENSOR] > 0.0
-        angle = row[at.IN_ANGLE] if motor else p[at.RATIO] * row[at.IN_OUTPUT] if speed else row[at.IN_OUTPUT]
-        return np.floor(np.array([angle]) * p[at.COUNTS_PER_RAD if motor or speed else at.POSITION_COUNTS])
+        angle, per_rad = row[at.IN_OUTPUT], ours.counts_per_rad(member.first)
+        if member.first == MOTOR_COUNTS:
+            angle = row[at.IN_ANGLE]
+        elif p[at.SPEED_SENSOR] > 0.0 and p[at.COUNTS_PER_RAD] > 0.0:  # rounded as the tick does
+            angle, per_rad = p[at.RATIO] * angle, p[at.COUNTS_PER_RAD]
+        return np.floor(np.array([angle]) * per_rad)
     values = row[_places(struct, member)]
     return np.rint(values * p[at.COUNTS_PER_RAD]) if member.kind == "count" else values
 
@@ -131,7 +140,7 @@ def rounding_bounds(ours: Controller, vectors: list[Vector], *, single_precision
     """How far rounding moves each member of output and state in one tick, to first order.
 
     Every number of input and state is moved by half an ulp, the effects are added up and taken
-    `ROUNDINGS` times, as many as there are operations one behind the other; the vector that is most is told.
+    `roundings` times, as many as there are operations one behind the other; the vector that is most is told.
     """
     scale, of_counts = (1.0, _DOUBLE) if single_precision else (_DOUBLE, 1.0)
     places = [_places(struct, each) for struct in (ours.out, ours.state) for each in struct.members]
@@ -142,7 +151,7 @@ def rounding_bounds(ours: Controller, vectors: list[Vector], *, single_precision
         total = _MOVE * np.abs(plain)
         for moved, weight in _moved(ours, vector, of_counts):
             total += weight * np.abs(after(ours, moved)[read] - plain)
-        worst = np.maximum(worst, ROUNDINGS * scale * total)
+        worst = np.maximum(worst, roundings(ours) * scale * total)
     ends = np.cumsum([each.size for each in places])
     bounds = [float(each.max()) for each in np.split(worst, ends[:-1])]
     return [bounds[: len(ours.out.members)], bounds[len(ours.out.members) :]]

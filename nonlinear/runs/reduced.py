@@ -100,11 +100,6 @@ class BatchResult:
         return self.outs[:, at.OUT_STICK_TICKS] / self.rows[:, at.TICKS]
 
     @property
-    def final_motor_angle_rad(self) -> Floats:
-        """Motor angle after the last tick."""
-        return self.outs[:, at.OUT_ANGLE]
-
-    @property
     def final_output_rad(self) -> Floats:
         """Output angle after the last tick."""
         rigid = self.outs[:, at.OUT_ANGLE] / self.rows[:, at.RATIO]

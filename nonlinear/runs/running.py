@@ -157,6 +157,8 @@ class Running:
 
     def each(self, states: Floats, ticks: int, place: int, values: Floats) -> None:
         """Run every row of ``states`` so many ticks on, with its own value of one parameter at ``place``."""
+        if ticks == 0:
+            return
         self.p[at.TICKS] = states[0, at.S_TICK] + ticks
         p, s, tick = self.p, self.s, self._tick
         for state, value in zip(states, values, strict=True):

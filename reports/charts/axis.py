@@ -40,13 +40,14 @@ class Axis:
     def see(self, values: Sequence[float] | np.ndarray) -> None:
         """Let the limits take these values in, where they are not set."""
         array = np.asarray(values, dtype=float)
-        array = array[np.isfinite(array) & (array > 0.0)] if self.log else array[np.isfinite(array)]
-        if len(array):
-            self.seen += [float(array.min()), float(array.max())]
+        array = array[np.isfinite(array)]
+        for each in (array, array[array > 0.0]):  # whether the axis is logarithmic may be said later
+            self.seen += [float(each.min()), float(each.max())] if len(each) else []
 
     def span(self) -> tuple[float, float]:
         """Give both ends: those set, or the values with some room."""
-        low, high = min(self.seen, default=1.0 if self.log else 0.0), max(self.seen, default=1.0)
+        seen = [value for value in self.seen if value > 0.0 or not self.log]
+        low, high = min(seen, default=1.0 if self.log else 0.0), max(seen, default=1.0)
         if self.log:
             room = (high / low) ** MARGIN if high > low else 2.0
             ends = (low / room, high * room)

@@ -77,7 +77,9 @@ def command(one: Analysis) -> Callable[..., None]:
         _parameter("quiet", QuietOption, False),
         *([_parameter("example", _example(one), False)] if one.example else []),
     ]
-    left_out = ("design", "changes") * one.alone + ("out", "quiet") * (one.alone or not one.page)
+    paged = one.page and not one.alone
+    left_out = ("design", "changes") * one.alone + ("out",) * (not paged)
+    left_out += ("quiet",) * (not paged and not one.doing)
     parameters = [each for each in parameters if each.name not in left_out]
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}
@@ -158,12 +160,13 @@ def _study(path: str | None, changes: list[str] | None) -> Study | None:
 def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, quiet: bool) -> list[str]:
     """Write page and JSON."""
     from reports.cli.progress import progress
-    from reports.study_pages import study_document, write_pages
+    from reports.html import write_report
+    from reports.study_pages import study_document
 
     title = f"{drive.title or drive.name}: {parts[0]['title']}"
     made = study_document(drive, parts, title=title, subtitle=parts[0]["result"], kind=one.name)
     with progress("drawing figures", quiet=quiet) as drawing:
-        return [str(path) for path in write_pages(made, out, one.stem or one.name, progress=drawing)]
+        return [str(path) for path in write_report(made, out, one.stem or one.name, progress=drawing)]
 
 
 def _print(

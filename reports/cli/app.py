@@ -25,7 +25,7 @@ PANELS: dict[str, tuple[str, ...]] = {
     "Nonlinear checks": _declared("Nonlinear checks"),
     "Bench records": _declared("Bench records"),
     "Out of Python": _declared("Out of Python"),
-    "Variants and history": (*_declared("Variants and history"), "nightly"),
+    "Variants and history": _declared("Variants and history"),
 }
 
 

@@ -29,7 +29,15 @@ INTERRUPTED = 130
 _USAGE_ERRORS: type[Exception] = typer.BadParameter.__mro__[2]
 
 _LONGEST = 1000  # characters of a line on standard error
-_NO_NUMBER = "Input should be a valid number, unable to parse string as a number"
+_PLAIN = {  # what typer says, and what it means
+    "Input should be a valid number, unable to parse string as a number": (
+        "allowed: a number with a decimal point, without unit"
+    ),
+    "Input should be a valid integer, unable to parse string as an integer": (
+        "allowed: a whole number, such as 1000"
+    ),
+    "Value error, ": "",
+}
 
 
 def leave_with(passed: bool) -> None:
@@ -125,8 +133,9 @@ def _usage_line(error: BaseException) -> str:
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "actuator-lti"
     message = error.format_message() if hasattr(error, "format_message") else str(error)
-    message = message.replace(_NO_NUMBER, "allowed: a number with a decimal point, without unit")
-    return f"{message} (see {command} --help)"
+    for said, plain in _PLAIN.items():
+        message = message.replace(said, plain)
+    return f"{message or 'a command is missing'} (see {command} --help)"
 
 
 def _os_line(error: OSError) -> str:

@@ -18,9 +18,7 @@ app = typer.Typer(
     help="Settings in the motion controller's own objects: export and import.", no_args_is_help=True
 )
 
-SettingsArgument = Annotated[
-    Path, typer.Argument(metavar="SETTINGS", help="Settings file, TOML or .xdc XML.")
-]
+SettingsArgument = Annotated[Path, typer.Argument(metavar="SETTINGS", help="Settings file of a controller.")]
 TargetOption = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")]
 PerOption = Annotated[
@@ -93,15 +91,23 @@ def import_settings(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Put controller settings into a design and write it as a design file."""
+    """Put controller settings into a design and write it as a design file.
+
+    Known by what stands in them: objects of an MC V3 controller, an EPOS4 export (.dcf, .xdc), an ODrive
+    configuration (JSON), a VESC motor configuration (XML), SimpleFOC settings (lines of the sketch).
+    """
     from actuator_lti.design import load_design, write_design
+    from actuator_lti.design.controller_files import import_controller_file
     from actuator_lti.design.objects import calibration, import_objects
     from actuator_lti.design.settings_file import read_settings
     from actuator_lti.files.reading import shown_path
     from reports.cli.output import print_json, print_line, print_note
 
     factor = None if per is None else calibration(per)
-    result = import_objects(read_settings(settings, factor), load_design(base), shown_path(settings))
+    drive = load_design(base)
+    result = import_controller_file(settings, drive) or import_objects(
+        read_settings(settings, factor), drive, shown_path(settings)
+    )
     text = write_design(result.design)
     write_new(out, text, force)
     if as_json:
@@ -111,7 +117,10 @@ def import_settings(
         return
     if out is None:
         print_line(text.rstrip())
-    changed_lines = [f"{path} = {result.design.parameters[path].text}" for path in result.changed]
+    said = [(path, result.design.parameters[path]) for path in result.changed]
+    changed_lines = [
+        f"{path} = {item.text}" + f"  ({item.source})" * bool(item.source) for path, item in said
+    ]
     kept_lines = [f"kept: {item.label} = {item.value}" for item in result.kept]
     for line in [*changed_lines, *kept_lines, *result.notes]:
         print_note(line)

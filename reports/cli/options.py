@@ -13,7 +13,6 @@ from reports.cli.targets import folder_for_results
 if TYPE_CHECKING:
     from actuator_lti.design import Design
     from analyses.request import Kind
-    from analyses.studies.engine import Engine
 
 DEFAULT_DESIGN = "ilr33-amber"
 DEFAULT_OUT = Path("out")
@@ -73,22 +72,4 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design) -> 
         raise InputError(f"{option} {words!r}: {reason}; allowed: {allowed}") from None
 
 
-SchedulerOption = Annotated[
-    str | None, typer.Option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that is running.")
-]
-TlsOption = Annotated[
-    Path | None,
-    typer.Option("--tls", metavar="DIR", help="ca.pem, cert.pem and key.pem for a tls:// scheduler."),
-]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress on standard error.")]
-
-
-def engine_of(workers: int | None, scheduler: str | None, tls: Path | None) -> Engine:
-    """Where a study is computed; says what to know of the connection."""
-    from analyses.studies.engine import Engine
-    from reports.cli.output import print_note
-
-    engine = Engine(workers, scheduler, tls=tls)
-    if engine.caution:
-        print_note(f"actuator-lti: {engine.caution}")
-    return engine

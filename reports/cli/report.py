@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from actuator_lti.errors import InputError
 from reports.analyses import FURTHER
 from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import (
@@ -69,6 +70,8 @@ def report(
     from reports.terminal import print_verdict
     from reports.verdict_summary import verdict_words
 
+    if summary and not pdf:
+        raise InputError("--summary: allowed with --pdf, of which it makes a short one")
     drive = load_drive(design, changes)
     made = build.report(
         drive,

@@ -68,6 +68,7 @@ def _loops(design: Design) -> tuple[str, ...]:
         loop = getattr(design.controller, name)
         if loop is not None:
             kind = "PI" if getattr(loop, "integral_time_s", None) is not None else "P"
+            kind = kind if loop.law is None else "law of one's own"
             every = getattr(loop, "every", 1)
             words.append(f"{name} {kind}" + (f" every {every} ticks" if every > 1 else ""))
     return tuple(words)

@@ -7,7 +7,6 @@ result comes home as an entry of the cache; a lost Dask worker's jobs are done a
 
 from __future__ import annotations
 
-import contextlib
 import os
 import pickle
 import subprocess
@@ -15,24 +14,22 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import closing, suppress
 from functools import partial
 from threading import Lock, Timer
-from typing import Any
+from typing import Any, NamedTuple
 
-from actuator_lti.errors import InputError
 from analyses.studies.engine import Engine
 from reports.arithmetic import ONE_THREAD  # the jobs themselves are what runs in parallel
 from reports.nightly import worker
-from reports.nightly.cache import Cache, CorruptEntry
+from reports.nightly.worker import Answer
 
 START_LIMIT_S = 180.0
 END_S = 10.0
 _CHILD = "import sys; from reports.nightly.worker import main; main(sys.argv[1], int(sys.argv[2]))"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Task:
+class Task(NamedTuple):
     """Something to build: an address, what the build function gets, and how many time limits it may take."""
 
     key: str
@@ -40,19 +37,7 @@ class Task:
     limits: int = 1
 
 
-@dataclass(frozen=True, kw_only=True)
-class Done:
-    """How a task ended: ``done`` (and in the cache), ``error``, ``timeout``, ``crash`` or ``disk``."""
-
-    key: str
-    status: str
-    message: str = ""
-    detail: str = ""
-    seconds: float = 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Limits:
+class Limits(NamedTuple):
     """What builds a task, and what it may take.
 
     Parameters
@@ -71,38 +56,28 @@ class Limits:
 
 
 def build_each(
-    tasks: Sequence[Task], limits: Limits, engine: Engine | None, cache: Cache, sink: Callable[[Done], None]
+    tasks: Sequence[Task], limits: Limits, engine: Engine | None, sink: Callable[[Task, Answer], None]
 ) -> None:
     """Build every task once and tell how each ended, in the order in which they end.
 
     Without an engine they are built in this process: with no limit, and in the order of the tasks.
     """
-
-    def keep(task: Task, answer: tuple[Done, bytes]) -> None:
-        sink(_kept(cache, *answer))
-
     if engine is None:
         function = worker.resolve(limits.build)
         for task in tasks:
             start = time.monotonic()
-            keep(task, _done(task, start, worker.execute(function, task.key, task.payload)))
+            sink(task, _since(start, worker.execute(function, task.key, task.payload)))
     elif engine.distributed:
-        engine.map(partial(build_apart, limits), tasks, keep)
+        engine.map(partial(build_apart, limits), tasks, sink)
     else:
-        warm = _Warm(limits)
-        try:
-            engine.map(warm.build, tasks, keep)
-        finally:
-            warm.close()
+        with closing(_Warm(limits)) as warm:
+            engine.map(warm.build, tasks, sink)
 
 
-def build_apart(limits: Limits, task: Task) -> tuple[Done, bytes]:
-    """Build one task in a process of its own; how it ended, and the entry for the cache."""
-    child = _Child(limits)
-    try:
+def build_apart(limits: Limits, task: Task) -> Answer:
+    """Build one task in a process of its own."""
+    with closing(_Child(limits)) as child:
         return child.build(task)
-    finally:
-        child.close()
 
 
 class _Child:
@@ -118,21 +93,21 @@ class _Child:
             env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
         )  # fmt: skip
 
-    def build(self, task: Task) -> tuple[Done, bytes]:
+    def build(self, task: Task) -> Answer:
         """Build a task within its time; where that fails the process is at its end."""
-        said, start = os.fstat(self._said.fileno()).st_size, time.monotonic()
         if not self._ready:
             self._ready = self._answer(START_LIMIT_S) == worker.READY
             if not self._ready:
                 why = f"the worker process could not start: {self._end(START_LIMIT_S)}"
-                return _done(task, start, ("crash", why, self._last_words(said), b""))
-            start = time.monotonic()
+                return Answer("crash", why, self._last_words(0))
+        said, start = os.fstat(self._said.fileno()).st_size, time.monotonic()
         limit_s = self._limits.time_limit_s * task.limits
         answer = self._answer(limit_s, (task.key, dict(task.payload), limit_s))
-        if answer is None:
-            status, detail = ("timeout", "") if self._late else ("crash", self._last_words(said))
-            answer = (status, self._end(limit_s), detail, b"")
-        return _done(task, start, answer)
+        if answer is None and self._late:
+            answer = Answer("timeout", self._end(limit_s))
+        elif answer is None:
+            answer = Answer("crash", self._end(limit_s), self._last_words(said))
+        return _since(start, answer)
 
     def _answer(self, limit_s: float, question: Any = None) -> Any:
         """What the process says within the limit; None where it ends instead."""
@@ -148,7 +123,7 @@ class _Child:
                 ask.flush()
             return pickle.load(listen)
         except (EOFError, OSError, pickle.UnpicklingError, ValueError):
-            with contextlib.suppress(subprocess.TimeoutExpired):
+            with suppress(subprocess.TimeoutExpired):
                 self._process.wait(END_S)  # it ends by itself, and its status says why
             self.end()
             return None
@@ -187,7 +162,7 @@ class _Child:
         self.end()
         for stream in (self._process.stdin, self._process.stdout, self._said):
             if stream is not None:
-                with contextlib.suppress(OSError):  # a question that nobody has read
+                with suppress(OSError):  # a question that nobody has read
                     stream.close()
 
 
@@ -201,7 +176,7 @@ class _Warm:
         self._busy: list[_Child] = []
         self._closed = False
 
-    def build(self, task: Task) -> tuple[Done, bytes]:
+    def build(self, task: Task) -> Answer:
         """Build a task in an idle process, or in a new one."""
         with self._lock:
             if self._closed:
@@ -232,20 +207,5 @@ class _Warm:
                 child.close()
 
 
-def _kept(cache: Cache, done: Done, entry: bytes) -> Done:
-    """Put a result into the cache: an error of the disk is none of its design."""
-    if done.status != "done":
-        return done
-    try:
-        cache.take(done.key, entry)
-    except InputError as error:
-        return replace(done, status="disk", message=str(error))
-    except CorruptEntry as error:
-        return replace(done, status="crash", message=f"its result came damaged ({error})")
-    return done
-
-
-def _done(task: Task, start: float, answer: worker.Answer) -> tuple[Done, bytes]:
-    status, message, detail, entry = answer
-    seconds = time.monotonic() - start
-    return Done(key=task.key, status=status, message=message, detail=detail, seconds=seconds), entry
+def _since(start: float, answer: Answer) -> Answer:
+    return answer._replace(seconds=time.monotonic() - start)

@@ -13,7 +13,7 @@ import os
 import time
 import zipfile
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -55,16 +55,17 @@ class Cache:
         """Where an entry lies."""
         return self.folder / key[:2] / f"{key}.entry"
 
-    def take(self, key: str, data: bytes) -> None:
+    def take(self, key: str, data: bytes) -> Entry:
         """Store an entry that was made elsewhere (see `sealed`), whole or not at all.
 
         Raises
         ------
         CorruptEntry
             Where it is not whole, or that of another key.
+        InputError
+            Where it cannot be written.
         """
-        _opened(key, data)
-        path = self.path(key)
+        entry, path = _opened(key, data), self.path(key)
         temporary = path.with_name(f".{path.name[:16]}.{os.getpid()}.part")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -73,6 +74,7 @@ class Cache:
         except OSError as error:
             temporary.unlink(missing_ok=True)
             raise InputError(f"cannot write: {error.strerror or error}", where=str(path)) from error
+        return entry
 
     def read(self, key: str) -> Entry | None:
         """Return an entry, or ``None`` where there is none.
@@ -95,9 +97,14 @@ class Cache:
         os.utime(path)
         return entry
 
-    def discard(self, key: str) -> None:
-        """Remove an entry that is corrupt."""
-        self.path(key).unlink(missing_ok=True)
+    def whole(self, key: str, tell: Callable[[str], None] = lambda _why: None) -> Entry | None:
+        """Return an entry, or ``None``; one that is corrupt is removed, and told why."""
+        try:
+            return self.read(key)
+        except CorruptEntry as error:
+            tell(str(error))
+            self.path(key).unlink(missing_ok=True)
+            return None
 
     def collect_garbage(self, keep: Iterable[str], older_than_days: float) -> int:
         """Remove entries that are not in ``keep`` and have not been used for so long; how many."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from reports.charts import chart as figures
 from reports.charts import style
+from reports.charts.chart import Chart
 from reports.charts.svg import page_svg
-from reports.nightly.text import one_line
+from reports.nightly.text import one_line, to_seconds
 from reports.nightly.trend import ChangePoint
 from reports.numbers import significant
 
@@ -19,57 +18,54 @@ DAY = 86400.0
 _MAX_POINTS = 400
 
 
-@dataclass(frozen=True, kw_only=True)
-class Chart:
-    """What one chart shows; ``times`` in s, ``values`` with NaN where there is none."""
+def line_chart(
+    title: str, unit: str, nights: Sequence[str], values: np.ndarray, points: Sequence[ChangePoint],
+    limit: float | None = None, prefix: str = "t",
+) -> str:  # fmt: skip
+    """Draw a figure over the nights: steps with gaps where there is none, lines at changes, the limit dashed.
 
-    title: str
-    unit: str
-    times: np.ndarray
-    values: np.ndarray
-    points: Sequence[ChangePoint]
-    limit: float | None = None
-    first_label: str = ""
-    last_label: str = ""
-
-
-def line_chart(chart: Chart, prefix: str = "t") -> str:
-    """Draw a chart: steps with gaps for missing nights, lines at changes of level, the limit dashed."""
-    finite = np.isfinite(chart.values)
+    Parameters
+    ----------
+    nights : sequence of str
+        When each began.
+    values : ndarray, shape (nights,)
+        NaN where a night has no such figure.
+    """
+    finite = np.isfinite(values)
     if not finite.any():
         return ""
-    made = figures.Chart(width=WIDTH, height=HEIGHT)
-    panel, days = made.panel(), chart.times / DAY
-    room = 0.03 * max(float(days[-1] - days[0]), 1.0)
-    panel.x.days, panel.x.grid = True, False
-    panel.x.limits(float(days[0]) - room, float(days[-1]) + room)
-    panel.x.ticks = _dates(chart, days)
-    panel.x.name = "night"
-    panel.y.name = f"value, {one_line(chart.unit, 20)}" if chart.unit else "value"
-    if chart.limit is not None:
-        panel.rule_y(chart.limit, "limit", colour=style.RED, dash=1)
-        panel.y.see([chart.limit])
-    for point in chart.points:
+    chart = Chart(width=WIDTH, height=HEIGHT)
+    panel, days = chart.panel(), np.array([to_seconds(night) for night in nights]) / DAY
+    first, last, span = float(days[0]), float(days[-1]), float(days[-1] - days[0])
+    panel.x.days, panel.x.grid, panel.x.name = True, False, "night"
+    panel.x.limits(first - 0.03 * max(span, 1.0), last + 0.03 * max(span, 1.0))
+    ends = [(first + 0.1 * span, nights[0][:10]), (last - 0.1 * span, nights[-1][:10])]
+    panel.x.ticks = ends if len(nights) > 1 else ends[1:]
+    panel.y.name = f"value, {one_line(unit, 20)}" if unit else "value"
+    if limit is not None:
+        panel.rule_y(limit, "limit", colour=style.RED, dash=1)
+        panel.y.see([limit])
+    for point in points:
         panel.rule_x(float(days[point.index]), "▼", colour=style.ORANGE, dash=2)
-    x, y = _steps(days, chart.values, finite)
+    x, y = _steps(days, values, finite)
     panel.curve(x, y, colour=style.BLUE, width=1.8)
-    last = int(np.flatnonzero(finite)[-1])
-    alone = [*_alone(finite), last]
-    panel.points(days[alone], chart.values[alone], colour=style.BLUE, size=4.0, read=False)
-    return page_svg(made, prefix, describe(chart))
-
-
-def _dates(chart: Chart, days: np.ndarray) -> list[tuple[float, str]]:
-    """Name the first night and the last."""
-    room = 0.1 * float(days[-1] - days[0])
-    ends = [(float(days[-1]) - room, chart.last_label)]
-    return [(float(days[0]) + room, chart.first_label), *ends] if chart.first_label else ends
-
-
-def _alone(finite: np.ndarray) -> list[int]:
-    """Find nights between two without a result: a line does not show them."""
     padded = np.concatenate([[False], finite, [False]])
-    return [int(k) for k in np.flatnonzero(finite & ~padded[:-2] & ~padded[2:])]
+    alone = np.flatnonzero(finite & ~padded[:-2] & ~padded[2:])  # a line does not show them
+    shown = [*alone.tolist(), int(np.flatnonzero(finite)[-1])]
+    panel.points(days[shown], values[shown], colour=style.BLUE, size=4.0, read=False)
+    return page_svg(chart, prefix, _words(title, unit, values[finite], points, limit))
+
+
+def _words(
+    title: str, unit: str, values: np.ndarray, points: Sequence[ChangePoint], limit: float | None
+) -> str:
+    """Say a chart in words, for those who do not see it."""
+    unit = f" {unit}" if unit else ""
+    text = f"{one_line(title, 120)}: {significant(float(values[-1]), 4)}{unit} in the last night"
+    if len(values) > 1:
+        low, high = significant(float(values.min()), 4), significant(float(values.max()), 4)
+        text += f", between {low} and {high} over {len(values)} nights, {len(points)} change(s) of level"
+    return text if limit is None else f"{text}; limit {significant(limit, 4)}{unit}"
 
 
 def _steps(days: np.ndarray, values: np.ndarray, finite: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -83,21 +79,6 @@ def _steps(days: np.ndarray, values: np.ndarray, finite: np.ndarray) -> tuple[np
         x += [across, np.array([np.nan])]
         y += [up, np.array([np.nan])]
     return np.concatenate(x), np.concatenate(y)
-
-
-def describe(chart: Chart) -> str:
-    """Say a chart in words, for those who do not see it."""
-    values = chart.values[np.isfinite(chart.values)]
-    unit = f" {chart.unit}" if chart.unit else ""
-    text = f"{one_line(chart.title, 120)}: {significant(float(values[-1]), 4)}{unit} in the last night"
-    if len(values) > 1:
-        low, high = significant(float(values.min()), 4), significant(float(values.max()), 4)
-        text += (
-            f", between {low} and {high} over {len(values)} nights, {len(chart.points)} change(s) of level"
-        )
-    if chart.limit is not None:
-        text += f"; limit {significant(chart.limit, 4)}{unit}"
-    return text
 
 
 def _thinned(y: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ import platform
 import shutil
 import subprocess
 from dataclasses import dataclass
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -60,6 +61,7 @@ def commit_of(path: Path) -> str:
     return _git(path, "rev-parse", "--verify", "HEAD^{commit}").strip()
 
 
+@cache
 def commits_between(path: Path, old: str, new: str) -> tuple[str, ...]:
     """First lines of the commits that lead from one commit to another, newest first."""
     if not old or not new or old == new:

@@ -9,11 +9,10 @@ import numpy as np
 from markupsafe import Markup
 
 from actuator_lti.files.tree import Tree
-from reports.nightly.charts import Chart, line_chart
+from reports.nightly.charts import line_chart
 from reports.nightly.figures import Figure, Verdict, first_number
 from reports.nightly.history import History
 from reports.nightly.records import Result
-from reports.nightly.text import to_seconds
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.trend import LOOK_BACK, ChangePoint, change_points, flaps
 from reports.nightly.view import DesignView, Overview
@@ -56,8 +55,7 @@ class _Writer:
         self.course = Course()
         self.past = past
         self.tolerances: Tolerances = night.tolerances
-        self.days = [started[r.run][:10] for r in past]
-        self.times = np.array([to_seconds(started[r.run]) for r in past])
+        self.nights = [started[r.run] for r in past]
         self.verdicts: Mapping[str, Verdict] = {f"{v.id}: value": v for v in design.verdicts}
 
     def add(self, figure: Figure, values: np.ndarray) -> None:
@@ -66,39 +64,26 @@ class _Writer:
         if not len(finite):
             return
         tolerance = self.tolerances.of(figure, float(np.max(np.abs(finite))))
-        points = _recent(values, tolerance)
-        to_and_fro = flaps(values, tolerance)
-        moved = bool(points) or to_and_fro
-        if figure.kind != "requirement" and (not moved or len(self.course.charts) >= MAX_CHARTS):
+        points, to_and_fro = _recent(values, tolerance), flaps(values, tolerance)
+        charts, moved = self.course.charts, bool(points) or to_and_fro
+        if figure.kind != "requirement" and (not moved or len(charts) >= MAX_CHARTS):
             self.course.steady.append(figure)
             return
         for point in points:
             self.course.marks.setdefault(self.past[point.index].run, []).append((figure, point))
-        self.course.charts.append(self._chart(figure, values, points, to_and_fro))
-
-    def _chart(
-        self, figure: Figure, values: np.ndarray, points: Sequence[ChangePoint], to_and_fro: bool
-    ) -> Tree:
-        """A figure over the nights: its drawing, and the nights in which its level changed."""
         verdict = self.verdicts.get(figure.name)
-        chart = Chart(
-            title=verdict.label if verdict is not None else figure.name,
-            unit=figure.unit,
-            times=self.times,
-            values=values,
-            points=points,
-            limit=first_number(verdict.limit) if verdict is not None else None,
-            first_label=self.days[0] if len(self.days) > 1 else "",
-            last_label=self.days[-1],
+        title, limit = (verdict.label, first_number(verdict.limit)) if verdict else (figure.name, None)
+        drawn = line_chart(title, figure.unit, self.nights, values, points, limit, f"t{len(charts)}")
+        charts.append(
+            {
+                "title": title,
+                "id": verdict.id if verdict else "",
+                "unit": figure.unit,
+                "svg": Markup(drawn),
+                "points": [(self.nights[p.index][:10], p) for p in points],
+                "flaps": to_and_fro,
+            }
         )
-        return {
-            "title": chart.title,
-            "id": verdict.id if verdict is not None else "",
-            "unit": figure.unit,
-            "svg": Markup(line_chart(chart, f"t{len(self.course.charts)}")),
-            "points": [(self.days[p.index], p) for p in points],
-            "flaps": to_and_fro,
-        }
 
 
 def _recent(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ...]:

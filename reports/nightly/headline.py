@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from reports.nightly.changes import Cause, Change, Comparison
 from reports.nightly.figures import Verdict
 from reports.nightly.text import one_line
-from reports.numbers import significant
+from reports.numbers import or_none
 
 if TYPE_CHECKING:
     from reports.nightly.view import DesignView
@@ -109,5 +109,4 @@ def _turned(label: str) -> str:
 
 
 def _pair(before: float | None, after: float | None) -> str:
-    words = ["none" if value is None else significant(value, 4) for value in (before, after)]
-    return " → ".join(words)
+    return f"{or_none(before)} → {or_none(after)}"

@@ -89,7 +89,8 @@ class History:
     ) -> Result:  # fmt: skip
         """The result with its content, or with the night that has the same of this design."""
         layout, values = tuple((f.name, f.unit, f.better, f.kind) for f in figures), packed(figures)
-        before = next(self._good(result.name), None)
+        past = (self.result(run.id, result.name) for run in reversed(self.runs))
+        before = next(filter(None, past), None)
         if before is not None and before.home is not None:
             night, content = self.night(before.home), self._content(before)
             known = (tuple(night.layouts[content.layout]), content.values, content.inputs)
@@ -158,12 +159,10 @@ class History:
         found = (night.by_name[name] for night in self._from_last() if name in night.by_name)
         return list(islice(found, last))[::-1]
 
-    def _good(self, name: str) -> Iterator[Result]:
-        """Results of a design that have figures, the last first."""
-        for night in self._from_last():
-            result = night.by_name.get(name)
-            if result is not None and result.home is not None:
-                yield result
+    def result(self, run: int, name: str) -> Result | None:
+        """What a design came to in a night; None where it has no figures of it."""
+        found = self.night(run).by_name.get(name)
+        return found if found is not None and found.home is not None else None
 
     def _from_last(self) -> Iterator[Night]:
         return (self.night(run.id) for run in reversed(self.runs))

@@ -1,18 +1,17 @@
-"""What a night has to do: jobs, and what came of each."""
+"""What a night has to do: jobs."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 from actuator_lti.bounds import JOB_BYTES, NIGHTLY_JOBS
 from actuator_lti.errors import InputError
 from reports.nightly.text import one_line, sha256
 
-Status = Literal["pass", "unproven", "fail", "error", "timeout", "crash"]
-BROKEN: tuple[Status, ...] = ("error", "timeout", "crash")
+BROKEN = ("error", "timeout", "crash")  # how a job ends without a result
 
 MAX_NAME = 20_000
 
@@ -47,19 +46,6 @@ class Job:
     def key(self, code: str) -> str:
         """Content address of the result: design, settings and code version."""
         return sha256(canonical([self.name, self.kind, self.design_hash, self.payload, code]))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """What came of a job: its content address, or why there is nothing."""
-
-    job: Job
-    key: str
-    status: Status
-    meta: Mapping[str, Any] = field(default_factory=dict)
-    seconds: float = 0.0
-    cached: bool = False
-    message: str = ""
 
 
 def canonical(value: Any) -> str:

@@ -9,21 +9,14 @@ from xml.etree import ElementTree as Xml
 from actuator_lti.files.tree import Tree
 from reports.nightly.changes import Cause, Change, Comparison
 from reports.nightly.text import markdown_cell, one_line
-from reports.nightly.view import DesignView, Overview
-from reports.numbers import significant
+from reports.nightly.view import STATE_WORDS, DesignView, Overview
+from reports.numbers import or_none
 from reports.visible import visible
 
 SCHEMA = "actuator-lti/nightly"
 VERSION = 2
 _MAX_TEXT = 20_000
 _LISTED = 20
-STATE_WORDS = {
-    "broken": "no result",
-    "fail": "failing",
-    "unproven": "not proven",
-    "regression": "regressed",
-    "pass": "passing",
-}
 _OF_REQUIREMENT = ("id", "label", "value", "limit", "unit", "distance", "verdict", "waiver")
 _OF_CHANGE = ("figure", "unit", "before", "after", "tolerance", "worse", "flapping")
 SIGNS = {"broken": "⚠", "fail": "✗", "unproven": "?", "regression": "▼", "pass": "✓"}
@@ -45,7 +38,7 @@ def summary(night: Overview) -> Tree:
         },
         "study_commit": night.run.study_commit,
         "history": asdict(night.memory),
-        "exit_status": night.exit_status,
+        "exit_status": int(not night.passed),
         "counts": {state: night.count(state) for state in STATE_WORDS},
         "gone": list(night.gone),
         "designs": [_design(d) for d in night.designs],
@@ -62,7 +55,7 @@ def _design(design: DesignView) -> Tree:
     return {
         **{name: getattr(result, name) for name in ("name", "kind", "status", "failed", "total", "cached")},
         "state": design.state,
-        "message": result.message.partition("\n")[0],
+        "message": design.why,
         "worst_requirement": result.worst_id or None,
         "worst_relative_distance": result.worst,
         "flapping": design.status_flaps,
@@ -123,8 +116,8 @@ def _cases(suite: Xml.Element, design: DesignView) -> None:
             Xml.SubElement(one, tag, about).text = visible(text)[:_MAX_TEXT]
 
     if design.broken:
-        first, _, rest = design.result.message.partition("\n")
-        case("is built", "error", first, design.result.status, rest)
+        rest = design.result.message.partition("\n")[2]
+        case("is built", "error", design.why, design.result.status, rest)
         return
     case("is built")
     worse = design.regressions
@@ -160,15 +153,9 @@ def _value(value: float | None) -> str:
 
 def markdown(night: Overview) -> str:
     """Summary for a pull request: verdict first, then what fails, what changed and what is behind it."""
-    counts = ", ".join(
-        f"{night.count(state)} {words}" for state, words in STATE_WORDS.items() if night.count(state)
-    )
-    sign = "✓" if night.exit_status == 0 else "✗"
-    lines = [f"## {sign} Nightly {markdown_cell(night.title)}: {counts}", ""]
-    lines += [
-        f"Run {night.run.id}, {night.run.started}, study commit {night.run.study_commit[:12] or 'unknown'}.",
-        "",
-    ]
+    sign = "✓" if night.passed else "✗"
+    run = f"Run {night.run.id}, {night.run.started}, study commit {night.run.study_commit[:12] or 'unknown'}."
+    lines = [f"## {sign} Nightly {markdown_cell(night.title)}: {night.counts}", "", run, ""]
     notable = [d for d in night.designs if d.state != "pass" or d.last_night.changes]
     if notable:
         lines += [
@@ -196,16 +183,11 @@ def _details(design: DesignView) -> list[str]:
     lines = [_moved(c) for c in design.last_night.changes[:8]]
     lines += [f"- {markdown_cell(line, 200)}" for line in cause_lines(design.last_night.cause)[:8]]
     if design.broken:
-        first = design.result.message.partition("\n")[0]
-        lines.append(f"- {design.result.status}: {markdown_cell(first, 200)}")
+        lines.append(f"- {design.result.status}: {markdown_cell(design.why, 200)}")
     return ["", f"**{markdown_cell(design.name)}**", "", *lines] if lines else []
 
 
 def _moved(change: Change) -> str:
     marks = (" (worse)" if change.worse else "") + (" (flapping)" if change.flapping else "")
-    values = f"{_short(change.before)} → {_short(change.after)} {markdown_cell(change.unit)}"
+    values = f"{or_none(change.before)} → {or_none(change.after)} {markdown_cell(change.unit)}"
     return f"- {markdown_cell(change.figure, 120)}: {values}{marks}"
-
-
-def _short(value: float | None) -> str:
-    return "none" if value is None else significant(value, 4)

@@ -20,18 +20,14 @@ class HistoryLost(Exception):
 
 @dataclass(frozen=True)
 class Memory:
-    """How much a history held when the site was published.
+    """How much a history held when the site was published; ``id`` is empty where it is not known."""
 
-    Attributes
-    ----------
-    id : str
-        Of the history file; empty where it is not known.
-    nights, approvals : int
-    """
+    id: str = ""
+    nights: int = 0
+    approvals: int = 0
 
-    id: str
-    nights: int
-    approvals: int
+    def __str__(self) -> str:
+        return f"{self.nights} night(s) and {self.approvals} approval(s)"
 
 
 def remembered(site: Path) -> Memory | None:
@@ -43,7 +39,7 @@ def remembered(site: Path) -> Memory | None:
     except (InputError, AttributeError):
         result = None
     if not isinstance(result, Mapping):
-        return Memory("", 1, 0)  # published by an older version, or damaged: at least one night
+        return Memory("", 1)  # published by an older version, or damaged: at least one night
     numbers = [result.get(key) for key in ("nights", "approvals")]
     nights, approvals = (n if isinstance(n, int) and not isinstance(n, bool) else 0 for n in numbers)
     return Memory(str(result.get("id", "")), max(nights, 1), max(approvals, 0))
@@ -57,6 +53,12 @@ def check(site: Path, now: Memory, state: Path) -> None:
     HistoryLost
         One line: what is missing, how to restore it, how to go on without it on purpose.
     """
+    old = state / "history.sqlite"
+    if not now.nights and old.exists():
+        raise HistoryLost(
+            f"{old}: is the history of an earlier version, which this one does not read: go on with that"
+            " version, or begin anew on purpose with --accept-lost-history"
+        )
     before = remembered(site)
     if before is None:
         return
@@ -65,16 +67,10 @@ def check(site: Path, now: Memory, state: Path) -> None:
     elif before.id and now.id != before.id:
         what = "is that of another site"
     elif now.nights < before.nights or now.approvals < before.approvals:
-        what = f"holds {_words(now.nights, now.approvals)}"
+        what = f"holds {now}"
     else:
         return
-    knows = _words(before.nights, before.approvals)
     raise HistoryLost(
-        f"{state / 'history.json'}: {what}, but the site knows of {knows}: "
-        "regressions cannot be told. Restore the state folder from a copy, or begin anew on purpose "
-        "with --accept-lost-history"
+        f"{state / 'history.json'}: {what}, but the site knows of {before}: regressions cannot be told."
+        " Restore the state folder from a copy, or begin anew on purpose with --accept-lost-history"
     )
-
-
-def _words(nights: int, approvals: int) -> str:
-    return f"{nights} night(s) and {approvals} approval(s)"

@@ -9,30 +9,34 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from actuator_lti.bounds import JOB_MEMORY
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown_path
-from analyses.studies.engine import Engine
 from reports.nightly import memory
 from reports.nightly import site as site_files
-from reports.nightly.apart import Done, Limits, Task, build_each
+from reports.nightly.apart import Limits, Task, build_each
+from reports.nightly.asked import Settings
 from reports.nightly.cache import Cache, CorruptEntry
 from reports.nightly.code_version import CodeVersion, code_version, commit_of
 from reports.nightly.figures import Figure
 from reports.nightly.history import FILE, NIGHTS, History, Reported, open_history
-from reports.nightly.job import BROKEN, Job, Outcome, check_jobs
+from reports.nightly.job import Job, check_jobs
 from reports.nightly.lock import hold
-from reports.nightly.records import Result
+from reports.nightly.records import Result, Run
 from reports.nightly.text import now, one_line
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.view import Overview, overview
+from reports.nightly.worker import Answer
 from reports.visible import visible
 
 DESIGNS_A_LIMIT = 50  # of a comparison, within one time limit
 Progress = Callable[[int, int], None]
 Say = Callable[[str], None]
+
+
+def _nobody(*_said: object) -> None:
+    """Whom nothing is told."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,41 +50,12 @@ class Study:
     tolerances: Tolerances = field(default_factory=Tolerances)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """How a night is run.
+class Outcome(NamedTuple):
+    """What came of a job, and what its report says where there is one."""
 
-    Parameters
-    ----------
-    workers : int
-        Worker processes; 0 builds in this process, without a time limit.
-    time_limit_s : float
-        A design that takes longer is ended and named, in s.
-    wait_s : float
-        How long to wait for another nightly on the same site, in s.
-    keep_reports : int
-        Nights whose reports stay on the site; their figures stay in the history for good.
-    build : str
-        ``module:function`` that makes ``(meta, files)`` of a job's payload.
-    state : pathlib.Path, optional
-        Folder of history and cache; ``DIR.state`` beside the site where left out.
-    accept_lost_history : bool
-        Go on where the history knows less than the site: a new one, or an older copy.
-    memory_limit_bytes : int
-        Of a worker process; a design that needs more has no result.
-    engine : Engine, optional
-        A Dask cluster to build on in place of worker processes here.
-    """
-
-    workers: int = 2
-    time_limit_s: float = 900.0
-    wait_s: float = 0.0
-    keep_reports: int = 60
-    build: str = "reports.nightly.compute:build"
-    state: Path | None = None
-    accept_lost_history: bool = False
-    memory_limit_bytes: int = JOB_MEMORY.most
-    engine: Engine | None = None
+    job: Job
+    result: Result
+    meta: Mapping[str, Any]
 
 
 def state_of(site: Path, settings: Settings) -> Path:
@@ -129,8 +104,8 @@ def run_night(
     site: Path,
     settings: Settings | None = None,
     *,
-    progress: Progress | None = None,
-    say: Say | None = None,
+    progress: Progress = _nobody,
+    say: Say = _nobody,
     code: CodeVersion | None = None,
     clock: Callable[[], str] = now,
 ) -> Overview:
@@ -148,7 +123,7 @@ def run_night(
     progress : callable, optional
         Called with (jobs done, jobs in all).
     say : callable, optional
-        Called with one line for whatever somebody should know (a corrupt cache entry, a migration).
+        Called with one line for whatever somebody should know (a corrupt cache entry).
     code : CodeVersion, optional
         Version of the code; found out where left out.
 
@@ -166,9 +141,9 @@ def run_night(
         site_files.remove_leftovers(site, history.state)
         site_files.mark(site)
         run = history.start_run(started=clock(), **_about(version, study))
-        outcomes = _outcomes(jobs, version, cache, use, progress, say or _silent)
-        history.finish_run(run, clock(), [(_result(run.id, o), _reported(o)) for o in outcomes])
-        return publish(study, site, history, cache, use, {o.key: o.meta for o in outcomes})
+        outcomes = _outcomes(run, jobs, cache, use, progress, say)
+        history.finish_run(run, clock(), [(o.result, _reported(o)) for o in outcomes])
+        return publish(study, site, history, cache, use, {o.result.key: o.meta for o in outcomes})
 
 
 @contextmanager
@@ -176,7 +151,8 @@ def _held(study: Study, site: Path, use: Settings, *, begun: bool = False) -> It
     """Hold history and cache of a site, both as they should be; ``begun``: only where there is a history."""
     state = state_of(site, use)
     site_files.check_place(site)
-    _unless_lost(site, state, use)
+    if not (use.accept_lost_history or (state / FILE).exists()):
+        memory.check(site, memory.Memory(), state)  # before one is begun
     if begun and not (state / FILE).exists():
         raise InputError("no night has been built here yet", where=str(site))
     with hold(state, use.wait_s), open_history(state) as history:
@@ -186,32 +162,16 @@ def _held(study: Study, site: Path, use: Settings, *, begun: bool = False) -> It
         yield history, Cache(state / "cache")
 
 
-def _unless_lost(site: Path, state: Path, use: Settings) -> None:
-    """Refuse a site whose history is not there, or of an earlier version, before one is begun."""
-    if use.accept_lost_history or (state / FILE).exists():
-        return
-    if (state / "history.sqlite").exists():
-        raise memory.HistoryLost(
-            f"{state / 'history.sqlite'}: is the history of an earlier version, which this one does not read:"
-            " go on with that version, or begin anew on purpose with --accept-lost-history"
-        )
-    memory.check(site, memory.Memory("", 0, 0), state)
-
-
 def publish(
-    study: Study,
-    site: Path,
-    history: History,
-    cache: Cache,
-    settings: Settings,
-    metas: Mapping[str, Mapping[str, Any]] | None = None,
-) -> Overview:
+    study: Study, site: Path, history: History, cache: Cache, settings: Settings,
+    metas: Mapping[str, Mapping[str, Any]],
+) -> Overview:  # fmt: skip
     """Make the site of the last finished night anew from history and cache.
 
     ``metas`` holds what is known already of the results, by content address; the rest is read.
     """
-    view = overview(history, cache, study, metas or {})
-    site_files.publish(site, view, history, cache, keep_reports=settings.keep_reports)
+    view = overview(history, cache, study, metas, site)
+    site_files.publish(site, view, history, cache, keep_reports=settings.keep)
     return view
 
 
@@ -248,7 +208,7 @@ def approve(
                 )
         limits = {"by": one_line(by, 200), "reason": one_line(reason, 2000)}
         history.approve(last, list(names) or None, at=clock(), **limits)
-        return publish(study, site, history, cache, use)
+        return publish(study, site, history, cache, use, {})
 
 
 def _about(version: CodeVersion, study: Study) -> dict[str, Any]:
@@ -263,34 +223,30 @@ def _about(version: CodeVersion, study: Study) -> dict[str, Any]:
 
 
 def _outcomes(
-    jobs: Sequence[Job],
-    version: CodeVersion,
-    cache: Cache,
-    use: Settings,
-    progress: Progress | None,
-    tell: Say,
+    run: Run, jobs: Sequence[Job], cache: Cache, use: Settings, progress: Progress, say: Say
 ) -> list[Outcome]:
     """Take from the cache what is there, build the rest."""
-    keys = {job.name: job.key(version.hash) for job in jobs}
-    result: dict[str, Outcome] = {}
+    done: dict[str, Outcome] = {}
+    todo: dict[str, Job] = {}
     for job in jobs:
-        outcome = _from_cache(cache, job, keys[job.name], tell)
-        if outcome is not None:
-            result[job.name] = outcome
-    todo = {keys[job.name]: job for job in jobs if job.name not in result}
-    if progress is not None:
-        progress(len(result), len(jobs))
+        key = job.key(run.code)
+        corrupt = f"cache entry of {one_line(job.name, 60)!r} is corrupt (%s): built again"
+        entry = cache.whole(key, lambda why, words=corrupt: say(words % why))  # type: ignore[misc]
+        if entry is None:
+            todo[key] = job
+        else:
+            done[job.name] = _outcome(run, job, key, entry.meta, cached=True)
 
-    def take(done: Done) -> None:
-        job = todo[done.key]
-        result[job.name] = _built(cache, job, done)
-        if progress is not None:
-            progress(len(result), len(jobs))
+    def take(task: Task, answer: Answer) -> None:
+        job = todo[task.key]
+        done[job.name] = _built(run, job, task.key, answer, cache)
+        progress(len(done), len(jobs))
 
-    limits = Limits(build=use.build, time_limit_s=use.time_limit_s, memory_bytes=use.memory_limit_bytes)
-    here = Engine(threads=use.workers) if use.workers else None
-    build_each([_task(key, job) for key, job in todo.items()], limits, use.engine or here, cache, take)
-    return [result[job.name] for job in jobs]
+    progress(len(done), len(jobs))
+    limits = Limits(use.build, use.time_limit_s, use.memory_limit * 1_000_000)
+    engine = use.engine if use.workers or use.scheduler else None
+    build_each([_task(key, job) for key, job in todo.items()], limits, engine, take)
+    return [done[job.name] for job in jobs]
 
 
 def _task(key: str, job: Job) -> Task:
@@ -300,84 +256,47 @@ def _task(key: str, job: Job) -> Task:
     return Task(key=key, payload=job.payload, limits=-(-designs // DESIGNS_A_LIMIT))
 
 
-def _from_cache(cache: Cache, job: Job, key: str, tell: Say) -> Outcome | None:
-    try:
-        entry = cache.read(key)
-    except CorruptEntry as error:
-        tell(f"cache entry of {one_line(job.name, 60)!r} is corrupt ({error}): built again")
-        cache.discard(key)
-        return None
-    if entry is None:
-        return None
-    return Outcome(job=job, key=key, status=_status(entry.meta), meta=entry.meta, cached=True)
+def _built(run: Run, job: Job, key: str, answer: Answer, cache: Cache) -> Outcome:
+    """Keep what was built; an error of the disk is none of its design."""
+    status, message = answer.status, "\n".join(filter(None, (answer.message, answer.detail)))
+    if status == "done":
+        try:
+            meta = cache.take(key, answer.entry).meta
+            return _outcome(run, job, key, meta, seconds=answer.seconds)
+        except CorruptEntry as error:
+            status, message = "crash", f"its result came damaged ({error})"
+        except InputError as error:
+            raise InputError(f"result of {one_line(job.name, 60)!r} cannot be kept: {error}") from error
+    return Outcome(job, _result(run, job, status, seconds=answer.seconds, message=visible(message)), {})
 
 
-def _built(cache: Cache, job: Job, done: Done) -> Outcome:
-    if done.status == "disk":
-        raise InputError(f"result of {one_line(job.name, 60)!r} cannot be kept: {done.message}")
-    if done.status == "done":
-        entry = cache.read(done.key)
-        if entry is not None:
-            return Outcome(
-                job=job, key=done.key, status=_status(entry.meta), meta=entry.meta, seconds=done.seconds
-            )
-    status = done.status if done.status in ("error", "timeout", "crash") else "crash"
-    message = visible(done.message + (f"\n{done.detail}" if done.detail else ""))
-    return Outcome(job=job, key=done.key, status=status, seconds=done.seconds, message=message)  # type: ignore[arg-type]
+def _outcome(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any) -> Outcome:
+    """What came of a job that has a result."""
+    failing = meta["failed"] or meta["failed_sections"]
+    status = "fail" if failing else "unproven" if meta["unproven"] else "pass"
+    ranked = [v for v in meta["verdicts"] if v["relative"] is not None]
+    worst = min(ranked, key=lambda v: v["relative"], default={"relative": None, "id": ""})
+    sections = ", ".join(meta["failed_sections"])
+    more |= {"failed": meta["failed"], "total": meta["total"], "key": key}
+    more |= {"worst": worst["relative"], "worst_id": worst["id"]}
+    message = f"not passed: {sections}" if sections else ""
+    return Outcome(job, _result(run, job, status, message=message, **more), meta)
 
 
-def _status(meta: Mapping[str, Any]) -> Any:
-    if meta.get("failed") or meta.get("failed_sections"):
-        return "fail"
-    return "unproven" if meta.get("unproven") else "pass"
-
-
-def _message(outcome: Outcome) -> str:
-    sections = outcome.meta.get("failed_sections", ())
-    return outcome.message or (f"not passed: {', '.join(sections)}" if sections else "")
+def _result(run: Run, job: Job, status: str, **more: Any) -> Result:
+    return Result(run=run.id, name=job.name, kind=job.kind, status=status, **more)
 
 
 def _reported(outcome: Outcome) -> Reported | None:
     """Figures of an outcome and what is behind them; None where there is no result."""
-    if outcome.status in BROKEN:
-        return None
     job = outcome.job
+    if not outcome.result.key:
+        return None
+    settings = job.payload.get("settings") or {}
     inputs = {
         "parameters": dict(job.parameters),
-        "settings": _flat_settings(job.payload),
+        "settings": {str(key): one_line(str(value), 200) for key, value in settings.items()},
         "design_hash": job.design_hash,
         "revision": job.revision,
     }
-    return [Figure(**f) for f in outcome.meta.get("figures", ())], inputs
-
-
-def _result(run: int, outcome: Outcome) -> Result:
-    """What the history keeps of an outcome."""
-    meta = outcome.meta
-    ranked = [v for v in meta.get("verdicts", ()) if v["relative"] is not None]
-    worst = min(ranked, key=lambda v: v["relative"], default=None)
-    return Result(
-        run=run,
-        name=outcome.job.name,
-        kind=outcome.job.kind,
-        status=outcome.status,
-        key="" if outcome.status in BROKEN else outcome.key,
-        seconds=outcome.seconds,
-        cached=outcome.cached,
-        failed=int(meta.get("failed", 0)),
-        total=int(meta.get("total", 0)),
-        worst=worst["relative"] if worst else None,
-        worst_id=worst["id"] if worst else "",
-        message=_message(outcome),
-    )
-
-
-def _flat_settings(payload: Mapping[str, Any]) -> dict[str, str]:
-    settings = payload.get("settings")
-    if not isinstance(settings, Mapping):
-        return {}
-    return {str(key): one_line(str(value), 200) for key, value in settings.items()}
-
-
-def _silent(_line: str) -> None:
-    return None
+    return [Figure(**f) for f in outcome.meta["figures"]], inputs

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from markupsafe import Markup
-
 from actuator_lti.files.tree import Tree
-from reports.html import environment, security_policy, show_signed
+from reports.html import render
+from reports.nightly.between import SHOWN_CHANGES
 from reports.nightly.course import Course, course_of
 from reports.nightly.headline import cause_words, change_words, headlines, main_changes
 from reports.nightly.history import History
-from reports.nightly.machines import SIGNS, STATE_WORDS, cause_lines
+from reports.nightly.machines import SIGNS, cause_lines
 from reports.nightly.records import Result, Run
 from reports.nightly.text import csv_text, one_line
-from reports.nightly.view import SHOWN_CHANGES, DesignView, Overview, outcome, report_folder
-from reports.numbers import MISSING, significant
+from reports.nightly.view import STATE_WORDS, DesignView, Overview, outcome, report_folder
 from reports.scripts import asset, bundled
 from reports.visible import visible
 
@@ -80,28 +77,19 @@ def figures_csv(design: DesignView, history: History) -> str:
 
 
 def _render(template: str, **context: Any) -> str:
-    script = asset("nightly/nightly.js") + bundled("figures")
-    counter = itertools.count(1)
-    return (
-        environment()
-        .get_template(template)
-        .render(
-            stylesheet=Markup(asset("style.css") + asset("nightly/nightly.css")),
-            script=Markup(script),
-            security_policy=security_policy(script),
-            unique=lambda letter: f"{letter}{next(counter)}",
-            states=STATES,
-            night_signs=NIGHT_SIGNS,
-            cause_lines=cause_lines,
-            cause_words=cause_words,
-            change_words=change_words,
-            main_changes=main_changes,
-            visible=visible,
-            one_line=one_line,
-            number=_number,
-            signed=_signed,
-            **context,
-        )
+    return render(
+        template,
+        style=asset("nightly/nightly.css"),
+        code=asset("nightly/nightly.js") + bundled("figures"),
+        states=STATES,
+        night_signs=NIGHT_SIGNS,
+        cause_lines=cause_lines,
+        cause_words=cause_words,
+        change_words=change_words,
+        main_changes=main_changes,
+        visible=visible,
+        one_line=one_line,
+        **context,
     )
 
 
@@ -142,11 +130,3 @@ def _night(
         "marks": course.marks.get(run.id, []),
         "approved": design.approval is not None and design.approval.run == run.id,
     }
-
-
-def _number(value: float | None, digits: int = 4) -> str:
-    return MISSING if value is None else significant(value, digits)
-
-
-def _signed(value: float | None, digits: int = 3) -> str:
-    return show_signed(value, digits)

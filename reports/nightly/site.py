@@ -13,14 +13,13 @@ import re
 import secrets
 import shutil
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.atomic import write_bytes, write_text
+from actuator_lti.files.atomic import write_text, write_together
 from reports.nightly import machines, pages
-from reports.nightly.batch import Batch
-from reports.nightly.cache import Cache, CorruptEntry, Entry
+from reports.nightly.cache import Cache
 from reports.nightly.history import History
 from reports.nightly.text import sha256
 from reports.nightly.view import DesignView, Overview, report_folder
@@ -85,32 +84,24 @@ def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep
         Where the site cannot be written; it is as it was then.
     """
     folder = f"nights/{night.run.id:06d}-{secrets.token_hex(4)}"
-    batch = Batch()
+    kept = _reports_to_keep(history, night, keep_reports)
+    write_together(file for design in night.designs for file in _lacking(site, design, cache))
+    available = {path for path in kept if (site / path / "report.html").exists()}
+    laid_out = pages.of_night(night, history, available)
     try:
-        kept = _reports_to_keep(history, night, keep_reports)
-        for design in night.designs:
-            _lay_out_report(site, design, cache, batch)
-        available = {path for path in kept if (site / path / "report.html").exists()}
-        for name, text in pages.of_night(night, history, available):
-            batch.write(site / folder / name, text)
-        batch.flush()
+        write_together((site / folder / name, text.encode()) for name, text in laid_out)
         write_text(site / "index.html", pages.index(night, folder))
     except InputError:
         shutil.rmtree(site / folder, ignore_errors=True)
         raise
-    for name, text in _machine_files(night).items():
-        write_text(site / name, text)
+    texts = (machines.summary_text(night), machines.junit(night), machines.markdown(night))
+    write_together((site / name, text.encode()) for name, text in zip(_FOR_MACHINES, texts, strict=True))
     _collect_garbage(site, folder, kept)
     cache.collect_garbage({d.result.key for d in night.designs}, KEPT_CACHE_DAYS)
 
 
-def _machine_files(night: Overview) -> Mapping[str, str]:
-    texts = (machines.summary_text(night), machines.junit(night), machines.markdown(night))
-    return dict(zip(_FOR_MACHINES, texts, strict=True))
-
-
-def _lay_out_report(site: Path, design: DesignView, cache: Cache, batch: Batch) -> None:
-    """Copy a report out of the cache unless the site has it, whole."""
+def _lacking(site: Path, design: DesignView, cache: Cache) -> Iterator[tuple[Path, bytes]]:
+    """The files of a report that the site has not, or not whole; out of the cache."""
     if design.broken:
         return
     folder = site / design.report
@@ -124,14 +115,12 @@ def _lay_out_report(site: Path, design: DesignView, cache: Cache, batch: Batch) 
     missing = [name for name, digest in wanted.items() if not _is_there(folder / name, digest)]
     if not missing:
         return
-    entry = _entry(cache, design.result.key)
+    entry = cache.whole(design.result.key)
     if entry is None:
         raise InputError(
             f"the result of {design.name[:60]!r} has vanished from the cache: run again", where=str(site)
         )
-    for name in missing:
-        write = write_bytes if (folder / name).exists() else batch.write
-        write(folder / name, entry.file(name))
+    yield from ((folder / name, entry.file(name)) for name in missing)
 
 
 def _is_there(path: Path, digest: str) -> bool:
@@ -139,14 +128,6 @@ def _is_there(path: Path, digest: str) -> bool:
         return sha256(path.read_bytes()) == digest
     except OSError:
         return False
-
-
-def _entry(cache: Cache, key: str) -> Entry | None:
-    try:
-        return cache.read(key)
-    except CorruptEntry:
-        cache.discard(key)
-        return None
 
 
 def _reports_to_keep(history: History, night: Overview, nights: int) -> set[str]:

@@ -10,22 +10,27 @@ A study file may hold a table for the nightly beside what `analyses.studies.stud
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from actuator_lti.errors import InputError
-from actuator_lti.files.reading import read_toml, shown, shown_path
+from actuator_lti.design import design_hash, load_design, write_design
+from actuator_lti.design.model import Design
+from actuator_lti.files.reading import read_toml, shown_path
 from actuator_lti.files.tree import Tree
+from analyses.studies.study import Study as StudyFile
+from analyses.studies.study import Variant, is_study, study_from_tree, study_of
+from analyses.toml_tables import Table
 from reports.nightly.job import Job
 from reports.nightly.night import Study
-from reports.nightly.tolerance import Tolerances, read_tolerances
+from reports.nightly.tolerance import read_tolerances
 
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.studies.study import Study as StudyFile
-    from analyses.studies.study import Variant
 
-_KEYS = ("pdf", "tolerance")
+@dataclass(frozen=True, kw_only=True)
+class _Nightly:
+    """The table ``[nightly]``; beside it stands ``tolerance``."""
+
+    pdf: bool = False
 
 
 def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) -> Study:
@@ -47,20 +52,17 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
     InputError
         From the file: one line with place, key and what is allowed.
     """
-    from analyses.studies.study import is_study, study_of
-
-    if not is_study(path):
-        from actuator_lti.design import load_design
-
-        design = load_design(path)
-        file = study_of(design)
-        table: Tree = {}
-        check = True if validation is None else validation
+    table = Table({}, "nightly", shown_path(path))
+    if is_study(path):
+        tree = read_toml(path, "study file")
+        table = replace(table, data=tree.pop("nightly", {}))
+        file = study_from_tree(tree, table.origin, Path(path).parent, keep_going=True)
     else:
-        file, table = _read_file(Path(path))
-        check = file.validation if validation is None else validation
-    tolerances = _tolerances(table, path)
-    settings: Tree = {"pdf": bool(pdf or _flag(table, "pdf", path)), "validation": check}
+        file = replace(study_of(load_design(path)), validation=True)
+    plan = table.read(_Nightly, beside=("tolerance",))
+    tolerances = read_tolerances(table.table("tolerance").data, table.origin)
+    check = file.validation if validation is None else validation
+    settings: Tree = {"pdf": pdf or plan.pdf, "validation": check}
     if file.monte_carlo is not None:
         settings["monte_carlo"] = {"samples": file.monte_carlo.samples, "seed": file.monte_carlo.seed}
     return Study(
@@ -70,34 +72,6 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
         origin=Path(path).resolve() if Path(path).is_file() else None,
         tolerances=tolerances,
     )
-
-
-def _read_file(path: Path) -> tuple[StudyFile, Tree]:
-    from analyses.studies.study import study_from_tree
-
-    where = shown_path(path)
-    tree = read_toml(path, "study file")
-    table = tree.pop("nightly", {})
-    if not isinstance(table, dict):
-        raise InputError("nightly: allowed: a table, [nightly]", where=where)
-    for key in table:
-        if key not in _KEYS:
-            raise InputError(f"nightly.{shown(key)}: unknown key; allowed: {', '.join(_KEYS)}", where=where)
-    return study_from_tree(tree, where, path.parent, keep_going=True), table
-
-
-def _tolerances(table: Mapping[str, Any], where: str) -> Tolerances:
-    rules = table.get("tolerance", {})
-    if not isinstance(rules, dict):
-        raise InputError("nightly.tolerance: allowed: a table of name pattern to tolerance", where=where)
-    return read_tolerances(rules, where)
-
-
-def _flag(table: Mapping[str, Any], key: str, where: str) -> bool:
-    value = table.get(key, False)
-    if not isinstance(value, bool):
-        raise InputError(f"nightly.{key} = {str(value)[:40]!r}: allowed: true or false", where=where)
-    return value
 
 
 def _jobs(study: StudyFile, settings: Mapping[str, Any]) -> Iterator[Job]:
@@ -139,8 +113,6 @@ def refused_job(variant: Variant) -> Job:
 
 def design_job(design: Design, settings: Mapping[str, Any], name: str) -> Job:
     """Make the job that builds one design's report."""
-    from actuator_lti.design import design_hash, write_design
-
     return Job(
         name=name,
         payload={"name": name, "design": write_design(design), "settings": dict(settings)},

@@ -11,7 +11,6 @@ from datetime import UTC, datetime
 
 from reports.visible import visible
 
-_NOT_SLUG = re.compile(r"[^A-Za-z0-9]+")
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n", "|")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
 
@@ -20,22 +19,6 @@ def sha256(data: bytes | str) -> str:
     """Hex digest of bytes or of the UTF-8 of a text (lone surrogates kept apart, not refused)."""
     raw = data.encode("utf-8", "surrogatepass") if isinstance(data, str) else data
     return hashlib.sha256(raw).hexdigest()
-
-
-def slug(name: str) -> str:
-    """File name of a design: readable ASCII of the name and ten digits of its hash.
-
-    Two different names never share a slug by their readable part, and no name can leave a folder.
-
-    Examples
-    --------
-    >>> slug("../../etc/passwd")
-    'etc-passwd-3754d6cb3a'
-    >>> slug("<b>")[:2]
-    'b-'
-    """
-    readable = _NOT_SLUG.sub("-", name).strip("-")[:40].strip("-").lower() or "design"
-    return f"{readable}-{sha256(name)[:10]}"
 
 
 def one_line(text: str, limit: int = 300) -> str:

@@ -2,33 +2,38 @@
 
 from __future__ import annotations
 
-import itertools
-from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reports.nightly.cache import Cache, CorruptEntry
-from reports.nightly.changes import Cause, Change, Columns, Comparison, cause_of
-from reports.nightly.code_version import commits_between
-from reports.nightly.figures import Figure, Verdict
+from analyses.slugs import hashed
+from reports.nightly.between import Between
+from reports.nightly.cache import Cache, Entry
+from reports.nightly.changes import Change, Comparison
+from reports.nightly.figures import Verdict
 from reports.nightly.history import History
 from reports.nightly.job import BROKEN
 from reports.nightly.memory import Memory
 from reports.nightly.records import Baseline, Result, Run
-from reports.nightly.text import slug
-from reports.nightly.trend import WINDOW, flaps, may_flap, missing_nights
+from reports.nightly.trend import WINDOW, missing_nights
 
 if TYPE_CHECKING:
     from reports.nightly.night import Study
 
 STRIP = 30
 CLOSER = 1e-3  # of the limit; a smaller step of the distance is none
-SHOWN_CHANGES = 100
+STATE_WORDS = {
+    "broken": "no result",
+    "fail": "failing",
+    "unproven": "not proven",
+    "regression": "regressed",
+    "pass": "passing",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,12 +56,17 @@ class DesignView:
     @property
     def slug(self) -> str:
         """Name as a file."""
-        return slug(self.result.name)
+        return hashed(self.result.name)
 
     @property
     def broken(self) -> bool:
         """Whether there is no result tonight."""
         return self.result.status in BROKEN
+
+    @property
+    def why(self) -> str:
+        """Why there is no result, or it does not pass, in one line."""
+        return self.result.message.partition("\n")[0]
 
     @property
     def title(self) -> str:
@@ -76,7 +86,7 @@ class DesignView:
 
     @property
     def state(self) -> str:
-        """``broken``, ``fail``, ``unproven``, ``regression`` or ``pass``."""
+        """One of `STATE_WORDS`."""
         if self.broken:
             return "broken"
         if self.result.status != "pass":
@@ -101,6 +111,7 @@ class Overview:
 
     study: str
     title: str
+    site: Path  # on which it is published
     run: Run
     designs: tuple[DesignView, ...]
     runs: tuple[Run, ...]
@@ -120,18 +131,28 @@ class Overview:
         return sum(d.state == state for d in self.alone)
 
     @property
-    def exit_status(self) -> int:
-        """0 where every design was built, meets its requirements and is as approved; else 1."""
-        return 0 if all(d.state == "pass" for d in self.designs) else 1
+    def counts(self) -> str:
+        """How many designs are in each state, in words."""
+        counted = ((self.count(state), words) for state, words in STATE_WORDS.items())
+        return ", ".join(f"{count} {words}" for count, words in counted if count)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every design was built, meets its requirements and is as approved."""
+        return all(d.state == "pass" for d in self.designs)
 
 
 def report_folder(name: str, key: str) -> str:
     """Folder of a report below the site: by design, then by content."""
-    return f"reports/{slug(name)}/{key[:16]}"
+    return f"reports/{hashed(name)}/{key[:16]}"
 
 
 def overview(
-    history: History, cache: Cache, study: Study, metas: Mapping[str, Mapping[str, Any]] | None = None
+    history: History,
+    cache: Cache,
+    study: Study,
+    metas: Mapping[str, Mapping[str, Any]] | None = None,
+    site: Path = Path(),
 ) -> Overview:
     """Put together what the site says about the last finished night."""
     runs = history.runs
@@ -143,6 +164,7 @@ def overview(
     return Overview(
         study=study.name,
         title=study.title or study.name,
+        site=site,
         run=run,
         designs=tuple(designs),
         runs=tuple(runs),
@@ -155,18 +177,13 @@ def overview(
 
 
 class _Reader:
-    """Reads what belongs to each design, and what lies between two nights once."""
+    """Reads what belongs to each design."""
 
     def __init__(self, history: History, cache: Cache, study: Study, metas: Mapping[str, Any]) -> None:
         self.history = history
         self.cache = cache
-        self.study = study
         self.metas = metas
-        self.runs = {r.id: r for r in history.runs}
-        self.last = history.runs[-1]
-        self._nights = list(self.runs)
-        self._commits: dict[tuple[int, int], tuple[tuple[str, str], ...]] = {}
-        self._columns: dict[tuple[int, int], Columns] = {}
+        self.between = Between(history, study.tolerances, study.origin)
 
     def design(self, result: Result) -> DesignView:
         past = self.history.results(result.name, last=2 * STRIP)
@@ -174,116 +191,25 @@ class _Reader:
         return DesignView(
             result=result,
             meta=self._meta(result),
-            last_night=self._last_night(result, past),
-            baseline=self._baseline(result, approval),
+            last_night=self.between.last_night(result, past),
+            baseline=self.between.baseline(result, approval),
             approval=approval,
             strip=self._strip(past),
-            status_flaps=_toggles([r.status for r in past[-WINDOW:]]) >= 3,
+            status_flaps=sum(a.status != b.status for a, b in pairwise(past[-WINDOW:])) >= 3,
         )
 
     def _meta(self, result: Result) -> Mapping[str, Any]:
-        if not result.key:
-            return {}
-        known: Mapping[str, Any] = self.metas.get(result.key, {})
-        if known:
-            return known
-        try:
-            entry = self.cache.read(result.key)
-        except CorruptEntry:
-            return {}
-        return entry.meta if entry else {}
+        known = self.metas.get(result.key) or (result.key and self.cache.whole(result.key))
+        return known.meta if isinstance(known, Entry) else known or {}
 
     def _strip(self, past: list[Result]) -> tuple[tuple[Run, str], ...]:
         known = {r.run: outcome(r, before) for r, before in zip(past, [None, *past], strict=False)}
-        shown = list(self.runs.values())[-STRIP:]
-        return tuple((run, known.get(run.id, "absent")) for run in shown)
+        return tuple((run, known.get(run.id, "absent")) for run in self.history.runs[-STRIP:])
 
     def _approval(self, name: str) -> Baseline | None:
-        for baseline in reversed(self.history.index.baselines):
-            if baseline.name in (None, name) and baseline.run in self.runs and self._good(baseline.run, name):
-                return baseline
-        return None
-
-    def _good(self, run: int, name: str) -> Result | None:
-        """The result of a design in a night, where it has one."""
-        result = self.history.night(run).by_name.get(name)
-        return result if result is not None and result.home is not None else None
-
-    def _last_night(self, result: Result, past: list[Result]) -> Comparison:
-        good = [r for r in past if r.home is not None and r.run < result.run]
-        if not any(r.run < result.run for r in past):
-            return Comparison(note="first night of this design")
-        if not good:
-            return Comparison(note="no earlier night has a result")
-        skipped = bisect_left(self._nights, result.run) - bisect_right(self._nights, good[-1].run)
-        note = (
-            f"{skipped} night(s) without a result before; compared with the last that has one"
-            if skipped
-            else ""
-        )
-        found = self._compare(good[-1], result, note)
-        return replace(found, changes=self._flapping(found.changes, past))
-
-    def _baseline(self, result: Result, approval: Baseline | None) -> Comparison:
-        if approval is not None:
-            base = self.history.night(approval.run).by_name[result.name]
-            return self._compare(base, result, "")
-        first = next(filter(None, (self._good(run, result.name) for run in self._nights)), None)
-        if first is None:
-            return Comparison(note="no baseline: no night has a result")
-        if first.run == result.run:
-            return Comparison(run=self.last, note="this is the first night: nothing to compare with")
-        note = "nobody has approved a baseline yet: compared with the first night"
-        return self._compare(first, result, note)
-
-    def _compare(self, old: Result, new: Result, note: str) -> Comparison:
-        run = self.runs[old.run]
-        if new.home is None:
-            return Comparison(run=run, note=note or "no result tonight")
-        if new.home == old.home:
-            return Comparison(run=run, note=note)
-        columns = self._columns_of(old, new)
-        before, after = self.history.matrix((old, new), columns.names)
-        inputs = (self.history.inputs(old), self.history.inputs(new))
-        cause = cause_of(run, self.runs[new.run], inputs, self._commits_between(run, self.runs[new.run]))
-        return Comparison(run=run, changes=columns.compare(before, after), cause=cause, note=note)
-
-    def _columns_of(self, old: Result, new: Result) -> Columns:
-        """The figures of two results, each as the new one declares it where both have it."""
-        before, after = (self.history.numbers(result)[0] for result in (old, new))
-        key = (id(before), id(after))  # the history keeps them
-        if key not in self._columns:
-            known = {figure.name: figure for figure in (*after, *before)} | {
-                figure.name: figure for figure in after
-            }
-            self._columns[key] = Columns(list(known.values()), self.study.tolerances)
-        return self._columns[key]
-
-    def _flapping(self, changes: tuple[Change, ...], past: list[Result]) -> tuple[Change, ...]:
-        """Mark those of the changes that a page shows that go to and fro."""
-        shown = changes[:SHOWN_CHANGES]
-        if not shown or len(past) < 4:
-            return changes
-        values = self.history.matrix(past[-WINDOW:], [c.figure for c in shown])
-        maybe = may_flap(values, np.array([c.tolerance for c in shown]))
-        to_and_fro = {c.figure for j, c in enumerate(shown) if maybe[j] and flaps(values[:, j], c.tolerance)}
-        return tuple(replace(c, flapping=True) if c.figure in to_and_fro else c for c in changes)
-
-    def _commits_between(self, old: Run, new: Run) -> tuple[tuple[str, str], ...]:
-        key = (old.id, new.id)
-        if key not in self._commits:
-            code_root = Path(__file__).resolve().parents[2]
-            result = [("code", line) for line in commits_between(code_root, old.code_commit, new.code_commit)]
-            origin = self.study.origin
-            if origin is not None and (old.study_commit, new.study_commit) != (
-                old.code_commit,
-                new.code_commit,
-            ):
-                result += [
-                    ("study", line) for line in commits_between(origin, old.study_commit, new.study_commit)
-                ]
-            self._commits[key] = tuple(result)
-        return self._commits[key]
+        nights = {run.id for run in self.history.runs}
+        own = (one for one in self.history.index.baselines[::-1] if one.name in (None, name))
+        return next((one for one in own if one.run in nights and self.history.result(one.run, name)), None)
 
 
 def outcome(result: Result, before: Result | None) -> str:
@@ -291,10 +217,3 @@ def outcome(result: Result, before: Result | None) -> str:
     if result.status != "pass" or before is None or result.worst is None or before.worst is None:
         return result.status
     return "regressed" if result.worst < before.worst - CLOSER else "pass"
-
-
-def _toggles(statuses: list[str]) -> int:
-    return sum(a != b for a, b in itertools.pairwise(statuses))
-
-
-__all__ = ["Cause", "DesignView", "Figure", "Overview", "overview", "report_folder"]

@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Callable, Mapping
 from queue import SimpleQueue
 from threading import Thread
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from actuator_lti.errors import InputError
 from reports.nightly.cache import sealed
@@ -20,7 +20,16 @@ from reports.nightly.text import one_line
 # A process that hangs in compiled code without its parent is ended by the system this long after its limit.
 GRACE_S = 15
 READY = b"ready"
-Answer = tuple[str, str, str, bytes]  # status, message, detail, entry for the cache
+
+
+class Answer(NamedTuple):
+    """How a job ended: ``done`` with an entry for the cache, ``error``, ``timeout`` or ``crash``, and why."""
+
+    status: str
+    message: str = ""
+    detail: str = ""
+    entry: bytes = b""
+    seconds: float = 0.0
 
 
 def resolve(name: str) -> Callable[..., Any]:
@@ -48,23 +57,23 @@ def main(build: str, memory_bytes: int) -> None:
 
 
 def execute(function: Callable[..., Any], key: str, payload: Mapping[str, Any]) -> Answer:
-    """Build one report; ``("done", "", "", entry)``, or what went wrong and where.
+    """Build one report; its entry, or what went wrong and where.
 
     Any error of the build belongs to its design and is reported as such.
     """
     try:
         meta, files = function(dict(payload))
     except InputError as error:
-        return ("error", one_line(str(error), 600), "", b"")
+        return Answer("error", one_line(str(error), 600))
     except MemoryError:
-        return ("error", "needs more memory than a job may take: see --memory-limit", "", b"")
+        return Answer("error", "needs more memory than a job may take: see --memory-limit")
     except Exception as error:  # noqa: BLE001 - the one place where a design may raise anything
         where = "".join(traceback.format_exception(error)[-6:])
-        return ("error", f"{type(error).__name__}: {one_line(str(error), 400)}", where[-4000:], b"")
+        return Answer("error", f"{type(error).__name__}: {one_line(str(error), 400)}", where[-4000:])
     try:
-        return ("done", "", "", sealed(key, meta, files))
+        return Answer("done", entry=sealed(key, meta, files))
     except (TypeError, ValueError) as error:
-        return ("error", f"result is no JSON: {one_line(str(error), 300)}", "", b"")
+        return Answer("error", f"result is no JSON: {one_line(str(error), 300)}")
 
 
 def _listen(source: BinaryIO, questions: SimpleQueue[Any]) -> None:

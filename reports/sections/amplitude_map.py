@@ -107,12 +107,11 @@ def _lines(panel: Panel, result: LargeSignals, scale: float) -> None:
             look: style.Style = {"colour": COLOURS[name], "dash": LINES[name], "width": 2.3}
             limited = np.where(np.isfinite(values), values, np.nan)
             panel.curve(result.map.frequency_hz, limited, LIMITERS[name].words, **look)
-    found = (("friction off", result.border), ("friction on", result.border_with_friction))
-    there = [(words, one) for words, one in found if one is not None and np.isfinite(one.simulated_rad).any()]
-    for k, (words, one) in enumerate(there):
-        look = {"colour": style.INK, "marker": "Dv"[k % 2], "size": 7.0, "hollow": True}
-        sizes = scale * one.simulated_rad / one.command_gain
-        panel.points(one.frequency_hz, sizes, f"simulated, {words}", **look)
+    shift = result.shift
+    if shift is not None and np.isfinite(shift.simulated_rad).any():
+        sizes = scale * shift.simulated_rad / shift.command_gain
+        look = {"colour": style.INK, "marker": "D", "size": 7.0, "hollow": True}
+        panel.points(shift.frequency_hz, sizes, "simulated, with friction", **look)
 
 
 def _names(panel: Panel, names: Sequence[str], cause: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:

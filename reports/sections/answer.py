@@ -229,7 +229,9 @@ def _pictures(figures: Mapping[str, LoopFigures], point: WeakPoint | None) -> li
         return []
     view = point.view if point else None
     name = view.loop if view and view.loop else list(figures)[-1]
-    result, seen = figures[name], view.found if view and view.found else figures[name]
+    result = figures[name]
+    there = view.found if view else None  # drawn where it crosses: in a gap nothing comes back at all
+    seen = there if there and (there.margins.gain_margins or there.margins.phase_margins) else result
     own = seen is result
     title = LOOPS[name] if own or view is None else weakest_label(view)
     bode = loop_section.open_bode(title, seen, frequency_grid(seen), name=name if own else "", small=True)

@@ -85,7 +85,8 @@ def _rests(result: LimitCycles, fine: float, small: str) -> Block:
         doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
         doc.of("amplitude_rad", "step", "Step", **size),
         doc.of(_end, "end", "Ends"),
-        doc.of(lambda one: one.swing_rad if one.hunting else None, "size", "Swing, peak", **size, better=-1),
+        doc.of(lambda one: one.rest.amplitude or None, "size", "Output, peak", **size, better=-1),
+        doc.of(lambda one: one.rest.motor_amplitude or None, "motor", "Motor, at the output", **size),
         doc.of("rest.frequency_hz", "hz", "at", "Hz", format="sig:3"),
     ]
     note = "The drive as it is: dry friction, play, quantisation and limits at work."

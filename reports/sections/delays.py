@@ -93,8 +93,8 @@ def _result(budgets: Mapping[str, DelayBudget]) -> str:
     name = max(lost, key=lambda key: lost[key])
     most = ", more than at any other" if len(lost) > 1 else ""
     return (
-        f"At the gain crossover of the {loop_words(name).lower()} speed measurement, hold, computing delay "
-        f"and sampling take {lost[name]:.1f} deg{most}; {180.0 + budgets[name].total_deg:.1f} deg are left."
+        f"Speed measurement, hold, computing delay and sampling take {lost[name]:.1f} deg at the crossover "
+        f"of the {loop_words(name).lower()}{most}; {180.0 + budgets[name].total_deg:.1f} deg are left."
     )
 
 

@@ -36,7 +36,7 @@ def section(result: Duty) -> Section:
 RATED = {
     Verdict.MET: "within continuous rating",
     Verdict.NOT_MET: "beyond continuous rating",
-    Verdict.NOT_PROVEN: "not judged, as no rating is stated",
+    Verdict.NOT_PROVEN: "not judged",
 }
 _COLUMNS = [
     doc.column("what", "What"),

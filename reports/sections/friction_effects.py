@@ -63,7 +63,7 @@ def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> 
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
-        f"No limit cycle of friction at {point.load_Nm:g} {load}",
+        f"No limit cycle of friction after small steps at {point.load_Nm:g} {load}",
         value=0.0 if swing is None else fine * swing.swing_rad,
         limit=0.0,
         unit=small,
@@ -228,6 +228,6 @@ def _summary(result: FrictionEffects, fine: float, small: str) -> str:
     if not result.integrator:
         return f"{does}; the steps leave no error at rest."
     return (
-        f"Dry friction alone leaves no steady-state error and causes no hunting: the {result.integrator} "
-        "integrator removes the error."
+        f"After small steps dry friction alone leaves no steady-state error and causes no hunting: the "
+        f"{result.integrator} integrator removes the error."
     )

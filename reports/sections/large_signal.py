@@ -1,4 +1,4 @@
-"""Large signals: verdicts on the border, the map, the amplitude Bode, the sawtooth."""
+"""Large signals: the map, the amplitude Bode, the sawtooth."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.large_signal import LargeSignals
     from analyses.large_signal.bode import AmplitudeBode
-    from analyses.large_signal.border import BorderCheck
+    from analyses.large_signal.border import LimitShift
     from analyses.large_signal.map import AmplitudeMap
     from analyses.large_signal.sawtooth import Sawtooth, SawtoothRun
 
@@ -32,25 +32,35 @@ def section(result: LargeSignals) -> Section:
 
     design = result.design
     scale, unit = output_unit(design.axis)
-    items = [*_border_verdict(result.border), *_sawtooth_verdicts(result.sawtooth)]
+    items = _sawtooth_verdicts(result.sawtooth)
     rules = doc.details("How the map is read", [doc.text(words) for words in (CAUSE_RULE, CRITERIA)])
     blocks = [doc.verdicts(items, what="checks"), _map_figure(result, scale, unit), rules]
-    if result.border is not None and np.isfinite(result.border.predicted_rad).any():
-        blocks.append(doc.details("The linear limit in numbers", [_border_table(result, scale, unit)]))
+    if result.shift is not None:
+        table = _shift_table(result.shift, design, scale, unit)
+        blocks.append(doc.details("The linear limit in numbers", [table]))
     blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
-    blocks += [_bode_table(result.bode, scale, unit), *_sawtooth_blocks(result.sawtooth, design, scale, unit)]
+    blocks += [
+        _bode_table(result.bode, scale, unit, _linear(design)),
+        *_sawtooth_blocks(result.sawtooth, design, scale, unit),
+    ]
     intro = (
         "Each point of the map is one sine command, simulated until steady. Below the lines the linear "
         "model holds. Above them the limit that is reached first determines the output."
     )
-    words = _result(result.bode, scale, unit)
+    words = _result(result.bode, scale, unit, _linear(design))
     status: Status = tally(items).role
     return doc.section(
         "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, told="info"
     )
 
 
-def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> str:
+def _linear(design: Design) -> str:
+    """Which linear response the map is beside: friction by load that changes sign with the motion is out."""
+    by_load = design.friction.load_coefficient > 0.0 and bool(design.coupling or design.load.acting())
+    return "linear, without friction by load" if by_load else "linear"
+
+
+def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str = "linear") -> str:
     """Say how far the bandwidth falls with the amplitude."""
     largest, fraction = max(
         zip(amplitude_bode.amplitude_rad, amplitude_bode.fractions, strict=True), default=(math.nan, 0.0)
@@ -64,12 +74,12 @@ def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> str:
     if not math.isfinite(value):
         found = _between(amplitude_bode, place)
         if amplitude_bode.below_from_start[place]:
-            return f"The −3 dB bandwidth falls from {linear:.3g} Hz (linear) to {found} at {size}."
-        return f"The −3 dB bandwidth is {linear:.3g} Hz (linear); at {size} it is {found}."
+            return f"The −3 dB bandwidth falls from {linear:.3g} Hz ({model}) to {found} at {size}."
+        return f"The −3 dB bandwidth is {linear:.3g} Hz ({model}); at {size} it is {found}."
     if f"{value:.3g}" == f"{linear:.3g}":
         return f"The −3 dB bandwidth stays at {linear:.3g} Hz up to {size}."
     does = "falls" if value < linear else "rises"
-    return f"The −3 dB bandwidth {does} from {linear:.3g} Hz (linear) to {value:.3g} Hz at {size}."
+    return f"The −3 dB bandwidth {does} from {linear:.3g} Hz ({model}) to {value:.3g} Hz at {size}."
 
 
 def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
@@ -86,28 +96,6 @@ def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
     hz = amplitude_bode.frequency_hz
     unsteady = ", the points between are not steady" if np.any((hz > low) & (hz < high)) else ""
     return f"between {low:.3g} and {high:.3g} Hz{unsteady}" if math.isfinite(high) else f"above {low:.3g} Hz"
-
-
-def _border_verdict(border: BorderCheck | None) -> list[VerdictItem]:
-    """Judge the simulated border against the smallest A_k; a drive without limits has none."""
-    from analyses.large_signal.border import TOLERANCE
-
-    what = {
-        "id": "validation-border",
-        "label": "Onset of saturation: difference between simulation and linear model, friction off",
-    }
-    common: dict[str, Any] = {**what, "limit": 100.0 * TOLERANCE, "unit": "%", "comparison": "<="}
-    if border is None:
-        return [doc.verdict(**common, value=None, distance=None, passed=None, reason="the loop is unstable")]
-    error = border.largest_error
-    if error is None:
-        return []
-    same, count = sum(border.same_limiter), len(border.same_limiter)
-    reason = f"largest of {count} frequencies; the predicted limiter acts at {same} of {count}"
-    reason += f"; without {border.left_out}" if border.left_out else ""
-    reason += f"; {border.reason}" if border.reason else ""
-    common |= {"distance": 100.0 * (TOLERANCE - error), "passed": border.passed}
-    return [doc.verdict(**common, value=100.0 * error, reason=reason)]
 
 
 def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
@@ -138,11 +126,11 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
 
 
 def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
-    """Make the map with the linear onset lines and the simulated border."""
+    """Make the map with the linear onset lines, and where limits are first reached with friction."""
     caption = (
         "What limits a sine command, at no load, with friction. Colour: limit that acts longest. Marks: "
         "waveform of the output; a sine has none. Lines: amplitude at which the linear loop reaches each "
-        "limit. Diamonds and triangles: where the simulation first reaches it."
+        "limit. Diamonds: where the simulation with friction first reaches one."
     )
     if result.design.command != Command():
         caption += " Simulated behind the profile and filter of the command, drawn in front of them."
@@ -163,26 +151,21 @@ def _map_words(amplitude_map: AmplitudeMap) -> str:
     return "Map of amplitude and frequency; share of the points by what acts: " + ", ".join(parts)
 
 
-def _border_table(result: LargeSignals, scale: float, unit: str) -> Block:
-    """List the border frequency by frequency."""
-    border, shifted = result.border, result.border_with_friction
-    assert border is not None
+def _shift_table(shift: LimitShift, design: Design, scale: float, unit: str) -> Block:
+    """List the linear limit and what friction makes of it, frequency by frequency."""
     small: dict[str, Any] = {"unit": unit, "scale": scale, "format": "sig:4"}
     columns = [
-        doc.of(lambda k: border.frequency_hz[k], "hz", "Frequency", "Hz", format="sig:3"),
-        doc.of(lambda k: border.predicted_rad[k], "predicted", "Smallest A_k", **small),
-        doc.of(lambda k: border.simulated_rad[k], "simulated", "Simulated, friction off", **small),
-        doc.of(lambda k: 100.0 * (border.ratio[k] - 1.0), "error", "Difference", "%", format="fix:3"),
-        doc.of(lambda k: words_of(border.predicted_limiter[k]), "limiter", "Predicted limiter"),
-        doc.of(lambda k: words_of(border.simulated_limiter[k]), "acts", "Acting limiter"),
+        doc.of(lambda k: shift.frequency_hz[k], "hz", "Frequency", "Hz", format="sig:3"),
+        doc.of(lambda k: shift.linear_rad[k], "linear", "Smallest A_k", **small),
+        doc.of(lambda k: shift.simulated_rad[k], "simulated", "Simulated, with friction", **small),
+        doc.of(lambda k: 100.0 * (shift.ratio[k] - 1.0), "shift", "Shift by friction", "%", format="fix:2"),
+        doc.of(lambda k: words_of(shift.linear_limiter[k]), "limiter", "Predicted limiter"),
+        doc.of(lambda k: words_of(shift.simulated_limiter[k]), "acts", "Acting limiter"),
     ]
-    if shifted is not None:
-        shift = 100.0 * (shifted.ratio - 1.0)
-        columns.append(doc.of(lambda k: shift[k], "shift", "Shift by friction", "%", format="fix:2"))
     note = "The shift by friction is shown, not judged."
-    if result.design.command != Command():
+    if design.command != Command():
         note += " Amplitudes behind the profile and filter of the command."
-    places = range(len(border.frequency_hz))
+    places = range(len(shift.frequency_hz))
     return doc.listing("Amplitude at which a limit is first reached", places, columns, note)
 
 
@@ -236,7 +219,7 @@ def _bandwidths(panel: Panel, result: AmplitudeBode, scale: float, unit: str, fu
     panel.y.label = "frequency, Hz"
 
 
-def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block:
+def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str) -> Block:
     """List both bandwidths at the design's amplitudes."""
     columns = [
         doc.column("fraction", "of full deflection", "%", format="sig:3"),
@@ -256,7 +239,7 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str) -> Block
         corners = (amplitude_bode.minus3db_hz[k], amplitude_bode.minus90deg_hz[k])
         rows.append((100.0 * fraction, scale * amplitude, *corners, note))
     corners = (amplitude_bode.linear_minus3db_hz, amplitude_bode.linear_minus90deg_hz)
-    rows.append((None, None, *corners, "linear loop"))
+    rows.append((None, None, *corners, model))
     return doc.table(
         "Bandwidth against amplitude", columns, [dict(zip(keys, row, strict=True)) for row in rows]
     )

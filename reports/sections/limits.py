@@ -31,7 +31,7 @@ def section(design: Design, border: Onset) -> Section:
     blocks = [doc.figure("onset", _chart(design, border, scale, unit), caption=caption, alt=caption)]
     blocks += [_table(rows, unit)] if rows else []
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
-    words = _result(rows, unit)
+    words = _result(rows, unit) if rows else _least(border, scale, unit)
     return doc.section(
         "limits", "Validity of the linear model", blocks, result=words, intro=intro, told="info"
     )
@@ -72,14 +72,22 @@ def _full(design: Design) -> float:
 
 def _result(rows: Sequence[_Linear], unit: str) -> str:
     """Say how far the largest command of the table stays linear."""
-    if not rows:
-        return ""
     row = max(rows, key=lambda row: row.amplitude)
     part = "full deflection" if row.fraction == 1.0 else f"{100.0 * row.fraction:.0f} % of full deflection"
     size = f"{part} ({row.amplitude:.3g} {unit})"
     if row.hz is None:
         return f"A sine of {size} stays linear over the whole frequency range."
     return f"A sine of {size} stays linear up to {row.hz:.3g} Hz; above, the {_noun(row.limiter)} acts."
+
+
+def _least(border: Onset, scale: float, unit: str) -> str:
+    """Say of a drive whose command is no position where the least command reaches a limit."""
+    if not np.isfinite(border.amplitude_rad).any():
+        return "No limit is reached by a sine command over the whole frequency range."
+    k = int(np.argmin(border.amplitude_rad))
+    size, hz = scale * border.amplitude_rad[k], hertz(border.omega_rad_s[k])
+    limit = _noun(words_of(border.active[k]))
+    return f"Sines up to {size:.3g} {unit} stay linear; above, the {limit} acts first, at {hz:.3g} Hz."
 
 
 def _noun(limiter: str) -> str:

@@ -259,4 +259,5 @@ def _margin_words(title: str, figures: LoopFigures) -> str:
     row = margin_row(figures)
     gain = "none" if row["gain_margin_db"] is None else f"{row['gain_margin_db']:.1f} dB"
     phase = "none" if row["phase_margin_deg"] is None else f"{row['phase_margin_deg']:.1f} deg"
-    return f"Open-loop Bode diagram of the {title.lower()}: gain margin {gain}, phase margin {phase}."
+    name = title[:1].lower() + title[1:]
+    return f"Open-loop Bode diagram of the {name}: gain margin {gain}, phase margin {phase}."

@@ -181,7 +181,7 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
     count = f"{count} stable, {evidence_words(figures)}"
     held = [f"{LOOPS[name].lower()} with the {HELD[name]}" for name, one in figures.items() if one.held]
     count += f" ({', '.join(held)})" if held else ""
-    return to_minus(f"{count}; {' and '.join(words)}." if words else f"{count}.")
+    return to_minus(f"{count}; with sliding friction {' and '.join(words)}." if words else f"{count}.")
 
 
 def evidence_words(figures: Mapping[str, LoopFigures]) -> str:

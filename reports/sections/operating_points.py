@@ -47,26 +47,30 @@ def section(points: Sequence[OperatingPointFigures], design: Design) -> Section:
 
 def _result(points: Sequence[OperatingPointFigures]) -> str:
     """Say the smallest phase margin over all operating points."""
-    unstable = [point.label for point in points if any(f.sound is False for f in point.figures.values())]
+    unstable = [_where(point) for point in points if any(f.sound is False for f in point.figures.values())]
     if unstable:
         return f"Unstable at {len(unstable)} of {len(points)} operating points: {'; '.join(unstable)}."
-    unknown = [point.label for point in points if any(f.sound is None for f in point.figures.values())]
+    unknown = [_where(point) for point in points if any(f.sound is None for f in point.figures.values())]
     if unknown:
         count = f"{len(unknown)} of {len(points)} operating points"
         return f"Stability is not known at {count}: {'; '.join(unknown)}."
     result = [
-        (row["phase_margin_deg"], name, point.label)
+        (row["phase_margin_deg"], name, _where(point))
         for point in points
         for name, figures in point.figures.items()
         if (row := margin_row(figures))["phase_margin_deg"] is not None
     ]
     if not result:
         return f"Stable at all {len(points)} operating points."
-    deg, name, label = min(result)
+    deg, name, label = min(result, key=lambda each: float(each[0]))
     return (
         f"Stable at all {len(points)} operating points; the smallest phase margin is {deg:.1f} deg "
         f"({name} loop, {label})."
     )
+
+
+def _where(point: OperatingPointFigures) -> str:
+    return point.place or point.label
 
 
 def _row(point: OperatingPointFigures, scale: float) -> Row:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,11 +11,12 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section, Status
+from reports.numbers import short
 from reports.sections.names import load_unit, output_unit
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
-    from analyses.stiffness import Stiffness, StiffnessCurve
+    from analyses.stiffness import Stiffness
 
 STATES = {
     "powered": "powered, command held",
@@ -28,7 +29,7 @@ def of_design(design: Design) -> Section:
     """Make the section of a report from the linear loops alone."""
     from analyses.stiffness import stiffness
 
-    return section(stiffness(design, simulated=False))
+    return {**section(stiffness(design, simulated=False)), "status": "info"}
 
 
 def section(result: Stiffness) -> Section:
@@ -45,26 +46,36 @@ def section(result: Stiffness) -> Section:
         "Moment on the output over its deflection, the command held: the inverse of the linear response "
         "from the moment to the output. Friction slides; dry friction and play are not in the curves."
     )
-    status: Status = "info" if not result.checks else "pass" if result.passed else "fail"
+    status: Status = result.verdict.role()
     return doc.section(
         "stiffness", "Stiffness", blocks, result=_result(result, unit), intro=intro, status=status
     )
 
 
 def _result(result: Stiffness, unit: str) -> str:
-    """Say the static stiffness and where the drive is weakest."""
+    """Say the static stiffness, where the drive is weakest, and what was compared with the simulator."""
     powered = result.curves[0]
-    if not np.isfinite(powered.stiffness_Nm_rad).any():
-        return "A moment does not move the output of this drive."
-    least, at = powered.least
-    static = powered.static_Nm_rad
-    words = f"{static:.4g} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
-    words = f"Powered, the static stiffness is {words}; the least is {least:.4g} {unit} at {at:.3g} Hz"
-    if result.checks:
-        most = max(check.difference for check in result.checks)
-        said = "confirms" if result.passed else "does not confirm"
-        words += f"; an injected moment {said} it (relative difference up to {most:.1e})"
-    return f"{words}."
+    words = "A moment does not move the output of this drive"
+    if np.isfinite(powered.stiffness_Nm_rad).any():
+        least, at = powered.least
+        static = powered.static_Nm_rad
+        words = f"{short(static, 4)} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
+        words = f"Powered, the static stiffness is {words}"
+        words += f"; the least is {short(least, 4)} {unit} at {at:.3g} Hz"
+    return "; ".join(filter(None, (words, _compared(result)))) + "."
+
+
+def _compared(result: Stiffness) -> str:
+    """What was put to the simulator, and how far it is off; or why it could not be."""
+    from analyses.stiffness.result import AGREED, READ
+
+    if not result.checks:
+        return f"nothing is compared: {result.unproven}" if result.unproven else ""
+    most = max(check.difference for check in result.checks)
+    words = f"moments injected at {len(result.checks)} frequencies agree to {most:.1e}, allowed {AGREED:g}"
+    if result.lost_motion_difference is not None:
+        words += f", the lost motion to {result.lost_motion_difference:.1e}, allowed {READ:g}"
+    return f"{words} (relative)"
 
 
 def _figure(result: Stiffness, unit: str) -> list[Block]:
@@ -86,23 +97,22 @@ def _figure(result: Stiffness, unit: str) -> list[Block]:
 
 def _table(result: Stiffness, unit: str) -> Block:
     note = "Infinite: the output comes back to its place, or does not move at all."
+    static: dict[str, Any] = {"unit": unit, "format": "sig:4", "better": 1}
     columns = [
         doc.of(lambda one: STATES[one.state], "state", "State"),
-        doc.of(_static, "static", "Static", unit, format="sig:4", better=1),
-        doc.of(lambda one: one.least[0], "least", "Least", unit, format="sig:4", better=1),
-        doc.of(
-            lambda one: one.least[1] if math.isfinite(one.least[0]) else None,
-            "at",
-            "at",
-            "Hz",
-            format="sig:4",
-        ),
+        doc.of(lambda one: _or_infinite(one.static_Nm_rad), "static", "Static", **static),
+        doc.of(lambda one: _or_infinite(one.least[0]), "least", "Least", **static),
+        doc.of(lambda one: _finite(one.least), "at", "at", "Hz", format="sig:4"),
     ]
     return doc.listing("Stiffness by state", result.curves, columns, note)
 
 
-def _static(curve: StiffnessCurve) -> float | str:
-    return curve.static_Nm_rad if math.isfinite(curve.static_Nm_rad) else "infinite"
+def _finite(least: tuple[float, float]) -> float | None:
+    return least[1] if math.isfinite(least[0]) else None
+
+
+def _or_infinite(stiffness: float) -> float | str:
+    return stiffness if math.isfinite(stiffness) else "infinite"
 
 
 def _lost_motion(result: Stiffness) -> Block:
@@ -147,8 +157,10 @@ def _checks(result: Stiffness, unit: str) -> Block:
     )
     columns = [
         doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:4"),
-        doc.of(lambda one: abs(one.foreseen_Nm_rad), "foreseen", "Predicted", unit, format="sig:6"),
-        doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Simulated", unit, format="sig:6"),
+        doc.of(
+            lambda one: _or_infinite(abs(one.foreseen_Nm_rad)), "foreseen", "Predicted", unit, format="sig:6"
+        ),
+        doc.of(lambda one: _or_infinite(abs(one.seen_Nm_rad)), "seen", "Simulated", unit, format="sig:6"),
         doc.of("difference", "difference", "Relative difference", format="sig:2"),
     ]
     return doc.listing("Injected moment", result.checks, columns, note)

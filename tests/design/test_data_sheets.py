@@ -5,11 +5,21 @@ from math import pi, sqrt
 
 import pytest
 
-from actuator_lti.design import parameter_value, read_design_text, warnings_of, with_overrides
+from actuator_lti.design import (
+    parameter_value,
+    read_design_text,
+    tolerances,
+    warnings_of,
+    with_overrides,
+    write_design,
+)
 from actuator_lti.design.explained import explained
 from actuator_lti.drive.facts import capability
+from actuator_lti.drive.steady import steady_torque_Nm
 from actuator_lti.errors import InputError
 from analyses.linear.loop_survey import survey_loops
+from analyses.studies.sampling import sampler_of
+from nonlinear import commands, simulate
 from reports.cli.main import main
 from reports.sections import forms
 
@@ -203,3 +213,101 @@ def test_gear_sheets_state_arc_minutes_and_torque_per_arc_minute() -> None:
     for text in ("1 arcmin", "60 arcsec"):
         play = with_overrides(spring, {"coupling.play": text}).coupling
         assert play.play_rad == pytest.approx(pi / 180 / 60, rel=1e-14)
+
+
+# --- no-load current and efficiency (model.md section 11); figures of a 24 V motor with a planetary gear ---
+SHEET = """
+[design]
+name = "sheet"
+[motor]
+resistance = "0.299 ohm"
+inductance = "0.082 mH"
+torque_constant = "30.2 mN*m/A"
+back_emf_constant = "317 rpm/V"
+rotor_inertia = "142 g*cm^2"
+no_load_current = "137 mA"
+no_load_speed = "7580 rpm"
+[[gear]]
+name = "first"
+ratio = "43:1"
+efficiency = "80 %"
+[[gear]]
+name = "second"
+ratio = 2
+efficiency = 0.9
+[load]
+inertia = "1e-3 kg*m^2"
+path = "back-drivable"
+[limits]
+voltage = "48 V"
+[control]
+period = "100 us"
+computing_delay = "0 s"
+"""
+SPEED = 7580 * pi / 30
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, None, 1.0])
+def test_a_motor_without_a_load_takes_its_no_load_current(share: float | None) -> None:
+    """At u = R i0 + kE w0, whatever part of it is dry."""
+    given = "" if share is None else f"no_load_dry_share = {share}\n"
+    motor = read_design_text(SHEET.replace("[[gear]]", f"{given}[[gear]]", 1), "sheet")
+    u = 0.299 * 0.137 + SPEED * 30 / (pi * 317)
+    run = simulate(motor, commands.step(u), 1.0)
+    assert run.motor_speed_rad_s[-1] == pytest.approx(SPEED, rel=1e-9)
+    assert run.current_A[-1] == pytest.approx(0.137, rel=1e-9)
+    assert steady_torque_Nm(motor, 0.0, SPEED) == pytest.approx(0.137 * 30.2e-3, rel=1e-12)
+
+
+@pytest.mark.parametrize("path", ["back-drivable", "self-locking"])
+def test_a_load_costs_what_the_efficiencies_leave(path: str) -> None:
+    """M/(N eta) at the motor, of both stages; a load that drives gives back M/N less the same loss."""
+    drive = read_design_text(SHEET.replace("back-drivable", path), "sheet")
+    load, N, eta, kM = 10.0, 86.0, 0.72, 30.2e-3
+
+    def torque(load_Nm: float) -> float:
+        run = simulate(drive, commands.step(24.0), 2.0, load_Nm=load_Nm)
+        free = kM * 0.137 * (0.5 + 0.5 * run.motor_speed_rad_s[-1] / SPEED)
+        return float(kM * run.current_A[-1] - free)
+
+    assert torque(-load) == pytest.approx(load / (N * eta), rel=1e-9)
+    driven = load / N * (1 / eta - 2) if path == "back-drivable" else load / (N * eta)
+    assert torque(load) == pytest.approx(driven, rel=1e-9)
+    assert steady_torque_Nm(drive, -load, 0.0) - steady_torque_Nm(drive, 0.0, 0.0) == pytest.approx(
+        load / (N * eta), rel=1e-12
+    )
+
+
+def test_an_unknown_share_is_a_tolerance_from_none_to_all() -> None:
+    """Dry and viscous part sum up to kM i0 at w0 in every sample."""
+    drive = read_design_text(SHEET, "sheet")
+    wide = {path: (value - t.half_width, value + t.half_width) for path, value, t in tolerances(drive)}
+    assert wide == {
+        "friction.dry_torque": pytest.approx((0.0, 0.137 * 30.2e-3)),
+        "friction.viscous": pytest.approx((0.0, 0.137 * 30.2e-3 / SPEED)),
+    }
+    dry, viscous = sampler_of(drive).draw(0, 64).T
+    assert dry + viscous * SPEED == pytest.approx(64 * [0.137 * 30.2e-3], rel=1e-9)
+    assert max(dry) > 3 * min(dry)
+    assert read_design_text(write_design(drive), "sheet") == drive
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('no_load_speed = "7580 rpm"\n', "", "motor.no_load_speed: missing"),
+        ('no_load_current = "137 mA"\n', "", "no_load_speed = 7580 rpm: needs motor.no_load_current"),
+        ("efficiency = 0.9", "efficiency = 1.1", "gear.second.efficiency = 1.1: allowed"),
+        (
+            "efficiency = 0.9",
+            'efficiency = {value = 0.9, tolerance = "2 %"}',
+            "efficiency.tolerance: allowed",
+        ),
+        ("[limits]", '[friction]\ndry_torque = "1 mN*m"\n[limits]', "beside friction.dry_torque"),
+        ("[limits]", "[friction]\nload_coefficient = 0.1\n[limits]", "beside friction.load_coefficient"),
+        ('torque_constant = "30.2 mN*m/A"\n', "", "no_load_current = 137 mA: needs motor.torque_constant"),
+    ],
+)
+def test_a_sheet_that_says_it_twice_or_by_half(old: str, new: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        read_design_text(SHEET.replace(old, new), "sheet")

@@ -9,10 +9,11 @@ import pytest
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.sections import SECTIONS
 from reports.cli.app import PANELS
 
 ROOT = Path(__file__).parents[2]
-GENERATED = {"keys", "quantities", "commands", "glossary"}
+GENERATED = {"keys", "quantities", "commands", "glossary", "diagram", "bode", "map"}
 PAGES = [
     ROOT / "README.md",
     *sorted(p for p in (ROOT / "docs").rglob("*.md") if p.parent.name != "generated"),
@@ -41,10 +42,26 @@ def test_every_link_of_a_page_resolves(page: Path) -> None:
 
 
 def test_every_page_is_in_the_contents() -> None:
-    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
-    named = {f"{line.strip()}.md" for line in index.splitlines()}
-    pages = {str(page.relative_to(ROOT / "docs")) for page in PAGES if page.is_relative_to(ROOT / "docs")}
-    assert pages - {"index.md"} <= named
+    trees = {page: re.findall(r"(?s)```\{toctree\}.*?\n```", page.read_text("utf-8")) for page in PAGES}
+    named = {
+        (page.parent / f"{line.strip()}.md").resolve()
+        for page, parts in trees.items()
+        for line in "\n".join(parts).splitlines()
+    }
+    assert {page for page in PAGES if page.is_relative_to(ROOT / "docs")} - named == {
+        ROOT / "docs" / "index.md"
+    }
+
+
+def test_every_part_of_a_drive_has_its_place_in_the_diagram(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All but what is asked of it, and what may stand at any stage."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "_ext"))
+    diagram = importlib.import_module("drive_diagram")
+    free = {section.template for section in SECTIONS if section.asked or ".law" in section.path}
+    sections = {section.template for section in SECTIONS} - free - {"control", "validation"}
+    assert diagram.drawn_sections() == sections
+    page = diagram.diagram_page()
+    assert all(f">{field.key}</text>" in page for field in FIELDS.values() if field.section in sections)
 
 
 def test_every_file_that_the_architecture_names_exists() -> None:

@@ -87,10 +87,15 @@ def random_drive(rng: Rng) -> Design:
 def _with_law(rng: Rng, design: Design) -> Design:
     """One in three with a law of one's own near the gains that the stage had."""
     stage = maybe(rng, "", str(rng.choice(["current", "velocity", "position"])), 2 / 3)
-    loop = getattr(design.controller, stage, None) if stage else None
-    if loop is None:
+    if not stage or getattr(design.controller, stage) is None:
         return design
-    gain, n = loop.gain_V_A if stage == "current" else loop.gain, int(rng.integers(0, 4))
+    return law_at(rng, design, stage, int(rng.integers(0, 4)))
+
+
+def law_at(rng: Rng, design: Design, stage: str, n: int) -> Design:
+    """A law of one's own of order ``n`` in a stage of a design, near the gain that it had."""
+    loop = getattr(design.controller, stage)
+    gain = loop.gain_V_A if stage == "current" else loop.gain
     inputs = ("error", *(name for name in LAW_INPUTS if name != "error" and rng.random() < 0.5))
     A, B = rng.standard_normal((n, n)), rng.standard_normal((n, len(inputs)))
     A *= 0.9 / max(np.abs(np.linalg.eigvals(A)), default=1.0)

@@ -136,6 +136,29 @@ def test_parameters_changed_on_the_way_have_the_same_bits(library: ctypes.CDLL, 
 
 
 @needs_compiler
+def test_two_drives_interleave_and_each_goes_back(library: ctypes.CDLL) -> None:
+    """Two designs in one program tick in turns; one is saved, runs ahead, and goes back twice."""
+    rng = np.random.default_rng(8)
+    twins = [Twins(library, exported(make(rng))) for make in (random_drive, random_elastic_drive)]
+    inputs = [random_inputs(rng, 300, float(each.rows[0][at.PERIOD])) for each in twins]
+    p, s, io = twins[1].c_rows
+    kept, behind = np.zeros_like(s), io.copy()
+    for k in range(300):
+        if k == 120:
+            library.drive_get(pointer(p), pointer(s), pointer(kept))
+            behind = io.copy()
+        for each, (command, moment) in zip(twins, inputs, strict=True):
+            assert each.tick(command[k], moment[k]) == at.OK
+    for _ in range(2):
+        library.drive_set_state(pointer(p), pointer(s), pointer(kept))
+        io[:] = behind
+        for command, moment in np.transpose(inputs[1])[120:]:
+            io[at.IN_COMMAND], io[at.IN_LOAD] = command, moment
+            assert library.drive_tick(pointer(p), pointer(s), pointer(io)) == at.OK
+        assert s.tobytes() == twins[1].rows[1].tobytes()
+
+
+@needs_compiler
 @pytest.mark.parametrize("seed", [3, 17])
 def test_a_state_goes_on_elsewhere_with_the_same_bits(library: ctypes.CDLL, seed: int) -> None:
     ours = exported(random_drive(np.random.default_rng(seed)))

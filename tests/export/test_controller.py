@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from random_drives import random_drive, random_elastic_drive
+from random_drives import law_at, random_drive, random_elastic_drive
 from typer.testing import CliRunner
 
 from actuator_lti import load_design
@@ -85,13 +85,25 @@ def test_vectors_of_the_simulator_hold_and_no_library_is_called(
 @pytest.mark.parametrize("seed", [1, 2, 6, 12])
 @pytest.mark.parametrize("make", [random_drive, random_elastic_drive])
 def test_vectors_hold_for_random_drives(make: object, seed: int, tmp_path: Path) -> None:
-    rng = np.random.default_rng(seed)
-    while (design := make(rng)).controller.own_law is not None:  # type: ignore[operator]
-        with pytest.raises(InputError, match="a law of one's own is not exported alone; allowed: export c"):
-            controller_export(design)
+    design = make(np.random.default_rng(seed))  # type: ignore[operator]
     folder = written(tmp_path, design, single=bool(seed % 2))
     assert without_library(folder) <= MATHEMATICS
     worst_of(folder)
+
+
+@pytest.mark.parametrize("order", [0, 2, 16])
+@pytest.mark.parametrize("stage", ["current", "velocity", "position"])
+def test_a_law_of_one_s_own_has_the_simulator_s_bits(stage: str, order: int, tmp_path: Path) -> None:
+    """No input that the law does not take is asked for; in ``float`` it is within the bound."""
+    design = law_at(np.random.default_rng(order), load_design("ilr33-amber"), stage, order)
+    folder = written(tmp_path, design, single=False)
+    assert without_library(folder) == set()
+    assert {difference for difference, _ in worst_of(folder).values()} == {0.0}
+    assert max(worst_of(written(tmp_path, design, single=True)).values())[0] > 0.0
+    taken = design.controller.own_law[1].inputs  # type: ignore[index]
+    header = (folder / "controller.h").read_text()
+    assert ("output_speed_rad_s" in header) == ("output_speed" in taken)
+    assert f"law_states[{order}];" in header or not order
 
 
 def test_a_coefficient_that_is_off_is_seen(tmp_path: Path) -> None:

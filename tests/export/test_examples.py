@@ -65,10 +65,22 @@ def test_the_lag_misses_what_friction_and_play_do_to_the_roll(tmp_path: Path) ->
     assert min(alone, smooth) > 0.0
 
 
-@pytest.mark.parametrize("name", ["ilr33-amber", "fin", "joint", "ballscrew", "emps"])
-def test_the_controller_for_firmware_closes_the_loop_as_the_simulator_does(name: str) -> None:
+LAW_OF_JOINT = [("joint", stage) for stage in ("current", "velocity", "position")]
+
+
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [*((name, "") for name in ("ilr33-amber", "fin", "joint", "ballscrew", "emps")), *LAW_OF_JOINT],
+)
+def test_the_controller_for_firmware_closes_the_loop_as_the_simulator_does(name: str, law: str) -> None:
     """With friction, play and limits: double to the bit but for differences of counts; float to one count."""
     design = load_design(name)
+    if law:  # PI with a little of both angles as they are counted
+        loop = getattr(design.controller, law)
+        every, gain = getattr(loop, "every", 1), getattr(loop, "gain", 1.2)
+        D = gain * np.array([[1.0, -1e-4, 1e-4]])
+        system = ([[1.0]], [[1.0, 0.0, 0.0]], [[1e-3 * gain]], D, every * design.controller.period_s)
+        design = design.with_law(law, system, ["error", "angle", "output_angle"], L=[0.5 / gain])
     commands = firmware.random_commands(design, 800, 0.5 * design.validation.full_deflection_rad)
     exact = firmware.closed(design, commands, "double").difference_rad
     assert exact <= 1e-12 * design.validation.full_deflection_rad

@@ -7,6 +7,7 @@ import subprocess
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from random_drives import random_drive, random_inputs
 
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import zig_command
-from actuator_lti.design.model import Design, Instruments
+from actuator_lti.design.model import Instruments
 from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import exported
 from nonlinear.export.wasm_module import MOST_BYTES, build_wasm, kept_wasm, record, sources_hash
@@ -43,12 +44,9 @@ def test_building_again_gives_the_same_bytes() -> None:
     assert build_wasm() == kept_wasm()
 
 
-def in_node(design: Design, command: np.ndarray, moment: np.ndarray, folder: Path) -> np.ndarray:
-    row = exported(design).row
+def in_node(units: list[dict[str, Any]], folder: Path, **more: int) -> Any:
     given = {
-        "row": [float(x) if np.isfinite(x) else str(x).replace("inf", "Infinity") for x in row],
-        "command": command.tolist(),
-        "moment": moment.tolist(),
+        "units": units, **more,
         "at": {"command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
                "current": at.IO_CURRENT},
     }  # fmt: skip
@@ -57,23 +55,43 @@ def in_node(design: Design, command: np.ndarray, moment: np.ndarray, folder: Pat
     call = ["node", str(host), str(MODULE), str(folder / "given.json")]
     done = json.loads(subprocess.run(call, capture_output=True, text=True, check=True).stdout)
     assert done["imports"] == []
-    return np.array(done["rows"])
+    return done
+
+
+def drive(seed: int, ticks: int = 400) -> tuple[dict[str, Any], np.ndarray]:
+    """A drive with what comes into it, and what the simulator makes of it; no instruments, which round."""
+    rng = np.random.default_rng(200 + seed)
+    design = load_design("ilr33-amber") if seed < 0 else random_drive(rng)
+    design = replace(design, instruments=Instruments())
+    command, moment = random_inputs(rng, ticks, design.controller.period_s)
+    row = exported(design).row
+    p, s = parameters(row)
+    io, ours = np.zeros(at.IO_SIZE), np.empty((ticks, 3))
+    for k in range(ticks):
+        io[at.IN_COMMAND], io[at.IN_LOAD] = command[k], moment[k]
+        assert tick(p, s, io) == at.OK
+        ours[k] = io[at.IO_OUTPUT], io[at.IO_SPEED], io[at.IO_CURRENT]
+    numbers = [float(x) if np.isfinite(x) else str(x).replace("inf", "Infinity") for x in row]
+    return {"row": numbers, "command": command.tolist(), "moment": moment.tolist()}, ours
+
+
+def assert_equal(theirs: Any, ours: np.ndarray) -> None:
+    """Another C library's exp, sin, log: 1e-9 of the largest value."""
+    assert (np.abs(np.array(theirs) - ours).max(axis=0) <= 1e-9 * np.abs(ours).max(axis=0)).all()
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
 @pytest.mark.parametrize("seed", [-1, 0, 1, 2, 3])
 def test_equal_to_the_simulator_in_node(seed: int, tmp_path) -> None:
-    """Another C library's exp, sin, log: 1e-9 of the largest value.  Instruments that round are left out."""
-    rng = np.random.default_rng(200 + seed)
-    design = load_design("ilr33-amber") if seed < 0 else random_drive(rng)
-    design = replace(design, instruments=Instruments())
-    command, moment = random_inputs(rng, 400, design.controller.period_s)
-    p, s = parameters(exported(design).row)
-    io = np.zeros(at.IO_SIZE)
-    ours = np.empty((400, 3))
-    for k in range(400):
-        io[at.IN_COMMAND], io[at.IN_LOAD] = command[k], moment[k]
-        assert tick(p, s, io) == at.OK
-        ours[k] = io[at.IO_OUTPUT], io[at.IO_SPEED], io[at.IO_CURRENT]
-    theirs = in_node(design, command, moment, tmp_path)
-    assert (np.abs(theirs - ours).max(axis=0) <= 1e-9 * np.abs(ours).max(axis=0)).all()
+    unit, ours = drive(seed)
+    assert_equal(in_node([unit], tmp_path)["rows"][0], ours)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
+def test_two_instances_interleave_and_each_goes_back(tmp_path) -> None:
+    """One module, two designs in turns; one is saved, runs ahead, and goes back twice to the same bits."""
+    (one, ours), (other, theirs) = drive(-1), drive(1)
+    done = in_node([one, other], tmp_path, keep=150)
+    for rows, expected in zip(done["rows"], (ours, theirs), strict=True):
+        assert_equal(rows, expected)
+    assert done["backs"] == [done["rows"][1][150:]] * 2

@@ -13,16 +13,15 @@ import warnings
 from pathlib import Path
 
 import pytest
-from nightly_fakes import BUILD, CODE, job, study
+from nightly_fakes import CODE, Fakes, job, study
 
 from actuator_lti.errors import InputError, NumericalError
 from analyses.studies import cluster as clusters
 from analyses.studies import engine, proof
 from analyses.studies.engine import Engine
 from reports.cli.main import main
-from reports.cli.options import engine_of
 from reports.nightly.cache import Cache
-from reports.nightly.night import Settings, run_night
+from reports.nightly.night import run_night
 
 
 def doubled(number: int) -> int:
@@ -260,12 +259,13 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_done_is_kept(bare, tmp_pa
         ("tcp://127.0.0.1:8786", False), ("tcp://localhost:8786", False), ("tcp://[::1]:8786", False),
     ],
 )  # fmt: skip
-def test_an_address_that_anybody_can_reach_is_warned_about(address: str, told: bool, capsys) -> None:
+def test_an_address_that_anybody_can_reach_is_warned_about(address, told, tmp_path, capsys) -> None:
     assert bool(Engine(scheduler=address).caution) is told
-    engine_of(None, address, None)
+    words = ["nightly", "approve", "emps", "--site", str(tmp_path / "s"), "--by", "x", "--reason", "y"]
+    assert main([*words, "--scheduler", address]) == 2
     said = capsys.readouterr().err
     assert ("tls://" in said) is told
-    assert said.count("\n") == told
+    assert said.count("\n") == 1 + told  # and that there is no night yet
 
 
 @pytest.mark.parametrize(
@@ -291,7 +291,7 @@ def test_certificates_that_are_none_are_named(tmp_path) -> None:
 
 
 HUNGRY = 1_500_000_000
-LEAN = 1_000_000_000
+LEAN = 1_000  # MB
 
 
 @pytest.fixture
@@ -311,7 +311,7 @@ def cluster(tmp_path, monkeypatch):
         n_workers=2, threads_per_worker=1, host="127.0.0.1", protocol="tls://", security=made,
         dashboard_address="127.0.0.1:0", silence_logs=50,
     ) as running:  # fmt: skip
-        yield running, Engine(scheduler=running.scheduler_address, tls=tls)
+        yield running, {"scheduler": running.scheduler_address, "tls": tls}
 
 
 def test_a_night_on_a_cluster_ends_like_one_here(cluster, tmp_path) -> None:
@@ -324,9 +324,12 @@ def test_a_night_on_a_cluster_ends_like_one_here(cluster, tmp_path) -> None:
         job("is killed", mode="die"),
         job("eats", mode="eat", bytes=HUNGRY),
     ]
-    common = {"time_limit_s": 8.0, "build": BUILD, "memory_limit_bytes": LEAN}
-    there = run_night(study(*jobs), tmp_path / "there", Settings(engine=remote, **common), code=CODE)
-    here = run_night(study(*jobs), tmp_path / "here", Settings(workers=2, **common), code=CODE)
+    here, there = (
+        run_night(
+            study(*jobs), tmp_path / place, Fakes(time_limit_s=8.0, memory_limit=LEAN, **where), code=CODE
+        )
+        for place, where in (("here", {}), ("there", remote))
+    )
     ends = {d.name: d.result.status for d in there.designs}
     assert ends == {d.name: d.result.status for d in here.designs}
     assert ends == {
@@ -358,8 +361,7 @@ def test_a_lost_worker_s_jobs_are_done_again(cluster, tmp_path) -> None:
             killed.append(workers[0])
             os.kill(workers[0], signal.SIGKILL)
 
-    settings = Settings(engine=remote, build=BUILD)
-    night = run_night(study(*jobs), tmp_path / "site", settings, code=CODE, progress=kill_one)
+    night = run_night(study(*jobs), tmp_path / "site", Fakes(**remote), code=CODE, progress=kill_one)
     assert killed
     assert {d.result.status for d in night.designs} == {"pass"}
 
@@ -386,7 +388,7 @@ def test_a_lost_worker_s_designs_of_a_comparison_are_done_again(cluster, tmp_pat
             killed.append(workers[0])
             os.kill(workers[0], signal.SIGKILL)
 
-    result = compare(plan, engine=remote, folder=tmp_path / "designs", progress=kill_one)
+    result = compare(plan, engine=Engine(**remote), folder=tmp_path / "designs", progress=kill_one)
     assert killed
     assert not result.refused
     assert len(result.all) == len(list((tmp_path / "designs").rglob("*.json"))) == 6

@@ -4,6 +4,7 @@ import json
 import random
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from reports.nightly.memory import HistoryLost, Memory, remembered
 from reports.nightly.night import Settings, approve, run_night
 from reports.nightly.text import sha256
 
-AGAIN = Settings(workers=0, build=INLINE.build, accept_lost_history=True)
+AGAIN = replace(INLINE, accept_lost_history=True)
 DAMAGE_ROUNDS = 250
 
 
@@ -94,7 +95,7 @@ def test_a_lost_history_closes_the_gate_until_somebody_says_so(site, lose) -> No
     with pytest.raises(HistoryLost):
         approve(study(job("a"), job("b")), site, by="x", reason="y", settings=INLINE)
     assert (site / "index.html").read_bytes() == index
-    assert night(site, 12.0, AGAIN).exit_status in (0, 1)
+    night(site, 12.0, AGAIN)
     night(site, 12.0)  # from here on it is known again
     with open_history(state(site)) as history:
         assert remembered(site) == history.memory()

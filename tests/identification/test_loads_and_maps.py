@@ -10,7 +10,8 @@ import pytest
 from actuator_lti.design import load_design, read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.identification.bench import BenchSettings, identify_bench
+from analyses.identification.asked import Settings
+from analyses.identification.bench import identify_bench
 from analyses.identification.electrical import electrical_values, fit_electrical
 from analyses.identification.friction_map import fit_map
 from analyses.identification.inverse import fit_records
@@ -124,7 +125,7 @@ def test_a_plain_law_needs_no_map() -> None:
 
 
 def test_the_map_goes_into_the_design_with_its_errors() -> None:
-    result = identify_bench(load_design("emps"), [_axis_record("map")], settings=BenchSettings(form="map"))
+    result = identify_bench(load_design("emps"), [_axis_record("map")], settings=Settings(friction="map"))
     back = read_design_text(result.text)
     points = back.friction.map(1)
     assert points[0].speed_rad_s == 0.0
@@ -165,7 +166,7 @@ def test_a_design_with_a_friction_map_is_moved_by_the_record_like_any_other() ->
 
     record = _axis_record("map")
     record = replace(record, signals={**record.signals, "position_reference": record["position"]})
-    result = identify_bench(load_design("emps"), [record], settings=BenchSettings(form="map"))
+    result = identify_bench(load_design("emps"), [record], settings=Settings(friction="map"))
     assert result.design.friction.points
     outcome = correlate_record(result.design, record)
     assert all(np.isfinite(signal.relative_error) for signal in outcome.signals.values())

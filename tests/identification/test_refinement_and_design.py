@@ -11,7 +11,8 @@ from actuator_lti.design import load_design, parameter_value, read_design_text, 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.estimation.fit import Fit
-from analyses.identification.bench import BenchSettings, identify_bench
+from analyses.identification.asked import Settings
+from analyses.identification.bench import identify_bench
 from analyses.identification.campaign_design import SuggestedRun, suggest_runs
 from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import refine_by_output_error
@@ -181,7 +182,7 @@ def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:
 
 def test_refinement_on_emps_lowers_the_force_error_and_is_what_is_written(emps_file: Path) -> None:
     design, record = load_design("emps"), open_record(emps_file)
-    result = identify_bench(design, [record], settings=BenchSettings(refine=True))
+    result = identify_bench(design, [record], settings=Settings(refine=True))
     assert result.refined.error_after < result.refined.error_before < 0.05848
     for path, value in zip(result.refined.names, result.refined.values, strict=True):
         assert parameter_value(read_design_text(result.text), path) == pytest.approx(value, rel=1e-6)

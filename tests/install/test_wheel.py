@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from actuator_lti.axis.library import LIBRARY as axis
 from actuator_lti.batch.library import LIBRARY as figures
 from nonlinear.native import LIBRARY as run
 
@@ -85,7 +86,7 @@ def test_no_test_and_nothing_else_is_installed(built: tuple[set[str], set[str], 
 def test_the_wheel_holds_the_compiled_kernels_of_this_machine(built: tuple[set[str], set[str], str]) -> None:
     names, inside, _ = built
     libraries = {name for name in names if "_native/" in name}
-    assert libraries == {str(each.path().relative_to(ROOT)) for each in (figures, run)}
+    assert libraries == {str(each.path().relative_to(ROOT)) for each in (figures, axis, run)}
     assert not [name for name in inside if "_native" in name]
 
 

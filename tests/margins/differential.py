@@ -13,24 +13,19 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
 import control
 import numpy as np
-from flint import acb, arb, ctx, fmpz_poly
 
 sys.path.insert(0, str(Path(__file__).parent))
 from margin_families import FAMILIES, PERIOD_S, poly, roots_of, scaled, signs, uniform
+from margin_truth import DEG, RATIO, Facts, determined, facts, polynomials, truth_of, unlike
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins import StabilityMargins, stability_margins
 from actuator_lti.systems.delay_system import DelaySystem
-
-FARTHEST = 1e10
-RATIO, DEG = 1e-9, 1e-7
-_BITS = 256
 
 
 def nearly_lossless(rng: np.random.Generator) -> control.TransferFunction:
@@ -84,117 +79,6 @@ ALL: tuple[Family, ...] = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Facts:
-    """Unstable closed-loop poles, ratios and phase margins (deg) in order of frequency (rad/s)."""
-
-    unstable: int | None
-    gains: list[tuple[float, float]]
-    phases: list[tuple[float, float]]
-
-
-def truth(loop: control.TransferFunction, part: Fraction = Fraction(0)) -> Facts:
-    """From the exact coefficients; behind part p/r of a sample in the r-th root of z."""
-    num, den = integers(loop)
-    r = part.denominator
-    if loop.dt:
-        root = fmpz_poly([0] * r + [1])
-        num, den = num(root), den(root) * fmpz_poly([0] * part.numerator + [1])
-        n = den.degree()
-        num, den = bilinear(num, n), bilinear(den, n)
-    hidden = num.gcd(den)
-    num, den = num // hidden, den // hidden
-    with ctx.workprec(_BITS):
-        (ne, no), (de, do) = even_odd(num), even_odd(den)
-        v = fmpz_poly([0, 1])
-        gain, phase = ne * ne + v * no * no - de * de - v * do * do, no * de - ne * do
-        top = math.tan(0.5 * math.pi / r) * (1.0 - 1e-15) if loop.dt else math.inf
-        unit = r / float(loop.dt) if loop.dt else 1.0
-
-        def crossings(p: fmpz_poly) -> list[tuple[float, complex]]:
-            found = [(x, num(acb(0, x)) / den(acb(0, x))) for x in positive(p) if float(x.mid()) < top]
-            return [(unit * 2.0 * math.atan(float(x)) if loop.dt else float(x), complex(L)) for x, L in found]
-
-        gains = [(w, -1.0 / L.real) for w, L in crossings(phase) if L.real < 0.0]
-        phases = [(w, math.degrees(math.atan2(-L.imag, -L.real))) for w, L in crossings(gain)]
-        unstable = None
-        if r == 1:
-            unstable = right_of_axis(num + den) + right_of_axis(hidden)
-            n = max(num.degree(), den.degree())
-            last = math.pi / float(loop.dt) if loop.dt else math.inf
-            both = ((0.0, num[0], den[0]), (last, num[n], den[n]))
-            gains += [(w, -float(arb(d) / arb(c))) for w, c, d in both if c * d < 0 and n]
-    return Facts(unstable, sorted(g for g in gains if g[1] <= FARTHEST), phases)
-
-
-def integers(loop: control.TransferFunction) -> tuple[fmpz_poly, fmpz_poly]:
-    """Numerator and denominator, lowest power first, times one power of two."""
-    parts = [[Fraction(float(c)) for c in np.trim_zeros(p[0][0], "f")[::-1]] for p in (loop.num, loop.den)]
-    unit = max(c.denominator for part in parts for c in part)
-    num, den = (fmpz_poly([int(c * unit) for c in part]) for part in parts)
-    return num, den
-
-
-def bilinear(p: fmpz_poly, n: int) -> fmpz_poly:
-    """(1 - s)^n p((1 + s)/(1 - s))."""
-    out = fmpz_poly()
-    for k, c in enumerate(p.coeffs()):
-        out += c * fmpz_poly([1, 1]) ** k * fmpz_poly([1, -1]) ** (n - k)
-    return out
-
-
-def even_odd(p: fmpz_poly) -> tuple[fmpz_poly, fmpz_poly]:
-    """p(j w) = even(v) + j w odd(v), v = w^2."""
-    even, odd = ([(-1) ** k * c for k, c in enumerate(p.coeffs()[i::2])] for i in (0, 1))
-    return fmpz_poly(even), fmpz_poly(odd)
-
-
-def positive(p: fmpz_poly) -> list[arb]:
-    """w of the positive roots v of odd multiplicity, in order."""
-    if p.degree() < 1:
-        return []
-    real = [(acb(z).real, n) for z, n in p.complex_roots() if acb(z).imag == 0]
-    return sorted((v.sqrt() for v, n in real if v > 0 and n % 2), key=lambda x: float(x.mid()))
-
-
-def right_of_axis(p: fmpz_poly) -> int:
-    """Roots with a positive real part; `AssertionError` where one is not told from the axis."""
-    if p.degree() < 1:
-        return 0
-    while p[0] == 0:
-        p = p.right_shift(1)
-    even, odd = even_odd(p)
-    common = even.gcd(odd) if odd.degree() >= 0 else even
-    symmetric = common(fmpz_poly([0, 0, -1]))  # roots that lie symmetrically, those on the axis among them
-    rest = p // symmetric
-    count = sum(n for z, n in roots(symmetric) if acb(z).real > 0)
-    for bits in (256, 1024, 4096, 16384):
-        with ctx.workprec(bits):
-            real = [(acb(z).real, n) for z, n in roots(rest)]
-            if all(x > 0 or x < 0 for x, _ in real):
-                return count + sum(n for x, n in real if x > 0)
-    raise AssertionError("a root is not told from the axis")
-
-
-def roots(p: fmpz_poly) -> list[tuple[acb, int]]:
-    return p.complex_roots() if p.degree() > 0 else []
-
-
-def moved(loop: control.TransferFunction, seed: int) -> control.TransferFunction:
-    """Every coefficient 8 ulp away, up or down."""
-    rng = np.random.default_rng(seed)
-    num, den = (p[0][0] + 8.0 * np.spacing(p[0][0]) * rng.choice([-1.0, 1.0], p[0][0].size) * (p[0][0] != 0)
-                for p in (loop.num, loop.den))  # fmt: skip
-    return control.tf(num, den, loop.dt)
-
-
-def facts(m: StabilityMargins) -> Facts:
-    gains = [(g.frequency_rad_s, g.ratio) for g in m.gain_margins if not g.tangent]
-    phases = [(p.frequency_rad_s, p.deg) for p in m.phase_margins if not p.tangent]
-    counts = (m.agreement.unstable_poles, m.agreement.unstable_nyquist)
-    return Facts(next((c for c in counts if c is not None), None), gains, phases)
-
-
 def without_touches(f: Facts, m: StabilityMargins) -> Facts:
     """Without the pairs of crossings, closer than 1e-9 to the line between, that are listed as one touch."""
     touches = [x.frequency_rad_s for x in (*m.gain_margins, *m.phase_margins) if x.tangent]
@@ -203,24 +87,6 @@ def without_touches(f: Facts, m: StabilityMargins) -> Facts:
         return [c for c in part if not any(math.isclose(c[0], w, rel_tol=1e-3) for w in touches)]
 
     return Facts(f.unstable, rest(f.gains), rest(f.phases))
-
-
-def unlike(a: Facts, b: Facts, ratio: float = RATIO, deg: float = DEG, far: float = FARTHEST) -> str | None:
-    """What differs, or ``None``; gain margins beyond ``far`` are left out."""
-    if a.unstable is not None and b.unstable is not None and a.unstable != b.unstable:
-        return f"{a.unstable} unstable, not {b.unstable}"
-    gains = [[g for g in f.gains if 1.0 / far < g[1] < far] for f in (a, b)]
-    for name, (ours, theirs) in (("gain margins", gains), ("phase margins", (a.phases, b.phases))):
-        if len(ours) != len(theirs):
-            return f"{name} {ours[:6]}, not {theirs[:6]}"
-        for (w, x), (u, y) in zip(ours, theirs, strict=True):
-            off = abs(x - y) if name == "phase margins" else abs(x / y - 1.0)
-            off = min(off, abs(off - 360.0)) if name == "phase margins" else off
-            if off > (deg if name == "phase margins" else ratio) or not math.isclose(
-                w, u, rel_tol=1e-6, abs_tol=1e-300
-            ):
-                return f"{name}: {x} at {w}, not {y} at {u}"
-    return None
 
 
 def forms(loop: control.LTI, rng: np.random.Generator) -> Iterator[tuple[str, StabilityMargins, float]]:
@@ -247,7 +113,7 @@ def delayed_forms(
     if loop.dt:
         period, k = float(loop.dt), int(rng.integers(1, 4))
         explicit = control.tf(num, np.concatenate((den, np.zeros(k))), loop.dt)
-        expected = truth(explicit)
+        expected = truth_of(explicit)
         given = {
             "explicit 1/z": stability_margins(explicit),
             "delay_s": stability_margins(loop, delay_s=k * period),
@@ -264,7 +130,7 @@ def delayed_forms(
                 end = math.pi / period * (1.0 - 1e-12)
                 inside = facts(m)
                 gains = [g for g in inside.gains if 0.0 < g[0] < end]
-                yield f"{part} of a sample", Facts(None, gains, inside.phases), truth(loop, part)
+                yield f"{part} of a sample", Facts(None, gains, inside.phases), truth_of(loop, part)
         return
     if num.size >= den.size:
         return
@@ -281,23 +147,25 @@ def delayed_forms(
 
 
 def hidden_free(loop: control.TransferFunction) -> bool:
-    num, den = integers(loop)
+    num, den = polynomials(loop)
     return num.gcd(den).degree() < 1
 
 
 def tried(family: Family, seed: int, k: int) -> tuple[str, str]:
-    """("right" | "withheld" | "refused" | "undetermined" | "wrong", what)."""
+    """("right" | "withheld" | "refused" | "undetermined" | "wrong", what).
+
+    Withheld is what was without need: where 8 ulp of the entries change the truth, it is undetermined.
+    """
     rng = np.random.default_rng([seed, k])
     loop = family(rng)
     try:
         m = stability_margins(loop)
+        ours, expected = facts(m), truth_of(loop)
         if m.withheld:
-            return "withheld", m.evidence_reason
-        ours = facts(m)
-        expected = truth(loop) if isinstance(loop, control.TransferFunction) else ours
+            kind = "withheld" if determined(loop, expected, rng) else "undetermined"
+            return kind, m.evidence_reason
         if what := unlike(ours, without_touches(expected, m), 1e-6, 1e-3):
-            near = [truth(moved(loop, n)) for n in range(4)]
-            same = all(unlike(expected, other, 0.05, 5.0) is None for other in near)
+            same = determined(loop, expected, rng)
             return ("wrong" if same else "undetermined"), f"against the truth: {what}"
         for name, other, unit in forms(loop, rng):
             theirs = facts(other)

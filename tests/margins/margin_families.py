@@ -201,6 +201,32 @@ def near_the_border(rng: np.random.Generator) -> Loop:
     return control.tf(closed - den, den) if abs(closed[1] - den[1]) > 1e-3 else near_the_border(rng)
 
 
+def integrators_and_whole_samples(rng: np.random.Generator) -> Loop:
+    """Damping down to 1e-4, up to two integrators, sampled ones behind up to three samples."""
+    sampled = rng.random() < 0.5
+    poles = roots_of(rng, int(rng.integers(2, 9)), 3.0, -4.0, 0.12)
+    poles += [0j] * int(rng.choice([0, 1, 2], p=[0.5, 0.4, 0.1]))
+    zeros = roots_of(rng, int(rng.integers(0, len(poles))), 3.0, -4.0, 0.12)
+    unit = 10.0 if sampled else 1.0
+    loop = scaled(rng, [unit * r for r in zeros], [unit * r for r in poles], sampled)
+    samples = int(rng.integers(0, 4)) if sampled else 0
+    return control.tf(loop.num[0][0], np.append(loop.den[0][0], np.zeros(samples)), loop.dt)
+
+
+def sections_permuted_and_scaled(rng: np.random.Generator) -> Loop:
+    """State space in series of sections, its states permuted and scaled by powers of two up to 1e5 apart."""
+    n, sampled = int(rng.integers(2, 9)), rng.random() < 0.5
+    poles, zeros = (roots_of(rng, count, 1.1, -4.0, 0.12) for count in (n, int(rng.integers(0, n))))
+    whole = scaled(rng, zeros, poles, False)
+    if sampled:
+        zeros, poles = ([complex(np.exp(0.1 * r)) for r in part] for part in (zeros, poles))
+    A, B, C, D = cascade(rng, zeros, poles, float(whole.num[0][0][0] / whole.den[0][0][0]))
+    order, scale = rng.permutation(n), 2.0 ** rng.integers(-8, 9, n)
+    A = (A * scale[:, None] / scale)[np.ix_(order, order)]
+    B, C = (B * scale)[order, None], (C / scale)[None, order]
+    return control.StateSpace(A, B, C, [[D]], PERIOD_S if sampled else 0, remove_useless_states=False)
+
+
 FAMILIES: tuple[Callable[[np.random.Generator], Loop], ...] = (
     orders_1_to_25,
     hardly_damped,
@@ -213,4 +239,6 @@ FAMILIES: tuple[Callable[[np.random.Generator], Loop], ...] = (
     nearly_ill_posed,
     badly_scaled_and_not_minimal,
     near_the_border,
+    integrators_and_whole_samples,
+    sections_permuted_and_scaled,
 )

@@ -8,7 +8,7 @@ import control
 import numpy as np
 import pytest
 from margin_families import poly, roots_of, uniform
-from margin_truth import Truth, truth_of
+from margin_truth import Facts, truth_of
 from mpmath import mp, mpf
 
 from actuator_lti import DelaySystem
@@ -31,7 +31,7 @@ def random_loop(rng: np.random.Generator) -> tuple[control.TransferFunction, flo
     return control.tf(gain * num, den), uniform(rng, -2.0, 0.7) / w
 
 
-def unstable_with_delay(loop: Truth, delay_s: float) -> int:
+def unstable_with_delay(loop: Facts, delay_s: float) -> int:
     """Unstable poles: those without delay, and a pair for each delay below it at which one crosses the axis.
 
     At a gain crossover they cross at the delays (phase margin + 2 pi k)/w, to the right where the gain falls.

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from margin_truth import polyval
 from mpmath import mp, mpc, mpf
 
 from actuator_lti.errors import InputError
@@ -51,8 +50,12 @@ def closed_loop_at(loop: control.TransferFunction, factor: complex, delay_s: flo
     with mp.workdps(40):
         w = mpf(omega)
         point = mp.expj(w * PERIOD_S) if loop.dt else mpc(0, w)
-        above = polyval([mpf(float(c)) for c in loop.num[0][0]], point) * factor * mp.expj(-w * delay_s)
-        below = polyval([mpf(float(c)) for c in loop.den[0][0]], point)
+        above = (
+            mp.polyval([mpf(float(c)) for c in loop.num[0][0][::-1]], point, asc=True)
+            * factor
+            * mp.expj(-w * delay_s)
+        )
+        below = mp.polyval([mpf(float(c)) for c in loop.den[0][0][::-1]], point, asc=True)
         return float(abs(above + below) / (abs(above) + abs(below)))
 
 

@@ -10,15 +10,24 @@ from pathlib import Path
 from typing import Any
 
 from reports.document import column, document, section, table, verdict, verdicts
+from reports.nightly.asked import Settings
 from reports.nightly.code_version import CodeVersion
 from reports.nightly.figures import digest
 from reports.nightly.job import Job
-from reports.nightly.night import Settings, Study
+from reports.nightly.night import Study
 from reports.verdict_summary import role
 
 CODE = CodeVersion(sources="s", libraries={"numpy": "2"}, commit="c" * 40)
 BUILD = "nightly_fakes:build"
-INLINE = Settings(workers=0, build=BUILD)
+
+
+class Fakes(Settings):
+    """Settings of nights that build such reports."""
+
+    build = BUILD
+
+
+INLINE = Fakes(workers=0)
 
 
 def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:

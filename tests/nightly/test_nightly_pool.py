@@ -11,13 +11,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from nightly_fakes import BUILD, CODE, INLINE, Calendar, job, study
+from nightly_fakes import BUILD, CODE, INLINE, Calendar, Fakes, job, study
 from site_checks import check_whole
 
 from analyses.studies.engine import Engine
-from reports.nightly.apart import Done, Limits, Task, build_each
+from reports.nightly.apart import Limits, Task, build_each
 from reports.nightly.cache import Cache
-from reports.nightly.night import Settings, run_night
+from reports.nightly.night import run_night
+from reports.nightly.worker import Answer
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def troubled(tmp_path_factory):
         job("fails", 5.0),
         *(job(f"good {k}") for k in range(4)),
     ]
-    settings = Settings(workers=2, time_limit_s=6.0, build=BUILD)
+    settings = Fakes(workers=2, time_limit_s=6.0)
     seen: list[tuple[int, int]] = []
     clock = Calendar()
     night = run_night(
@@ -56,7 +57,7 @@ def test_every_design_gets_its_own_end(troubled) -> None:
 
 def test_the_page_and_the_exit_status_name_who_failed_and_why(troubled) -> None:
     site, night, _ = troubled
-    assert night.exit_status == 1
+    assert not night.passed
     page = check_whole(site)
     assert "did not end within 6 s" in page.text
     assert "signal 9" in page.text
@@ -83,57 +84,58 @@ def test_no_worker_stays_behind(troubled) -> None:
     assert workers_left() == []
 
 
-def ends_of(build: str, tasks: list[Task], folder: Path) -> list[Done]:
-    ends: list[Done] = []
+def ends_of(build: str, tasks: list[Task]) -> dict[str, Answer]:
+    ends: dict[str, Answer] = {}
     limits = Limits(build=build, time_limit_s=5.0, memory_bytes=10**10)
-    build_each(tasks, limits, Engine(threads=2), Cache(folder), ends.append)
+    build_each(tasks, limits, Engine(threads=2), lambda task, answer: ends.update({task.key: answer}))
     return ends
 
 
-def test_a_build_that_cannot_be_imported_fails_every_task_and_ends(tmp_path) -> None:
-    ends = ends_of("no_such_module:build", [Task(key=f"k{k}", payload={}) for k in range(3)], tmp_path)
-    assert [d.status for d in ends] == ["crash"] * 3
-    assert all("could not start" in d.message and "no_such_module" in d.detail for d in ends)
+def test_a_build_that_cannot_be_imported_fails_every_task_and_ends() -> None:
+    ends = ends_of("no_such_module:build", [Task(key=f"k{k}", payload={}) for k in range(3)])
+    assert [d.status for d in ends.values()] == ["crash"] * 3
+    assert all("could not start" in d.message and "no_such_module" in d.detail for d in ends.values())
 
 
-def test_nothing_to_do_starts_no_process(tmp_path) -> None:
-    assert ends_of("no_such_module:build", [], tmp_path) == []
+def test_nothing_to_do_starts_no_process() -> None:
+    assert ends_of("no_such_module:build", []) == {}
 
 
 def test_a_process_goes_from_job_to_job(tmp_path) -> None:
     tasks = [Task(key=f"{k:064d}", payload=job(f"d{k}", mode="pid").payload) for k in range(6)]
-    assert {d.status for d in ends_of(BUILD, tasks, tmp_path)} == {"done"}
-    entries = [Cache(tmp_path).read(task.key) for task in tasks]
-    assert 1 <= len({entry.meta["pid"] for entry in entries if entry is not None}) <= 2
+    ends = ends_of(BUILD, tasks)
+    assert {answer.status for answer in ends.values()} == {"done"}
+    pids = {Cache(tmp_path).take(key, answer.entry).meta["pid"] for key, answer in ends.items()}
+    assert 1 <= len(pids) <= 2
 
 
-def test_a_process_that_died_while_it_waited_is_replaced(tmp_path) -> None:
+def test_a_process_that_died_while_it_waited_is_replaced() -> None:
     """By the system, short of memory, say: the next job does not pay for it."""
     from reports.nightly.apart import _Warm
 
     warm = _Warm(Limits(build=BUILD, time_limit_s=60.0, memory_bytes=10**10))
     try:
-        first, _ = warm.build(Task(key="0" * 64, payload=job("a", mode="pid").payload))
+        first = warm.build(Task(key="0" * 64, payload=job("a", mode="pid").payload))
         (waiting,) = warm._idle
         waiting._process.kill()
         waiting._process.wait()
-        second, _ = warm.build(Task(key="1" * 64, payload=job("b", mode="pid").payload))
+        second = warm.build(Task(key="1" * 64, payload=job("b", mode="pid").payload))
     finally:
         warm.close()
     assert (first.status, second.status) == ("done", "done")
     assert workers_left() == []
 
 
-def test_an_interrupted_night_ends_the_jobs_under_way(tmp_path) -> None:
+def test_an_interrupted_night_ends_the_jobs_under_way() -> None:
     """Ctrl-C beside a job that never ends: no wait for its time limit, no process left."""
 
-    def interrupt(_done: Done) -> None:
+    def interrupt(_task: Task, _answer: Answer) -> None:
         raise KeyboardInterrupt
 
     tasks = [Task(key=f"{k:064d}", payload=job(f"d{k}", mode=m).payload) for k, m in enumerate(["hang", ""])]
     limits = Limits(build=BUILD, time_limit_s=500.0, memory_bytes=10**10)
     with pytest.raises(KeyboardInterrupt):
-        build_each(tasks, limits, Engine(threads=2), Cache(tmp_path), interrupt)
+        build_each(tasks, limits, Engine(threads=2), interrupt)
     assert workers_left() == []
 
 
@@ -169,11 +171,11 @@ def test_sixty_kills_at_random_moments_lose_nothing(fast_folder: Path) -> None:
 WITH_WORKERS = """
 import sys
 from pathlib import Path
-from nightly_fakes import BUILD, CODE, job, study
-from reports.nightly.night import Settings, run_night
+from nightly_fakes import CODE, Fakes, job, study
+from reports.nightly.night import run_night
 if __name__ == "__main__":
     jobs = [job(f"d{k}", log=sys.argv[2], pause=0.15) for k in range(8)] + [job("hangs", mode="hang")]
-    run_night(study(*jobs), Path(sys.argv[1]), Settings(workers=2, build=BUILD), code=CODE)
+    run_night(study(*jobs), Path(sys.argv[1]), Fakes(workers=2), code=CODE)
 """
 
 
@@ -183,7 +185,8 @@ def test_a_killed_nightly_takes_its_workers_along_and_resumes(tmp_path) -> None:
     before = (site / "index.html").read_bytes()
     script.write_text(WITH_WORKERS)
     nightly = subprocess.Popen([sys.executable, str(script), str(site), str(log)], env=QUIET)
-    _wait_for(lambda: log.exists() and len(log.read_text().split()) >= 4)
+    cache = tmp_path / "site.state" / "cache"
+    _wait_for(lambda: len(list(cache.glob("*/*.entry"))) >= 4)  # one of them is of the night before
     workers = _children(nightly.pid)
     nightly.send_signal(signal.SIGKILL)
     nightly.wait()
@@ -191,11 +194,11 @@ def test_a_killed_nightly_takes_its_workers_along_and_resumes(tmp_path) -> None:
     _wait_for(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers))
     assert (site / "index.html").read_bytes() == before
     check_whole(site)
-    built = set(log.read_text().split())
+    kept = len(list(cache.glob("*/*.entry"))) - 1
     jobs = [job(f"d{k}", log=str(log), pause=0.15) for k in range(8)]
     night = run_night(study(*jobs), site, INLINE, code=CODE)
     cached = {d.name for d in night.designs if d.result.cached}
-    assert len(cached) >= len(built) - 2
+    assert len(cached) == kept >= 3
     assert night.interrupted
     assert "did not end" in check_whole(site).text
 

@@ -31,7 +31,7 @@ def answers(design: Design) -> list[str]:
 def main(first: int, count: int) -> int:
     """Print what differs; how many do."""
     differ = 0
-    for design in stable_drives(first, count, "full"):
+    for design in stable_drives(first, count):
         if design.controller.outermost != "position":
             continue
         given = answers(design)

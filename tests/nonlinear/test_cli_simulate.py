@@ -8,6 +8,7 @@ import pyarrow.parquet
 import pytest
 
 from actuator_lti.errors import InputError
+from analyses.motion.asked import OF
 from nonlinear import loads
 from reports.cli.main import main
 
@@ -55,6 +56,10 @@ def test_json_and_files(run, tmp_path) -> None:
         ("--command hold --start 0.1", "--start 0.1: a hold is there from the first tick on"),
         ("--command sine --frequency 2 --cycles 3 --duration 1", "3 periods take 1.5 s"),
         ("--command step --cycles 3", "allowed with --command sine"),
+        ("--frequency 2", "--frequency 2: allowed with --command sine, triangle"),
+        ("--command sine --to 20", "--to 20: allowed with --command chirp"),
+        ("--command chirp --seed 4", "--seed 4: allowed with --command multisine"),
+        ("--command sine --frequency -2", "--frequency -2: must be positive"),
     ],
 )
 def test_refusals(arguments: str, words: str, run) -> None:
@@ -81,10 +86,15 @@ def test_linear_axis_speaks_millimetres(run) -> None:
     assert {"output_angle_m", "motor_angle_m", "motor_speed_m_s"} <= set(made.rows.dtype.names)
 
 
+def _those(kind: str, **options: int) -> str:
+    """The options that a kind of command has."""
+    return " ".join(f"--{name} {value}" for name, value in options.items() if kind in OF[name])
+
+
 @pytest.mark.parametrize("kind", ["hold", "triangle", "chirp", "multisine", "stepped-sine"])
 def test_every_command_on_the_terminal(kind: str, capsys) -> None:
     stepped = kind == "stepped-sine"  # to its end: 5 cycles of 5, 10 and 20 Hz, 1.75 s
-    arguments = f"simulate --command {kind} --frequency 5 --to 20 --count 3 --every 10"
+    arguments = f"simulate --command {kind} --every 10 {_those(kind, frequency=5, to=20, count=3)}"
     more = "" if stepped else " --amplitude 0.2 --duration 0.4 --bias-rate 5 --load-slope -20"
     assert main(f"{arguments}{more}".split()) == 0
     out = capsys.readouterr().out
@@ -94,8 +104,8 @@ def test_every_command_on_the_terminal(kind: str, capsys) -> None:
 
 @pytest.mark.parametrize("kind", ["step", "ramp", "sine", "triangle", "chirp", "stepped-sine", "multisine"])
 def test_every_command_begins_at_its_start(kind: str, run) -> None:
-    words = f"--command {kind} --amplitude 0.1 --frequency 10 --to 40 --count 2 --start 0.1"
-    words += " --cycles 2" if kind in ("sine", "triangle", "stepped-sine") else ""
+    words = f"--command {kind} --amplitude 0.1 --start 0.1 "
+    words += _those(kind, frequency=10, to=40, count=2, cycles=2)
     reference = run(f"{words} --duration {1.0 if kind == 'stepped-sine' else 0.3}").rows["reference_rad"]
     assert not reference[:1000].any()
     assert np.abs(reference[1000:1200]).max() > 0.0

@@ -10,7 +10,8 @@ from live_page import opened, written
 
 from actuator_lti import load_design
 from actuator_lti.design.model import Design
-from reports.build import design_report, write_report
+from reports.build import design_report
+from reports.html import write_report
 
 
 @pytest.fixture(scope="session")

@@ -75,6 +75,18 @@ def test_limits_follow_the_values_and_survive_a_single_one() -> None:
     assert y0 < 5.0 < y1
 
 
+@pytest.mark.parametrize("before", [True, False])
+def test_a_logarithmic_axis_leaves_out_what_it_has_no_place_for_whenever_it_is_said(before: bool) -> None:
+    panel = Chart().panel()
+    panel.y.log = before
+    panel.curve([1.0, 2.0, 3.0, 4.0], [0.0, -1.0, 10.0, 1000.0])
+    panel.y.log = True
+    low, high = panel.y.span()
+    assert 0.0 < low < 10.0
+    assert high > 1000.0
+    assert low * high == pytest.approx(1e4)
+
+
 def test_gaps_break_a_line() -> None:
     chart = Chart()
     chart.panel().curve([0, 1, 2, 3, 4], [0.0, 1.0, None, 1.0, 0.0])

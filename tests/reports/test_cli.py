@@ -157,6 +157,11 @@ def test_a_failed_requirement_is_status_1(tmp_path, capsys) -> None:
             'velocity gain per "Hz": allowed: "rad/s" or "rpm"',
         ),
         (["init", "."], "."),
+        (["report", "--summary"], "--summary: allowed with --pdf"),
+        (["report", "--also", "all-of-it"], "--also 'all-of-it': allowed: corners"),
+        (["tune", "--place", "spring"], "--place 'spring': allowed: notch"),
+        (["tune", "--aim", "least"], "Invalid value for '--aim': 'least' is not one of"),
+        (["montecarlo", "--samples", "1e3"], "'--samples': allowed: a whole number, such as 1000"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(arguments: list[str], words: str, capsys) -> None:
@@ -178,6 +183,9 @@ def test_a_folder_that_is_a_file_is_named(tmp_path, capsys) -> None:
     (tmp_path / "out").write_text("in the way")
     assert main(["report", "ctms-motor-position", "--out", str(tmp_path / "out"), "--no-validation"]) == 2
     assert str(tmp_path / "out") in one_line(capsys.readouterr().err)
+    (tmp_path / "empty.json").touch()
+    assert main(["pdf", str(tmp_path / "empty.json")]) == 2
+    assert "empty.json: is empty; allowed: a report.json" in one_line(capsys.readouterr().err)
 
 
 def test_report_writes_both_files_and_gives_the_document(tmp_path, capsys) -> None:

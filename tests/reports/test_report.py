@@ -17,13 +17,13 @@ import reports
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.errors import InputError
 from reports import document as doc
-from reports.build import design_report, write_report
+from reports.build import design_report
 from reports.certain import certain
 from reports.charts.chart import Chart, Curve, Panel
 from reports.charts.data import chart_data, chart_of
 from reports.cli.main import main
 from reports.drawing import draw_svg
-from reports.html import page
+from reports.html import page, write_report
 from reports.numbers import show
 from reports.sections.names import loop_words
 from tests.nightly.site_checks import Page
@@ -146,7 +146,7 @@ def test_report_in_python_is_the_command(tmp_path, monkeypatch) -> None:
     parts = reports.report("ctms-motor-position", validation=False, also=["duty"], added=[mine])["sections"]
     order = [part["id"] for part in parts]
     assert order.index("mine") < order.index("duty")  # as the command puts what it includes
-    with pytest.raises(InputError, match="section 'all'"):
+    with pytest.raises(InputError, match="also = 'all'"):
         reports.report("ctms-motor-position", also=["all"])
 
 

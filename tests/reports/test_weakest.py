@@ -11,12 +11,14 @@ from hypothesis import strategies as st
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.asked.quantities import CUSTOMARY, distance_from_minus_one, reserve
-from actuator_lti.design import with_values
+from actuator_lti.design import with_overrides, with_values
 from actuator_lti.design.model import Design
 from analyses.corners import corners
 from analyses.linear.loop_survey import LoopSurvey, operating_points, survey_loops
+from analyses.linear.responses import curve
 from analyses.specification.mending import mending
 from analyses.specification.weakest import spread, views, weakest
+from reports.build import report
 from reports.cli.main import main
 from reports.sections.answer import weakest as words_of
 
@@ -79,6 +81,21 @@ def test_the_weakest_point_of_the_fin_is_where_it_is_not_stable(fin: Design, sur
     said = words_of(nominal)
     assert said["label"] == "Position loop, motor driven by the load"
     assert said["words"] == "modulus margin 0.481, customary 0.5: 0.0186 beyond"
+
+
+def test_a_load_that_is_driven_away_in_the_gap_is_said_and_the_loop_itself_is_drawn(fin: Design) -> None:
+    """In the play the position loop is open: its response is zero, and no factors make it up."""
+    driven_away = with_overrides(fin, {"load.moment_slope": "5 N*m/rad"})
+    gap = assemble_loops(driven_away, operating_point="gap").position
+    assert np.abs(curve(gap.plain_open, np.array([1.0, 10.0])).values).max() < 1e-12
+    made = report(driven_away, validation=False)
+    first, *others = made["sections"]
+    assert first["id"] == "answer"
+    assert not [part["id"] for part in others if part["id"].startswith("missing")]
+    glance, bode, _ = first["blocks"]
+    assert glance["weakest"]["words"] == "not stable"
+    assert "in the gap of the play" in glance["weakest"]["label"]
+    assert "phase margin none" not in bode["alt"]
 
 
 def test_a_required_limit_stands_for_the_customary_one(survey: LoopSurvey, fin: Design) -> None:

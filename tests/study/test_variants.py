@@ -2,12 +2,14 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from typer.testing import CliRunner
 
-from actuator_lti import load_design
+from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.errors import InputError
+from analyses.comparison.variant_figures import LargeSignal, figure_names
 from analyses.comparison.variants import compare
 from analyses.slugs import slug
 from analyses.specification.sensitivity import sensitivities
@@ -94,7 +96,7 @@ minimum = "10 dB"
 
 @pytest.mark.parametrize(("text", "message"), [
     ("[study]\nname = 's'\n", "study.base"),
-    (HEAD + "[[varient]]\n", 'nearest known: "variant"'),
+    (HEAD + "[[varient]]\n", 'did you mean "variant"'),
     (HEAD + "[[variant]]\nname = 'a'\n[[variant]]\nname = 'a'\n", "twice"),
     (HEAD + "[[variant]]\nname = 'a'\noverride = { 'motor.resistence' = '1 ohm' }\n", "resistence"),
     (HEAD + "[[variant]]\nname = 'a'\noverride = { 'motor.resistance' = '1 V' }\n", "motor.resistance"),
@@ -245,6 +247,26 @@ def test_slopes_are_those_of_closed_forms():
     entry = next(e for e in result.entries if e.figure == "velocity.gain_margin")
     assert entry.per_percent == pytest.approx(-20 * math.log10(math.e) / 100, rel=1e-5)
     assert entry.low - entry.high == pytest.approx(20 * math.log10(1.1 / 0.9), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("changes", "unit", "per_si"),
+    [
+        ({}, "deg/s", 180.0 / math.pi),
+        ({"axis": "linear"}, "mm/s", 1e3),
+        ({"position": True}, "deg", 180.0 / math.pi),
+    ],
+)
+def test_an_amplitude_is_in_the_unit_of_the_command(changes, unit, per_si):
+    """Of a speed drive a speed; it was shown in degrees."""
+    design = load_design("ilr33-amber")
+    if "position" not in changes:
+        design = replace(design, controller=replace(design.controller, position=None), **changes)
+    loops = assemble_loops(design)
+    found = LargeSignal((5.0,), 0.1, 0.1, ()).figures(design, loops)
+    assert found["large.onset@5"] == pytest.approx(per_si * onset(loops, [10.0 * math.pi]).amplitude_rad[0])
+    (name,) = figure_names([found], design)
+    assert name.unit == unit
 
 
 def test_the_page_escapes_names_and_has_every_figure(tmp_path):

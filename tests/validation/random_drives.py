@@ -3,9 +3,9 @@
 
 Run as a script it validates a number of them and prints a line for each::
 
-    python -m tests.validation.random_drives 0 40            # rigid cascades
-    python -m tests.validation.random_drives 0 40 full all   # every feature, every part of a validation
-    python -m tests.validation.random_drives 0 400 full all 3600   # no new drive after so many seconds
+    python -m tests.validation.random_drives 0 40            # the checks
+    python -m tests.validation.random_drives 0 40 all        # every part of a validation
+    python -m tests.validation.random_drives 0 400 all 3600  # no new drive after so many seconds
 
 Every drive has to keep the bound of processor time; the last line is the table of all.
 """
@@ -66,15 +66,8 @@ class Dice:
         return values[int(self.rng.integers(len(values)))]
 
 
-def random_drive(seed: int, *, wider: bool = False) -> Design:
-    """One drive; whether it is stable is not known yet.
-
-    Parameters
-    ----------
-    wider : bool
-        With an elastic coupling, filters, command filter, other sensors, or without a position loop.
-    """
-    dice = Dice(seed)
+def _rigid_drive(dice: Dice, seed: int) -> Design:
+    """A rigid cascade."""
     period = dice.decades(2e-6 if dice.chance(0.1) else 2e-5, 1e-3)
     delay = period * dice.one_of((0.0, 0.5, 1.0, 1.0, 2.0, 3.0))
     axis = dice.one_of(("rotary", "rotary", "rotary", "linear"))
@@ -108,7 +101,7 @@ def random_drive(seed: int, *, wider: bool = False) -> Design:
     if dice.chance(0.2):
         slope = -dice.decades(0.01, 1.0) * torque * ratio / design.validation.full_deflection_rad
         design = replace(design, load=replace(load, path="back-drivable", moment_slope_Nm_rad=slope))
-    return _widened(dice, design) if wider else design
+    return design
 
 
 def _plant(dice: Dice, delay: float, axis: str) -> tuple[Motor, float, tuple[Gear, ...], Load]:
@@ -210,43 +203,9 @@ def _encoder(dice: Dice, control: Controller, axis: str) -> Encoder:
     )
 
 
-def _widened(dice: Dice, design: Design) -> Design:
-    """Add one or two of what goes beyond a rigid cascade."""
-    control, kind = design.controller, dice.one_of(("coupling", "filter", "command", "speed", "sensor"))
-    velocity = control.velocity
-    if kind == "coupling":
-        J = design.inertia_kgm2
-        omega = dice.decades(2.0, 30.0) * control.position_loop.gain
-        stiffness = omega**2 * J * 0.2 * design.total_ratio**2
-        coupling = Coupling(
-            stiffness_Nm_rad=stiffness,
-            damping_Nms_rad=0.04 * stiffness / omega,
-            play_rad=design.validation.full_deflection_rad * dice.one_of((0.0, 0.01)),
-        )
-        return replace(design, coupling=coupling)
-    if kind == "filter" and velocity is not None:
-        at = 2.0 * pi * 0.05 / (control.period_s * velocity.every)
-        item = dice.one_of(
-            (
-                Filter(kind="lowpass", on="torque", frequency_rad_s=2.0 * at),
-                Filter(kind="notch", on="torque", frequency_rad_s=at, width_rad_s=0.5 * at),
-                Filter(kind="lowpass", on="speed", frequency_rad_s=3.0 * at),
-            )
-        )
-        return replace(design, controller=replace(control, velocity=replace(velocity, filters=(item,))))
-    if kind == "command":
-        return replace(design, command=Command(filter_time_s=0.2 / control.position_loop.gain))
-    if kind == "speed" and velocity is not None:
-        return replace(design, controller=replace(control, position=None))
-    place = replace(control.position_loop, sensor="output")
-    return replace(
-        design, controller=replace(control, position=place), output_encoder=OutputEncoder(counts_per_rev=None)
-    )
-
-
 def full_drive(seed: int) -> Design:
     """A drive with any mixture of what sections 6 and 7 of the model know; not known to be stable yet."""
-    design = random_drive(seed)
+    design = _rigid_drive(Dice(seed), seed)
     dice = Dice(10**6 + seed)
     for change in (
         _elastic, _frictions, _loads, _motor_data, _filtered, _regulators, _outer, _sensors, _commanded,
@@ -502,17 +461,11 @@ def _outermost(dice: Dice, design: Design) -> Design:
     return design
 
 
-def stable_drives(first: int, count: int, kind: str = "") -> Iterator[Design]:
-    """The first ``count`` drives from a seed on whose loops are all stable, by their exact margins.
-
-    Parameters
-    ----------
-    kind : {"", "wider", "full"}
-        Of `random_drive`, or `full_drive`.
-    """
+def stable_drives(first: int, count: int) -> Iterator[Design]:
+    """The first ``count`` drives from a seed on whose loops are all stable, by their exact margins."""
     seed, result = first, 0
     while result < count:
-        design = full_drive(seed) if kind == "full" else random_drive(seed, wider=kind == "wider")
+        design = full_drive(seed)
         seed += 1
         if is_stable(design):
             result += 1
@@ -555,12 +508,12 @@ class Tried:
         return f"TABLE {words}"
 
 
-def main(first: int, count: int, kind: str, everything: bool, until_s: float = inf) -> Tried:
+def main(first: int, count: int, everything: bool, until_s: float = inf) -> Tried:
     """Validate and print a line for each, and at the end what they came to."""
     import time
 
     began, tried = time.monotonic(), Tried()
-    for design in stable_drives(first, count, kind):
+    for design in stable_drives(first, count):
         if time.monotonic() - began > until_s:
             break
         validate_one(design, Settings() if everything else CHECKS, tried)
@@ -612,11 +565,5 @@ def validate_one(design: Design, settings: Settings, tried: Tried) -> None:
 if __name__ == "__main__":
     import sys
 
-    arguments = sys.argv[1:]
-    main(
-        int(arguments[0]),
-        int(arguments[1]),
-        "full" if "full" in arguments else "",
-        "all" in arguments,
-        float(arguments[4]) if len(arguments) > 4 else inf,
-    )
+    numbers = [float(each) for each in sys.argv[1:] if each != "all"]
+    main(int(numbers[0]), int(numbers[1]), "all" in sys.argv, numbers[2] if len(numbers) > 2 else inf)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from actuator_lti import assemble_loops
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import (
     Controller,
     Design,
@@ -25,8 +26,9 @@ from actuator_lti.design.model import (
     Validation,
     VelocityLoop,
 )
-from analyses.large_signal.border import check_border
 from analyses.large_signal.map import amplitude_map
+from analyses.validation.places import Bench
+from analyses.validation.small_signal import small_signal
 from nonlinear import Rows, commands, simulate
 
 T, k, J, Kp, Tn, Kv, LIMIT = 5e-4, 0.5, 0.02, 6.0, 0.05, 12.0, 30.0
@@ -75,21 +77,13 @@ def test_the_linear_border_knows_the_clamp() -> None:
     assert (integral < 0.8 * output).any()
 
 
-def test_the_border_check_judges_the_clamp() -> None:
-    for law in ("clamped", "conditional"):
-        design = drive(law)
-        border = check_border(design, assemble_loops(design), count=6)
-        assert border.passed is True
-        assert border.left_out == ""
-        output, integral = sizes(border.frequency_hz)
-        largest = np.maximum(output, integral) if law == "clamped" else output
-        np.testing.assert_allclose(border.simulated_rad, LIMIT / largest, rtol=2e-3)
-
-
-def test_a_border_without_the_clamp_is_caught() -> None:
-    """Judged by the loops of the other law, which has no clamp of its integral."""
-    border = check_border(drive("clamped"), assemble_loops(drive("conditional")), count=6)
-    assert border.passed is False
+@pytest.mark.parametrize("law", ["clamped", "conditional"])
+def test_the_clamp_is_judged(law: str) -> None:
+    """By what stands in front of it, the output and the integral."""
+    design = drive(law)
+    rows = [row for place in Bench(design, design).onsets() for row in small_signal(place)]
+    assert [row.name for row in rows] == ["voltage_onset", "voltage_onset_integral"][: 1 + (law == "clamped")]
+    assert {row.verdict for row in rows} == {Verdict.MET}
 
 
 def test_the_map_draws_the_border_that_is_judged() -> None:

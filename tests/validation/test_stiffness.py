@@ -1,14 +1,14 @@
 """Stiffness at the output: published digits, closed forms, and the same seen by the simulator."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from actuator_lti.design import load_design, with_overrides
+from actuator_lti.design import load_design, with_overrides, write_design
 from actuator_lti.design.model import Load
-from actuator_lti.errors import InputError
 from actuator_lti.loops.compliance import compliance
 from actuator_lti.loops.stiffness import lost_motion_rad, stiffness_at
 from analyses.stiffness import (
@@ -69,8 +69,10 @@ def test_an_integral_on_the_output_comes_back_and_a_self_locking_gear_does_not_m
     rigid = stiffness(load_design("ilr33-amber"))
     assert all(curve.static_Nm_rad == float("inf") for curve in rigid.curves)
     assert rigid.lost_motion is None
-    with pytest.raises(InputError, match="does not answer"):
-        check_stiffness(load_design("ilr33-amber"), [1.0])
+    assert [check.seen_Nm_rad for check in rigid.checks] == 3 * [complex(np.inf)]  # pushed, and not moved
+    assert rigid.verdict == "met"
+    moved = replace(rigid.checks[0], seen_Nm_rad=1e9 + 0j)
+    assert replace(rigid, checks=(moved,)).verdict == "not met"
     compliant = stiffness_curves(load_design("ilr33-amber-compliant"))[0]
     assert compliant.static_Nm_rad == pytest.approx(1500.0, rel=1e-6)  # the shaft behind the worm
 
@@ -130,6 +132,21 @@ def test_command_section_and_figure(capsys) -> None:
     figure = next(block for block in part["blocks"] if block["kind"] == "figure")
     assert "<svg" in draw_svg(figure, page=False)
     assert section(stiffness(load_design("ilr33-amber"), simulated=False))["result"].startswith("A moment")
+
+
+def test_without_a_position_loop_nothing_is_proven_and_that_is_no_pass(tmp_path, capsys) -> None:
+    fin = load_design("fin")
+    bare = replace(fin, controller=replace(fin.controller, position=None), requirements=())
+    (tmp_path / "speed.toml").write_text(write_design(bare), encoding="utf-8")
+    assert main(["stiffness", str(tmp_path / "speed.toml")]) == 1
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith("NOT PROVEN  ")
+    assert first.endswith("nothing is compared: no position loop holds the output.")
+    assert main(["stiffness", "fin"]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert re.search(
+        r"moments injected at 3 frequencies agree to \S+, allowed 1e-06, the lost motion to", first
+    )
 
 
 def test_the_least_stiffness_is_never_above_the_static_one() -> None:

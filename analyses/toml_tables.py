@@ -68,8 +68,8 @@ class Table:
 
     def fail(self, name: str, allowed: str) -> InputError:
         """The refusal of one key."""
-        shown = f" = {self.data[name]!r:.60}" if name in self.data else " is missing"
-        return InputError(f"{self.key(name)}{shown}: {allowed}", where=self.origin)
+        value = f" = {self.data[name]!r:.60}" if name in self.data else " is missing"
+        return InputError(f"{self.key(name)}{value}: {allowed}", where=self.origin)
 
     def table(self, name: str) -> Table:
         """A table below this one; empty where it is not given."""
@@ -106,7 +106,7 @@ class Table:
         """The value of a key, as the type of its field wants it."""
         value = self.data[name]
         if get_origin(kind) is Annotated:
-            return self._quantity(name, value, get_args(kind)[1])
+            return self.quantity(name, get_args(kind)[1])
         if get_origin(kind) is Literal:
             if value not in get_args(kind):
                 raise self.fail(name, "one of " + ", ".join(get_args(kind)))
@@ -122,8 +122,9 @@ class Table:
             raise self.fail(name, WANTED[kinds])
         return float(value) if number else Path(value) if kinds == {Path} else value
 
-    def _quantity(self, name: str, value: object, unit: str) -> float:
+    def quantity(self, name: str, unit: str) -> float:
         """A number with a unit, in SI."""
+        value = self.data.get(name)
         if isinstance(value, bool) or not isinstance(value, str | int | float):
             raise self.fail(name, f"a quantity in {unit or 'no unit'}")
         try:

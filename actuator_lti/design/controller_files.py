@@ -1,0 +1,241 @@
+"""A controller's own settings file as the controller section of a design: one declaration a format.
+
+Where a maker counts amperes as the peak of a phase (ODrive, VESC, SimpleFOC: field-oriented control with an
+amplitude-invariant Clarke transform), i = sqrt(3)/2 I_peak and u = sqrt(3) U_peak of the equivalent DC motor
+(model.md section 1), and a gain in V/A is doubled.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite, pi, sqrt
+from pathlib import Path
+from typing import Any, Literal
+
+from actuator_lti.design.model import Design
+from actuator_lti.design.objects import Imported
+from actuator_lti.design.plant import no_load_speed
+from actuator_lti.design.sections import parts_of
+from actuator_lti.design.settings_xml import objects_of_xml, parsed_xml
+from actuator_lti.design.units import si_text
+from actuator_lti.design.writing import with_overrides
+from actuator_lti.errors import InputError
+from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
+from actuator_lti.files.tree import Tree
+
+Stage = Literal["velocity", "-velocity", "current", "-current"]
+Value = float | Callable[..., float]
+A_dc, V_dc, TURN, RPM = sqrt(3.0) / 2.0, sqrt(3.0), 2.0 * pi, 2.0 * pi / 60.0
+_DCF = re.compile(r"^\s*\[([0-9A-F]{4})(?:sub([0-9A-F]{1,2}))?\]|^\s*ParameterValue\s*=\s*(\S+)", re.I | re.M)
+_ASSIGNED = re.compile(r"^\s*\w+\.([\w.]+)\s*=\s*([^;\n]+);", re.M)
+
+
+class Setting:
+    """One key of a design: a factor on one number of the file, or ``value`` of several, in the unit."""
+
+    def __init__(self, key: str, unit: str, value: Value, *names: str, when: Stage | None = None) -> None:
+        self.key, self.unit, self.value, self.names, self.when = key, unit, value, names, when
+
+    def of(self, numbers: Sequence[float]) -> float:
+        """Its value."""
+        return float(self.value(*numbers) if callable(self.value) else self.value * numbers[0])
+
+    def holds(self, design: Design) -> bool:
+        """Whether a design of these stages takes it: ``"-velocity"`` is one without a velocity loop."""
+        stages = design.controller.stages
+        return not self.when or (self.when.strip("-") in stages) != self.when.startswith("-")
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of file: how it is known and read, what its numbers are, and what every such controller does."""
+
+    words: str
+    known: re.Pattern[str]
+    read: Callable[[str, str], Tree]
+    settings: tuple[Setting, ...]
+    fixed: Mapping[str, Any] = field(default_factory=dict)
+    unfit: Callable[[str, Design], str] = lambda text, design: ""
+    also: tuple[str, ...] = ()
+    """Names that ``unfit`` looks at."""
+
+
+def _ratio(above: float, below: float) -> float:
+    return above / below if below else 0.0
+
+
+def _flat(tree: Any, prefix: str = "") -> Tree:
+    """Leaves of a tree by dotted name; ODrive's newer names as the older ones."""
+    result: Tree = {}
+    for key, value in tree.items():
+        result |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    newer = {"axis0.config.motor.": "axis0.motor.config.", "current_soft_max": "current_lim",
+             "axis0.config.encoder_bandwidth": "axis0.encoder.config.bandwidth"}  # fmt: skip
+    for name, older in newer.items():
+        result = {key.replace(name, older): value for key, value in result.items()}
+    return result
+
+
+def _canopen(text: str, where: str) -> Tree:
+    """Objects of a device configuration, CiA 306 (.dcf) or CiA 311 (.xdc), by ``0x30A0.01``."""
+    if text.lstrip().startswith("<"):
+        return {item.label: item.value for item in objects_of_xml(text, where)}
+    found, label = {}, ""
+    for index, sub, value in _DCF.findall(text):
+        label = f"0x{index.upper()}.{int(sub or '0', 16):02X}" if index else label
+        if value and label:
+            found[label] = int(value, 0) if re.fullmatch(r"-?(0x[0-9A-Fa-f]+|[0-9]+)", value) else value
+    return found
+
+
+def _torque_mode(text: str, design: Design) -> str:
+    by_current = "TorqueControlType::foc_current" in text
+    if by_current == (design.controller.current is not None):
+        return ""
+    return f"its torque control is by {'current' if by_current else 'voltage'}; allowed: a design " + (
+        "with [control.current]" if by_current else "without [control.current]"
+    )
+
+
+_AXIS, _MOTOR, _LOOP = "axis0.encoder.config.", "axis0.motor.config.", "axis0.controller.config."
+FORMATS = (
+    Format(
+        "ODrive configuration", re.compile(r"\A\s*\{.*axis0", re.S),
+        lambda text, where: _flat(parse_json(text, where)),
+        (
+            Setting("control.position.gain", "1/s", 1.0, _LOOP + "pos_gain"),
+            Setting("control.velocity.gain", "A*s/rad", lambda gain, kM: A_dc * gain / (TURN * kM),
+                  _LOOP + "vel_gain", _MOTOR + "torque_constant"),
+            Setting("control.velocity.integral_time", "s", _ratio, _LOOP + "vel_gain",
+                  _LOOP + "vel_integrator_gain"),
+            Setting("control.current.gain", "V/A", lambda bandwidth, L: 2.0 * bandwidth * L,
+                  _MOTOR + "current_control_bandwidth", _MOTOR + "phase_inductance"),
+            Setting("control.current.integral_time", "s", _ratio, _MOTOR + "phase_inductance",
+                  _MOTOR + "phase_resistance"),
+            Setting("limits.peak_current", "A", A_dc, _MOTOR + "current_lim"),
+            Setting("limits.speed", "rad/s", TURN, _LOOP + "vel_limit"),
+            Setting("encoder.counts_per_rev", "1", 1.0, _AXIS + "cpr"),
+            Setting("encoder.bandwidth", "rad/s", 1.0, _AXIS + "bandwidth"),
+        ),
+        {"control.period": "125 us", "control.velocity.every": 1, "control.position.every": 1,
+         "encoder.speed": "tracking", "encoder.filter_time": "0 s"},
+    ),
+    Format(
+        "VESC motor configuration", re.compile(r"<MCConfiguration"),
+        lambda text, where: {str(item.tag): item.text for item in parsed_xml(text, where).iter()
+                             if not len(item)},
+        (
+            Setting("control.current.gain", "V/A", 2.0, "foc_current_kp"),
+            Setting("control.current.integral_time", "s", _ratio, "foc_current_kp", "foc_current_ki"),
+            Setting("control.velocity.gain", "A*s/rad",
+                  lambda gain, peak, poles: A_dc * peak * gain / 20.0 * (poles / 2.0) / RPM,
+                  "s_pid_kp", "l_current_max", "si_motor_poles"),
+            Setting("control.velocity.integral_time", "s", _ratio, "s_pid_kp", "s_pid_ki"),
+            Setting("limits.peak_current", "A", A_dc, "l_current_max"),
+            Setting("limits.speed", "rad/s", lambda rpm, poles: rpm * RPM / (poles / 2.0),
+                  "l_max_erpm", "si_motor_poles"),
+        ),
+    ),
+    Format(
+        "EPOS4 object export", re.compile(r'^\s*\[30A0sub1\]|index="(0x)?30A0"', re.I | re.M), _canopen,
+        (
+            Setting("control.current.gain", "V/A", 1e-6, "0x30A0.01"),
+            Setting("control.current.integral_time", "s", lambda above, below: 1e-3 * _ratio(above, below),
+                  "0x30A0.01", "0x30A0.02"),
+            Setting("control.velocity.gain", "A*s/rad", 1e-6, "0x30A2.01", when="velocity"),
+            Setting("control.velocity.integral_time", "s", _ratio, "0x30A2.01", "0x30A2.02", when="velocity"),
+            Setting("control.position.gain", "A/rad", 1e-6, "0x30A1.01", when="-velocity"),
+            Setting("control.position.integral_time", "s", _ratio, "0x30A1.01", "0x30A1.02",
+                    when="-velocity"),
+            Setting("control.position.derivative_time", "s", _ratio, "0x30A1.03", "0x30A1.01",
+                    when="-velocity"),
+            Setting("limits.continuous_current", "A", 1e-3, "0x3001.01"),
+            Setting("limits.peak_current", "A", 1e-3, "0x3001.02"),
+            Setting("limits.speed", "rad/s", RPM, "0x6080.00"),
+        ),
+        {"control.period": "40 us", "control.velocity.every": 10, "control.position.every": 10},
+        lambda text, design: "" if {"velocity", "position"} - {*design.controller.stages} else
+        "an EPOS4 has no velocity loop inside its position loop; allowed: a design without one of the two",
+    ),
+    Format(
+        "SimpleFOC settings", re.compile(r"\.(PID_velocity|P_angle|PID_current_q)\."),
+        lambda text, where: {name: value.strip().rstrip("fF") for name, value in _ASSIGNED.findall(text)},
+        (
+            Setting("control.position.gain", "1/s", 1.0, "P_angle.P"),
+            Setting("control.velocity.gain", "A*s/rad", A_dc, "PID_velocity.P", when="current"),
+            Setting("control.velocity.gain", "V*s/rad", V_dc, "PID_velocity.P", when="-current"),
+            Setting("control.velocity.integral_time", "s", _ratio, "PID_velocity.P", "PID_velocity.I"),
+            Setting("control.current.gain", "V/A", 2.0, "PID_current_q.P", when="current"),
+            Setting("control.current.integral_time", "s", _ratio, "PID_current_q.P", "PID_current_q.I",
+                  when="current"),
+            Setting("encoder.filter_time", "s", 1.0, "LPF_velocity.Tf"),
+            Setting("limits.peak_current", "A", A_dc, "current_limit", when="current"),
+            Setting("limits.voltage", "V", 1.0, "voltage_power_supply"),
+            Setting("limits.speed", "rad/s", 1.0, "velocity_limit"),
+        ),
+        {}, _torque_mode, ("torque_controller",),
+    ),
+)  # fmt: skip
+
+
+def import_controller_file(path: Path, base: Design) -> Imported | None:
+    """A design with the settings of such a file; None where it is of none of these formats.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or the design cannot hold what stands in it.
+    """
+    where = shown_path(path)
+    text = decode(read_bytes(path, "settings file"), where)
+    found = next((one for one in FORMATS if one.known.search(text)), None)
+    if found is None:
+        return None
+    if unfit := found.unfit(text, base):
+        raise InputError(unfit, where=where)
+    given = found.read(text, where)
+    overrides, used, notes = _overrides(found, given, base, path.name)
+    tables = {key.rpartition(".")[0] for key in overrides}
+    tables |= {path for _, path, _ in parts_of(base)}
+    fixed = {
+        key: value if key == "encoder.speed" else {"value": value, "source": found.words}
+        for key, value in found.fixed.items()
+        if key.rpartition(".")[0] in tables
+    }
+    left = [name for name in given if name not in (*used, *found.also)]
+    words = f"not understood, of {len(given)} settings: {', '.join(left) or 'none'}"
+    design = with_overrides(base, {**fixed, **overrides})
+    changed = tuple(key for key in (*fixed, *overrides) if key in design.parameters)
+    return Imported(design=design, changed=changed, kept=(), notes=(f"read as {found.words}", *notes, words))
+
+
+def _overrides(
+    found: Format, given: Tree, base: Design, file: str
+) -> tuple[dict[str, Any], set[str], list[str]]:
+    """What the file sets, with its sources; the names that were understood; remarks."""
+    overrides: dict[str, Any] = {}
+    used: set[str] = set()
+    notes: list[str] = []
+    for item in found.settings:
+        numbers = [_number(given.get(name)) for name in item.names]
+        known = [number for number in numbers if number is not None]
+        if not item.holds(base) or len(known) < len(numbers):
+            continue
+        used |= {*item.names}
+        value = item.of(known)
+        stated = ", ".join(f"{name} = {given[name]}" for name in item.names)
+        if item.key == "limits.speed" and value > no_load_speed(base):
+            notes.append(f"{stated}: faster than the supply allows, left out")
+        elif value > 0.0 and isfinite(value):
+            text = int(value) if item.unit == "1" else si_text(value, item.unit.replace("A", "A dc"))
+            overrides[item.key] = {"value": text, "source": f"{file}: {stated}"}
+    return overrides, used, notes
+
+
+def _number(raw: object) -> float | None:
+    try:
+        return None if isinstance(raw, bool) else float(raw)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return None

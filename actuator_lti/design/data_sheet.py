@@ -1,0 +1,120 @@
+"""What data sheets state in place of friction: no-load current and efficiencies (model.md section 11).
+
+Read into the keys of ``[friction]`` that follow from them, which is what a design has from there on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import prod
+from typing import Any
+
+from actuator_lti.design import model
+from actuator_lti.design.field import Field, Structure, positive, quantity
+from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.mistakes import Refusal
+from actuator_lti.design.units import si_text
+from actuator_lti.files.tree import Tree
+
+_CURRENT, _SPEED, _SHARE = "motor.no_load_current", "motor.no_load_speed", "motor.no_load_dry_share"
+SHEET: tuple[Field, ...] = (
+    positive(_CURRENT, "A", "i0", "current of the motor without a load: kM i0 = C0 + Cv w0, in place of "
+             "friction.dry_torque and friction.viscous", example="137 mA"),
+    positive(_SPEED, "{angle}/s", "w0", "speed of the motor at its no-load current", example="7580 rpm"),
+    quantity(_SHARE, "1", "", "share of the no-load torque that is dry; where it is not given a half, with a "
+             "tolerance from 0 to 1", low=0.0, high=1.0, example="0.8"),
+    positive("gear.*.efficiency", "1", "eta", "efficiency of the stage under load, driving, in place of "
+             "friction.load_coefficient; stages without one count as 1", high=1.0, example="72 %"),
+)  # fmt: skip
+"""Keys of a file that no part of a design has an attribute for."""
+
+FROM = "from data sheet: "
+"""What the source of a value begins with that follows from such keys."""
+_TAKEN = {
+    _CURRENT: ("dry_torque", "viscous", "dry_torque_reverse", "viscous_reverse", "point"),
+    "gear.efficiency": ("load_coefficient",),
+}
+
+
+def sheet_fields(template: str) -> tuple[Field, ...]:
+    """Those of a table such as ``"gear.*"``."""
+    return tuple(field for field in SHEET if field.section == template)
+
+
+class DataSheet:
+    """What a file states so: values with their pedigree, by dotted key."""
+
+    def __init__(self, stated: dict[str, model.Parameter], tree: Tree) -> None:
+        self.stated = stated
+        self.motor, self.friction = (_table(tree.get(key)) for key in ("motor", "friction"))
+        self.gears = {path: item for path, item in stated.items() if path.startswith("gear.")}
+
+    def refusals(self) -> Iterator[Refusal]:
+        """What stands beside what it takes the place of, and what lacks its other half."""
+        for path, item in self.stated.items():
+            for key in _TAKEN["gear.efficiency" if path in self.gears else _CURRENT]:
+                if key in self.friction:
+                    yield path, item.text, f"not allowed beside friction.{key}, which says the same; give one"
+            if item.tolerance is not None:
+                yield f"{path}.tolerance", "", "allowed: none here; of the keys of friction"
+            if path in (_SPEED, _SHARE) and _CURRENT not in self.stated:
+                yield path, item.text, f"needs {_CURRENT}"
+            if path == _CURRENT and "torque_constant" not in self.motor:
+                yield path, item.text, "needs motor.torque_constant"
+        share = self.stated.get(_SHARE)
+        if _CURRENT in self.stated and _SPEED not in self.stated and (share is None or share.value < 1.0):
+            yield _SPEED, "", f"missing; {_CURRENT} needs it"
+
+    def read_into(self, design: model.Design) -> model.Design:
+        """The design with the friction that follows."""
+        if _CURRENT in self.stated:
+            design = self._no_load(design)
+        return self._loaded(design) if self.gears else design
+
+    def _no_load(self, design: model.Design) -> model.Design:
+        """kM i0 = C0 + Cv w0, both in the sheet's own amperes."""
+        assert design.motor.torque_constant_Nm_A is not None
+        torque = design.motor.torque_constant_Nm_A * self.stated[_CURRENT].value
+        share = self.stated[_SHARE].value if _SHARE in self.stated else 0.5
+        values = {"friction.dry_torque": share * torque}
+        if share < 1.0:
+            values["friction.viscous"] = (1.0 - share) * torque / self.stated[_SPEED].value
+        said = (_CURRENT, _SPEED, *((_SHARE,) if _SHARE in self.stated else ()))
+        design = self._with(design, {path: value for path, value in values.items() if value}, said)
+        if _SHARE in self.stated:
+            return design
+        open_ = {path: replace(design.parameters[path], tolerance=model.Tolerance(
+            kind="uniform", half_width=value, text="100.0 %")) for path, value in values.items()}  # fmt: skip
+        pair = model.Correlation(first="friction.dry_torque", second="friction.viscous", coefficient=-1.0)
+        parameters = model.FrozenMap({**design.parameters, **open_})
+        return replace(design, parameters=parameters, correlations=(*design.correlations, pair))
+
+    def _loaded(self, design: model.Design) -> model.Design:
+        """A load M wants M/(N eta) of the motor; where it is not locked M/N of that acts by itself."""
+        eta = prod(item.value for item in self.gears.values())
+        lost = 1.0 / eta if design.load.path == "self-locking" else 1.0 / eta - 1.0
+        said = tuple(self.gears)
+        return self._with(
+            design, {"friction.load_coefficient": lost / design.total_ratio} if lost else {}, said
+        )
+
+    def _with(self, design: model.Design, values: dict[str, float], said: tuple[str, ...]) -> model.Design:
+        """The design with values of friction, whose source is what the sheet says."""
+        stated = [self.stated[path] for path in said if path in self.stated]
+        sources = dict.fromkeys(item.source for item in stated if item.source)
+        words = ", ".join(f"{item.path} = {item.text}" for item in stated)
+        source = "; ".join((FROM + words, *sources))
+        made, structure = {}, Structure.of(design)
+        for path, value in values.items():
+            unit = FIELDS[path].unit(structure)
+            made[path] = model.Parameter(
+                path=path, text=si_text(value, unit), value=value, unit=unit, symbol=FIELDS[path].symbol,
+                source=source, grade=stated[0].grade)  # fmt: skip
+        attributes: dict[str, Any] = {FIELDS[path].attribute: value for path, value in values.items()}
+        friction = replace(design.friction, **attributes)
+        return replace(design, friction=friction, parameters=model.FrozenMap({**design.parameters, **made}))
+
+
+def _table(raw: Any) -> Tree:
+    return raw if isinstance(raw, dict) else {}

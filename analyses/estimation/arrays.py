@@ -1,0 +1,35 @@
+"""Arrays of one kind of number, as all analyses of records type them, and rows that are marked in them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+def stretches(marked: BoolArray) -> list[tuple[int, int]]:
+    """Where marked rows follow each other: the first, and the one after the last.
+
+    Examples
+    --------
+    >>> stretches(np.array([True, False, False, True, True]))
+    [(0, 1), (3, 5)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(np.int8), [0]]))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def longest(marked: BoolArray) -> tuple[int, int]:
+    """The longest such stretch, the first of equal ones; an empty one where nothing is marked."""
+    return max(stretches(marked), key=lambda one: one[1] - one[0], default=(0, 0))
+
+
+def picked(values: FloatArray, keep: BoolArray, rows: BoolArray) -> FloatArray:
+    """Of values at the rows ``keep`` those at ``rows``, which are among them (and may be fewer)."""
+    whole = np.zeros((len(keep), *values.shape[1:]))
+    whole[keep] = values
+    return whole[: len(rows)][rows]

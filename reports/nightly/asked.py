@@ -1,0 +1,88 @@
+"""What is asked of `actuator-lti nightly`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from actuator_lti.bounds import JOB_MEMORY
+from actuator_lti.errors import InputError
+from analyses.request import OnMachines, Option, flag
+
+if TYPE_CHECKING:
+    from analyses.studies.engine import Engine
+
+_ALLOWED = {
+    "workers": (1, 256), "time_limit_s": (1, inf), "memory_limit": (300, inf), "wait_s": (0, inf),
+    "keep": (1, inf),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings(OnMachines):
+    """How a night is run; without workers and scheduler in this process, without a time limit.
+
+    ``build`` is ``module:function`` that makes ``(meta, files)`` of a job's payload.
+    """
+
+    build: ClassVar[str] = "reports.nightly.compute:build"
+    workers: Annotated[int | None, Option(words="Worker processes; 2.", metavar="N")] = 2
+    time_limit_s: Annotated[
+        float, Option(words="A design that takes longer is ended; 900.", metavar="SECONDS")
+    ] = 900.0
+    memory_limit: Annotated[int, Option(words="A design that needs more has no result.", metavar="MB")] = (
+        JOB_MEMORY.most // 1_000_000
+    )
+    wait_s: Annotated[
+        float, Option(words="Wait for another nightly on the same site; 0.", metavar="SECONDS")
+    ] = 0.0
+    keep: Annotated[
+        int,
+        Option(words="Nights whose reports stay on the site; 60.", metavar="NIGHTS"),
+    ] = 60
+    state: Annotated[
+        Path | None, Option(words="History and cache; DIR.state beside the site otherwise.", metavar="DIR")
+    ] = None
+    accept_lost_history: Annotated[
+        bool, Option(words="Begin anew where the history knows less than the site.")
+    ] = False
+
+    @property
+    def engine(self) -> Engine:
+        """Where to compute."""
+        from analyses.studies.engine import Engine
+
+        return Engine(None, self.scheduler, threads=self.workers or 1, tls=self.tls)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked(Settings):
+    """A night of a study on a site, or the approval of its last night."""
+
+    words: Annotated[
+        list[str],
+        Option(
+            words="Study file (compare --example prints one), design file or shipped design; first 'approve'"
+            " to approve.",
+            metavar="[approve] STUDY",
+            argument=True,
+        ),
+    ]
+    site: Annotated[Path | None, Option(words="Folder of the site; has to be given.", metavar="DIR")] = None
+    pdf: Annotated[bool, Option(words="A PDF beside each report.")] = False
+    no_validation: Annotated[bool, Option(words="Linear reports only, no simulation.")] = False
+    by: Annotated[str, Option(words="Who approves.", metavar="NAME")] = ""
+    reason: Annotated[str, Option(words="Why the night is approved.", metavar="TEXT")] = ""
+    only: Annotated[
+        list[str] | None,
+        Option(words="Approve only this design; may be repeated.", metavar="NAME", flag="design"),
+    ] = None
+
+    def __post_init__(self) -> None:
+        """Refuse numbers out of range."""
+        for name, (least, most) in _ALLOWED.items():
+            if not least <= getattr(self, name) <= most:
+                to = "" if most == inf else f" to {most}"
+                raise InputError(f"--{flag(name)} {getattr(self, name)}: allowed: {least}{to or ' or more'}")
