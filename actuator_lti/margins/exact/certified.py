@@ -89,6 +89,6 @@ def _notes(base: Findings, result: Settled) -> tuple[str, ...]:
     if result.dropped:
         notes.append(
             f"{result.dropped} crossing(s) of the real axis more than {FAR_DB:g} dB from -1 are left out: "
-            f"{ULP} ulp of the entries decide about them"
+            "not resolved in double precision"
         )
     return tuple(notes)
