@@ -324,10 +324,4 @@ def closing_sections(
 
 def design_head(design: Design) -> Tree:
     """Give what a document says of its design."""
-    return {
-        "name": design.name,
-        "title": design.title,
-        "revision": design.revision,
-        "origin": design.origin,
-        "axis": design.axis,
-    }
+    return {name: getattr(design, name) for name in ("name", "title", "revision", "origin", "axis")}

@@ -258,7 +258,7 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
 
 def range_words(range_: Spread) -> str:
     """Say between which values a figure lies over the operating points; empty where they agree."""
-    least, most = short(range_.least, 3), "∞" if math.isinf(range_.most) else short(range_.most, 3)
+    least, most = ("∞" if math.isinf(end) else short(end, 3) for end in (range_.least, range_.most))
     return least if least == most else f"{least} ({range_.where}) to {most}"
 
 
