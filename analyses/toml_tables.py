@@ -87,8 +87,9 @@ class Table:
         for name in self.data:
             if name not in known:
                 near = get_close_matches(name, known, 1)
-                hint = f'; did you mean "{near[0]}"?' if near else ""
-                raise InputError(f"{self.key(name)}: unknown key{hint}", where=self.origin)
+                hint = f'; did you mean "{near[0]}"? Allowed: ' if near else "; allowed: "
+                words = f"{self.key(name)}: unknown key{hint}{', '.join(sorted(known))}"
+                raise InputError(words, where=self.origin)
 
     def read(self, kind: type[T], *, beside: Collection[str] = (), **given: Any) -> T:
         """A dataclass; ``beside``: keys for others to read, ``given``: fields that are no keys."""

@@ -172,7 +172,7 @@ def study_from_tree(tree: Tree, where: str, folder: Path, *, keep_going: bool = 
         if times > 1:
             raise InputError(f"variant.name = {shown(name)}: twice; allowed: names that differ", where=where)
     return Study(
-        _name(root.table("study"), head.name or maker.base.name),
+        _name(root.table("study"), maker.base.name if head.name is None else head.name),
         head.title,
         head.description,
         where,
@@ -188,7 +188,7 @@ class _Head:
     """The table ``[study]``."""
 
     base: str
-    name: str = ""
+    name: str | None = None
     title: str = ""
     description: str = ""
     validation: bool = False

@@ -93,7 +93,7 @@ def test_bad_usage_is_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys,
     ("table", "expected"),
     [
         ("nightly = 1", "nightly: must be a table"),
-        ("[nightly]\npdff = true", "nightly.pdff: unknown key"),
+        ("[nightly]\npdff = true", 'nightly.pdff: unknown key; did you mean "pdf"? Allowed: pdf, tolerance'),
         ("[nightly]\npdf = 1", "nightly.pdf = 1: true or false"),
         ("[nightly]\ntolerance = 3", "nightly.tolerance: must be a table"),
         ('[nightly.tolerance]\n"*" = "much"', "a number of at least 0"),

@@ -96,6 +96,7 @@ minimum = "10 dB"
 
 @pytest.mark.parametrize(("text", "message"), [
     ("[study]\nname = 's'\n", "study.base"),
+    (HEAD.replace('"s"', '""'), "study.name = ''"),
     (HEAD + "[[varient]]\n", 'did you mean "variant"'),
     (HEAD + "[[variant]]\nname = 'a'\n[[variant]]\nname = 'a'\n", "twice"),
     (HEAD + "[[variant]]\nname = 'a'\noverride = { 'motor.resistence' = '1 ohm' }\n", "resistence"),
