@@ -147,7 +147,9 @@ def _replaced(
 ) -> Design:
     for path, attributes in changes.items():
         design = with_part(design, path, replace(part_at(design, path), **attributes))
-    return replace(design, parameters=FrozenMap({**design.parameters, **parameters}))
+    gone = {path for path, item in parameters.items() if item.tolerance is None}
+    kept = tuple(pair for pair in design.correlations if not gone & {pair.first, pair.second})
+    return replace(design, parameters=FrozenMap({**design.parameters, **parameters}), correlations=kept)
 
 
 def pedigrees(design: Design) -> tuple[Parameter, ...]:

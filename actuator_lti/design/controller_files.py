@@ -86,7 +86,7 @@ def _canopen(text: str, where: str) -> Tree:
     for index, sub, value in _DCF.findall(text):
         label = f"0x{index.upper()}.{int(sub or '0', 16):02X}" if index else label
         if value and label:
-            found[label] = int(value, 0) if re.fullmatch(r"-?(0x[0-9A-Fa-f]+|[0-9]+)", value) else value
+            found[label] = int(value, 16) if re.fullmatch("0x[0-9A-Fa-f]{1,16}", value) else value
     return found
 
 
@@ -106,7 +106,7 @@ FORMATS = (
         lambda text, where: _flat(parse_json(text, where)),
         (
             Setting("control.position.gain", "1/s", 1.0, _LOOP + "pos_gain"),
-            Setting("control.velocity.gain", "A*s/rad", lambda gain, kM: A_dc * gain / (TURN * kM),
+            Setting("control.velocity.gain", "A*s/rad", lambda gain, kM: A_dc * _ratio(gain, TURN * kM),
                   _LOOP + "vel_gain", _MOTOR + "torque_constant"),
             Setting("control.velocity.integral_time", "s", _ratio, _LOOP + "vel_gain",
                   _LOOP + "vel_integrator_gain"),
@@ -134,7 +134,7 @@ FORMATS = (
                   "s_pid_kp", "l_current_max", "si_motor_poles"),
             Setting("control.velocity.integral_time", "s", _ratio, "s_pid_kp", "s_pid_ki"),
             Setting("limits.peak_current", "A", A_dc, "l_current_max"),
-            Setting("limits.speed", "rad/s", lambda rpm, poles: rpm * RPM / (poles / 2.0),
+            Setting("limits.speed", "rad/s", lambda rpm, poles: _ratio(rpm * RPM, poles / 2.0),
                   "l_max_erpm", "si_motor_poles"),
         ),
     ),
@@ -229,13 +229,15 @@ def _overrides(
         if item.key == "limits.speed" and value > no_load_speed(base):
             notes.append(f"{stated}: faster than the supply allows, left out")
         elif value > 0.0 and isfinite(value):
-            text = int(value) if item.unit == "1" else si_text(value, item.unit.replace("A", "A dc"))
+            text = value if item.unit == "1" else si_text(value, item.unit.replace("A", "A dc"))
             overrides[item.key] = {"value": text, "source": f"{file}: {stated}"}
+        else:
+            notes.append(f"{stated}: not taken, {item.key} stays as it is")
     return overrides, used, notes
 
 
 def _number(raw: object) -> float | None:
     try:
         return None if isinstance(raw, bool) else float(raw)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None

@@ -65,7 +65,10 @@ class DataSheet:
         """What stands beside what it takes the place of, and what lacks its other half."""
         for path, item in self.stated.items():
             for key in _TAKEN["gear.efficiency" if path in self.gears else _CURRENT]:
-                if key in self.friction:
+                entry = self.friction.get(key)
+                if isinstance(entry, dict) and str(entry.get("source", "")).startswith(FROM):
+                    yield path, item.text, f"was read into friction.{key}; change that, or the file"
+                elif entry is not None:
                     yield path, item.text, f"not allowed beside friction.{key}, which says the same; give one"
             if item.tolerance is not None:
                 yield f"{path}.tolerance", "", "allowed: none here; of the keys of friction"

@@ -84,10 +84,12 @@ def check_tolerance(tolerance: Tolerance, nominal: float, unit: str, field: Fiel
         raise InputError("allowed: lower and upper on either side of the value")
 
 
-def rescaled(tolerance: Tolerance, nominal: float) -> Tolerance:
-    """The tolerance of a changed nominal: a relative one follows it, an absolute one stays."""
+def rescaled(tolerance: Tolerance, nominal: float) -> Tolerance | None:
+    """The tolerance of a changed nominal: a relative one follows it, of 0 there is none."""
     if not tolerance.text.strip().endswith("%"):
         return tolerance
+    if nominal == 0.0:
+        return None
     width = _width(tolerance.text, nominal, lambda text: parse_quantity(text, "1"))
     uniform = tolerance.kind == "uniform"
     return replace(tolerance, half_width=width) if uniform else replace(tolerance, std=width)

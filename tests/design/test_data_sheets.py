@@ -12,6 +12,7 @@ from actuator_lti.design import (
     tolerances,
     warnings_of,
     with_overrides,
+    with_values,
     write_design,
 )
 from actuator_lti.design.explained import explained
@@ -291,6 +292,11 @@ def test_an_unknown_share_is_a_tolerance_from_none_to_all() -> None:
     assert dry + viscous * SPEED == pytest.approx(64 * [0.137 * 30.2e-3], rel=1e-9)
     assert max(dry) > 3 * min(dry)
     assert read_design_text(write_design(drive), "sheet") == drive
+    assert (
+        with_values(drive, {"friction.dry_torque": 0.0}).parameters["friction.dry_torque"].tolerance is None
+    )
+    with pytest.raises(InputError, match=r"no_load_current = 1 A: was read into friction\.dry_torque"):
+        with_overrides(drive, {"motor.no_load_current": "1 A"})
 
 
 @pytest.mark.parametrize(
