@@ -188,9 +188,9 @@ ANALYSES = (
         name="stiffness",
         group="Linear loops",
         words="""
-        Dynamic and static stiffness and lost motion, checked by an injected moment.
+        Dynamic and static stiffness and lost motion, checked by the simulator.
 
-        Met where the simulator, with moments injected, agrees; not proven where no position loop holds the
+        Met where the simulator agrees; not proven where no position loop holds the
         output. The exit status is 1 where it is not met, or not proven.
         """,
     ),
