@@ -19,8 +19,8 @@ class SignalSummary:
     """One signal over all records that hold it.
 
     ``mean_error`` and ``rms_error`` are over all samples together, ``max_error`` the largest of all,
-    ``relative_error`` the norm of all differences over the norm of all that was measured. ``worst`` is the
-    record with the largest relative error.
+    ``relative_error`` the norm of all differences over the norm of all that was measured, ``share_of_motion``
+    over that of each record's about its mean. ``worst`` is the record with the largest of these.
     """
 
     name: str
@@ -31,6 +31,7 @@ class SignalSummary:
     rms_error: float
     max_error: float
     relative_error: float
+    share_of_motion: float
     worst: str
 
 
@@ -45,7 +46,8 @@ def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary
     samples = np.array([signal.samples for signal in signals])
     squared = np.array([signal.rms_error**2 for signal in signals]) * samples
     measured = np.array([float(np.sum(signal.measured**2)) for signal in signals])
-    worst = max(outcome, key=lambda pair: pair[1].relative_error)
+    motion = np.array([float(np.sum((signal.measured - signal.measured.mean()) ** 2)) for signal in signals])
+    worst = max(outcome, key=lambda pair: pair[1].share_of_motion)
     return SignalSummary(
         name=name,
         unit=signals[0].unit,
@@ -55,6 +57,7 @@ def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary
         rms_error=float(np.sqrt(squared.sum() / samples.sum())),
         max_error=max(signal.max_error for signal in signals),
         relative_error=float(np.sqrt(squared.sum() / measured.sum())),
+        share_of_motion=float(np.sqrt(squared.sum() / (motion.sum() or measured.sum()))),
         worst=worst[0].record,
     )
 

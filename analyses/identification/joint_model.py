@@ -16,7 +16,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.estimation.fit import Fit
-from analyses.records.differentiation import Motion
+from analyses.records.differentiation import Motion, filtered_motion
 
 FrictionForm = Literal["symmetric", "per-direction"]
 
@@ -51,6 +51,12 @@ class Recipe:
         ):
             if getattr(self, name) < low:
                 raise InputError(f"{name} = {getattr(self, name)}: must be {low} or more")
+
+    def motion(self, values: FloatArray, period_s: float) -> Motion:
+        """A position, filtered and differentiated."""
+        return filtered_motion(
+            values, period_s, cutoff_hz=self.cutoff_hz, order=self.filter_order, points=self.points
+        )
 
 
 def base_columns(motion: Motion, form: FrictionForm) -> FloatArray:

@@ -10,7 +10,7 @@ from scipy.signal import lsim
 from actuator_lti.design.model import Design
 from analyses.estimation.arrays import FloatArray
 from analyses.identification.joint_model import Recipe
-from analyses.records.differentiation import Motion, filtered_motion
+from analyses.records.differentiation import Motion
 from analyses.records.record import Record
 
 ROUNDS = 4
@@ -56,7 +56,7 @@ def two_sides(
     """
     behind = design.ratio_behind_coupling
     if place in ("output_angle", "position", "velocity"):
-        load = _scaled(motion, 1.0 / design.ratio_to_coupling)
+        load = motion.scaled(1.0 / design.ratio_to_coupling)
         torque = _of_load(design, load)
         return TwoSides(
             motor=_with_twist(design, record, motion, torque - moment / behind, recipe),
@@ -92,7 +92,7 @@ def _measured(
         return None
     angle, period = record["output_angle"], record.period_s
     behind = design.ratio_behind_coupling
-    made = _filtered(behind * angle, period, recipe)
+    made = recipe.motion(behind * angle, period)
     noise = float(np.std(behind * angle - made.position))
     cutoff = recipe.cutoff_hz
     rough = noise * (2.0 * np.pi * cutoff) ** 2 * np.sqrt(0.4 * cutoff * period)
@@ -106,7 +106,7 @@ def _follows(design: Design, record: Record, motion: Motion, moment: FloatArray)
     coupling, friction = design.coupling, design.load.friction
     assert coupling is not None
     k, c, inertia = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad, design.load_side_inertia_kgm2
-    driver = _scaled(motion, 1.0 / design.ratio_to_coupling)
+    driver = motion.scaled(1.0 / design.ratio_to_coupling)
     viscous, dry, offset = 0.0, 0.0, 0.0
     if friction is not None:
         viscous, dry = friction.viscous_Nms_rad, friction.dry_torque_Nm
@@ -137,23 +137,9 @@ def _with_twist(
     coupling = design.coupling
     assert coupling is not None
     twist = design.ratio_to_coupling / coupling.stiffness_Nm_rad * carried
-    extra = _filtered(twist, record.period_s, recipe)
+    extra = recipe.motion(twist, record.period_s)
     return Motion(
         position=motion.position + extra.position,
         velocity=motion.velocity + extra.velocity,
         acceleration=motion.acceleration + extra.acceleration,
-    )
-
-
-def _scaled(motion: Motion, factor: float) -> Motion:
-    return Motion(
-        position=factor * motion.position,
-        velocity=factor * motion.velocity,
-        acceleration=factor * motion.acceleration,
-    )
-
-
-def _filtered(values: FloatArray, period: float, recipe: Recipe) -> Motion:
-    return filtered_motion(
-        values, period, cutoff_hz=recipe.cutoff_hz, order=recipe.filter_order, points=recipe.points
     )

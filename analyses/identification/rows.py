@@ -21,7 +21,7 @@ from analyses.identification.joint_model import (
 from analyses.identification.load_side import TwoSides, two_sides
 from analyses.identification.sampled_current import mean_current
 from analyses.records.consistency import place_of
-from analyses.records.differentiation import Motion, decimated, filtered_motion
+from analyses.records.differentiation import Motion, decimated
 from analyses.records.prepare import period_of, prepared
 from analyses.records.record import Record
 
@@ -123,12 +123,12 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
     period = period_of(record)
     place = place_of(design, record)
     if place is not None:
-        return _filtered(place[1], period, recipe), place[0]
+        return recipe.motion(place[1], period), place[0]
     rate = "velocity" if design.axis == "linear" else "speed"
     if rate not in record.signals:
         wanted = "position or velocity" if design.axis == "linear" else "angle, output_angle or speed"
         raise InputError(f"no motion: {wanted} is needed", where=record.name)
-    made = _filtered(record[rate], period, recipe)
+    made = recipe.motion(record[rate], period)
     whole = np.concatenate([[0.0], np.cumsum(made.position[:-1] * period)])
     return Motion(position=whole, velocity=made.position, acceleration=made.velocity), rate
 
@@ -139,11 +139,6 @@ def _late_s(design: Design, record: Record) -> float:
     stage = control.current or control.velocity or control.position
     held = control.period_s * getattr(stage, "every", 1)
     return control.computing_delay_s + 0.5 * min(held, period_of(record))
-
-
-def _filtered(values: FloatArray, period: float, recipe: Recipe) -> Motion:
-    cutoff, order = recipe.cutoff_hz, recipe.filter_order
-    return filtered_motion(values, period, cutoff_hz=cutoff, order=order, points=recipe.points)
 
 
 def moment_of(

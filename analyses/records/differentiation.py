@@ -20,6 +20,10 @@ class Motion:
     velocity: FloatArray
     acceleration: FloatArray
 
+    def scaled(self, factor: float) -> Motion:
+        """The motion behind a ratio."""
+        return Motion(**{name: factor * values for name, values in vars(self).items()})
+
 
 SEVEN_POINTS = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0
 

@@ -102,6 +102,7 @@ def summary_section(results: Sequence[CorrelationResult], *, error_limit: float 
         doc.of(lambda row: row[1].rms_error, "rms", "rms", format="sig:4"),
         doc.of(lambda row: row[1].max_error, "largest", "Largest", format="sig:4"),
         doc.of(lambda row: row[1].unit, "unit", "Unit"),
+        doc.of(lambda row: 100.0 * row[1].share_of_motion, "share", "Of the motion", "%", format="sig:4"),
         doc.of(lambda row: 100.0 * row[1].relative_error, "relative", "Relative error", "%", format="sig:4"),
     ]
     table = doc.listing(

@@ -195,6 +195,8 @@ def test_correlation_over_several_records(files: dict[str, str], command: Comman
     summary = result["summary"]["current"]
     assert status == 0
     assert summary["max_error"] == max(one["max_error"] for one in own)
+    shares = [one["share_of_motion"] for one in own]
+    assert min(shares) < summary["share_of_motion"] < max(shares)
     assert summary["rms_error"] ** 2 == pytest.approx(np.mean([one["rms_error"] ** 2 for one in own]))
     assert summary["mean_error"] == pytest.approx(np.mean([one["mean_error"] for one in own]))
     assert own[0]["rms_error"] == pytest.approx(0.02, rel=0.05)  # the noise that was added
