@@ -1,4 +1,4 @@
-"""How long margins, curves, run and verdicts take to follow a slider of the report, in Chromium.
+"""How long margins, curves, run and verdicts take to follow a slider or a dragged curve, in Chromium.
 
 Of each move the least of several counts: the machine may do other things meanwhile.
 """
@@ -21,6 +21,15 @@ if TYPE_CHECKING:
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 TARGET_MS = 50.0
 ROUNDS = 3
+# a place on a curve where nothing lies above it, on the screen
+MIDDLE = """(node) => {
+    node.ownerSVGElement.scrollIntoView({ block: "center" });
+    for (const part of [0.5, 0.6, 0.7, 0.8, 0.9, 0.4, 0.3, 0.2]) {
+        const place = node.getPointAtLength(part * node.getTotalLength());
+        const at = place.matrixTransform(node.getScreenCTM());
+        if (document.elementFromPoint(at.x, at.y) === node) return [at.x, at.y];
+    }
+}"""
 
 
 def rows(quick: bool = False) -> Iterable[Row]:
@@ -36,6 +45,7 @@ def rows(quick: bool = False) -> Iterable[Row]:
             page = browser.new_page(viewport={"width": 1400, "height": 1000})
             page.goto(_written(name, Path(folder)).as_uri())
             page.wait_for_selector("#hands-on[data-ready]")
+            dragged = [_dragged(page) for _ in range(1 if quick else ROUNDS)]
             rounds = [_moved(page) for _ in range(1 if quick else ROUNDS)]
             taken = [min(times) for times in zip(*rounds, strict=True)]
             yield Row(
@@ -45,6 +55,13 @@ def rows(quick: bool = False) -> Iterable[Row]:
                 unit="ms",
                 target=TARGET_MS,
                 note=f"of {len(taken)} sliders, median {statistics.median(taken):.0f} ms",
+            )
+            yield Row(
+                group="live",
+                name=f"longest step of a drag to figures, {name}",
+                measured=max(min(times) for times in zip(*dragged, strict=True)),
+                unit="ms",
+                target=TARGET_MS,
             )
             page.close()
         browser.close()
@@ -71,4 +88,19 @@ def _moved(page: Page) -> list[float]:
         slider.press("ArrowRight")
         page.wait_for_function("(n) => document.getElementById('hands-on').dataset.count !== n", arg=count)
         taken.append(float(page.get_attribute("#hands-on", "data-ms") or "nan"))
+    return taken
+
+
+def _dragged(page: Page) -> list[float]:
+    """Drag the magnitude of the loop that is shown, up and down again; the times that the page measured."""
+    taken = []
+    x, y = (round(value) for value in page.locator('[data-chart="bode"] path.grab').evaluate(MIDDLE))
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for by in (*range(1, 9), *range(7, -1, -1)):
+        count = page.get_attribute("#hands-on", "data-count")
+        page.mouse.move(x, y - by)
+        page.wait_for_function("(n) => document.getElementById('hands-on').dataset.count !== n", arg=count)
+        taken.append(float(page.get_attribute("#hands-on", "data-ms") or "nan"))
+    page.mouse.up()
     return taken

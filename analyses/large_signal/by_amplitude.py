@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import ceil
+from math import ceil, nan
 
 import numpy as np
 import numpy.typing as npt
@@ -50,6 +50,8 @@ class AmplitudeMargin:
     period_s : float
     limiter : str
         Limit that acts longest while the oscillation lasts, just past the value; empty where none does.
+    output : float
+        Amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value.
     """
 
     loop: str
@@ -62,6 +64,8 @@ class AmplitudeMargin:
     furthest: float
     period_s: float
     limiter: str = ""
+    output: float = nan
+    axis: str = "rotary"
 
 
 def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
@@ -102,11 +106,9 @@ def _released(
         if k == 0 or values[k] - values[k - 1] <= CLOSE * value:
             break
         values = np.linspace(values[k - 1], values[k], VALUES + 1)[1:]
-    limiter = "" if value is None else release.limiter(value)
-    tick_s = bench.setup(name).period_s
-    return AmplitudeMargin(
-        name, kind, size, SIZES[size], friction_on, linear, value, 4.0 * linear, tick_s, limiter
-    )
+    seen = ("", nan) if value is None else release.seen(value)
+    found = (linear, value, 4.0 * linear, bench.setup(name).period_s, *seen)
+    return AmplitudeMargin(name, kind, size, SIZES[size], friction_on, *found, bench.design.axis)
 
 
 class _Release:
@@ -148,11 +150,12 @@ class _Release:
         }[self.setup.point]
         return np.asarray(~result.ok | ((spans[0] > ALIVE * full) & (spans[0] >= LASTING * spans[1])))
 
-    def limiter(self, value: float) -> str:
-        """What limits the oscillation at a value."""
+    def seen(self, value: float) -> tuple[str, float]:
+        """What limits the oscillation at a value, and its amplitude at the output."""
         result: BatchResult = self.rows(np.array([value])).run()
         shares = [float(result.window_limit_fraction(name)[0]) for name in LIMITERS]
-        return LIMITERS[int(np.argmax(shares))] if max(shares) > 0.0 else ""
+        low, high = result.span("output_angle_rad")
+        return LIMITERS[int(np.argmax(shares))] if max(shares) > 0.0 else "", 0.5 * float(high[0] - low[0])
 
 
 def _travel_s(design: Design, stage: str, part: float) -> float:

@@ -19,7 +19,7 @@ from nonlinear.row.parameters import design_row
 
 PLACES = {
     "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
-    "current": at.IO_CURRENT, "voltage": at.IO_VOLTAGE, "flags": at.IO_FLAGS,
+    "angle": at.IO_ANGLE, "current": at.IO_CURRENT, "voltage": at.IO_VOLTAGE, "flags": at.IO_FLAGS,
     "period": at.PERIOD, "ratio": at.RATIO,
     "stick": at.FLAG_STICK, "dry": at.DRY, "dry_reverse": at.DRY_REVERSE, "load_dry": at.LOAD_DRY,
     "load_coefficient": at.LOAD_COEFFICIENT, "friction_map": at.MAP_COUNT,

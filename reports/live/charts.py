@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from actuator_lti.design.model import Axis
 from actuator_lti.drive.signals import LIMITERS, SIGNALS
@@ -14,56 +15,57 @@ from reports.charts.svg import page_svg
 NOW = {"colour": style.BLUE, "width": 2.0}
 BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}
 PINNED = tuple(zip("ABC", style.SERIES[1:], strict=False))
-FOLLOWED = "live"  # what the figures say of the loop that they share a cursor for
 FRAME = 1.6
+HERTZ = (1.0, 1000.0)
+FOLLOWED = "live"  # the loop whose figures share a cursor
 BORDERS = tuple(limiter.words for limiter in LIMITERS.values() if line_of(limiter) is not None)
 
 
 def live_charts(unit: str, axis: Axis = "rotary", *, electrical: bool = True) -> dict[str, str]:
     """Give each figure's SVG by its name; ``unit`` is that of the command, ``electrical``: with a current."""
+    both = "as designed and as changed"
     drawn = {
-        "bode": _bode(),
-        "nyquist": _nyquist(),
-        "sensitivity": _sensitivity(),
-        "step": _step(),
-        "run": _run(unit, axis, electrical),
-        "border": _border(unit),
+        "bode": (_bode(), f"Open loop: magnitude and phase, {both}."),
+        "nyquist": (_nyquist(), f"Nyquist curve near -1, {both}."),
+        "sensitivity": (_sensitivity(), f"Sensitivity S and closed loop T, {both}."),
+        "step": (_step(), f"Step response of the linear loop, {both}."),
+        "difference": (_difference(), "Measured frequency response over the model as changed."),
+        "run": (
+            _run(unit, axis, electrical),
+            f"Run with limits and friction, {both}, and a record.",
+        ),
+        "border": (_border(unit), f"Command amplitude at which a limit is reached, {both}."),
     }
-    words = {
-        "bode": "Open loop: magnitude and phase, as designed and as changed.",
-        "nyquist": "Nyquist curve near -1, as designed and as changed.",
-        "sensitivity": "Sensitivity S and closed loop T, as designed and as changed.",
-        "step": "Step response of the linear loop, as designed and as changed.",
-        "border": "Command amplitude at which a limit is reached, as designed and as changed.",
-        "run": "Run with limits and friction, as designed and as changed, and a measured record.",
-    }
-    return {name: page_svg(chart, f"live{k}", words[name]) for k, (name, chart) in enumerate(drawn.items())}
+    return {name: page_svg(made, f"live-{name}", words) for name, (made, words) in drawn.items()}
 
 
-def _both(panel: Panel, ends: tuple[float, float] = (0.0, 1.0)) -> None:
-    """Put in a curve as designed and one as changed."""
-    panel.curve(ends, (0.0, 0.0), "as designed", **BEFORE)
-    panel.curve(ends, (0.0, 0.0), "as changed", **NOW)
+def _empty(panel: Panel, label: str, **look: Any) -> None:
+    """Put in a curve that the script fills."""
+    panel.curve((), (), label, **look)
 
 
-def _pinned(panel: Panel, of: str = "", **look: float) -> None:
-    """Put in a curve of each pinned variant, which the script fills."""
-    for letter, colour in PINNED:
-        panel.curve((), (), of + letter, colour=colour, **{"width": 1.5, **look})
+def _both(panel: Panel, *, pinned: bool = True, measured: bool = False) -> None:
+    """Put in a curve as designed and one as changed, with pinned variants and a measured response."""
+    if measured:
+        _empty(panel, "measured", colour=style.ORANGE, width=2.6, opacity=0.6)
+    for letter, colour in PINNED if pinned else ():
+        _empty(panel, letter, colour=colour, width=1.5)
+    _empty(panel, "as designed", **BEFORE)
+    _empty(panel, "as changed", **NOW)
 
 
 def _bode() -> Chart:
     chart = Chart(width=style.HALF, height=370.0, loop=FOLLOWED)
     top, bottom = chart.column(1.15, 1.0)
-    for panel in (top, bottom):
-        _pinned(panel)
-        _both(panel, (1.0, 1000.0))
-    style.frequency(bottom, (1.0, 1000.0))
-    top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
-    top.y.limits(-60.0, 40.0)
-    bottom.y.limits(-360.0, 0.0)
-    top.rule_y(0.0, colour=style.INK)
-    bottom.rule_y(-180.0, colour=style.INK)
+    for panel, label, low, high, level in (
+        (top, "magnitude, dB", -60.0, 40.0, 0.0),
+        (bottom, "phase, deg", -360.0, 0.0, -180.0),
+    ):
+        _both(panel, measured=True)
+        panel.y.label = label
+        panel.y.limits(low, high)
+        panel.rule_y(level, colour=style.INK)
+    style.frequency(bottom, HERTZ)
     return chart
 
 
@@ -74,16 +76,9 @@ def _nyquist() -> Chart:
     panel.rule_y(0.0)
     panel.rule_x(0.0)
     angles = [2.0 * math.pi * k / 72 for k in range(73)]
-    panel.curve(
-        [math.cos(a) for a in angles],
-        [math.sin(a) for a in angles],
-        colour=style.MUTED,
-        dash=2,
-        width=1.0,
-        read=False,
-    )
-    _pinned(panel)
-    _both(panel)
+    circle = [math.cos(a) for a in angles], [math.sin(a) for a in angles]
+    panel.curve(*circle, colour=style.MUTED, dash=2, width=1.0, read=False)
+    _both(panel, measured=True)
     panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
     panel.note("−1", (-1.0, 0.0))
     panel.x.limits(-1.0 - FRAME, FRAME - 0.35)
@@ -95,22 +90,33 @@ def _nyquist() -> Chart:
 def _sensitivity() -> Chart:
     chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
     panel = chart.panel()
-    ends = (1.0, 1000.0)
-    for name, colour in (("S", style.ORANGE), ("T", style.GREEN)):
-        _pinned(panel, f"{name} ", dash=4 if name == "T" else 0)
-        panel.curve(ends, (0.0, 0.0), f"{name} as designed", **{**BEFORE, "colour": colour, "opacity": 0.6})
-        panel.curve(ends, (0.0, 0.0), f"{name} as changed", colour=colour, width=2.0)
-    style.frequency(panel, ends)
+    for name, colour, dash in (("S", style.ORANGE, 0), ("T", style.GREEN, 4)):
+        for letter, pinned in PINNED:
+            _empty(panel, f"{name} {letter}", colour=pinned, width=1.5, dash=dash)
+        _empty(panel, f"{name} as designed", **{**BEFORE, "colour": colour, "opacity": 0.6})
+        _empty(panel, f"{name} as changed", colour=colour, width=2.0)
+    style.frequency(panel, HERTZ)
     panel.y.label = "magnitude, dB"
     panel.y.limits(-40.0, 15.0)
+    return chart
+
+
+def _difference() -> Chart:
+    chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
+    panels = chart.column(1.0, 1.0)
+    for panel, label in zip(panels, ("magnitude, dB", "phase, deg"), strict=True):
+        _empty(panel, "measured over model", colour=style.ORANGE, width=1.6)
+        panel.rule_y(0.0, colour=style.INK)
+        panel.y.label = label
+        panel.y.limits(-10.0, 10.0)
+    style.frequency(panels[-1], HERTZ)
     return chart
 
 
 def _step() -> Chart:
     chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
     panel = chart.panel()
-    panel.curve((0.0, 1.0), (1.0, 1.0), "command", colour=style.INK, width=1.0)
-    _pinned(panel)
+    _empty(panel, "command", colour=style.INK, width=1.0)
     _both(panel)
     panel.x.label, panel.y.label = "time, ms", "linear response to a unit step"
     panel.x.limits(0.0, 1.0)
@@ -119,35 +125,31 @@ def _step() -> Chart:
 
 
 def _run(unit: str, axis: Axis, electrical: bool) -> Chart:
-    traces = {"w": "speed", "i": "current", "u": "voltage"}
-    if not electrical:
-        del traces["i"]
-    labels = [
-        f"output, {unit}",
-        *(f"{words}, {SIGNALS[name].unit_for(axis)}" for name, words in traces.items()),
-    ]
+    traces = {"w": "speed", **({"i": "current"} if electrical else {}), "u": "voltage"}
+    labels = [f"output, {unit}"]
+    labels += [f"{words}, {SIGNALS[name].unit_for(axis)}" for name, words in traces.items()]
     chart = Chart(width=style.HALF, height=170.0 + 105.0 * len(traces))
     panels = chart.column(*([1.5] + [1.0] * len(traces)))
-    panels[0].curve((0.0, 1.0), (0.0, 0.0), "command", colour=style.INK, width=1.0)
-    panels[0].curve((0.0, 1.0), (0.0, 0.0), "measured record", colour=style.ORANGE, width=2.6, opacity=0.6)
+    _empty(panels[0], "command", colour=style.INK, width=1.0)
+    _empty(panels[0], "measured record", colour=style.ORANGE, width=2.6, opacity=0.6)
+    _empty(panels[0], "residual", colour=style.RED, width=1.2)
     for panel, label in zip(panels, labels, strict=True):
-        _both(panel)
+        _both(panel, pinned=False)
         panel.y.label = label
-        panel.y.limits(-0.1, 1.3)
+        panel.y.limits(-0.01, 0.13)  # room for ticks of as many digits
     panels[-1].x.label = "time, ms"
     panels[-1].x.limits(0.0, 1.0)
     return chart
 
 
 def _border(unit: str) -> Chart:
-    chart = Chart(width=style.HALF, height=290.0)
+    chart = Chart(width=style.HALF, height=265.0)
     panel = chart.panel()
-    ends = (1.0, 1000.0)
-    panel.curve(ends, (1.0, 1.0), "lowest, as designed", **BEFORE)
-    panel.curve(ends, (1.0, 1.0), "lowest, as changed", **{**NOW, "width": 2.6})
+    _empty(panel, "lowest, as designed", **BEFORE)
+    _empty(panel, "lowest, as changed", **{**NOW, "width": 2.6})
     for k, name in enumerate(BORDERS):
-        panel.curve(ends, (1.0, 1.0), name, colour=style.SERIES[k + 1], width=1.1)
-    style.frequency(panel, ends)
+        _empty(panel, name, colour=style.SERIES[k + 1], width=1.1)
+    style.frequency(panel, HERTZ)
     panel.y.log, panel.y.label = True, f"command amplitude, {unit}"
     panel.y.limits(1e-3, 1e3)
     return chart

@@ -60,6 +60,7 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
         return {"refused": f"{refused}."}
     result = followed(design, _figures(design))
     text, places = patches(design, result.free, source)
+    requirements, apart = _judged(design, result.figures, held)
     return {
         "name": design.name,
         "axis": design.axis,
@@ -80,8 +81,8 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
         "limiters": [[name, bit, LIMITERS[name].words, LIMITERS[name].signal] for name, bit in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
         "figures": [_followed(each) for each in LOOP_QUANTITIES.values() if each.followed],
-        "requirements": [*_on_loops(design, held), *_on_drive(design, result.figures)],
-        "apart": _apart(design, result.figures, held),
+        "requirements": requirements,
+        "apart": apart,
         "step": _step(design),
         "limits": [list(limit) for limit in page.limits_seen(design)],
         "borders": list(BORDERS),
@@ -134,64 +135,40 @@ def _limit(item: Requirement) -> FollowedLimit:
     }
 
 
-def _on_loops(design: Design, held: Collection[str]) -> list[FollowedLimit]:
-    """Give the requirements on loops, one for each loop that it holds for."""
+def _judged(
+    design: Design, figures: Mapping[Figure, list[list[str | float]]], held: Collection[str]
+) -> tuple[list[FollowedLimit], list[NotFollowed]]:
+    """Give the requirements that the page judges, one for each loop, and what the others limit.
+
+    ``figures``: those of the whole drive that follow, each with its statements.
+    """
     stages = tuple(name for name in LOOPS if name in design.controller.stages)
-    return [
-        {**_limit(item), "loop": loop}
-        for item in design.requirements
-        if item.quantity in LOOP_QUANTITIES and in_populations(item, design)
-        for loop in judged_loops(item.loop, stages)
-        if loop in stages and loop not in held
-    ]
+    followed: list[FollowedLimit] = []
+    apart: list[NotFollowed] = []
+    for item in design.requirements:
+        words, load = QUANTITIES[item.quantity].words, item.load_Nm or 0.0
+        if item.quantity not in LOOP_QUANTITIES:
+            lines = figures.get((item.quantity, load))
+            if lines is None:
+                apart.append({"id": item.id, "words": words})
+            else:
+                followed.append({**_limit(item), "load": load, "lines": lines})
+        elif not in_populations(item, design):
+            which = "rotor locked" if item.rotor == "locked" else f"to the {item.to or 'command'}"
+            apart.append({"id": item.id, "words": f"{words}, {which}"})
+        else:
+            for loop in judged_loops(item.loop, stages):
+                if loop in held:
+                    apart.append({"id": item.id, "words": f"{words}, {loop} loop held"})
+                elif loop in stages:
+                    followed.append({**_limit(item), "loop": loop})
+    return followed, apart
 
 
 def _figures(design: Design) -> list[Figure]:
     """Give the figures of the whole drive that requirements limit."""
-    return [
-        (item.quantity, item.load_Nm or 0.0)
-        for item in design.requirements
-        if item.quantity in DRIVE_QUANTITIES
-    ]
-
-
-def _on_drive(design: Design, figures: Mapping[Figure, list[list[str | float]]]) -> list[FollowedLimit]:
-    """Give the requirements on the whole drive whose figures follow, each with its statements."""
-    return [
-        {**_limit(item), "load": item.load_Nm or 0.0, "lines": figures[item.quantity, item.load_Nm or 0.0]}
-        for item in design.requirements
-        if (item.quantity, item.load_Nm or 0.0) in figures
-    ]
-
-
-def _apart(
-    design: Design, figures: Mapping[Figure, list[list[str | float]]], held: Collection[str]
-) -> list[NotFollowed]:
-    """Give the requirements that do not follow, with what they limit."""
-    stages = tuple(name for name in LOOPS if name in design.controller.stages)
-    of_held: list[NotFollowed] = [
-        {"id": item.id, "words": f"{QUANTITIES[item.quantity].words}, {loop} loop held"}
-        for item in design.requirements
-        if item.quantity in LOOP_QUANTITIES and in_populations(item, design)
-        for loop in judged_loops(item.loop, stages)
-        if loop in held
-    ]
-    of_held += [
-        {"id": item.id, "words": f"{QUANTITIES[item.quantity].words}, {_which(item)}"}
-        for item in design.requirements
-        if item.quantity in LOOP_QUANTITIES and not in_populations(item, design)
-    ]
-    others: list[NotFollowed] = [
-        {"id": item.id, "words": QUANTITIES[item.quantity].words}
-        for item in design.requirements
-        if item.quantity not in LOOP_QUANTITIES and (item.quantity, item.load_Nm or 0.0) not in figures
-    ]
-    return [*of_held, *others]
-
-
-def _which(item: Requirement) -> str:
-    """What the page does not follow of a figure of a loop."""
-    return "rotor locked" if item.rotor == "locked" else f"to the {item.to or 'command'}"
+    limited = (item for item in design.requirements if item.quantity in DRIVE_QUANTITIES)
+    return [(item.quantity, item.load_Nm or 0.0) for item in limited]
 
 
 def _step(design: Design) -> StepData:

@@ -11,6 +11,7 @@ from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block
 from reports.sections.limits import words_of
+from reports.sections.names import output_unit
 
 KINDS = {"gain": "loop gain, up", "delay": "delay at the loop"}
 NEXT_TO_NOTHING = 0.01  # of the linear margin
@@ -49,10 +50,16 @@ def remark(item: AmplitudeMargin) -> str:
     quiet = "" if item.friction_on else ", without dry friction,"
     acting = f" The {words_of(item.limiter)} acts." if item.limiter else ""
     return (
-        f"The {item.loop} loop{quiet} sustains an oscillation {cause} after release from "
+        f"The {item.loop} loop{quiet} sustains an oscillation{_of(item)} {cause} after release from "
         f"{100.0 * item.part:.0f} % of full range; the linear {item.kind} margin on the validation's "
         f"operating motion is {linear}.{acting}"
     )
+
+
+def _of(item: AmplitudeMargin) -> str:
+    """How large the oscillation is at the output, where it moves."""
+    scale, unit = output_unit(item.axis)
+    return f" of {scale * item.output:.2g} {unit} at the output" if item.output > 0.0 else ""
 
 
 def _already(item: AmplitudeMargin) -> bool:

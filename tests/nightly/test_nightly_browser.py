@@ -123,6 +123,9 @@ def test_trends_are_live_figures(page) -> None:
     assert "8.00 dB" in words
     page.locator(".chart").first.get_by_role("button", name="Zoom in").click()
     assert plot.locator(".panel.zoomed").count() == 1
+    page.locator(".chart").first.get_by_role("button", name="Show everything").click()
+    page.mouse.click(box["x"] + 0.97 * box["width"], box["y"] + 0.5 * box["height"])
+    page.wait_for_url("**/report.html")
 
 
 def test_a_broken_design_says_why(page) -> None:

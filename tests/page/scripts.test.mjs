@@ -11,7 +11,7 @@ const page = { "live-data": { textContent: JSON.stringify(row) }, "hands-on": {}
 globalThis.document = { getElementById: (name) => page[name] ?? null };
 
 const { Axis } = await import("../../reports/templates/page/axis.js");
-const { recordOf } = await import("../../reports/templates/page/columns.js");
+const { MEASURED, fitOf, guess, recordOf, responseOf, tableOf } = await import("../../reports/templates/page/columns.js");
 const { commandOf, lengthOf, spansOf } = await import("../../reports/templates/page/commands.js");
 const { unified } = await import("../../reports/templates/page/diff.js");
 const { checkOf, general } = await import("../../reports/templates/page/relations.js");
@@ -72,15 +72,38 @@ test("statements are what they say", () => {
   assert.deepEqual([...rowOf([])], [0, Infinity, 2]);
 });
 
-test("columns of a record are found by name and unit, or refused in words", () => {
-  const found = recordOf("a.csv", "# bench\ntime_ms;note;angle_deg;command_deg\n10;x;0;0\n20;x;90;180\n".replaceAll("x", "1"));
-  assert.deepEqual(found.time, [0, 0.01]);
+const read = (text, changed = {}, of = undefined) => {
+  const table = tableOf(text), found = guess(table, MEASURED.angle, changed.kind), choice = { ...found, columns: { ...found.columns, ...changed.columns }, units: { ...found.units, ...changed.units } };
+  return found.kind === "record" ? recordOf("a", table, choice, MEASURED.angle) : responseOf("a", table, choice, of);
+};
+test("columns are found by name and unit, or as chosen, or refused in words", () => {
+  const text = "# bench\ntime_ms;note;angle_deg;command_deg\n10;1;0;0\n20;1;90;180\nx;1;2;3\n", found = read(text);
+  assert.deepEqual([found.time, found.left], [[0, 0.01], 1]);
   near(found.angle[1], Math.PI / 2);
   near(found.scale, Math.PI);
-  assert.deepEqual(recordOf("b.csv", "0,1,2\n1,1,2\n").command, [1, 1]);
-  assert.throws(() => recordOf("c.csv", "time,angle\n0,1\n1,2\n"), /command/);
-  assert.throws(() => recordOf("d.csv", "time,command,angle\n1,0,0\n0,0,0\n"), /backwards/);
-  assert.throws(() => recordOf("e.csv", "time,command,angle\n1,0,0\n"), /two rows/);
+  near(read(text, { units: { command: "mrad" }, columns: { command: 1 } }).command[1], 1e-3);
+  assert.deepEqual(read("0,1,2\n1,1,2\n").command, [1, 1]);
+  assert.deepEqual(read("0;1,5;2\n1;1,5;2\n").command, [1.5, 1.5]);
+  for (const [told, words] of [["time,angle\n0,1\n1,2\n", /the command: choose/], ["time,command,angle\n1,0,0\n0,0,0\n", /backwards/], ["time,command,angle\n1,0,0\n1,0,0\n", /still/],
+    ["time,command,angle\n1,0,0\n", /two rows/], ["\0PNG", /no text/], ["", /nothing/], ["5\n6\n", /one column/], ["f_Hz,dB,deg\n0,1,2\n1,1,2\n", /above 0/],
+    ["f_Hz,re,phase\n1,1,2\n2,1,2\n", /real part goes/], ["f_Hz,dB,phase,coherence\n1,1,2,3\n2,1,2,1\n", /coherence/]]) assert.throws(() => read(told), words, told);
+});
+
+test("a response in any form is the open loop", () => {
+  for (const [text, of] of [
+    ["freq_Hz,mag_dB,phase_deg,coh\n5,13.979400086720375,-53.13010235415598,0.9\n2,0,0,1\n", "L"],
+    ["omega,gain_abs,phase_rad\n31.41592653589793,5,-0.9272952180016122\n1,1,1\n", "L"],
+    ["f_khz re im\n0.005 3 -4\n0.001 1 0\n", "L"],
+    ["f,re,im\n5,0.875,-0.125\n1,.5,0\n", "T"], // (3 - 4j) / (4 - 4j)
+    ["f,re,im\n5,0.125,0.125\n1,.5,0\n", "S"], // 1 / (4 - 4j)
+  ]) {
+    const { hertz, re, im } = read(text, {}, of);
+    assert.ok(hertz[0] < hertz[1]); // in order
+    for (const [found, wanted] of [[hertz[1], 5], [re[1], 3], [im[1], -4]]) near(found, wanted);
+  }
+  const { rms, fit } = fitOf([0, 2, 4], [1, 2, 3]);
+  near(rms, Math.sqrt(2 / 3));
+  near(fit, 50);
 });
 
 test("a check refuses in its words, with the values of then", () => {

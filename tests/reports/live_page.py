@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from typer.testing import CliRunner
 
+from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design
 from reports.build import design_report
 from reports.cli.app import build
@@ -38,7 +39,9 @@ def written(design: Design, folder: Path) -> Path:
     return path
 
 
-def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "", **options: Any) -> Page:
+def opened(
+    browser: Browser, path: Path, trouble: list[str], fragment: str = "", *, live: bool = True, **options: Any
+) -> Page:
     """Open a page from disk, offline; complaints and requests are collected."""
     chosen = {"viewport": {"width": 1400, "height": 1000}, **options}
     page = browser.new_context(offline=True, accept_downloads=True, **chosen).new_page()
@@ -47,7 +50,8 @@ def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "",
     page.on("pageerror", lambda error: trouble.append(str(error)))
     page.on("request", lambda r: trouble.append(r.url) if r.url.split("#")[0] != own else None)
     page.goto(own + fragment)
-    page.wait_for_selector("#hands-on[data-ready]", timeout=30_000)
+    if live:
+        page.wait_for_selector("#hands-on[data-ready]", timeout=30_000)
     return page
 
 
@@ -114,6 +118,19 @@ def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any]) -> None:
                 assert not math.isfinite(ours[loop][name]), (loop, name)
             elif math.isfinite(result[key]):
                 assert ours[loop][name] == pytest.approx(result[key], rel=1e-9, abs=1e-9), (loop, name)
+
+
+def same_figures(page: Page, design: Design, what: str = "") -> None:
+    """Compare every figure of every loop with those of the linear form; an unstable loop's S has no peak."""
+    theirs, ours = linear_figures(Population(design, {}, 1)), read(page)
+    for loop in theirs.loops:
+        for name in FIGURES:
+            wanted = float(theirs.quantity(name, loop)[0])
+            if math.isfinite(wanted):
+                assert ours[loop][name] == pytest.approx(wanted, rel=1e-9, abs=1e-9), (what, loop, name)
+            elif name == "sensitivity_peak" and not theirs.stable(loop)[0]:
+                assert math.isnan(wanted)
+                assert math.isnan(ours[loop][name])
 
 
 def saved(page: Page, path: Path) -> Path:

@@ -7,13 +7,14 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
-from live_page import opened, settled, type_value, written
+from live_page import opened, read, settled, type_value, written
 
 from actuator_lti import load_design
 from actuator_lti.design import with_values
 from nonlinear import simulate
-from nonlinear.commands import Command, ramp, sine, step
+from nonlinear.commands import Command, ramp, sampled, sine, step
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -71,6 +72,41 @@ def test_the_load_and_the_changed_design_are_in_the_run(page: Page) -> None:
     agree(found, step(math.radians(4.0)), 5.0, **{"control.position.gain": 80.0})
     ask(page, "step", Load=0.0)
     settled(page, lambda: page.click('[data-do="reset"]'))
+
+
+def test_a_step_of_a_drive_that_moves_is_that_of_the_simulator(page: Page) -> None:
+    """The motion goes on from rest until it is steady; then the step comes on top of it."""
+    found = ask(page, "step", Size=1.0, Moving=12.0, Duration=0.05)
+    before, ticks, period = int(found["before"]), int(found["ticks"]), load_design(DESIGN).controller.period_s
+    k = np.arange(before + ticks)
+    command = sampled(k * period, np.radians(12.0 * k * period + (k >= before)))
+    run = simulate(load_design(DESIGN), command, duration_s=k.size * period)
+    output = math.degrees(run.output_angle_rad[k[-1]]) - 12.0 * before * period
+    assert before > 100
+    assert found["output"] == pytest.approx(output, rel=1e-7)
+    assert found["speed"] == pytest.approx(run.motor_speed_rad_s[k[-1]], rel=1e-6)
+    ask(page, "step", Moving=0.0)
+
+
+def test_the_drive_is_drawn_as_it_stands_at_a_time(page: Page) -> None:
+    """Played to the end, by key and by the run's cursor: motor and load have turned by the same angle."""
+    found = ask(page, "step", Size=2.0, Duration=0.05)
+    slider = page.locator(".playback input")
+    slider.focus()
+    page.keyboard.press("End")
+    assert f"output {found['output']:.3f} deg" in page.inner_text(".play-keys")
+    turned = page.eval_on_selector_all(
+        ".playback [transform]", "all => all.map(n => +n.getAttribute('transform').match(/[-.\\d]+/)[0])"
+    )
+    assert turned == [pytest.approx(-60.0, rel=1e-3)] * 2
+    page.locator('[data-chart="run"] .plots').focus()
+    for _ in range(20):
+        page.keyboard.press("ArrowLeft")
+    told = page.inner_text('[data-chart="run"] .readout').split("time\t")[1].split(" ms")[0]
+    assert abs(float(page.inner_text(".play-keys").split("\n")[-1].split(" ms")[0]) - float(told)) < 0.2
+    page.click(".playback button")
+    page.wait_for_function("() => document.querySelector('.playback button').textContent === 'Play'")
+    assert slider.input_value() == "1000"
 
 
 def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
@@ -134,4 +170,12 @@ def test_growth_of_an_unstable_drive_is_seen(page: Page) -> None:
         late = [float(point.split(" ")[1]) for point in points[len(points) // 2 :]]
         swings.append(max(late) - min(late))
     assert swings[1] > 5.0 > 10.0 * swings[0]  # as changed it goes on, as designed it rests
+    settled(page, lambda: page.click('[data-do="reset"]'))
+    usual = ask(page, "step", Size=4.0, Duration=0.0)["ticks"]
+    # so little beyond its limit that a run of usual length still decays
+    limit = read(page)["position"]["gain_margin"]
+    gain = 120.0 * 10.0 ** (limit / 20.0) * 1.002
+    type_value(page, "control.position.gain", gain)
+    assert "unstable" in page.inner_text("table.now")
+    assert last(page)["ticks"] > usual
     settled(page, lambda: page.click('[data-do="reset"]'))

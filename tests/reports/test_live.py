@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,19 +73,10 @@ def made(tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def page(browser: Browser, made: Path, request) -> Iterator[Page]:
+def page(opens, made: Path, request) -> Page:
     """Open the page from disk, offline; any complaint and any request fails the test."""
-    options = {"viewport": {"width": 1400, "height": 1000}, **getattr(request, "param", {})}
-    context = browser.new_context(offline=True, **options)
-    opened = context.new_page()
-    trouble: list[str] = []
-    opened.on("console", lambda message: trouble.append(message.text))
-    opened.on("pageerror", lambda error: trouble.append(str(error)))
-    opened.on("request", lambda r: trouble.append(r.url) if r.url.split("#")[0] != made.as_uri() else None)
-    opened.goto(made.as_uri() + "#loop-current")  # which opens its fold
-    yield opened
-    context.close()
-    assert trouble == []
+    options = {"live": False, **getattr(request, "param", {})}
+    return opens(made, "#loop-current", **options)  # which opens its fold
 
 
 def chart(page: Page, k: int) -> Locator:

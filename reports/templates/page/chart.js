@@ -4,10 +4,9 @@ import { holdCurve, putMarks } from "./grips.js";
 import { Panel } from "./panel.js";
 import { saveAs } from "./picture.js";
 import { key, listen, wheel } from "./pointer.js";
-import { make } from "./svg.js";
-import { html } from "./words.js";
+import { html, make } from "./words.js";
 
-const closest = (list, value) => list.reduce((best, one, k) => (Math.abs(one - value) < Math.abs(list[best] - value) ? k : best), 0);
+export const closest = (list, value) => list.reduce((best, one, k) => (Math.abs(one - value) < Math.abs(list[best] - value) ? k : best), 0);
 
 export class Chart {
   constructor(root) {
@@ -40,6 +39,7 @@ export class Chart {
     root.addEventListener("chart:cells", (event) => this.cells(event.detail));
     root.addEventListener("chart:hold", (event) => holdCurve(this, event.detail));
     root.addEventListener("chart:marks", (event) => putMarks(this, event.detail));
+    root.addEventListener("chart:cursor", (event) => this.show(event.detail));
     root.addEventListener("chart:axes", (event) => this.rescale(event.detail));
   }
   legend() {
@@ -136,29 +136,25 @@ export class Chart {
     this.hide();
     this.root.dispatchEvent(new CustomEvent("chart:at", { detail: {} }));
   }
-  // shows a frequency that is pointed at in another figure of the loop; undefined: no more
-  show(hertz) {
+  // shows what is pointed at elsewhere, in every panel: a frequency (in a step half its period), or a place along x
+  show({ hertz = NaN, x = NaN }, look = "cursor") {
     if (this.pinned) return;
     for (const p of this.panels) {
       p.clear();
-      if (hertz === undefined) continue;
-      const at = p.x.unit === "Hz" ? hertz : p.x.seconds ? 0.5 / (hertz * p.x.seconds) : NaN;
-      if (Number.isFinite(at)) p.cursor(p.x.px(at), "cursor");
+      const at = p.x.unit === "Hz" ? hertz : p.x.seconds && hertz ? 0.5 / (hertz * p.x.seconds) : x, px = p.x.px(at);
+      if (Number.isFinite(px)) p.cursor(px, look);
       for (const curve of p.seen(this)) {
-        const q = curve.parameter ? curve.points[closest(curve.parameter, hertz)] : Number.isFinite(at) && p.at(curve, p.x.px(at));
+        const q = Number.isFinite(px) && !curve.parameter ? p.at(curve, px) : curve.parameter && hertz && curve.points[closest(curve.parameter, hertz)];
         if (q) p.dot(q);
       }
     }
   }
-  // shows a crossing: a frequency in every panel that has one
+  // shows a crossing, a frequency
   mark(hertz) {
-    const first = this.panels.find((p) => p.x.log && p.x.unit === "Hz");
-    const [at] = first.place(first.x.px(hertz), 0);
+    const first = this.panels.find((p) => p.x.log && p.x.unit === "Hz"), [at] = first.place(first.x.px(hertz), 0);
     if (at < first.left || at > first.right) this.reset();
-    for (const p of this.panels) {
-      p.clear();
-      if (p.x.log && p.x.unit === "Hz") p.cursor(p.x.px(hertz), "crossing");
-    }
+    this.pinned = null;
+    this.show({ hertz }, "crossing");
   }
   // gives the axes of a panel new ends: {panel, x: [low, high], y: [low, high], words}; curves are redrawn after it
   rescale({ panel, x, y, words }) {

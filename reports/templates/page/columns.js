@@ -1,24 +1,83 @@
-// Columns of a measured record: time, command, and what was measured.
-const MEASURED = /angle|pos|output|meas|actual|speed|current/i;
+// Measured data as columns of a text: a record in time (command, what was measured) or a frequency response.
+const TURN = 2 * Math.PI, DEGREE = Math.PI / 180;
+// units of a column: SI over each, and how a heading says it; the first where it says none
+const TIME = { s: [1], ms: [1e-3, /(_|\b)ms\b/i], "µs": [1e-6, /(_|\b)[uµ]s\b/i] };
+export const MEASURED = {
+  angle: { rad: [1], deg: [DEGREE, /deg|°/i], mrad: [1e-3, /mrad/i] }, length: { m: [1], mm: [1e-3, /(_|\b)mm\b/i], "µm": [1e-6, /(_|\b)[uµ]m\b/i] },
+  rate: { "rad/s": [1], "deg/s": [DEGREE, /deg|°/i], rpm: [TURN / 60, /rpm|1\/min/i] }, velocity: { "m/s": [1], "mm/s": [1e-3, /mm/i] }, current: { A: [1], mA: [1e-3, /(_|\b)mA\b/] },
+};
+// the columns of each kind of data: its words, how a heading names it, its units
+export const rolesOf = (kind, measured) => (kind === "response" ? {
+  frequency: { words: "Frequency", like: /^f(req|_|\b)|^omega|hz\b/i, units: { Hz: [1], "rad/s": [1 / TURN, /rad|omega/i], kHz: [1e3, /khz/i] } },
+  size: { words: "Magnitude", like: /mag|gain|abs|amp|db|^re(al)?(_|\b)/i, units: { dB: ["dB"], ratio: ["abs", /abs|ratio/i], "real part": ["re", /^re/i] } },
+  turn: { words: "Phase", like: /phase|arg|deg|^im(ag)?(_|\b)/i, units: { deg: [DEGREE], rad: [1, /rad/i], "imaginary part": ["im", /^im/i] } },
+  coherence: { words: "Coherence", like: /coh/i, units: { "1": [1] }, free: true },
+} : {
+  time: { words: "Time", like: /^t(ime)?(_|\b)|^time/i, units: TIME },
+  command: { words: "Command", like: /comm|^cmd|ref|target|demand/i, units: measured },
+  measured: { words: "Measured", like: /angle|pos|output|meas|actual|speed|current/i, units: measured },
+});
 
-// columns are found by their names, or taken in order; time in s, angles in rad, lengths in m
-export const recordOf = (name, text) => {
+// headings and rows of numbers; refused where it is no table
+export const tableOf = (text) => {
+  if (/[\0\ufffd]/.test(text)) throw new Error("no text: a table in text is read, its columns parted by comma, semicolon, tab or space");
   const lines = text.split(/\r?\n/).map((line) => line.trim()).filter((line) => line && !line.startsWith("#"));
-  const cut = lines[0].includes(";") ? ";" : lines[0].includes("\t") ? "\t" : ",";
-  const head = lines[0].split(cut).map((word) => word.trim().replace(/^"|"$/g, ""));
-  const titled = head.some((word) => Number.isNaN(Number(word)));
-  const column = (pattern, otherwise) => (titled ? head.findIndex((word) => pattern.test(word)) : otherwise);
-  const at = [column(/^t(ime)?\b|^time/i, 0), column(/comm|^cmd|ref|target|demand/i, 1), column(MEASURED, 2)];
-  if (at[0] < 0 || at[1] < 0) throw new Error("no column for time, or none for the command");
-  if (at[2] < 0 || at[2] === at[1]) at[2] = head.findIndex((word, k) => k !== at[0] && k !== at[1] && MEASURED.test(word));
-  if (at[2] < 0) throw new Error("no column for the angle");
-  const factor = (k) => (titled && /deg|°/i.test(head[k]) ? Math.PI / 180 : titled && /(_|\b)mm\b|_mm/i.test(head[k]) ? 1e-3 : 1);
-  const inTime = titled && /(_|\b)ms\b|_ms/i.test(head[at[0]]) ? 1e-3 : 1;
-  const table = lines.slice(titled ? 1 : 0).map((line) => line.split(cut).map(Number)).filter((row) => at.every((k) => Number.isFinite(row[k])));
-  if (table.length < 2) throw new Error("fewer than two rows of numbers");
-  const first = table[0][at[0]], time = table.map((row) => (row[at[0]] - first) * inTime);
+  if (!lines.length) throw new Error("nothing in it");
+  const cut = [";", "\t", ","].find((sign) => lines[0].includes(sign)) ?? /\s+/;
+  const fields = lines.map((line) => line.split(cut).map((word) => word.trim().replace(/^"|"$/g, "")));
+  const numbers = (row) => row.map((word) => (word === "" ? NaN : Number(cut === ";" ? word.replace(",", ".") : word)));
+  const titled = numbers(fields[0]).some(Number.isNaN), rows = fields.slice(titled ? 1 : 0).map(numbers);
+  if (fields[0].length < 2) throw new Error("one column only: columns are parted by comma, semicolon, tab or space");
+  if (rows.filter((row) => row.some(Number.isFinite)).length < 2) throw new Error("fewer than two rows of numbers");
+  return { rows, titled, head: titled ? fields[0] : fields[0].map((_, k) => `column ${k + 1}`) };
+};
+// which columns are what, by their names or in order (-1: none), and their units; kind is found where none is given
+export const guess = ({ head, titled }, measured, kind = undefined) => {
+  if (!kind) kind = titled && head.some((word) => rolesOf("response").frequency.like.test(word)) && !head.some((word) => rolesOf("record").time.like.test(word)) ? "response" : "record";
+  const roles = Object.entries(rolesOf(kind, measured)), columns = {}, units = {};
+  roles.forEach(([role, { like, units: known }], k) => {
+    const taken = Object.values(columns);
+    columns[role] = titled ? head.findIndex((word, at) => !taken.includes(at) && like.test(word)) : k < head.length ? k : -1;
+    units[role] = Object.keys(known).find((unit) => titled && known[unit][1]?.test(head[columns[role]] ?? "")) ?? Object.keys(known)[0];
+  });
+  return { kind, columns, units };
+};
+// rows whose chosen columns are numbers, by role, and the factor or form of each unit
+const taken = ({ rows }, { kind, columns, units }, measured) => {
+  const roles = rolesOf(kind, measured), wanted = Object.keys(roles).filter((role) => columns[role] >= 0);
+  const missing = Object.keys(roles).find((role) => columns[role] < 0 && !roles[role].free);
+  if (missing) throw new Error(`no column for the ${roles[missing].words.toLowerCase()}: choose one`);
+  const good = rows.filter((row) => wanted.every((role) => Number.isFinite(row[columns[role]])));
+  if (good.length < 2) throw new Error("fewer than two rows of numbers");
+  return { good, list: (role) => good.map((row) => row[columns[role]]), unit: (role) => roles[role].units[units[role]][0], left: rows.length - good.length };
+};
+export const recordOf = (name, table, choice, measured) => {
+  const { list, unit, left } = taken(table, choice, measured), clock = list("time"), scaled = (role) => list(role).map((value) => value * unit(role));
+  const time = clock.map((t) => (t - clock[0]) * unit("time"));
   if (time.some((t, k) => k && t < time[k - 1])) throw new Error("time runs backwards");
-  const command = table.map((row) => row[at[1]] * factor(at[1])), angle = table.map((row) => row[at[2]] * factor(at[2]));
-  const scale = command.reduce((most, value) => Math.max(most, Math.abs(value)), 0) || 1;
-  return { name, time, command, angle, scale, low: [...command, ...angle].reduce((least, value) => Math.min(least, value), 0) / scale };
+  if (!(time[time.length - 1] > 0)) throw new Error("time stands still");
+  const command = scaled("command"), scale = command.reduce((most, value) => Math.max(most, Math.abs(value)), 0) || 1;
+  return { name, time, command, angle: scaled("measured"), scale, left };
+};
+// of is what was measured: the open loop L, the closed loop T or the sensitivity S; each is turned into L
+export const responseOf = (name, table, choice, of = "L") => {
+  const { good, list, unit, left } = taken(table, choice), order = [...good.keys()], size = list("size"), turn = list("turn"), known = choice.columns.coherence >= 0;
+  const hertz = list("frequency").map((f) => f * unit("frequency")), weight = known ? list("coherence") : good.map(() => 1);
+  if (hertz.some((f) => !(f > 0))) throw new Error("a frequency that is not above 0");
+  if (weight.some((share) => share < 0 || share > 1)) throw new Error("a coherence outside 0 to 1");
+  const parts = unit("size") === "re";
+  if (parts !== (unit("turn") === "im")) throw new Error("a real part goes with an imaginary part, a magnitude with a phase");
+  const points = order.sort((a, b) => hertz[a] - hertz[b]).map((k) => {
+    const gain = unit("size") === "dB" ? 10 ** (size[k] / 20) : size[k], angle = turn[k] * unit("turn");
+    const [re, im] = parts ? [size[k], turn[k]] : [gain * Math.cos(angle), gain * Math.sin(angle)], far = of === "T" ? (1 - re) ** 2 + im ** 2 : re * re + im * im;
+    if (of === "T") return [(re - re * re - im * im) / far, im / far]; // T / (1 - T)
+    return of === "S" ? [re / far - 1, -im / far] : [re, im]; // 1 / S - 1
+  });
+  return { name, hertz: order.map((k) => hertz[k]), re: points.map(([re]) => re), im: points.map(([, im]) => im), weight: order.map((k) => weight[k]), known, left };
+};
+// rms of what a model leaves over, and its fit: 100 (1 - |y - model| / |y - mean of y|) per cent
+export const fitOf = (measured, model) => {
+  const mean = measured.reduce((sum, value) => sum + value, 0) / measured.length, norm = (list) => Math.sqrt(list.reduce((sum, value) => sum + value * value, 0));
+  const rest = norm(measured.map((value, k) => value - model[k]));
+  return { rms: rest / Math.sqrt(measured.length), fit: 100 * (1 - rest / norm(measured.map((value) => value - mean))) };
 };

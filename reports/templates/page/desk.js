@@ -15,6 +15,6 @@ export const LOOP_NAMES = { current: "Current loop", velocity: "Velocity loop", 
 export const POINT_NAMES = { "at w_ref": "Cut at the speed command", "at i_ref": "Cut at the current command", "at u": "Cut at the voltage" };
 export const BEHIND = -9; // a loop that follows in a moment, and one whose stability rounding decides
 export const DOUBT = -3;
-// as designed, as changed, the loop whose curves are seen, the limits that acted in the last run (bits)
+// as designed, as changed, the loop whose curves are seen, measured data, the limits that acted in the last run (bits)
 /** @type {any} */
-export const desk = { before: null, now: null, shown: outer, record: null, acted: 0, late: null, follow: () => {} };
+export const desk = { before: null, now: null, shown: outer, record: null, response: null, acted: 0, late: null, follow: () => {} };

@@ -1,11 +1,17 @@
 // Every figure of the page is made to live, and a row of a table that names a crossing shows it there.
-import { Chart } from "./chart.js";
+import { Chart, closest } from "./chart.js";
 import { all, html, unfold } from "./words.js";
 
 const charts = all(".chart").map((root) => new Chart(root));
 // one cursor through all figures of a loop
 for (const one of charts) if (one.loop) one.root.addEventListener("chart:at", (/** @type {any} */ { detail }) => {
-  for (const other of charts) if (other !== one && other.loop === one.loop) other.show(detail.hertz);
+  for (const other of charts) if (other !== one && other.loop === one.loop) other.show({ hertz: detail.hertz });
+});
+// a click on a night of a trend opens its report, or leads to its line where that is kept no more
+const nights = all("tr[data-night]"), days = nights.map((row) => Date.parse(row.dataset.night) / 864e5);
+for (const one of charts) if (nights.length && one.panels[0]?.x.days) one.root.addEventListener("chart:click", (/** @type {any} */ { detail }) => {
+  const row = nights[closest(days, detail.x)], link = row.querySelector("a");
+  if (link) link.click(); else row.scrollIntoView({ block: "center" });
 });
 for (const row of all("tr[data-loop][data-hz]")) {
   const own = charts.filter((c) => c.loop === row.dataset.loop && c.panels.some((p) => p.x.log && p.x.unit === "Hz"));

@@ -2,7 +2,7 @@
 import { data, find } from "./desk.js";
 import { inUnit, keys, past, start } from "./history.js";
 import { unified } from "./diff.js";
-import { give } from "./give.js";
+import { give } from "./words.js";
 
 export const changedText = () => {
   const places = data.patches.map((patch, k) => [patch, k]).filter(([, k]) => past.values[k] !== start[k]).sort((a, b) => a[0][0] - b[0][0] || a[0][1] - b[0][1]);

@@ -1,5 +1,5 @@
 // What can be taken hold of in a figure: a curve, or a handle on it; and marks that are drawn anew with the curves.
-import { make } from "./svg.js";
+import { make } from "./words.js";
 
 // values on the axes of a panel where the pointer is, inside its frame or not
 const valuesAt = (panel, back, event) => {

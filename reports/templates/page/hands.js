@@ -7,14 +7,15 @@ import { holdCurves, marginMarks, stepGain } from "./drag.js";
 import { changedText, copy, save, savePatch, sheet } from "./file.js";
 import { fragment, free, fromFragment, keys, past, pin, redo, reset, restore, start, undo, unpin } from "./history.js";
 import { borderOf, compute, load, slow } from "./module.js";
-import { take } from "./record.js";
+import { follow, playStart } from "./playback.js";
+import { forget, overLoop, overRun, take } from "./record.js";
 import { refusalOf } from "./relations.js";
 import { state } from "./requirements.js";
 import { makePanel, show } from "./sliders.js";
 import { table } from "./table.js";
-import { drawRuns, misfit, playSine, runKeys, runStart, trial, tried } from "./trial.js";
+import { drawRuns, playSine, runKeys, runStart, tried } from "./trial.js";
 import { drawPins, sideBySide } from "./variants.js";
-import { all, digits, html } from "./words.js";
+import { all, html } from "./words.js";
 
 let lastGood = start.slice();
 const drawLoop = (name) => {
@@ -22,17 +23,21 @@ const drawLoop = (name) => {
   if (!own.figures || !kept[name]) return;
   const curves = beside("as changed", name, own);
   if (curves) marginMarks(kept[name].hertz, curves);
+  overLoop();
 };
 const LONG_RUN = 20; // ms
 let runTook = 0;
-const runNow = () => {
-  const began = performance.now(), part = tried(desk.now.row);
+const runNow = (whole) => {
+  const began = performance.now(), part = tried(desk.now, whole);
   drawRuns(part);
+  follow(part);
   const acting = data.limiters.filter(([, bit]) => desk.acted & bit).map(([, , words]) => words);
   find(".acting").textContent = acting.length ? `Limits that act as changed: ${acting.join(", ")}.` : "No limit acts as changed.";
-  if (desk.record && part.y) find(".record").textContent = `${desk.record.name}: ${desk.record.time.length} samples. Model as changed: ${digits(misfit(part), 3)} % rms of the largest command; as designed: ${digits(misfit(trial.designed), 3)} %.`;
+  overRun(part);
   runTook = performance.now() - began;
+  if (part.more) desk.late = runOn;
 };
+const runOn = () => runNow(true);
 const update = () => {
   const began = performance.now();
   let refused = "";
@@ -49,8 +54,8 @@ const update = () => {
   find('[data-do="pin"]').disabled = Boolean(refused) || !free();
   drawLoop(desk.shown);
   drawBorder("as changed", borderOf(desk.now.row, border.grid));
-  if (runTook < LONG_RUN) runNow();
-  else desk.late = runNow; // too long for a moving slider
+  if (runTook < LONG_RUN) runNow(false);
+  else desk.late = runOn; // too long for a moving slider
   root.dataset.ms = (performance.now() - began).toFixed(1);
   fillBehind();
   root.dataset.count = String(+(root.dataset.count || 0) + 1);
@@ -89,8 +94,9 @@ const begin = () => {
     event.preventDefault();
     stepGain(by);
   });
-  chart("border").addEventListener("chart:click", (/** @type {any} */ { detail }) => playSine(detail.x, detail.y));
+  chart("border").addEventListener("chart:click", (/** @type {any} */ { detail }) => { forget("record"); playSine(detail.x, detail.y); });
   runKeys();
+  playStart();
   runStart();
   borderStart();
   choose(desk.shown);

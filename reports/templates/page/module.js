@@ -1,7 +1,6 @@
 // The module: loops, their figures and responses, limits and runs, all computed in WebAssembly.
 import { BEHIND, DOUBT, STABLE, data, desk } from "./desk.js";
 import { driveOf, rowOf } from "./row.js";
-import { meanAt } from "./mean.js";
 
 const TOO_SLOW = 6; // ms
 // its exports, once it is there
@@ -50,6 +49,10 @@ export const stepOf = (name, count) => {
   return x.step_of(stage, count) > 0 ? Array.from(view(x.y_at(), count)) : null;
 };
 
+export const meanAt = (row, turns) => { // gain and phase of the mean over n samples that limits the jerk
+  const n = row[data.places.mean], half = Math.PI * turns;
+  return n > 1 ? [Math.sin(n * half) / (n * Math.sin(half)), -half * (n - 1)] : [1, 0];
+};
 // command amplitude at which each limit is just reached, over frequency
 export const borderOf = (row, hertz) => {
   const ratio = row[data.places.ratio], T = row[data.places.outer], count = hertz.length;
@@ -61,26 +64,23 @@ export const borderOf = (row, hertz) => {
   const each = data.limits.map(([name, place, line]) => [name, hertz.map((f, k) => row[place] / (input * sizes[line * count + k]) / data.step.factor / (data.map ? Math.abs(meanAt(row, f * period)[0]) : 1))]);
   return { each, lowest: hertz.map((_, k) => Math.min(...each.map(([, values]) => values[k]))) };
 };
-// the drive with all its limits and its friction, from rest: y, the output as a share of the scale; motor speed,
-// current, voltage, and the flags of every tick
-export const run = (count, command, scale, moment) => {
+const SEEN = ["output", "angle", "speed", "current", "voltage", "flags"];
+// the drive with all its limits and its friction, from rest, `before` ticks before the first that is kept: what is
+// seen at every tick (angle: the motor's), and y, what follows the command as a share of the scale; ends where it fails
+export const run = (count, command, scale, moment, before = 0) => {
   desk.acted = 0;
   if (!x.start()) return null;
-  const at = data.places, io = view(x.io_at(), x.io_length()), flags = new Int32Array(count);
-  const [y, speed, current, voltage] = [0, 1, 2, 3].map(() => new Float64Array(count));
-  const ratio = view(x.p_at(), at.ratio + 1)[at.ratio];
-  const place = { output: at.output, speed: at.speed, current: at.current }[data.step.of];
-  const over = data.step.of === "speed" ? ratio * scale : scale;
-  for (let k = 0; k < count; k++) {
+  const at = data.places, io = view(x.io_at(), x.io_length()), places = SEEN.map((name) => at[name]), lists = SEEN.map(() => new Float64Array(count));
+  const over = scale * (data.step.of === "speed" ? view(x.p_at(), at.ratio + 1)[at.ratio] : 1);
+  let k = -before;
+  for (; k < count; k++) {
     io[at.command] = command(k);
     io[at.moment] = moment;
-    if (x.tick() !== 0) return { y: y.subarray(0, k), speed: speed.subarray(0, k), current: current.subarray(0, k), voltage: voltage.subarray(0, k), flags: flags.subarray(0, k) };
+    if (x.tick() !== 0) break;
+    if (k < 0) continue;
     desk.acted |= io[at.flags];
-    flags[k] = io[at.flags];
-    y[k] = io[place] / over;
-    speed[k] = io[at.speed];
-    current[k] = io[at.current];
-    voltage[k] = io[at.voltage];
+    for (let n = 0; n < places.length; n++) lists[n][k] = io[places[n]];
   }
-  return { y, speed, current, voltage, flags };
+  const part = Object.fromEntries(SEEN.map((name, n) => [name, lists[n].subarray(0, Math.max(k, 0))]));
+  return { ...part, y: part[data.step.of].map((value) => value / over) };
 };

@@ -1,7 +1,7 @@
 // One panel of a figure: its curves, its view, its ticks, and what is read from it.
 import { Axis } from "./axis.js";
-import { make } from "./svg.js";
 import { degreeTicks, linearTicks, logTicks } from "./ticks.js";
+import { make } from "./words.js";
 
 export class Panel {
   /** @type {any} */
@@ -27,7 +27,6 @@ export class Panel {
     this.uses = [...group.querySelectorAll(".marks use")].map((node) => ({ node, x: +node.getAttribute("x"), y: +node.getAttribute("y") }));
     this.notes = [...group.querySelectorAll(".note[data-at]")].map((node) => ({ node, at: node.dataset.at.split(" ").map(Number) }));
     this.first = { grid: group.querySelector(".grid").getAttribute("d"), edge: group.querySelector(".edge").getAttribute("d"), xt: [...group.querySelector(".xt").childNodes], yt: [...group.querySelector(".yt").childNodes] };
-    this.sample = group.querySelector(".xt text, .yt text");
     this.view = { sx: 1, tx: 0, sy: 1, ty: 0 };
     this.curves = [...group.querySelectorAll(".curve:not(.mute), .dots:not(.mute)")].map((node) => this.curve(node));
     this.over = make("g", { class: "over" }, group);

@@ -1,6 +1,5 @@
 // A figure as a file: SVG and PNG as it is seen, its curves as a table.
-import { give } from "./give.js";
-import { make } from "./svg.js";
+import { give, make } from "./words.js";
 
 const MARGIN = 10, KEY = 16, DENSE = 2; // DENSE: points of the PNG for one of the page
 // pictures side by side and the legend below, with the colours of now in place of their names

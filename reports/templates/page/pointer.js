@@ -1,7 +1,10 @@
 // Pointer, wheel and keys on a figure: read, zoom, pan.
-import { placeOf } from "./place.js";
-import { read, readAt } from "./readout.js";
+import { placeOf, read, readAt } from "./readout.js";
 
+const click = (chart, { panel, x, y }) => {
+  const [px, py] = panel.back(x, y);
+  chart.root.dispatchEvent(new CustomEvent("chart:click", { detail: { x: panel.x.value(px), y: panel.y.value(py) } }));
+};
 export const listen = (chart, picture) => {
   const held = new Map();
   let moved = false, gap = 0;
@@ -46,9 +49,7 @@ export const listen = (chart, picture) => {
     chart.hide();
     if (read(chart, picture, event) && !pinned) chart.pinned = true;
     const found = placeOf(picture, event);
-    if (!found) return;
-    const [px, py] = found.panel.back(found.x, found.y);
-    chart.root.dispatchEvent(new CustomEvent("chart:click", { detail: { x: found.panel.x.value(px), y: found.panel.y.value(py) } }));
+    if (found) click(chart, found);
   };
   for (const name of ["pointerup", "pointercancel"]) svg.addEventListener(name, release);
   svg.addEventListener("pointerleave", () => {
@@ -77,6 +78,7 @@ export const key = (chart, event) => {
   if (event.key === "+" || event.key === "=") chart.zoom(panel, chart.spot ?? middle[0], middle[1], 1.25);
   else if (event.key === "-") chart.zoom(panel, chart.spot ?? middle[0], middle[1], 0.8);
   else if (event.key === "0" || event.key === "Escape") chart.reset();
+  else if (event.key === "Enter" && chart.spot !== undefined) click(chart, { panel, x: chart.spot, y: chart.rise });
   else if (keys[event.key] && event.shiftKey) chart.pan(panel, -24 * keys[event.key][0], -24 * keys[event.key][1]);
   else if (keys[event.key]) {
     const size = panel.right - panel.left;

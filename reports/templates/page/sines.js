@@ -2,8 +2,7 @@
 // What a cell shows is named by the rule of analyses.large_signal.classify: the limit that acts most, stiction,
 // friction (of a drive that has any) or what else is not linear, linear.
 import { data } from "./desk.js";
-import { meanAt } from "./mean.js";
-import { view, x } from "./module.js";
+import { meanAt, view, x } from "./module.js";
 
 const { columns, levels, updates, lowest, stick, decibel, degrees, longest } = data.map || {};
 const at = data.places;

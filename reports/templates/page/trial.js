@@ -1,14 +1,15 @@
 // The run with limits and friction: a step, a sine, a ramp, or the command of a record.
+import { fitOf } from "./columns.js";
 import { KINDS, commandOf, lengthOf, spansOf } from "./commands.js";
 import { thinned } from "./curves.js";
-import { PLACE, data, desk, find, outer, tell } from "./desk.js";
+import { PLACE, STABLE, data, desk, find, outer, tell } from "./desk.js";
 import { start } from "./history.js";
 import { compute, run, view, x } from "./module.js";
 import { digits, html } from "./words.js";
 
 const { size: usual, unit: unitIn, factor } = data.step;
 /** @type {any} */
-export const trial = { kind: "step", size: usual, hertz: 1, rate: 1, moment: 0, chosen: 0, length: 0, designed: null };
+export const trial = { kind: "step", size: usual, hertz: 1, rate: 1, moment: 0, moving: 0, before: 0, chosen: 0, length: 0, span: 0, designed: null };
 const TRACES = ["output", "speed", ...(data.electrical ? ["current"] : []), "voltage"];
 const MOST = 60000, GROWTH = 6; // ticks of a run; how far beyond the run as designed the axes follow one that grows
 const held = (rec, T) => {
@@ -20,24 +21,44 @@ const held = (rec, T) => {
   };
 };
 const scaleOf = () => (desk.record ? desk.record.scale : trial.size);
-export const tried = (row) => {
-  view(x.p_at(), row.length).set(row);
-  const T = row[data.places.period], command = commandOf(trial);
-  const count = Math.min(Math.max(Math.ceil(trial.length / T), 2), MOST);
-  return { T, ...run(count, desk.record ? held(desk.record, T) : (k) => command(k * T), scaleOf(), trial.moment) };
+const unstable = ({ loops }) => data.loops.some((name) => loops[name].figures && loops[name].figures[STABLE] !== 1);
+// whether what is left between command and response is less in the last quarter than in the one before
+const decays = (y, command) => {
+  const most = (from, to) => y.subarray(from, to).reduce((high, value, k) => Math.max(high, Math.abs(value - command(from + k) / scaleOf())), 0);
+  const [half, last] = [0.5, 0.75].map((share) => Math.floor(share * y.length));
+  return most(last, y.length) < most(half, last);
+};
+// the motion under way, and runs that begin in it: angles from where the command then stood
+const motion = () => (data.step.of === "output" ? (t) => trial.moving * t : () => trial.moving);
+const shifted = (part, before, ratio) => {
+  if (data.step.of !== "output" || !before || !part) return part;
+  const by = trial.moving * before;
+  return { ...part, y: part.y.map((value) => value - by / scaleOf()), output: part.output.map((value) => value - by), angle: part.angle.map((value) => value - by * ratio) };
+};
+// runs a drive; one that is not stable goes on until its instability shows (whole), or is asked to (more)
+export const tried = (found, whole) => {
+  const { row } = found, { period, ratio } = data.places, T = row[period], shape = commandOf(trial), base = motion();
+  const before = desk.record ? 0 : Math.ceil(trial.before / T), command = desk.record ? held(desk.record, T) : (k) => base(k * T) + (k < 0 ? 0 : shape(k * T));
+  const asked = data.step.of === "output" && before ? (k) => command(k) + trial.moving * before * T : command;
+  for (let count = Math.min(Math.max(Math.ceil(trial.length / T), 2), MOST); ; count = Math.min(2 * count, MOST)) {
+    view(x.p_at(), row.length).set(row);
+    const part = shifted(run(count, asked, scaleOf(), trial.moment, before), before * T, row[ratio]);
+    const more = Boolean(part) && part.y.length === count && count < MOST && !trial.chosen && !desk.record && unstable(found) && decays(part.y, command);
+    if (!more || !whole) return { T, more, before, ratio: row[ratio], ...part };
+  }
 };
 const measure = () => { // how long the run takes: that of a step, as designed, till it has settled
   const T = desk.before.row[data.places.period];
-  if (desk.record) { trial.length = desk.record.time[desk.record.time.length - 1]; return; }
-  if (trial.chosen) { trial.length = trial.chosen; return; }
   view(x.p_at(), desk.before.row.length).set(desk.before.row);
   const y = run(Math.min(Math.ceil(6 / T), 6000), () => trial.size, trial.size, trial.moment)?.y || [];
   let last = 0;
   for (let k = 0; k < y.length; k++) if (Math.abs(y[k] - 1) > 0.02) last = k;
-  trial.length = Math.min(lengthOf(trial, Math.max(1.4 * last, 60) * T), MOST * T);
+  const settled = Math.max(1.4 * last, 60) * T;
+  trial.before = trial.moving ? settled : 0;
+  trial.length = desk.record ? desk.record.time[desk.record.time.length - 1] : trial.chosen || Math.min(lengthOf(trial, settled), MOST * T);
 };
 /** @type {() => [number, string]} */
-export const unitOf = () => (trial.length < 2 ? [1e3, "ms"] : [1, "s"]);
+export const unitOf = () => (trial.span < 2 ? [1e3, "ms"] : [1, "s"]);
 const traceOf = (part, name) => (name === "output" ? part.y.map((value) => value * scaleOf() / factor) : part[name]);
 const rangeOf = (lists) => lists.reduce(([low, high], list) => list.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [low, high]), [0, 0]);
 const draw = (label, part, panel, values) => {
@@ -59,14 +80,16 @@ const shade = (part, ends) => {
   cells.forEach((list, panel) => tell("run", "chart:cells", { panel, cells: list }));
 };
 export const drawRuns = (part) => {
-  const { designed } = trial, [unit, words] = unitOf(), command = commandLine();
-  if (!part.y || !designed.y) return;
+  const { designed } = trial;
+  if (!part.y?.length || !designed.y?.length) return;
+  trial.span = Math.max(trial.length, part.y.length * part.T, designed.y.length * designed.T);
+  const [unit, words] = unitOf(), command = commandLine();
   const ends = TRACES.map((name, panel) => {
     const known = traceOf(designed, name), own = traceOf(part, name), first = panel === 0;
     const [low, high] = rangeOf([known, ...(first ? [command[1], ...(desk.record ? [desk.record.angle.map((value) => value / factor)] : [])] : [])]), span = high - low || 1;
     const [least, most] = rangeOf([[low, high], own]).map((value) => Math.min(Math.max(value, low - GROWTH * span), high + GROWTH * span));
     const room = 0.08 * (most - least || 1), y = [least - room, most + room];
-    tell("run", "chart:axes", { panel, x: [0, trial.length * unit], y, words: panel === TRACES.length - 1 ? words : undefined });
+    tell("run", "chart:axes", { panel, x: [0, trial.span * unit], y, words: panel === TRACES.length - 1 ? words : undefined });
     draw("as designed", designed, panel, known);
     draw("as changed", part, panel, own);
     return y;
@@ -75,25 +98,23 @@ export const drawRuns = (part) => {
   const dots = desk.record ? [desk.record.time.map((t) => t * unit), desk.record.angle.map((value) => value / factor)] : [[], []];
   tell("run", "chart:redraw", { panel: 0, curve: "measured record", x: dots[0], y: dots[1] });
   shade(part, ends);
-  find(".hands-run").dataset.last = JSON.stringify(Object.fromEntries([["ticks", part.y.length], ...TRACES.map((name) => [name, traceOf(part, name)[part.y.length - 1]])]));
+  find(".hands-run").dataset.last = JSON.stringify(Object.fromEntries([["ticks", part.y.length], ["before", part.before], ...TRACES.map((name) => [name, traceOf(part, name)[part.y.length - 1]])]));
 };
 const commandLine = () => {
   const [unit] = unitOf(), rec = desk.record;
   if (rec) return [rec.time.map((t) => t * unit), rec.command.map((value) => value / factor)];
-  const at = Array.from({ length: 401 }, (_, k) => k * trial.length / 400), command = commandOf(trial);
-  return [at.map((t) => t * unit), at.map((t) => command(t) / factor)];
+  const at = Array.from({ length: 401 }, (_, k) => k * trial.span / 400), command = commandOf(trial), base = motion();
+  return [at.map((t) => t * unit), at.map((t) => (base(t) + command(t)) / factor)];
 };
 export const runStart = () => {
   measure();
-  trial.designed = tried(desk.before.row);
+  trial.designed = tried(desk.before, true);
 };
-export const misfit = (part) => {
-  let sum = 0, n = 0;
-  desk.record.time.forEach((t, k) => {
-    const at = Math.round(t / part.T);
-    if (at < part.y.length) { sum += (part.y[at] - desk.record.angle[k] / desk.record.scale) ** 2; n++; }
-  });
-  return n ? 100 * Math.sqrt(sum / n) : NaN;
+// what the run of a record's command leaves over of it, as a curve and in figures
+export const residual = (part) => {
+  const { time, angle, scale } = desk.record, [unit] = unitOf(), kept = time.map((t) => Math.round(t / part.T)).filter((at) => at < part.y.length);
+  const measured = kept.map((_, k) => angle[k] / scale), model = kept.map((at) => part.y[at]);
+  return { x: kept.map((_, k) => time[k] * unit), y: measured.map((value, k) => (value - model[k]) * scale / factor), ...fitOf(measured, model) };
 };
 
 const again = () => {
@@ -106,13 +127,12 @@ const show = () => {
   find(".run-kind").value = trial.kind;
   for (const [name, { label, field, read }] of Object.entries(fields)) {
     label.hidden = (name === "hertz" && trial.kind !== "sine") || (name === "rate" && !["ramp", "back"].includes(trial.kind));
-    field.value = trial[name] || name === "moment" ? digits(read(trial[name]), 4).replace("−", "-") : "";
+    field.value = trial[name] || ["moment", "moving"].includes(name) ? digits(read(trial[name]), 4).replace("−", "-") : "";
   }
 };
 // the sine of a place on the map of limits
 export const playSine = (hertz, amplitude) => {
   Object.assign(trial, { kind: "sine", hertz, size: amplitude * factor });
-  desk.record = null;
   show();
   again();
 };
@@ -149,7 +169,8 @@ export const runKeys = () => {
   make("size", `Size, ${unitIn}:`, factor, (value) => value !== 0);
   make("hertz", "Frequency, Hz:", 1, (value) => value > 0);
   make("rate", `Rate, ${unitIn}/s:`, factor, (value) => value > 0);
-  if (data.step.of === "output") make("moment", data.axis === "linear" ? "Load force, N:" : "Load torque, N m:", 1, () => true);
+  if (data.step.of === "output") make("moment", data.axis === "linear" ? "Load, N:" : "Load, N m:", 1, () => true);
+  if (data.step.of !== "current") make("moving", `Moving, ${data.step.of === "output" ? `${unitIn}/s` : unitIn}:`, factor, () => true);
   make("chosen", "Duration, s:", 1, (value) => value >= 0);
   show();
 };

@@ -39,3 +39,19 @@ export const digits = (value, count) => {
   if (size < -4 || size > 6) return minus(value.toExponential(Math.max(count - 1, 0)));
   return minus(value.toFixed(Math.min(Math.max(count - 1 - size, 0), 12)));
 };
+// an element of an SVG: the SVG on the page says its name space, the scripts name no address
+/** @type {(name: string, attributes: Record<string, any>, parent?: Element) => any} */
+export const make = (name, attributes, parent) => {
+  const made = document.createElementNS(document.querySelector(".plot").namespaceURI, name);
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  if (parent) parent.append(made);
+  return made;
+};
+// a file that is saved from the page
+export const give = (name, content, type = "text/plain") => {
+  const link = html("a"), address = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
+  link.href = address;
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(address), 1000);
+};

@@ -1,0 +1,55 @@
+"""Ten questions of a new user, on six drives: each is answered within two clicks, in words and figures."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.design.loader import shipped_designs
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+HANDS, SIZE = '.toc a[href="#hands-on"]', ".run-keys label:has-text('Size') input"
+EACH, LOOPS = "#answer details.fold > summary", "table.loops"
+# question: what is clicked (and typed), where the answer stands, and what it looks like
+QUESTIONS = {
+    "Is it good?": ([], ".masthead .overall", r"\d+ of \d+ requirements met"),
+    "Which loop is worst?": ([], ".weakest strong", r"(Current|Velocity|Position) loop"),
+    "By how much?": ([], ".weakest", r"not stable|margin [−-]?[\d.]+.*(inside|beyond)"),
+    "Who checked that?": ([], ".said a", r"checked|checks"),
+    "Is it linear?": ([], '.said a[href="#limits"]', r"linear up to [\d.]+ Hz; above, the .+ acts"),
+    "What is nearest?": ([], ".bar-row >> nth=0", r"[\d.]+\n?\s*[≥≤] [\d.]+"),
+    "How fast is it?": ([EACH], LOOPS, r"bandwidth[\s\S]+[\d.]+ "),
+    "How much delay can I add?": ([HANDS], "#hands-on .now", r"Delay margin ms[\s\S]+loop\t[\s\S]+\d"),
+    "What happens at 20?": ([HANDS, SIZE], ".acting", r"^(No limit acts|Limits that act).+changed"),
+    "What is assumed?": (['.toc a[href="#parameters"]'], "#parameters", r"\d+ of them are assumed"),
+    "Where is phase lost?": (['.toc a[href="#delays"]'], "#delays", r"delay[\s\S]+deg"),
+}  # fmt: skip
+DRIVES = ("ballscrew", "emps", "fin", "ilr33-amber", "ilr33-amber-compliant", "joint")
+
+
+@pytest.mark.parametrize("name", DRIVES)
+def test_ten_questions_are_answered_within_two_clicks(opens, name: str) -> None:
+    assert name in shipped_designs()
+    page: Page = opens(load_design(name))
+    page.set_viewport_size({"width": 1400, "height": 900})
+    for question, (clicks, place, pattern) in QUESTIONS.items():
+        assert len(clicks) <= 2
+        page.goto(page.url.split("#")[0] + "#content")
+        for each in clicks:
+            page.click(each)
+        if SIZE in clicks:
+            page.fill(SIZE, "20")
+            page.press(SIZE, "Enter")
+            page.wait_for_selector("#hands-on[data-behind=done]")
+        answer = page.locator(place).first
+        assert answer.is_visible(), question
+        assert re.search(pattern, answer.inner_text()), (question, answer.inner_text())
+        if not clicks:  # seen without scrolling
+            box = answer.bounding_box()
+            assert box is not None
+            assert box["y"] + box["height"] <= 900, question
