@@ -41,18 +41,8 @@ def written(folder: Path, design: Design, *, single: bool, prefix: str = "drive_
 
 def worst_of(folder: Path) -> dict[str, tuple[float, float]]:
     """Runs the vectors; difference and bound of each signal."""
-    gcc(
-        folder,
-        "-std=c99",
-        "-O1",
-        "-ffp-contract=off",
-        *STRICT[:6],
-        "main.c",
-        "controller.c",
-        "-lm",
-        "-o",
-        "run",
-    )
+    call = ("-std=c99", "-O1", "-ffp-contract=off", *STRICT[:6], "main.c", "controller.c", "-lm", "-o", "run")
+    gcc(folder, *call)
     done = subprocess.run([str(folder / "run")], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
     rows = [line.split(",") for line in done.stdout.splitlines()[2:-1]]
