@@ -48,33 +48,33 @@ def rows(quick: bool = False) -> Iterable[Row]:
 
 def history_rows(folder: Path, nights: int) -> Iterator[Row]:
     """Every figure of every design moves every night: the worst that a history can be asked to keep."""
-    with open_history(folder) as history:
-        fill(history, nights)
+    history = open_history(folder)
+    fill(history, nights)
     size = sum(p.stat().st_size for p in folder.rglob("*.json")) / 1e6
     what = f"{DESIGNS} designs, {FIGURES} figures, {nights} nights, all moving"
     yield Row(group=GROUP, name=f"history on disk: {what}", measured=size, unit="MB", target=0.3 * nights)
     study = Study(name="bench", jobs=())
     change_points(np.arange(10.0), 0.1)  # imports what it needs
-    with open_history(folder) as history:
-        start = time.process_time()
-        night = overview(history, Cache(folder / "cache"), study)
-        text = index(night, "nights/x")
-        yield Row(
-            group=GROUP,
-            name="index page from it",
-            measured=time.process_time() - start,
-            unit="s",
-            target=0.5,
-            note="processor time",
-        )
-        start = time.process_time()
-        for design in night.designs[:PAGES]:
-            text += design_page(night, design, history, set())
-        taken = (time.process_time() - start) / PAGES
-        yield Row(
-            group=GROUP, name="page of a design from it", measured=taken, unit="s", target=0.5,
-            note=f"processor time, mean of {PAGES} pages; the first reads every night",
-        )  # fmt: skip
+    history = open_history(folder)
+    start = time.process_time()
+    night = overview(history, Cache(folder / "cache"), study)
+    text = index(night, "nights/x")
+    yield Row(
+        group=GROUP,
+        name="index page from it",
+        measured=time.process_time() - start,
+        unit="s",
+        target=0.5,
+        note="processor time",
+    )
+    start = time.process_time()
+    for design in night.designs[:PAGES]:
+        text += design_page(night, design, history, set())
+    taken = (time.process_time() - start) / PAGES
+    yield Row(
+        group=GROUP, name="page of a design from it", measured=taken, unit="s", target=0.5,
+        note=f"processor time, mean of {PAGES} pages; the first reads every night",
+    )  # fmt: skip
 
 
 def fill(history: History, nights: int) -> None:

@@ -188,9 +188,9 @@ ANALYSES = (
         name="stiffness",
         group="Linear loops",
         words="""
-        Dynamic and static stiffness and lost motion, checked by an injected moment.
+        Dynamic and static stiffness and lost motion, checked by the simulator.
 
-        Met where the simulator, with moments injected, agrees; not proven where no position loop holds the
+        Met where the simulator agrees; not proven where no position loop holds the
         output. The exit status is 1 where it is not met, or not proven.
         """,
     ),
@@ -286,7 +286,7 @@ ANALYSES = (
         Identify a drive from bench records, and write the result as a design with
         tolerances.
 
-        Three ways to call it:
+        Four ways to call it:
 
         identify campaign.toml --out result: C0, Cv and CM from the steady parts
         of many runs. A bad run is set aside and named, the others go on.
@@ -299,6 +299,9 @@ ANALYSES = (
 
         identify --frequency-response chirp.csv --play reversal.csv --design my.toml:
         inertias, stiffness, damping and play of a two-mass drive.
+
+        identify --plan my.toml --within 2 --out result: motions that make the
+        intervals as small as asked; with records after it, what to measure next.
 
         Every column of every file is accounted for. Each record is held against
         itself and against the design's limits, and the written design against the

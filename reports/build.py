@@ -145,11 +145,7 @@ def design_report(
     ]
     doc.waived(sections, design)
     with isolated() as unanswered:
-        items = (
-            [item for block in doc.walk(loops[0]) if block["kind"] == "verdicts" for item in block["items"]]
-            if loops
-            else []
-        )
+        items = doc.judged(doc.walk(loops[0])) if loops else []
         answered = attempt(
             "first screen",
             lambda: answer.section(
@@ -328,10 +324,4 @@ def closing_sections(
 
 def design_head(design: Design) -> Tree:
     """Give what a document says of its design."""
-    return {
-        "name": design.name,
-        "title": design.title,
-        "revision": design.revision,
-        "origin": design.origin,
-        "axis": design.axis,
-    }
+    return {name: getattr(design, name) for name in ("name", "title", "revision", "origin", "axis")}

@@ -277,10 +277,9 @@ def verdict(
 
 def waived(sections: Iterable[Section], design: Design) -> None:
     """Mark in place the checks not proven that the design file waives; its requirements know it already."""
-    for block in (block for part in sections for block in walk(part) if block["kind"] == "verdicts"):
-        for item in block["items"]:
-            waiver = design.waiver_of(item["id"]) if item["verdict"] == Verdict.NOT_PROVEN else None
-            item["waiver"] = item["waiver"] or (waiver.words if waiver else "")
+    for item in judged(block for part in sections for block in walk(part)):
+        waiver = design.waiver_of(item["id"]) if item["verdict"] == Verdict.NOT_PROVEN else None
+        item["waiver"] = item["waiver"] or (waiver.words if waiver else "")
 
 
 def verdicts(items: Iterable[VerdictItem], what: str = "requirements") -> Block:

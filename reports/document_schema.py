@@ -37,12 +37,7 @@ Judged = Literal["met", "not met", "not proven"]
 Scalar = None | bool | int | float | str
 Format = Annotated[str, Field(pattern=r"^(text|yesno|int|fix:1?[0-9]|(sig|short|ms):(1?[1-9]|10))$")]
 
-_strict = with_config(
-    ConfigDict(strict=True, extra="allow", allow_inf_nan=False)
-)  # no NaN; more keys may stand
 
-
-@_strict
 class Mark(TypedDict):
     """A cell with a state."""
 
@@ -50,7 +45,6 @@ class Mark(TypedDict):
     status: Status | Literal[""] | None
 
 
-@_strict
 class State(TypedDict):
     """A word with a state that is known."""
 
@@ -74,7 +68,6 @@ def _row_state(row: Tree) -> Tree:
 Row = Annotated[dict[str, Cell], AfterValidator(_row_state)]
 
 
-@_strict
 class Column(TypedDict):
     """A column of a table; see `reports.document.column`."""
 
@@ -86,7 +79,6 @@ class Column(TypedDict):
     better: NotRequired[int]
 
 
-@_strict
 class TableBlock(TypedDict):
     """A table."""
 
@@ -97,7 +89,6 @@ class TableBlock(TypedDict):
     note: NotRequired[str]
 
 
-@_strict
 class FigureBlock(TypedDict):
     """A figure: its chart (`reports.charts.data`) is drawn as it stands."""
 
@@ -109,7 +100,6 @@ class FigureBlock(TypedDict):
     layout: NotRequired[Layout]
 
 
-@_strict
 class TextBlock(TypedDict):
     """Paragraphs."""
 
@@ -117,7 +107,6 @@ class TextBlock(TypedDict):
     text: str
 
 
-@_strict
 class FactItem(TypedDict):
     """A labelled value."""
 
@@ -127,7 +116,6 @@ class FactItem(TypedDict):
     better: NotRequired[int]
 
 
-@_strict
 class FactsBlock(TypedDict):
     """Labelled values."""
 
@@ -135,7 +123,6 @@ class FactsBlock(TypedDict):
     items: list[FactItem]
 
 
-@_strict
 class VerdictItem(TypedDict):
     """One verdict; ``waiver`` says by what one that is not proven is waived, else it is empty.
 
@@ -158,7 +145,6 @@ class VerdictItem(TypedDict):
     gathers: NotRequired[Counts]
 
 
-@_strict
 class VerdictsBlock(TypedDict):
     """Verdicts of one kind."""
 
@@ -167,7 +153,6 @@ class VerdictsBlock(TypedDict):
     what: NotRequired[str]
 
 
-@_strict
 class DetailsBlock(TypedDict):
     """Blocks that open on demand."""
 
@@ -176,7 +161,6 @@ class DetailsBlock(TypedDict):
     blocks: list[Block]
 
 
-@_strict
 class GlanceFigure(TypedDict):
     """One figure of a loop on the first screen, with the limit that is nearest to it."""
 
@@ -191,7 +175,6 @@ class GlanceFigure(TypedDict):
     spread: NotRequired[str]
 
 
-@_strict
 class GlanceLoop(TypedDict):
     """One loop on the first screen."""
 
@@ -201,7 +184,6 @@ class GlanceLoop(TypedDict):
     figures: list[GlanceFigure]
 
 
-@_strict
 class FindingItem(TypedDict):
     """One sentence that a reader must know."""
 
@@ -210,7 +192,6 @@ class FindingItem(TypedDict):
     where: str
 
 
-@_strict
 class Weakest(TypedDict):
     """The margin of all views that has least left to its limit, in words."""
 
@@ -220,7 +201,6 @@ class Weakest(TypedDict):
     move: NotRequired[str]
 
 
-@_strict
 class Bar(TypedDict):
     """A requirement on the first screen; ``band``: between which values its figure lies at the corners."""
 
@@ -234,7 +214,6 @@ class Bar(TypedDict):
     band: list[float] | None
 
 
-@_strict
 class GlanceBlock(TypedDict):
     """The first screen."""
 
@@ -255,7 +234,6 @@ Block = Annotated[
 ]
 
 
-@_strict
 class Section(TypedDict):
     """A section."""
 
@@ -269,7 +247,6 @@ class Section(TypedDict):
     blocks: list[Block]
 
 
-@_strict
 class Counts(TypedDict):
     """Verdicts of one kind, counted."""
 
@@ -279,7 +256,6 @@ class Counts(TypedDict):
     waived: int
 
 
-@_strict
 class Verdict(TypedDict):
     """The verdicts of the whole document: the worst of them, and the count of each kind."""
 
@@ -290,7 +266,6 @@ class Verdict(TypedDict):
     unproven_sections: NotRequired[list[str]]
 
 
-@_strict
 class Provenance(TypedDict):
     """By whom, of what and when it was made; more may stand."""
 
@@ -300,7 +275,7 @@ class Provenance(TypedDict):
     design_hash: NotRequired[str | None]
 
 
-@_strict
+@with_config(ConfigDict(strict=True, extra="allow", allow_inf_nan=False))  # no NaN; more keys may stand
 class Document(TypedDict):
     """A whole report.json."""
 

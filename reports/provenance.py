@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import shutil
 import subprocess
 from datetime import UTC, datetime
 from functools import cache
@@ -14,14 +15,18 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
 
 LIBRARIES = ("control", "numpy", "scipy", "matplotlib", "jinja2")
+_SAFE = (
+    "--no-pager", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null", "-c",
+    "log.showSignature=false", "-c", "core.pager=cat", "-c", "protocol.allow=never",
+)  # fmt: skip
 
 
-def package_version() -> str:
-    """Give the version of the installed distribution."""
+def package_version(name: str = "actuator-lti", otherwise: str = "not installed") -> str:
+    """Give the version of an installed distribution."""
     try:
-        return version("actuator-lti")
+        return version(name)
     except PackageNotFoundError:
-        return "not installed"
+        return otherwise
 
 
 def provenance(design_hash: str | None = None) -> Tree:
@@ -42,7 +47,7 @@ def provenance(design_hash: str | None = None) -> Tree:
         "time": build_time(),
         "python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
-        "libraries": {name: version(name) for name in LIBRARIES},
+        "libraries": {name: package_version(name) for name in LIBRARIES},
     }
 
 
@@ -63,18 +68,27 @@ def commit() -> str | None:
     root = Path(__file__).resolve().parent.parent
     if not (root / ".git").exists():
         return None
-    head = _git(root, "rev-parse", "HEAD")
+    head = git(root, "rev-parse", "HEAD")
     if head is None:
         return None
-    changed = _git(root, "status", "--porcelain", "--untracked-files=no")
+    changed = git(root, "status", "--porcelain", "--untracked-files=no")
     return head + ("+changes" if changed else "")
 
 
-def _git(root: Path, *arguments: str) -> str | None:
-    """Run git quietly; ``None`` where it is missing or fails."""
-    command = ["git", "-C", str(root), *arguments]
+def git(place: Path, *arguments: str) -> str | None:
+    """What git says of the work tree of a file or folder; ``None`` where it is missing or fails.
+
+    A work tree is data: nothing that its own configuration names is started.
+    """
+    program = shutil.which("git")
+    folder = place if place.is_dir() else place.parent
+    if program is None or not folder.is_dir():
+        return None
+    environment = {name: os.environ[name] for name in ("HOME", "SYSTEMROOT") if name in os.environ}
+    environment |= {"PATH": os.defpath, "GIT_TERMINAL_PROMPT": "0", "GIT_OPTIONAL_LOCKS": "0", "LC_ALL": "C"}
+    command = [program, *_SAFE, "-C", str(folder), *arguments]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=False)
+        done = subprocess.run(command, capture_output=True, timeout=10, check=False, env=environment)
     except (OSError, subprocess.TimeoutExpired):
         return None
-    return done.stdout.strip() if done.returncode == 0 else None
+    return done.stdout.decode("utf-8", "replace").strip() if done.returncode == 0 else None

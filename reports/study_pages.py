@@ -22,11 +22,7 @@ def study_document(
     from reports.sections import provenance as provenance_section
 
     head, origin = design_head(design), provenance(design_hash(design))
+    parts = [*sections, provenance_section.section(head, origin)]
     return doc.document(
-        title=title,
-        subtitle=subtitle,
-        design=head,
-        provenance=origin,
-        sections=[*sections, provenance_section.section(head, origin)],
-        kind=kind,
+        title=title, subtitle=subtitle, design=head, provenance=origin, sections=parts, kind=kind
     )

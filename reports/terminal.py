@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from actuator_lti.asked.verdict import Verdict
+from reports import document as doc
 from reports.cli.output import console, printable
 from reports.html import show_signed
 from reports.numbers import show
@@ -20,6 +21,7 @@ from reports.verdict_summary import role, why
 
 COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}
 WRAPPED = 26  # characters; a cell of text is not broken into narrower lines
+VERDICT_WRAPPED = 18
 SIGNS = {"pass": "✓", "fail": "✗", "warn": "?", "info": "–"}
 HEADS = {"met": "PASS", "not met": "FAIL", "not proven": "NOT PROVEN"}
 
@@ -75,18 +77,18 @@ def print_section(section: Mapping[str, Any], passed: bool | Verdict | None, nam
 
 def _print(block: Mapping[str, Any], out: Console) -> None:
     """Print one block; a table that is too wide for the terminal is stacked."""
+    wrapped = WRAPPED
+    if block["kind"] == "verdicts":
+        block, wrapped = verdict_table(block), VERDICT_WRAPPED
     if block["kind"] == "table":
-        laid = table(block)
+        laid = table(block, wrapped)
         if Measurement.get(out, out.options.update(width=10_000), laid).maximum > out.width:
-            laid = table(block, narrow=True)
+            laid = table(block, wrapped, narrow=True)
         out.print(laid if _fits(laid, out) else stacked(block))
         if block.get("note"):
             out.print(Text(block["note"], style="dim"))
     elif block["kind"] == "facts":
         out.print(fact_table(block))
-    elif block["kind"] == "verdicts":
-        laid = verdict_table(block)
-        out.print(laid if _fits(laid, out) else stacked_verdicts(block))
     elif block["kind"] == "text":
         out.print(Text(block["text"]))
     elif block["kind"] == "details":
@@ -94,7 +96,7 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
             _print(inner, out)
 
 
-def table(block: Mapping[str, Any], *, narrow: bool = False) -> Table:
+def table(block: Mapping[str, Any], wrapped: int, *, narrow: bool = False) -> Table:
     """Lay a table block out; ``narrow``: each word of a heading longer than its column on its own line."""
     made = _empty(block["caption"])
     for column in block["columns"]:
@@ -103,7 +105,7 @@ def table(block: Mapping[str, Any], *, narrow: bool = False) -> Table:
         )
         cells = [_cell(row.get(column["key"]), column["format"]) for row in block["rows"]]
         longest = max((cell.cell_len for cell in cells), default=0)
-        least = longest if column["align"] == "right" else min(longest, WRAPPED)
+        least = longest if column["align"] == "right" else min(longest, wrapped)
         least = max(least, *map(len, label.split(" ")))
         label = label.replace(" ", "\n") if narrow and len(label) > least else label
         made.add_column(Text(label), justify=_side(column["align"]), min_width=least)
@@ -131,31 +133,18 @@ def stacked(block: Mapping[str, Any]) -> Text:
     text = Text().append(block["caption"], style="bold")
     for row in block["rows"]:
         text.append("\n").append_text(_cell(row.get(first["key"]), first["format"])).append(": ")
-        cells = [(column, _cell(row.get(column["key"]), column["format"])) for column in others]
-        said = [(column, cell) for column, cell in cells if cell.plain.strip() not in ("", "–")]
-        for number, (column, cell) in enumerate(said):
-            label = column["label"].lower() if column["label"] != "Unit" else ""
-            text.append("; " if number and label else " " if number else "").append(f"{label} ".lstrip())
-            text.append_text(cell).append(f" {column['unit']}".rstrip())
+        _list(text, ((column, row.get(column["key"])) for column in others))
     return text.append("\n")
 
 
-def stacked_verdicts(block: Mapping[str, Any]) -> Text:
-    """Write verdicts as two lines each: what and whether, then the figures."""
-    text = Text().append(block.get("what", "requirements").capitalize(), style="bold")
-    for item in block["items"]:
-        status, word = _judged(item)
-        limit = f"limit {item['comparison']} {show(item['limit'])}"
-        figures = f"{show(item['value'])} {item['unit']}, {limit}, distance {show_signed(item['distance'])}"
-        text.append(f"\n{item['label']}: ").append(word, style=COLOURS[status])
-        text.append(f"\n  {' '.join(figures.split())}")
-        text.append(f"\n  {why(item)}" if why(item) else "")
-    return text.append("\n")
-
-
-def side_by_side(title: str, blocks: Sequence[Mapping[str, Any]]) -> SideBySide:
-    """Tables of the same rows as one, laid out when it is printed; stacked where that is too wide."""
-    return SideBySide(title, blocks)
+def _list(text: Text, said: Iterable[tuple[Mapping[str, Any], Any]]) -> None:
+    """Write cells one after the other, each by its label; what is not there is left out."""
+    cells = [(column, _cell(value, column["format"])) for column, value in said]
+    there = [(column, cell) for column, cell in cells if cell.plain.strip() not in ("", "–")]
+    for number, (column, cell) in enumerate(there):
+        label = column["label"].lower() if column["label"] != "Unit" else ""
+        text.append("; " if number and label not in ("", "at") else " " if number else "")
+        text.append(f"{label} ".lstrip()).append_text(cell).append(f" {column['unit']}".rstrip())
 
 
 def _names(side: SideBySide) -> list[str]:
@@ -169,18 +158,13 @@ def _one_by_one(side: SideBySide) -> Text:
     text = Text().append(side.title, style="bold")
     for name in _names(side):
         text.append(f"\n{name}: ")
-        said = []
-        for block in side.blocks:
-            first, *columns = block["columns"]
-            for row in block["rows"]:
-                if str(row[first["key"]]) == name:
-                    said += [(column, _cell(row.get(column["key"]), column["format"])) for column in columns]
-        there = [(column, cell) for column, cell in said if cell.plain.strip() not in ("", "–")]
-        for number, (column, cell) in enumerate(there):
-            own = column["label"] not in ("", "at")
-            text.append("; " if number and own else " " if number else "")
-            text.append(f"{column['label']} ".lower() if own else f"{column['label']} ".lstrip())
-            text.append_text(cell).append(f" {column['unit']}".rstrip())
+        rows = [
+            (block["columns"][1:], row)
+            for block in side.blocks
+            for row in block["rows"]
+            if str(row[block["columns"][0]["key"]]) == name
+        ]
+        _list(text, ((column, row.get(column["key"])) for columns, row in rows for column in columns))
     return text.append("\n")
 
 
@@ -203,27 +187,25 @@ def _label(column: Mapping[str, Any]) -> str:
     return f"{name}, {column['unit']}" if column["unit"] and name.strip() else f"{name} {column['unit']}"
 
 
-def verdict_table(block: Mapping[str, Any]) -> Table:
-    """Lay verdicts out."""
-    made = _empty(block.get("what", "requirements").capitalize())
-    for label in ("Requirement", "Verdict"):
-        made.add_column(label)
-    for label in ("Found", "Limit", "Distance"):
-        made.add_column(label, justify="right", no_wrap=True)
-    made.add_column("Unit")
+def verdict_table(block: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Verdicts as a table block."""
+    columns = [doc.column("label", "Requirement"), doc.column("word", "Verdict")]
+    columns += [doc.column(key, key.capitalize(), align="right") for key in ("found", "limit", "distance")]
+    rows = []
     for item in block["items"]:
-        status, word = _judged(item)
-        word += f" ({why(item)})" if why(item) else ""
-        limit = f"{item['comparison']} {show(item['limit'])}"
-        cells = [show(item["value"]), limit, show_signed(item["distance"]), item["unit"]]
-        made.add_row(Text(item["label"]), Text(word, style=COLOURS[status]), *map(Text, cells))
-    return made
-
-
-def _judged(item: Mapping[str, Any]) -> tuple[str, str]:
-    """Colour and word of a verdict."""
-    status = role(item)
-    return status, f"{SIGNS[status]} {item['verdict']}"
+        colour, because = role(item), f" ({why(item)})" if why(item) else ""
+        rows.append(
+            {
+                "label": item["label"],
+                "word": {"text": f"{SIGNS[colour]} {item['verdict']}{because}", "status": colour},
+                "found": show(item["value"]),
+                "limit": f"{item['comparison']} {show(item['limit'])}",
+                "distance": show_signed(item["distance"]),
+                "unit": item["unit"],
+            }
+        )
+    caption = block.get("what", "requirements").capitalize()
+    return doc.table(caption, [*columns, doc.column("unit", "Unit")], rows)
 
 
 def _empty(caption: str) -> Table:

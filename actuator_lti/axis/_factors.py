@@ -1,7 +1,7 @@
 """Gain and phase of a factored loop at one frequency, and their range over an interval, compiled.
 
-Rows are flat. ``factors`` holds `FACTOR` numbers a root, then those of the loop. What is known at a frequency
-fills a slot of ``parts``: gain, turn and their rates of every factor, those of L, and w itself.
+Rows are flat. ``factors`` holds `FACTOR` numbers of each root, kind by kind, then those of the loop. What is
+known at a frequency fills a slot of ``parts``: gain, turn and their rates of every factor, those of L, and w.
 """
 
 # mypy: disallow-untyped-defs=False
@@ -31,17 +31,17 @@ def evaluated(m, factors, w, parts, at):
     gain, phase = factors[FACTOR * m + LOG_GAIN], factors[FACTOR * m + PHASE] - delay * w
     gain_rate, phase_rate = 0.0, -delay
     for k in range(m):
-        own, to = FACTOR * k, at + 4 * k
-        y, off = w - factors[own + IMAGINARY], factors[own + OFF_AXIS]
+        to, weight, turning = at + 4 * k, factors[WEIGHT * m + k], factors[TURNING * m + k]
+        y, off = w - factors[IMAGINARY * m + k], factors[OFF_AXIS * m + k]
         size = y * y + off * off
         parts[to] = 0.5 * math.log(size)
         parts[to + 1] = math.atan2(y, off)
         parts[to + 2] = y / size
         parts[to + 3] = off / size
-        gain += factors[own + WEIGHT] * parts[to]
-        phase += factors[own + TURNING] * parts[to + 1]
-        gain_rate += factors[own + WEIGHT] * parts[to + 2]
-        phase_rate += factors[own + TURNING] * parts[to + 3]
+        gain += weight * parts[to]
+        phase += turning * parts[to + 1]
+        gain_rate += weight * parts[to + 2]
+        phase_rate += turning * parts[to + 3]
     to = at + 4 * m
     parts[to], parts[to + 1], parts[to + 2], parts[to + 3], parts[to + 4] = (
         gain, phase, gain_rate, phase_rate, w
@@ -60,7 +60,7 @@ def bounded(m, factors, parts, left, right, bounds):
         spread = 0.0
         for k in range(m):
             change = parts[right + 4 * k + kind] - parts[left + 4 * k + kind]
-            spread += abs(factors[FACTOR * k + WEIGHT] * change)
+            spread += abs(factors[WEIGHT * m + k] * change)
         if kind == 1:
             spread += factors[FACTOR * m + DELAY] * width
         middle = parts[a + kind] + parts[b + kind]

@@ -38,9 +38,9 @@ def _second(m, factors, parts, at):
     """Second derivative of log L by w in a slot."""
     re, im = 0.0, 0.0
     for k in range(m):
-        y, off = parts[at + 4 * k + 2], math.copysign(parts[at + 4 * k + 3], factors[FACTOR * k + REAL])
-        re += factors[FACTOR * k + WEIGHT] * (off * off - y * y)
-        im += factors[FACTOR * k + WEIGHT] * 2.0 * off * y
+        y, off = parts[at + 4 * k + 2], math.copysign(parts[at + 4 * k + 3], factors[REAL * m + k])
+        re += factors[WEIGHT * m + k] * (off * off - y * y)
+        im += factors[WEIGHT * m + k] * 2.0 * off * y
     return re, im
 
 
@@ -54,7 +54,7 @@ def _third(m, factors, parts, left, right):
             parts[a + 2] * parts[a + 2] + parts[a + 3] * parts[a + 3],
             parts[b + 2] * parts[b + 2] + parts[b + 3] * parts[b + 3],
         )
-        total += abs(factors[FACTOR * k + WEIGHT]) * square * math.sqrt(square)
+        total += abs(factors[WEIGHT * m + k]) * square * math.sqrt(square)
     return 2.0 * total
 
 

@@ -115,6 +115,8 @@ def search(
     evaluated(m, factors, edges[0], parts, 0)
     found[RATE] = parts[4 * m + 3]
     for n in range(1, count):
+        if edges[n] == edges[n - 1]:
+            continue
         evaluated(m, factors, edges[n], parts, size)
         depth = 1
         while depth > 0:

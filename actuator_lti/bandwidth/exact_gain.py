@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import flint
 
-from actuator_lti.margins.certified_roots import all_roots, even_and_odd, positive_roots
+from actuator_lti.margins.exact.extremes import least
+from actuator_lti.margins.exact.roots import all_roots, even_and_odd, positive_roots
 from actuator_lti.systems.exact_fraction import Fraction, double
 
 _BITS = 128
@@ -42,19 +43,9 @@ class ExactGain:
 
     def largest(self) -> tuple[float, float]:
         """Largest |H|/|H(0)| and its w: 0 where that is zero frequency, infinity at the other end."""
-        with flint.ctx.workprec(_BITS):
-            poles = _positive_roots(self.below)
-            if poles:
-                return math.inf, _root(poles[0][0])
-            slope = self.above.derivative() * self.below - self.above * self.below.derivative()
-            result = [(1.0, 0.0)]
-            for v, _ in _positive_roots(slope):
-                value = flint.arb_poly(self.above)(v) / flint.arb_poly(self.below)(v)
-                result.append((_root(value) / abs(double(self.dc)), _root(v)))
-            n = self.below.degree()
-            end = math.sqrt(double(self.above[n] / self.below[n])) / abs(double(self.dc))
-            result.append((end, math.inf))
-        return max(result, key=lambda pair: pair[0])
+        above, below = self.above.numer() * self.below.denom(), self.below.numer() * self.above.denom()
+        value, w = least(below, above)
+        return (1.0 / value if value else math.inf) / abs(double(self.dc)), w
 
     def first_turn(self, floor_squared: float) -> float | None:
         """w at which the phase first falls below -90 deg against zero frequency.

@@ -11,9 +11,16 @@ import numpy as np
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Range
 from actuator_lti.errors import InputError
 from actuator_lti.margins.loop import Complex, Real
-from actuator_lti.margins.measured import Group, measured_points, passed, refuse_coarse, single_passages
-from actuator_lti.margins.measured_bounds import Bounds, Strip, bounds
-from actuator_lti.margins.measured_data import MeasuredResponse, at_once, measured_response
+from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds
+from actuator_lti.margins.measured.data import MeasuredResponse, at_once, measured_response
+from actuator_lti.margins.measured.margins import (
+    Group,
+    between,
+    measured_points,
+    passed,
+    refuse_coarse,
+    single_passages,
+)
 
 
 @dataclass(frozen=True)
@@ -116,14 +123,14 @@ def _first_fall(omega: Real, strip: Strip, level: float) -> _Passage:
     if not sure:
         return _Passage(None, None, ())
     low, high = _frequency(omega, groups[0], 0), _frequency(omega, sure[0][0], -1)
-    crossings = tuple(float(omega[k] * (omega[k + 1] / omega[k]) ** t) for _, (k, t) in sure)
+    crossings = tuple(between(omega, k, t) for _, (k, t) in sure)
     return _Passage(crossings[0], (low, high), crossings)
 
 
 def _frequency(omega: Real, group: Group, end: int) -> float:
     """Where a group begins (0) or ends (-1)."""
     k, t = (group.last, group.t1[-1]) if end else (group.first, group.t0[0])
-    return float(omega[k] * (omega[k + 1] / omega[k]) ** t)
+    return between(omega, k, float(t))
 
 
 def _coarse(omega: Real, result: Bounds) -> tuple[str, ...]:

@@ -29,6 +29,17 @@ SHEET: tuple[Field, ...] = (
 )  # fmt: skip
 """Keys of a file that no part of a design has an attribute for."""
 
+WORDS = {
+    "speed_constant": 'back_emf_constant, which takes "317 rpm/V" too',
+    "backlash": "play of [coupling]",
+    "mass": "inertia, in kg on a linear axis",
+    "friction_torque": "dry_torque of [friction]",
+    "nominal_voltage": "voltage of [limits]",
+    "nominal_current": "continuous_current of [limits]",
+    "stall_current": "peak_current of [limits]",
+    "max_speed": "speed of [limits]",
+}
+"""Data sheets' words for what a design file has under another name."""
 FROM = "from data sheet: "
 """What the source of a value begins with that follows from such keys."""
 _TAKEN = {

@@ -14,7 +14,7 @@ from typing import Any
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design import model
-from actuator_lti.design.data_sheet import DataSheet, sheet_fields
+from actuator_lti.design.data_sheet import WORDS, DataSheet, sheet_fields
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
 from actuator_lti.design.law_sources import PARTS, read_law
@@ -101,7 +101,7 @@ class Reader:
         known, meant = list(known), []
         for key in table:
             if key not in known:
-                hint = nearest(key, known)
+                hint = f" (it is {WORDS[key]})" if key in WORDS else nearest(key, known)
                 where = f"{path}.{key}" if path else key
                 self.refuse(where, table[key], f"unknown key{hint}; allowed: {', '.join(known)}")
                 meant += [one for one in known if f'"{one}"' in hint]

@@ -10,12 +10,13 @@ from actuator_lti.files.reading import shown
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9])")
 _COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
-_SIGNS = str.maketrans({"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"'}) | {
-    ord(raised): f"^{digit}" for raised, digit in zip("²³", "23", strict=True)
-}
+_SIGNS = str.maketrans({"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"'})
+_POWER = re.compile(r"[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")  # min⁻¹
+_GROUPS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:[ \u00a0\u2009\u202f][0-9]{3})+(?![0-9/])")  # 10 600
 # How data sheets write what is not a product of names: each becomes one, in this order.
 _SPELLINGS = (
     (re.compile(r"\*\*"), "^"),
+    (re.compile(r"^/"), "1/"),  # 25/s
     (re.compile(r"°C"), " degC"),
     (re.compile(r"°"), " deg"),
     (re.compile(r"%"), " percent"),
@@ -37,7 +38,7 @@ LONGEST = 120  # characters of a quantity
 
 def tidy(unit: str) -> str:
     """A unit as a product of names, powers and signs."""
-    text = unit.strip().translate(_SIGNS)
+    text = _POWER.sub(lambda found: f"^{found[0].translate(_RAISED)}", unit.strip().translate(_SIGNS))
     for spelling, product in _SPELLINGS:
         text = spelling.sub(product, text)
     return text.rstrip()
@@ -50,6 +51,8 @@ def split_quantity(text: str) -> tuple[float, str]:
         if over[2] == ":" and above < below:
             raise ValueError(f'a reduction is written "{over[3]}:{over[1]}"')
         return above / below if below else nan, ""
+    if len(text) <= LONGEST and (grouped := _GROUPS.match(text)):
+        text = "".join(grouped[0].split()) + text[grouped.end() :]
     text = _POWER_OF_TEN.sub(r"e\1", text.translate(_RAISED) if "10" in text else text)
     match = _NUMBER.match(text) if len(text) <= LONGEST else None
     if match is None:

@@ -58,11 +58,14 @@ _DERIVED = {
     "ohm Ω Ohm": ("1", "V/A"),
     "H henry": ("1", "V*s/A"),
     "F farad": ("1", "A*s/V"),
+    "Vs": ("1", "V*s"),
+    "As": ("1", "A*s"),
     "deg degree": ("0.017453292519943295", "rad"),
     "arcmin arcminute": ("0.0002908882086657216", "rad"),
     "arcsec arcsecond": ("4.84813681109536e-06", "rad"),
     "rev turn revolution": ("6.283185307179586", "rad"),
     "rpm RPM": ("0.10471975511965977", "rad/s"),
+    "KV": ("0.10471975511965977", "rad/(V*s)"),
     "Hz hertz": ("6.283185307179586", "rad/s"),
     "count cpr": ("1", "1"),
 }
@@ -330,6 +333,8 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
         result = _as_meant(written, wanted)
     except (ValueError, OverflowError) as error:
         raise InputError(f"{error}; allowed: {example}") from None
+    if number == 0.0 and not written and "[celsius]" not in dict(wanted.dimension):
+        return 0.0
     if not compatible(result, wanted):
         missing = "has no unit" if not written else _kind_of(written, result)
         wrong = "wrong dimension, " if written else ""

@@ -18,8 +18,8 @@ from scipy.optimize import brentq
 from actuator_lti.bandwidth import Bandwidth, closed_loop_bandwidth
 from actuator_lti.drive.profile import CommandMean
 from actuator_lti.margins.axis_search import gain_bounds
-from actuator_lti.margins.delay_form import delay_form
-from actuator_lti.margins.delay_response import DelayResponse
+from actuator_lti.margins.delays.form import delay_form
+from actuator_lti.margins.delays.response import DelayResponse
 from actuator_lti.margins.distances import INVERSE
 from actuator_lti.margins.factored import Response, factored
 from actuator_lti.margins.given import given_of

@@ -10,14 +10,14 @@ from actuator_lti.axis._search import FAR_LOG
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, out_of_sight, within
 from actuator_lti.margins.axis_parts import axis_ends, axis_parts, distances_over, merged
-from actuator_lti.margins.collocation import closed_loop_matrix, points_for
-from actuator_lti.margins.delay_form import in_series
+from actuator_lti.margins.delays.collocation import closed_loop_matrix, points_for
+from actuator_lti.margins.delays.form import in_series
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.factored import Response, factored
 from actuator_lti.margins.factors_on_axis import Factored
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.nyquist import half_turns_about
-from actuator_lti.margins.poles import SortedPoles, polynomial_roots, sorted_poles
+from actuator_lti.margins.poles import SortedPoles, sorted_poles
 from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
 from actuator_lti.margins.trust import MOST_ERROR, Doubtful, error_bound, hardly_placed
 
@@ -57,8 +57,7 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
         closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
     _trust_poles(loop, poles, closed)
     factors = factored(response, poles)
-    if np.unique(factors.weights[factors.roots == 0.0]).size > 1:
-        raise Doubtful("poles and zeros at zero frequency")
+    _trust_factors(loop, poles, factors)
     parts, listed_to, floor = axis_parts(factors, band)
     ends = axis_ends(factors, response)
     gain_w, real_w, rising, far = merged(parts)
@@ -153,10 +152,16 @@ def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | N
         raise Doubtful("rounding of the coefficients moves a pole over the border")
     if closed is not None and hardly_placed(loop, closed.values, True):
         raise Doubtful("rounding of the coefficients moves a closed-loop pole over the border")
-    size = np.abs(poles.values - 1.0) if loop.in_z else np.abs(poles.values)
-    if loop.numerator is not None:
-        size = np.concatenate((size, np.abs(polynomial_roots(loop.numerator))))
-    size = size[size > 0.0]
+
+
+def _trust_factors(loop: RationalLoop, poles: SortedPoles, factors: Factored) -> None:
+    at_zero = factors.weights[factors.roots == 0.0]
+    if at_zero.size and at_zero.min() != at_zero.max():
+        raise Doubtful("poles and zeros at zero frequency")
+    roots = factors.roots
+    if loop.numerator is None:  # zeros at infinity come out far away
+        roots = poles.values - 1.0 if loop.in_z else poles.values
+    size = np.abs(roots[roots != 0.0])
     if size.size and float(size.max()) > _WIDEST * float(size.min()):
         raise Doubtful("poles and zeros over too many decades")
 

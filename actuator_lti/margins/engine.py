@@ -9,12 +9,12 @@ from typing import Any
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.assemble import assembled, within
 from actuator_lti.margins.checked import checked_margins
-from actuator_lti.margins.delay_form import DelayForm, delay_form
+from actuator_lti.margins.delays.form import DelayForm, delay_form
+from actuator_lti.margins.delays.series import in_series
 from actuator_lti.margins.given import Given, given_of, whole_samples
 from actuator_lti.margins.loop import loop_of
-from actuator_lti.margins.measured import measured_margins
+from actuator_lti.margins.measured.margins import measured_margins
 from actuator_lti.margins.results import Agreement, StabilityMargins
-from actuator_lti.margins.series_delay import in_series
 from actuator_lti.margins.trust import Doubtful
 
 
@@ -107,7 +107,7 @@ def stability_margins(
 
 def _rational(given: Given, certify: bool) -> StabilityMargins:
     """In double precision, and by exact arithmetic where that is not sure of itself."""
-    from actuator_lti.margins.certified import certified_margins  # python-flint only where it is needed
+    from actuator_lti.margins.exact.certified import certified_margins  # python-flint only where it is needed
 
     if certify:
         return certified_margins(given)
@@ -130,8 +130,8 @@ def _behind_delay(
         return margins
     if given.period_s is not None:
         return _withheld(given.period_s, delay_s, "factors of the loop", doubt)
-    from actuator_lti.margins.certified_delay import certified_delayed_margins  # python-flint if needed
-    from actuator_lti.margins.exact_delay import exact_behind_delay
+    from actuator_lti.margins.delays.certified import certified_delayed_margins  # python-flint if needed
+    from actuator_lti.margins.delays.exact import exact_behind_delay
 
     try:
         return certified_delayed_margins(exact_behind_delay(given, delay_s), delay_s, band, margins)
@@ -143,8 +143,8 @@ def _behind_delay(
 
 def _inside_delays(form: DelayForm, band: tuple[float, float] | None) -> StabilityMargins:
     """By certified intervals."""
-    from actuator_lti.margins.certified_delay import certified_delayed_margins  # python-flint if needed
-    from actuator_lti.margins.exact_delay import exact_inside_delays
+    from actuator_lti.margins.delays.certified import certified_delayed_margins  # python-flint if needed
+    from actuator_lti.margins.delays.exact import exact_inside_delays
 
     loops = exact_inside_delays(form)
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 
@@ -15,7 +16,7 @@ from actuator_lti.margins.trust import Doubtful
 _LEAST_SLACK = 1e-8
 _SAME = 1e-4  # relative: the loop and the product of its factors
 _NEARLY_REAL = 1e-12
-_SEEN = 1e-10  # of L
+_SEEN = math.log(1e10)  # of L, to either side of one
 _NEWTON_STEPS = 6
 _NEWTON_STEP = 1e-9
 _ROUNDED = 1e-13  # of gain and phase: no step says more
@@ -157,7 +158,8 @@ def factored(response: Response, poles: SortedPoles) -> Factored:
     delay = response.delay
     if delay and loop.period_s is not None:
         roots, weights, delay = np.append(roots, (1.0, -1.0)), np.append(weights, (delay, -delay)), 0.0
-    return _fitted(Factored(roots, weights, delay), response, below)
+    with np.errstate(all="ignore"):
+        return _fitted(Factored(roots, weights, delay), response, below)
 
 
 def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
@@ -170,18 +172,15 @@ def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
     )
     L = response.at(w)
     gain, phase = factors.log_value(w)
-    off = np.log(np.abs(L)) - gain
-    turned = np.angle(L * np.exp(-1j * phase))
-    seen = (np.abs(L) > _SEEN) & (np.abs(L) < 1.0 / _SEEN)
-    k = int(np.argmin(np.where(seen, np.abs(np.log(np.abs(L))), np.inf)))
-    apart = np.hypot(off - off[k], np.angle(np.exp(1j * (turned - turned[k]))))
-    if not seen.any() or not (apart[seen] <= _SAME).all() or not np.isfinite(off[k]):
+    off, level = L * np.exp(-gain - 1j * phase), np.abs(np.log(np.abs(L)))
+    k = int(level.argmin())
+    off, turned = off[level < _SEEN] / off[k], cmath.phase(off[k])
+    turn = half_turn(turned)
+    apart = max(float(np.abs(off - 1.0).max(initial=0.0)), abs(turn - turned))
+    log_gain = float(np.log(np.abs(L[k]))) - float(gain[k])
+    if not off.size or not apart <= _SAME or not math.isfinite(log_gain):
         raise Doubtful("the factors do not make up the loop")
-    turn = half_turn(float(turned[k]))
-    if not abs(turn - turned[k]) <= _SAME:
-        raise Doubtful("the factors do not make up the loop")
-    slack = max(_LEAST_SLACK, 10.0 * float(apart[seen].max()), 10.0 * abs(turn - float(turned[k])))
-    return replace(factors, log_gain=float(off[k]), phase=turn, slack=slack)
+    return replace(factors, log_gain=log_gain, phase=turn, slack=max(_LEAST_SLACK, 10.0 * apart))
 
 
 def _exact_zero(poles: SortedPoles, in_z: bool) -> Complex:

@@ -81,17 +81,15 @@ class Factored:
     @cached_property
     def table(self) -> Real:
         """What the compiled search knows of each factor, then of the loop, see `actuator_lti.axis`."""
-        columns = (self.roots.real, self.roots.imag, self._off_axis, self.weights, self._turning)
-        loop = (self.log_gain, self.phase, self.delay, self.slack)
-        return np.append(np.array(columns).T, loop)
+        roots = (self.roots.real, self.roots.imag, self._off_axis, self.weights, self._turning)
+        return np.concatenate((*roots, (self.log_gain, self.phase, self.delay, self.slack)))
 
     @cached_property
     def places(self) -> Real:
-        """Frequencies w > 0 between which every factor is monotone."""
+        """Frequencies w > 0 between which every factor is monotone, in order; some twice."""
         im = self.roots.imag
         w = np.concatenate((im - self._off_axis, im, im + self._off_axis))
-        w = np.sort(w[w > 0.0])
-        return np.asarray(w[np.diff(w, prepend=0.0) > 0.0])
+        return np.sort(w[w > 0.0])
 
     def log_value(self, w: Real) -> Real:
         """Log gain and phase (continuous, less whole turns), shape (2, points)."""

@@ -67,5 +67,4 @@ def first_turn(loop: RationalLoop, delay_s: float, floor: float) -> float | None
 
 def _factors(loop: RationalLoop, delay_s: float) -> tuple[Response, Factored]:
     response = Response(loop, delay_s / (loop.period_s or 1.0))
-    with np.errstate(all="ignore"):
-        return response, factored(response, sorted_poles(loop.A, loop.in_z))
+    return response, factored(response, sorted_poles(loop.A, loop.in_z))

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import flint
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
-from actuator_lti.margins.collocation import open_loop_matrix
-from actuator_lti.margins.delay_form import DelayForm, characteristic, delay_form
-from actuator_lti.margins.delay_response import DelayResponse
+from actuator_lti.margins.delays.collocation import open_loop_matrix
+from actuator_lti.margins.delays.form import DelayForm, characteristic, delay_form
+from actuator_lti.margins.delays.response import DelayResponse
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import Motion
@@ -135,30 +133,18 @@ def _grid_step(delays: Real, horizon: float) -> float:
     return h
 
 
-@dataclass(frozen=True)
-class _Lag:
-    """A delay in steps: whole steps and, where it is no multiple of the step, the fraction left."""
-
-    whole: NDArray[np.intp]
-    part: Real
-
-    @classmethod
-    def of(cls, steps: Real) -> _Lag:
-        whole = np.floor(steps + 1e-9).astype(int)
-        return cls(whole, np.where(np.abs(steps - whole) < 1e-9 * steps, 0.0, steps - whole))
-
-
 class _Past:
     """Delayed signals: in each step a parabola through its start, middle and end; zero before t = 0."""
 
-    def __init__(self, steps: int, lag: _Lag) -> None:
-        q = lag.part.size
-        self.start, self.middle, self.end = (np.zeros((steps + 1, q)) for _ in range(3))
-        self._lag, self._rows = lag, np.arange(q)
+    def __init__(self, steps: int, lag: Real) -> None:
+        self.start, self.middle, self.end = (np.zeros((steps + 1, lag.size)) for _ in range(3))
+        self._rows, self._whole = np.arange(lag.size), np.floor(lag + 1e-9).astype(int)
+        rest = lag - self._whole
+        self._part = np.where(np.abs(rest) < 1e-9 * lag, 0.0, rest)
 
     def at(self, k: int, position: float) -> Real:
         """Signals delayed, at t = (k + position) h with position 0, 1/2 or (the end of a step) 1."""
-        step, inside = k - self._lag.whole, position - self._lag.part
+        step, inside = k - self._whole, position - self._part
         step, inside = np.where(inside < 0.0, step - 1, step), np.where(inside < 0.0, inside + 1.0, inside)
         j = np.maximum(step, 0)
         a, m, b = (table[j, self._rows] for table in (self.start, self.middle, self.end))
@@ -177,7 +163,7 @@ def _stepped(form: DelayForm, h: float, steps: int) -> Real:
     M[n : n + q, n + q : n + 2 * q] = M[n + q : n + 2 * q, n + 2 * q : n + 3 * q] = np.eye(q)
     positions = np.arange(_PARTS + 1) / _PARTS
     inside = np.stack([expm(M * (h * part))[:n] for part in positions])
-    past = _Past(steps, _Lag.of(form.delays_s / h))
+    past = _Past(steps, form.delays_s / h)
     x, y = np.zeros(n), np.empty((steps + 1, _PARTS + 1))
     for k in range(steps + 1):
         z = np.stack([past.at(k, part) for part in positions])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.margins.loop import Real, rational_loop
-from actuator_lti.margins.measured_data import refuse_measured
+from actuator_lti.margins.measured.data import refuse_measured
 from actuator_lti.step.delayed import delayed_response
 from actuator_lti.step.motion import OVER, Motion
 from actuator_lti.step.rational import notes, rational_motion

@@ -28,7 +28,7 @@ class Asked:
     ] = None
     error_limit: Annotated[
         float | None,
-        Option(words="Relative error above which a signal fails.", metavar="PERCENT"),
+        Option(words="Error, of the motion about its mean, above which a signal fails.", metavar="PERCENT"),
     ] = None
     predict: Annotated[
         Path | None,

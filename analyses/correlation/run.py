@@ -25,7 +25,7 @@ class Correlation:
 
     @property
     def limit(self) -> float | None:
-        """Largest relative error allowed."""
+        """Largest error allowed, over the measured signal about its mean."""
         return None if self.asked.error_limit is None else self.asked.error_limit / 100.0
 
     @property

@@ -10,6 +10,9 @@ import numpy as np
 from analyses.correlation.closed_loop import CorrelationResult
 from analyses.correlation.compare import SignalComparison
 
+BESIDE = ("speed", "velocity", "current", "force")
+"""Signals that stand beside the motion, in the first sentence too."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SignalSummary:
@@ -67,15 +70,16 @@ def worst_of(results: Sequence[CorrelationResult]) -> tuple[CorrelationResult, S
 
 
 def moves_alike(result: CorrelationResult) -> bool:
-    """Whether the model's motion is nearer to the measured one than the mean of that is: a fit above 0 %."""
-    return worst_of([result])[1].share_of_motion <= 1.0
+    """Whether the model's motion, speed and drive each fit better than the measured mean: above 0 %."""
+    told = [worst_of([result])[1], *(result[name] for name in BESIDE if name in result.signals)]
+    return all(signal.share_of_motion <= 1.0 for signal in told)
 
 
 def agrees(results: Sequence[CorrelationResult], error_limit: float | None) -> bool:
     """Whether no record contradicts itself or the design, each motion fits and, with a limit, each signal is
-    within."""
+    within that share of its motion."""
     if any(finding.passed is False for result in results for finding in result.findings):
         return False
     signals = [signal for result in results for signal in result.signals.values()]
-    within = error_limit is None or all(signal.relative_error <= error_limit for signal in signals)
+    within = error_limit is None or all(signal.share_of_motion <= error_limit for signal in signals)
     return within and all(moves_alike(result) for result in results)

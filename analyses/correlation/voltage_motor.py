@@ -121,12 +121,10 @@ def _fit(steps: Sequence[_Step], estimator_rad_s: float) -> VoltageMotor:
     ends = np.cumsum([len(step.speed) for step in steps]).tolist()
     std = np.sqrt(np.diag(correlated_covariance(solution.jac, solution.fun, ends)))
     size = float(np.linalg.norm(np.concatenate([s.speed for s in steps])))
-    return VoltageMotor(
-        gain_rad_sV=float(solution.x[0] * gain),
+    return replace(
+        motor(solution.x),
         gain_std=float(std[0] * gain),
-        time_constant_s=float(abs(solution.x[1]) * 1e-3),
         time_constant_std_s=float(std[1] * 1e-3),
-        estimator_rad_s=estimator_rad_s,
         steady_speeds_rad_s=tuple(step.steady for step in steps),
         relative_residual=float(np.linalg.norm(solution.fun)) / size,
     )

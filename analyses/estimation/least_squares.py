@@ -131,15 +131,31 @@ def covariance_of(blocks: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray
 
     Grown by rows over rows less all that was found of them: the values, and the coefficients of A.
     """
-    inverse = np.linalg.inv(sum(w.T @ w for w, _ in blocks))
-    total = np.zeros_like(inverse)
-    rows, found = sum(len(w) for w, _ in blocks), len(inverse)
-    for w, noise in blocks:
-        a, variance = autoregressive(noise)
-        found += len(a) - 1
-        z = lfilter([1.0], a, w[::-1], axis=0)
-        total += variance * z.T @ z
-    return np.asarray(rows / max(rows - found, 1) * inverse @ total @ inverse)
+    return joint_covariance([information_of(*block) for block in blocks])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Information:
+    """What one record tells: ``W'W``, ``W' G W``, its rows, and how many coefficients its noise took."""
+
+    gram: FloatArray
+    noise: FloatArray
+    rows: int
+    order: int
+
+
+def information_of(w: FloatArray, noise: FloatArray) -> Information:
+    """Of the rows of one record and (at least a part of) its noise."""
+    a, variance = autoregressive(noise)
+    z = lfilter([1.0], a, w[::-1], axis=0)
+    return Information(gram=w.T @ w, noise=variance * z.T @ z, rows=len(w), order=len(a) - 1)
+
+
+def joint_covariance(parts: Sequence[Information]) -> FloatArray:
+    """Of the values that all records together give."""
+    inverse = np.linalg.inv(sum(part.gram for part in parts))
+    rows, found = sum(part.rows for part in parts), len(inverse) + sum(part.order for part in parts)
+    return np.asarray(rows / max(rows - found, 1) * inverse @ sum(part.noise for part in parts) @ inverse)
 
 
 def autoregressive(values: FloatArray) -> tuple[FloatArray, float]:

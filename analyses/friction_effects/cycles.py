@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from actuator_lti.design.model import Design, Instruments
+from actuator_lti.design.model import Design
 from analyses.friction_effects.stick_slip import StickSlipCycle
-from analyses.limit_cycles.describing import without_counts
 from analyses.limit_cycles.friction import cycles_of_friction, dry_Nm
 from analyses.limit_cycles.result import Confirmation, Cycle
 from analyses.limit_cycles.run import confirm
 from analyses.motion.settling import Settling, largest_swing, settle
 from analyses.specification.drive_figures import drive_figures
+from nonlinear.bench.on_the_bench import quiet
 
 BELOW = 0.3
 
@@ -83,7 +83,7 @@ def limit_cycles(
     foreseen : tuple of Cycle, optional
         By describing function, if known already.
     """
-    design = without_counts(replace(design, instruments=Instruments()))  # they keep moving, friction does not
+    design = quiet(design)
     if foreseen is None:
         foreseen = described_cycles(design, load_Nm)
     checked = tuple(confirm(design, cycle) for cycle in foreseen)

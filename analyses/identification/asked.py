@@ -91,6 +91,21 @@ class Asked(Settings):
         float | None,
         Option(words="Period of the excitation (default: found from the command).", metavar="s"),
     ] = None
+    plan: Annotated[
+        bool,
+        Option(words="FILE is a design: motions that tell its values as closely as asked (then records)."),
+    ] = False
+    within: Annotated[
+        float, Option(words="With --plan: half of each 95 % interval, of the value; 5.", metavar="PERCENT")
+    ] = 5.0
+    noise: Annotated[
+        float | None,
+        Option(
+            words="With --plan: noise of the recorded current (without one, voltage), rms; the design's "
+            "instruments.current_noise.",
+            metavar="A",
+        ),
+    ] = None
     accept: Annotated[
         bool, Option(words="Write the design even where a check fails (the status stays 1).")
     ] = False
@@ -105,6 +120,8 @@ class Asked(Settings):
             ("residual-limit", self.residual_limit, 0.0, None),
             ("decimation", self.decimation or 1, 1, None),
             ("suggest", self.suggest, 0, 50),
+            ("within", self.within, 0.01, 100.0),
+            ("noise", self.noise or 0.0, 0.0, None),
         ):
             if not low <= value or (high is not None and value > high):
                 allowed = f"{low:g} or more" if high is None else f"{low:g} to {high:g}"
@@ -118,7 +135,8 @@ class Asked(Settings):
     def is_campaign(self) -> bool:
         """Whether a single TOML file is given that lists runs, and is no record file."""
         first = self.files[0]
-        if self.frequency_response or len(self.files) != 1 or first.suffix.lower() != ".toml":
+        alone = len(self.files) == 1 and not (self.frequency_response or self.plan)
+        if not alone or first.suffix.lower() != ".toml":
             return False
         from analyses.toml_tables import read_toml
 
@@ -127,6 +145,8 @@ class Asked(Settings):
     @classmethod
     def design_of(cls, chosen: Mapping[str, Any]) -> str:
         """The design where none is named: the campaign's, looked for beside its file too, or emps."""
+        if chosen.get("plan"):
+            return str(chosen["files"][0])
         asked = cls(files=chosen["files"], frequency_response=chosen["frequency_response"])
         if not asked.is_campaign:
             return "ilr33-amber" if asked.frequency_response else "emps"

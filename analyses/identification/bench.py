@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
@@ -20,6 +21,7 @@ from analyses.identification.joint_model import NAMES, JointModel, Recipe
 from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.own_bias import without_bias
 from analyses.identification.refinement import refine_records
+from analyses.identification.residuals import ResidualTest, residual_tests
 from analyses.identification.resimulation import Resimulated, resimulate
 from analyses.identification.rows import is_loaded, recipe_for
 from analyses.identification.to_design import (
@@ -66,6 +68,11 @@ class BenchResult(Identified):
         """The columns of each record, and what each was used for."""
         pairs = zip(self.model.records, self.records, strict=True)
         return {record.name: account(record, part.used) for part, record in pairs}
+
+    @cached_property
+    def residual_tests(self) -> tuple[ResidualTest, ...]:
+        """Whiteness of each record's residual, and its independence of the inputs."""
+        return residual_tests(self.model)
 
 
 def identify_bench(

@@ -113,18 +113,18 @@ def _with_error_of(lags: Sequence[Lag], before: JointModel, model: JointModel) -
 def _drift(part: RecordFit, model: JointModel) -> tuple[Finding, FloatArray] | None:
     """Whether all torques change their scale along a record, and what that adds to the covariance.
 
-    The residual over the modelled torque times the time (-1 at the begin, 1 at the end) and over that time
-    alone, beside the model's own columns. A value that drifts by +-d about its mean is uniform in that.
+    The noise (what the simulated record leaves is taken off) over the modelled torque times the time (-1 at
+    the begin, 1 at the end) and over that time alone, beside the model's own columns. A value that drifts by
+    +-d about its mean is uniform in that.
     """
-    time = np.linspace(-1.0, 1.0, len(part.keep))[part.keep]
-    torque = part.w @ model.values
-    table = np.column_stack([part.w, time * torque, time])
+    time, w = np.linspace(-1.0, 1.0, len(part.keep))[part.keep][part.compared], part.w[part.compared]
+    table = np.column_stack([w, time * (w @ model.values), time])
     size = np.linalg.norm(table, axis=0)
     names = (*model.names, "scale", "shift")
     if len(told_apart(table, names)[0]) < len(names):
         return None
-    found = np.linalg.lstsq(table / size, part.own_residual, rcond=None)[0] / size
-    rest = part.own_residual - table @ found
+    found = np.linalg.lstsq(table / size, part.noise, rcond=None)[0] / size
+    rest = part.noise - table @ found
     errors = np.sqrt(np.diag(covariance_of([(table / size, rest)]))) / size
     scale, shift = found[-2:]
     sure = np.abs(found[-2:]) > SURE * errors[-2:]

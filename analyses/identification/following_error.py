@@ -6,7 +6,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from analyses.estimation.arrays import FloatArray
-from analyses.identification.verdict import Item
+from analyses.identification.verdict import Item, share_item
 from analyses.records.record import Record
 
 LARGEST_ERROR = 0.015
@@ -39,19 +39,12 @@ def following_item(design: Design, record: Record, simulated: Record) -> Item | 
     if size == 0.0 or float(own @ model) / size < LEAST_ALIKE:
         return None
     ratio = float(own @ model) / float(model @ model)
-    passed = abs(ratio - 1.0) <= LARGEST_ERROR
     reason = (
         f"the following error is {ratio:.4g} times that of the design's loops at this motion: "
         f"a clock about {100.0 * (ratio - 1.0):+.2g} % off, a command logged early or late, or another gain"
     )
-    return Item(
-        id=f"following-{record.name}",
-        label=f"{record.name}: following error is that of the design's loops",
-        passed=passed,
-        value=abs(ratio - 1.0),
-        limit=LARGEST_ERROR,
-        reason="" if passed else reason,
-    )
+    label = f"{record.name}: following error is that of the design's loops"
+    return share_item(f"following-{record.name}", label, abs(ratio - 1.0), LARGEST_ERROR, reason)
 
 
 def _errors(design: Design, record: Record, simulated: Record) -> tuple[FloatArray, FloatArray] | None:

@@ -218,8 +218,11 @@ def _model(
     residual = np.concatenate(rests)
     drive = np.concatenate([block.y for block in blocks])
     own = [rest for _, rest in singles] or rests
+    found = {name: one.value for name, one in fixed.items()}
+    found |= dict(zip(free, solution.values.tolist(), strict=True))
     parts = tuple(
-        _part(block, block.w[:, columns], *pair) for block, *pair in zip(blocks, rests, own, strict=True)
+        _part(block, block.w[:, columns], found, *pair)
+        for block, *pair in zip(blocks, rests, own, strict=True)
     )
     scaled = [(g * part.w, g * part.own_residual) for g, part in zip(weights, parts, strict=True)]
     model = JointModel(
@@ -249,7 +252,13 @@ def with_scatter(design: Design, model: JointModel) -> JointModel:
     return replace(model, between=between, covariance=model.covariance + extra + kept)
 
 
-def _part(block: Rows, w: FloatArray, rest: FloatArray, own: FloatArray) -> RecordFit:
+FRICTION = ("viscous", "dry", "map_")
+
+
+def _part(
+    block: Rows, w: FloatArray, found: Mapping[str, float], rest: FloatArray, own: FloatArray
+) -> RecordFit:
+    other = [0.0 if name.startswith(FRICTION) else found[name] for name in block.names]
     return RecordFit(
         name=block.record,
         rows_in=block.rows_in,
@@ -262,6 +271,13 @@ def _part(block: Rows, w: FloatArray, rest: FloatArray, own: FloatArray) -> Reco
         residual=rest,
         own_residual=own,
         keep=block.keep,
+        speed=block.speed,
+        acceleration=block.w[:, block.names.index("inertia")],
+        drive=block.y,
+        friction=block.y - block.w @ np.array(other),
+        step_s=block.step_s,
+        noise=own,
+        compared=np.ones(len(own), dtype=bool),
     )
 
 

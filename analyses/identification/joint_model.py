@@ -86,8 +86,11 @@ def linear_basis(speed: FloatArray, knots: Sequence[float]) -> FloatArray:
 class RecordFit:
     """One record's part: rows, its relative residual under the joint model, what was used and noted.
 
-    ``w`` (columns of the fitted names) and ``residual`` are of the rows used, ``keep`` marks these among all.
+    ``w`` (columns of the fitted names), ``residual``, ``speed``, ``acceleration``, ``drive`` and ``friction``
+    (the drive less all but the friction) are of the rows used, ``keep`` marks these among all, ``step_s``
+    apart.
     ``own_residual`` is that of the record fitted alone: what is left of it has no scatter between records.
+    ``noise`` is what the simulated record does not explain of that, at the rows ``compared`` of those used.
     """
 
     name: str
@@ -101,6 +104,19 @@ class RecordFit:
     residual: FloatArray = field(repr=False)
     own_residual: FloatArray = field(repr=False)
     keep: BoolArray = field(repr=False)
+    speed: FloatArray = field(repr=False)
+    acceleration: FloatArray = field(repr=False)
+    drive: FloatArray = field(repr=False)
+    friction: FloatArray = field(repr=False)
+    step_s: float = field(repr=False)
+    noise: FloatArray = field(repr=False)
+    compared: BoolArray = field(repr=False)
+
+    @property
+    def fit_percent(self) -> float:
+        """``100 (1 - norm of the residual / norm of the drive signal about its mean)``."""
+        about_mean = float(np.linalg.norm(self.drive - self.drive.mean()))
+        return 100.0 * (1.0 - float(np.linalg.norm(self.residual)) / about_mean)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,14 +24,13 @@ class TwoSides:
     """Motor and load of a drive with a coupling.
 
     ``motor`` is the motion at the motor shaft, ``load`` that at the coupling's own shaft. ``torque`` is what
-    the coupling carries without a moment at the output, ``J_l dW/dt + T_f,load``; ``friction`` the second
-    term alone. ``told`` says where the load's motion comes from.
+    the coupling carries without a moment at the output, ``J_l dW/dt + T_f,load``. ``told`` says where the
+    load's motion comes from.
     """
 
     motor: Motion
     load: Motion
     torque: FloatArray
-    friction: FloatArray
     told: str
 
 
@@ -58,33 +57,27 @@ def two_sides(
     behind = design.ratio_behind_coupling
     if place in ("output_angle", "position", "velocity"):
         load = _scaled(motion, 1.0 / design.ratio_to_coupling)
-        torque, friction = _of_load(design, load)
+        torque = _of_load(design, load)
         return TwoSides(
             motor=_with_twist(design, record, motion, torque - moment / behind, recipe),
             load=load,
             torque=torque,
-            friction=friction,
             told="load's own motion, the motor's by the design's stiffness",
         )
     followed = _follows(design, record, motion, moment)
     measured = _measured(design, record, followed, moment, recipe)
     load = followed if measured is None else measured
-    torque, friction = _of_load(design, load)
     told = "load's motion " + ("by the design's coupling" if measured is None else "of the output's encoder")
-    return TwoSides(motor=motion, load=load, torque=torque, friction=friction, told=told)
+    return TwoSides(motor=motion, load=load, torque=_of_load(design, load), told=told)
 
 
-def _of_load(design: Design, load: Motion) -> tuple[FloatArray, FloatArray]:
-    """What the coupling carries without a moment, and the friction behind it alone."""
-    friction = design.load.friction
-    own = np.zeros_like(load.velocity)
-    if friction is not None:
-        own = (
-            friction.dry_torque_Nm * np.sign(load.velocity)
-            + friction.viscous_Nms_rad * load.velocity
-            + friction.offset_torque_Nm
-        )
-    return design.load_side_inertia_kgm2 * load.acceleration + own, own
+def _of_load(design: Design, load: Motion) -> FloatArray:
+    """What the coupling carries without a moment: for inertia and friction behind it."""
+    friction, inertial = design.load.friction, design.load_side_inertia_kgm2 * load.acceleration
+    if friction is None:
+        return np.asarray(inertial)
+    dry = friction.dry_torque_Nm * np.sign(load.velocity)
+    return np.asarray(inertial + dry + friction.viscous_Nms_rad * load.velocity + friction.offset_torque_Nm)
 
 
 def _measured(
@@ -103,7 +96,7 @@ def _measured(
     noise = float(np.std(behind * angle - made.position))
     cutoff = recipe.cutoff_hz
     rough = noise * (2.0 * np.pi * cutoff) ** 2 * np.sqrt(0.4 * cutoff * period)
-    carried = _of_load(design, followed)[0] - moment / behind
+    carried = _of_load(design, followed) - moment / behind
     small = design.load_side_inertia_kgm2 * rough < NOISE_SHARE * float(np.std(carried))
     return made if small else None
 

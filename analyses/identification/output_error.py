@@ -25,13 +25,15 @@ class OutputErrorResult(Fit):
     """Refined values by dotted key, and the relative error before and after.
 
     These errors are those of the drive signal: norm of the difference over norm of the measured. The standard
-    errors respect the correlation in time of what is left.
+    errors respect the correlation in time of what is left. ``at_bound`` are those that ended at the least or
+    largest value of their key: the records want another, and no error of theirs holds.
     """
 
     error_before: float
     error_after: float
     iterations: int
     design: Design
+    at_bound: tuple[str, ...] = ()
 
 
 def refine_by_output_error(
@@ -74,13 +76,16 @@ def refine_by_output_error(
         result = start + scale * (moved - 1.0)
         return {path: _allowed(path, float(v)) for path, v in zip(paths, result, strict=True)}
 
+    def within(moved: FloatArray) -> FloatArray:
+        return 1.0 + (np.array(list(values_at(moved).values())) - start) / scale
+
     def residual(moved: FloatArray) -> FloatArray:
         output = simulate_output(with_values(design, values_at(moved), check=False))
         if output.shape != measured.shape:
             raise InputError(f"output and measurement have the shapes {output.shape} and {measured.shape}")
         return np.asarray(measured - output)
 
-    p, rest, jac, iterations, first = _gauss_newton(residual, len(paths), paths, progress)
+    p, rest, jac, iterations, first = _gauss_newton(residual, within, paths, progress)
     covariance = correlated_covariance(jac, rest, ends) * np.outer(scale, scale)
     values = values_at(p)
     norm = float(np.linalg.norm(measured))
@@ -92,29 +97,30 @@ def refine_by_output_error(
         error_after=float(np.linalg.norm(rest)) / norm,
         iterations=iterations,
         design=with_values(design, values, check=False),
+        at_bound=tuple(path for path, value in values.items() if _allowed(path, value, 1e-9) != value),
     )
 
 
 def _gauss_newton(
     residual: Callable[[FloatArray], FloatArray],
-    count: int,
+    within: Callable[[FloatArray], FloatArray],
     paths: tuple[str, ...],
     progress: Callable[[int, int], None] | None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, int, FloatArray]:
-    p = np.ones(count)
+    p = np.ones(len(paths))
     rest = first = residual(p)
-    jac = np.zeros((len(rest), count))
+    jac = np.zeros((len(rest), len(p)))
     iteration = 0
     for iteration in range(1, ITERATIONS + 1):
-        for k in range(count):
-            h = np.zeros(count)
+        for k in range(len(p)):
+            h = np.zeros(len(p))
             h[k] = STEP
             jac[:, k] = (residual(p + h) - residual(p - h)) / (2.0 * STEP)
         dead = np.flatnonzero(np.linalg.norm(jac, axis=0) <= 1e-12 * np.linalg.norm(rest))
         if len(dead):
             raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
         change = np.asarray(-np.linalg.lstsq(jac, rest, rcond=None)[0])
-        p, rest, moved = _halved_step(residual, p, rest, change)
+        p, rest, moved = _halved_step(residual, within, p, rest, change)
         if progress is not None:
             progress(iteration, ITERATIONS)
         if not moved or np.max(np.abs(change)) < TOLERANCE:
@@ -123,13 +129,17 @@ def _gauss_newton(
 
 
 def _halved_step(
-    residual: Callable[[FloatArray], FloatArray], p: FloatArray, rest: FloatArray, change: FloatArray
+    residual: Callable[[FloatArray], FloatArray],
+    within: Callable[[FloatArray], FloatArray],
+    p: FloatArray,
+    rest: FloatArray,
+    change: FloatArray,
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """The longest of the full, half, quarter ... steps that makes the residual smaller."""
+    """The longest of the full, half, quarter ... steps, within bounds, that makes the residual smaller."""
     for _ in range(8):
-        tried = residual(p + change)
+        tried = residual(within(p + change))
         if np.linalg.norm(tried) < np.linalg.norm(rest):
-            return p + change, tried, True
+            return within(p + change), tried, True
         change = 0.5 * change
     return p, rest, False
 
@@ -147,7 +157,7 @@ def _scale(design: Design, path: str, start: float) -> float:
     return like
 
 
-def _allowed(path: str, value: float) -> float:
-    """A tried value, kept within what its key allows."""
+def _allowed(path: str, value: float, off: float = 0.0) -> float:
+    """A tried value, kept within what its key allows (and ``off`` its ends)."""
     field = field_of(path)
-    return value if field is None else min(max(value, field.low), field.high)
+    return value if field is None else min(max(value, field.low + off), field.high - off)

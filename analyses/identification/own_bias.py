@@ -96,14 +96,14 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     if wild:
         told = f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}"
         return replace(model, bias_told=told)
-    noise = [_noise(*pair) for pair in zip(model.records, again.records, strict=True)]
-    pairs = zip(model.weights, model.records, noise, strict=True)
-    blocks = [(weight * part.w, weight * rest) for weight, part, rest in pairs]
+    parts = tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
+    blocks = [(g * part.w, g * part.noise) for g, part in zip(model.weights, parts, strict=True)]
     singles = zip(model.alone, again.alone, blocks, strict=False)
     less = replace(
         model,
         values=model.values - bias,
         covariance=covariance_of(blocks),
+        records=parts,
         alone=tuple(_alone(*each, made, model) for each in singles),
         bias={name: float(b) for name, b in zip(model.names, bias, strict=True)},
         bias_told="found on records simulated with the result, and taken off",
@@ -111,14 +111,15 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     return with_scatter(start, less)
 
 
-def _noise(measured: RecordFit, simulated: RecordFit) -> FloatArray:
-    """What is left of a residual where the simulated record's is taken off, of the rows that both use."""
+def _with_noise(measured: RecordFit, simulated: RecordFit) -> RecordFit:
+    """The record's part, its noise what is left where the simulated residual is taken off: rows of both."""
     count = min(len(measured.keep), len(simulated.keep))
     both = measured.keep[:count] & simulated.keep[:count]
     if len(measured.keep) < len(simulated.keep) or np.count_nonzero(both) < 2 * measured.w.shape[1]:
-        return measured.own_residual
+        return measured
     own, model = (picked(part.own_residual, part.keep, both) for part in (measured, simulated))
-    return np.asarray(own - model)
+    compared = np.concatenate([both, np.zeros(len(measured.keep) - count, dtype=bool)])[measured.keep]
+    return replace(measured, noise=own - model, compared=compared)
 
 
 def _alone(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
@@ -28,11 +29,11 @@ class LawScore:
 
     name: str
     formula: str
-    parameters: int
-    error_Nm: float
-    gain: float
-    gain_std: float
-    warranted: bool
+    parameters: int = 0
+    error_Nm: float = nan
+    gain: float = nan
+    gain_std: float = nan
+    warranted: bool = False
     possible: bool = True
     reason: str = ""
 
@@ -164,14 +165,4 @@ def _score(name: str, formula: str, parameters: int, base: FloatArray, errors: F
 
 
 def _impossible(name: str, formula: str, reason: str) -> LawScore:
-    return LawScore(
-        name=name,
-        formula=formula,
-        parameters=0,
-        error_Nm=float("nan"),
-        gain=float("nan"),
-        gain_std=float("nan"),
-        warranted=False,
-        possible=False,
-        reason=reason,
-    )
+    return LawScore(name=name, formula=formula, possible=False, reason=reason)

@@ -35,8 +35,8 @@ SHORTEST_S = 0.2
 class Rows:
     """Regressors ``w`` by ``names`` and drive ``y`` after decimation, rows at rest left out.
 
-    ``sine`` and ``cosine`` of the output angle keep all rows, of which ``keep`` marks those used. ``used``
-    tells what each signal was used for.
+    ``sine`` and ``cosine`` of the output angle keep all rows, of which ``keep`` marks those used. ``speed``
+    is the motor's, ``step_s`` the time from row to row; ``used`` tells what each signal was used for.
     """
 
     record: str
@@ -45,6 +45,8 @@ class Rows:
     y: FloatArray
     sine: FloatArray
     cosine: FloatArray
+    speed: FloatArray
+    step_s: float
     keep: BoolArray
     rows_in: int
     recipe: Recipe
@@ -100,6 +102,9 @@ def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool
                 f"torque kM i, kM = {constant:g} N m/A",
                 False,
             )
+    name = "force_reference" if design.axis == "linear" else "torque_reference"
+    if name in signals:
+        return record[name], name, f"{name.replace('_reference', '')} as commanded", False
     for name in ("voltage", "voltage_reference"):
         if name in signals and gain is not None:
             told = f"source gain {gain:g} times the {name.replace('_', ' ')}"
@@ -108,7 +113,7 @@ def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool
             told = f"kM (u - kE w)/R of the {name.replace('_', ' ')}, without the inductance"
             return np.asarray(constant / ohm * record[name]), name, told, True
     raise InputError(
-        "no drive signal: force, current (with kM), or voltage (with a source gain, or kM and R)",
+        "no drive signal: force, current (with kM), torque or voltage (with a source gain, or kM and R)",
         where=record.name,
     )
 
@@ -229,7 +234,7 @@ def record_rows(
         known = known - design.ratio_behind_coupling * sides.torque
         drive = drive - (_reaction(design, sides) if free else 0.0)
     sines = np.column_stack([np.sin(angle), np.cos(angle)])
-    table = np.column_stack([columns, sines, np.sign(motion.velocity), known, drive])
+    table = np.column_stack([columns, sines, motion.velocity, np.sign(motion.velocity), known, drive])
     moving = ~_at_rest(motion.velocity, period_of(record))
     if record.left_out is not None:
         moving &= ~record.left_out
@@ -238,7 +243,7 @@ def record_rows(
     rows = decimated(table, recipe.decimation)
     keep = _kept_rows(moving, recipe.decimation)
     width = columns.shape[1]
-    sine, cosine, side, known, y = rows[:, width:].T
+    sine, cosine, speed, side, known, y = rows[:, width:].T
     whole = known if moment is None else known + moment
     w = np.column_stack([rows[:, :width], np.abs(whole) * side])
     names.append("load_coefficient")
@@ -253,6 +258,8 @@ def record_rows(
         y=y[keep],
         sine=sine,
         cosine=cosine,
+        speed=speed[keep],
+        step_s=period_of(record) * recipe.decimation,
         rows_in=len(record),
         keep=keep,
         recipe=recipe,

@@ -14,6 +14,7 @@ from analyses.identification.campaign import CampaignResult, campaign_items, ide
 from analyses.identification.campaign_design import CampaignSuggestion, suggest_runs
 from analyses.identification.contributions import Contribution, contributions
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
+from analyses.identification.plan import Plan, plan_motions
 from analyses.identification.resimulation import steady_current_error
 from analyses.identification.surface_fit import NAMES
 from analyses.identification.to_design import design_with_fit, with_fixed
@@ -37,7 +38,7 @@ class CampaignAnswer(Identified):
 
 def identify(
     design: Design, asked: Asked, *, progress: Progress | None = None
-) -> BenchResult | CampaignAnswer | FrequencyResult:
+) -> BenchResult | CampaignAnswer | FrequencyResult | Plan:
     """Identify a drive from its records, and hold the design that comes of it against them.
 
     Raises
@@ -45,6 +46,8 @@ def identify(
     InputError
         Where a file cannot be read, or no design can be made of it.
     """
+    if asked.plan:
+        return _planned(design, asked, progress)
     of = _of_campaign if asked.is_campaign else _of_response if asked.frequency_response else _of_records
     return replace(of(design, asked, progress), accepted=asked.accept)
 
@@ -53,6 +56,14 @@ def _of_records(design: Design, asked: Asked, progress: Progress | None) -> Benc
     records = named_apart([open_record(path) for path in asked.files])
     unseen = named_apart([open_record(path) for path in asked.validate or ()], [r.name for r in records])
     return identify_bench(design, records, validation=unseen, settings=asked, progress=progress)
+
+
+def _planned(design: Design, asked: Asked, progress: Progress | None) -> Plan:
+    records = named_apart([open_record(path) for path in asked.files[1:]])
+    measured = identify_bench(design, records, settings=asked).model if records else None
+    noise = asked.noise if asked.noise is not None else design.instruments.current_noise_A
+    within = asked.within / 100.0
+    return plan_motions(design, within=within, noise=noise, measured=measured, progress=progress)
 
 
 def _of_response(design: Design, asked: Asked, _: Progress | None) -> FrequencyResult:

@@ -14,7 +14,7 @@ from analyses.estimation.least_squares import told_apart
 from analyses.identification.outliers import find_outliers
 from analyses.identification.points import SteadyPoint
 from analyses.identification.surface_fit import NAMES, Outlier, SurfaceFit
-from analyses.identification.systematic import SharedError, draw_errors, effects_of, shared_errors
+from analyses.identification.systematic import SharedError, effects_of, half_widths, shared_errors
 from analyses.records.campaign_file import Instruments
 
 ITERATIONS = 6
@@ -106,7 +106,6 @@ def _fitted(
     random_covariance = (gain * variance) @ gain.T
     shifts = {error.name: gain @ error.effect for error in shared}
     moved = np.array(list(shifts.values())).reshape(len(shifts), len(theta))
-    draws = draw_errors(random_covariance, moved, freedom)
     return SurfaceFit(
         points=points,
         names=NAMES,
@@ -114,8 +113,7 @@ def _fitted(
         covariance=random_covariance + moved.T @ moved / 3.0,
         random_covariance=random_covariance,
         shared_shifts=shifts,
-        half_widths=draws.half_width(),
-        draws=draws,
+        half_widths=half_widths(random_covariance, moved, freedom),
         shared_effects=effects_of(shared, len(y)),
         residuals_Nm=y - x @ theta,
         own_residuals_Nm=_own_residuals(y - x @ theta, variance, effects_of(shared, len(y))),

@@ -10,7 +10,6 @@ from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
 from analyses.identification.points import SteadyPoint
-from analyses.identification.systematic import ErrorDraws
 
 NAMES = ("C0", "Cv", "CM")
 PATHS = tuple(parameter(name).key for name in NAMES)
@@ -43,7 +42,6 @@ class SurfaceFit(Fit):
     random_covariance: FloatArray
     shared_shifts: dict[str, FloatArray]
     half_widths: FloatArray
-    draws: ErrorDraws = field(repr=False)
     shared_effects: FloatArray = field(repr=False)
     residuals_Nm: FloatArray
     own_residuals_Nm: FloatArray

@@ -56,17 +56,6 @@ def effects_of(errors: tuple[SharedError, ...], runs: int) -> FloatArray:
     return np.array([error.effect for error in errors]).reshape(len(errors), runs).T
 
 
-@dataclass(frozen=True, kw_only=True)
-class ErrorDraws:
-    """Draws of the joint error of the coefficients, shape (draws, p): random and shared parts together."""
-
-    values: FloatArray
-
-    def half_width(self, coverage: float = 0.95) -> FloatArray:
-        """Half widths of the symmetric intervals that hold ``coverage`` of the draws, shape (p,)."""
-        return np.asarray(np.quantile(np.abs(self.values), coverage, axis=0))
-
-
 @lru_cache(maxsize=8)
 def _base(normals: int, uniforms: int, freedom: int, draws: int) -> tuple[FloatArray, FloatArray]:
     """Student draws (unit scale, jointly) and uniform draws; fixed, so that results repeat exactly."""
@@ -76,8 +65,12 @@ def _base(normals: int, uniforms: int, freedom: int, draws: int) -> tuple[FloatA
     return student, rng.uniform(-1.0, 1.0, (draws, uniforms))
 
 
-def draw_errors(random_covariance: FloatArray, shared: FloatArray, freedom: int) -> ErrorDraws:
-    """Propagate distributions (GUM Supplement 1): Student errors of the runs, uniform errors of the
+def half_widths(
+    random_covariance: FloatArray, shared: FloatArray, freedom: int, coverage: float = 0.95
+) -> FloatArray:
+    """Half widths of the symmetric intervals that hold ``coverage`` of the joint errors, shape (p,).
+
+    Propagated distributions (GUM Supplement 1): Student errors of the runs, uniform errors of the
     instruments.
 
     Parameters
@@ -95,4 +88,4 @@ def draw_errors(random_covariance: FloatArray, shared: FloatArray, freedom: int)
     total = student @ root.T
     if len(shared):
         total = total + uniform @ shared
-    return ErrorDraws(values=total)
+    return np.asarray(np.quantile(np.abs(total), coverage, axis=0))

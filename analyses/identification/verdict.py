@@ -67,16 +67,18 @@ def inputs_item(record: str, findings: Sequence[Finding]) -> Item:
     )
 
 
+def share_item(id: str, label: str, value: float, limit: float, otherwise: str) -> Item:
+    """A share of the drive signal against its limit, and what it means beyond."""
+    passed = value <= limit
+    return Item(
+        id=id, label=label, passed=passed, value=value, limit=limit, reason="" if passed else otherwise
+    )
+
+
 def residual_item(residual: float, limit: float) -> Item:
     """The relative residual of the fit."""
-    return Item(
-        id="residual",
-        label="Relative residual of the fit",
-        passed=residual <= limit,
-        value=residual,
-        limit=limit,
-        reason="" if residual <= limit else "the model does not explain these records",
-    )
+    why = "the model does not explain these records"
+    return share_item("residual", "Relative residual of the fit", residual, limit, why)
 
 
 def sampling_item(record: Record) -> Item | None:
@@ -108,26 +110,17 @@ def rows_item(rows: int, parameters: int) -> Item:
 def held_out_item(record: str, residual: float, fit: float, limit: float) -> Item:
     """The relative residual of a record that the fit has not seen, against that of the fit."""
     allowed = min(HELD_OUT_FACTOR * fit + HELD_OUT_EXTRA, limit)
-    return Item(
-        id=f"held-out-{record}",
-        label=f"Relative residual of {record}, not seen by the fit",
-        passed=residual <= allowed,
-        value=residual,
-        limit=allowed,
-        reason="" if residual <= allowed else "the fit does not carry over to it",
-    )
+    label, why = f"Relative residual of {record}, not seen by the fit", "the fit does not carry over to it"
+    return share_item(f"held-out-{record}", label, residual, allowed, why)
 
 
 def simulated_item(record: str, error: float, limit: float, how: str) -> Item:
     """How far the written design is from a record."""
-    return Item(
-        id=f"written-{record}",
-        label=f"Written design against {record}, {how}",
-        passed=error <= limit,
-        value=error,
-        limit=limit,
-        reason="" if error <= limit else "the written design does not drive as the record does",
+    label, why = (
+        f"Written design against {record}, {how}",
+        "the written design does not drive as the record does",
     )
+    return share_item(f"written-{record}", label, error, limit, why)
 
 
 def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: bool, loaded: bool) -> Item:

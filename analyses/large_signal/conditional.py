@@ -14,7 +14,7 @@ it and goes on integrating.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from math import asin, inf, isfinite, pi, sqrt
 from typing import TYPE_CHECKING, Literal
@@ -22,12 +22,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design, Instruments
+from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import stage_gain
 from actuator_lti.errors import TooManyTicks
 from analyses.large_signal.settling_ticks import full_range
 from nonlinear import LIMITERS, Rows
 from nonlinear.bench.loop_setup import points_of
+from nonlinear.bench.on_the_bench import quiet
 from nonlinear.bench.operating_motion import lasting_torque_Nm
 
 if TYPE_CHECKING:
@@ -185,7 +186,7 @@ def conditional_stability(
         if margins[point].stable and margins[point].gain_lower > LOW_GAIN
     ]
     predictions = tuple(one for one in result if one is not None)
-    design = _quiet(design)
+    design = quiet(design)
     threshold, following = step_threshold(design, settle_ticks)
     hertz, amplitude, end = None, None, None
     if following is not None:
@@ -204,16 +205,6 @@ def conditional_stability(
         limiter_share=0.0 if end is None else end.share,
         ending="" if end is None else end.words,
         end_rad=None if end is None else end.output_rad,
-    )
-
-
-def _quiet(design: Design) -> Design:
-    """A drive without counts and noise: what they do at rest is a finding of its own."""
-    return replace(
-        design,
-        encoder=replace(design.encoder, counts_per_rev=None),
-        output_encoder=replace(design.output_encoder, counts_per_rev=None),
-        instruments=Instruments(),
     )
 
 

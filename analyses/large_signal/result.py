@@ -12,7 +12,6 @@ from analyses.large_signal.bode import AmplitudeBode, amplitude_bode
 from analyses.large_signal.border import LimitShift, limit_shift
 from analyses.large_signal.map import AMPLITUDES, FREQUENCIES, AmplitudeMap, amplitude_map
 from analyses.large_signal.sawtooth import Sawtooth, sawtooth
-from analyses.limit_cycles.friction import dry_Nm
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,7 +79,8 @@ def large_signals(
     loops = assemble_loops(design) if loops is None else loops
     map_ = amplitude_map(design, loops, counts=counts)
     step(1)
-    shift = limit_shift(design, loops) if dry_Nm(design, 0.0) > 0.0 else None
+    rubs = any(design.friction.dry_Nm(0.0, direction) > 0.0 for direction in (1, -1))
+    shift = limit_shift(design, loops) if rubs else None
     step(2)
     teeth = sawtooth(design)
     step(3)

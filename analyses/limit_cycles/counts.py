@@ -27,6 +27,7 @@ from analyses.large_signal.settling_ticks import LONGEST_TICKS, full_range
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
 from nonlinear import Rows
+from nonlinear.bench.on_the_bench import without_counts
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
@@ -123,7 +124,7 @@ def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, 
 
 
 def _one(design: Design, loops: Loops, sensor: Sensor, settle_ticks: int) -> Counts:
-    from analyses.limit_cycles.describing import cycles_of_quantisation, without_counts
+    from analyses.limit_cycles.describing import cycles_of_quantisation
     from analyses.limit_cycles.run import confirm
 
     cause = "motor-quantisation" if sensor == "motor" else "quantisation"

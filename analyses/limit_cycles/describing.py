@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction, Sensor
+from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction
 from actuator_lti.drive.operating import Operating, dead_zone, described_dry, slope_at
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import assemble_loops
@@ -277,12 +277,3 @@ def without_nonlinearities(design: Design) -> Design:
             friction=None if behind is None else LoadFriction(viscous_Nms_rad=behind.viscous_Nms_rad),
         ),
     )
-
-
-def without_counts(design: Design, *sensors: Sensor) -> Design:
-    """The same drive with some encoders free of counts, by default with both."""
-    if "motor" in sensors or not sensors:
-        design = replace(design, encoder=replace(design.encoder, counts_per_rev=None))
-    if "output" in sensors or not sensors:
-        design = replace(design, output_encoder=replace(design.output_encoder, counts_per_rev=None))
-    return design

@@ -13,12 +13,12 @@ from analyses.limit_cycles.describing import (
     counts_matter,
     cycles_of_play,
     cycles_of_quantisation,
-    without_counts,
     without_nonlinearities,
 )
 from analyses.limit_cycles.result import Cause, Confirmation, Cycle, LimitCycles
 from analyses.motion.settling import settlings_of
 from nonlinear import Rows
+from nonlinear.bench.on_the_bench import without_counts
 
 SCALES = np.geomspace(0.4, 2.5, 41)
 CYCLES_WATCHED = 24

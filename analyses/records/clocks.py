@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -20,22 +20,12 @@ RATE_SPREAD = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClockJoin:
-    """How the second recorder's time was put on the first one's: ``t_first = offset_s + rate * t_second``.
-
-    ``rate`` is 1 and ``rate_std`` None where the records do not tell it (a single event).
-    ``offset_std_s`` is that of the offset at the middle of the second record.
-    ``quality`` is the correlation coefficient of the two signals after the joining.
-    """
+class ClockJoin(Fit):
+    """How the second recorder's time was put on the first one's, by which of their signals."""
 
     method: str
     first_signal: str
     second_signal: str
-    offset_s: float
-    offset_std_s: float
-    rate: float
-    rate_std: float | None
-    quality: float
 
     def __str__(self) -> str:
         if self.method == "given":
@@ -99,16 +89,7 @@ def join_records(
         fit = find(first.time_s, a, second.time_s, b, where)
     else:
         raise InputError(f'join method "{method}": "event", "correlation" or "given"')
-    join = ClockJoin(
-        method=method,
-        first_signal=first_signal,
-        second_signal=second_signal,
-        offset_s=fit.offset_s,
-        offset_std_s=fit.offset_std_s,
-        rate=fit.rate,
-        rate_std=fit.rate_std,
-        quality=fit.quality,
-    )
+    join = ClockJoin(method=method, first_signal=first_signal, second_signal=second_signal, **vars(fit))
     return _joined(first, second, join), join
 
 
@@ -125,15 +106,10 @@ def _joined(first: Record, second: Record, join: ClockJoin) -> Record:
         raise InputError(f'both records hold a signal "{min(clash)}"', where=second.name)
     cut = first.slice(int(start), stop)
     added = {name: np.interp(cut.time_s, time, values) for name, values in second.signals.items()}
-    return Record(
-        name=first.name,
-        time_s=cut.time_s,
+    return replace(
+        cut,
         signals=MappingProxyType({**cut.signals, **added}),
         units=MappingProxyType({**first.units, **second.units}),
-        counts=first.counts,
-        averaged=first.averaged,
-        sha256=first.sha256,
-        constants=first.constants,
         notes=(*first.notes, *second.notes, str(join)),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,8 +15,13 @@ MIN_QUALITY = 0.5
 RATE_STD_MAX = 1e-3
 
 
-class Fit(NamedTuple):
-    """``t_first = offset_s + rate * t_second``, with standard deviations and the correlation reached."""
+@dataclass(frozen=True)
+class Fit:
+    """``t_first = offset_s + rate * t_second``, with standard deviations and the correlation reached.
+
+    ``rate`` is 1 and ``rate_std`` None where the records do not tell it (a single event).
+    ``offset_std_s`` is that of the offset at the middle of the second record.
+    """
 
     offset_s: float
     offset_std_s: float

@@ -1,93 +1,76 @@
-"""The stiffness put to the simulator: a moment injected at the output while the command stands still."""
+"""The stiffness put to the simulator: by its own derivative, and a moment injected at the output."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import ceil, log, sqrt
+from math import ceil, sqrt
 
 import numpy as np
 
-from actuator_lti.design.model import Design, Instruments
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops.compliance import compliance
 from actuator_lti.loops.stiffness import LOST_MOTION_SHARE, lost_motion_rad, stiffness_at
 from analyses.stiffness.result import AtRest, Check, LostMotion
-from nonlinear import commands, simulate
+from nonlinear import commands, simulate, tangent
+from nonlinear.bench.loop_setup import LoopSetup
+from nonlinear.bench.on_the_bench import on_the_bench
+from nonlinear.bench.operating_motion import standing
 from nonlinear.loads import series
 
-_SETTLED = 1e-7
 _MOST_TICKS = 400_000
 SKIPPED = 6  # periods at rest, before one is looked at
 PERIODS_WITHIN = 10
-_DEFLECTION = 1e-4  # of the full deflection: far inside every limit, so that a pendulum is linear too
-
-
-def linear_twin(design: Design) -> Design:
-    """The design without play, quantisation, noise and friction by load; the run omits the dry friction."""
-    coupling = design.coupling
-    return replace(
-        design,
-        coupling=None if coupling is None else replace(coupling, play_rad=0.0),
-        friction=replace(design.friction, load_coefficient=0.0),
-        encoder=replace(design.encoder, counts_per_rev=None),
-        output_encoder=replace(design.output_encoder, counts_per_rev=None),
-        instruments=Instruments(),
-    )
 
 
 def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Check, ...]:
-    """Inject a small moment of each frequency and compare.
+    """The simulator's own derivative from the load to the output (`nonlinear.tangent`) beside the loops.
 
-    The frequencies are moved to whole numbers of position periods, so that the ratio of the fundamentals
-    over whole periods is exact once the transient is gone. An output that no moment moves is pushed with the
-    largest load moment.
+    At rest, without dry friction, play, counts and friction of two slopes.  An output that no moment moves is
+    pushed with the largest load moment.
+
+    Raises
+    ------
+    UnstableError
+        For a loop that is not stable.
     """
-    twin, period = linear_twin(design), design.controller.period_s
-    response = compliance(twin)
-    slowest = float(response.slowest)
-    if slowest >= 1.0:
+    coupling, bench = design.coupling, on_the_bench(design)
+    friction = replace(design.friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
+    coupling = None if coupling is None else replace(coupling, play_rad=0.0)
+    bench = replace(bench, coupling=coupling, friction=friction)
+    setup = LoopSetup(bench, "load", standing(bench), limits_on=False)
+    response, hertz = compliance(bench, setup.bias.operating(bench)), np.asarray(frequencies_hz, dtype=float)
+    if float(response.slowest) >= 1.0:
         raise UnstableError("stiffness: the closed loop is not stable")
-    settle = min(ceil(log(_SETTLED) / log(slowest)), _MOST_TICKS) if slowest > 0.0 else 1
-    made = []
-    for asked in frequencies_hz:
-        ticks = _ticks(design, asked)
-        frequency = 1.0 / (ticks * period)
-        K = complex(stiffness_at(response, frequency)[0])
-        moment = _DEFLECTION * twin.validation.full_deflection_rad * abs(K)
-        if not np.isfinite(moment):
-            K, moment = complex(np.inf), design.load.moment_max_Nm or 1.0
-        made.append(Check(frequency, K, _injected(twin, moment, ticks, True, ceil(settle / ticks) + 1)))
-    return tuple(made)
+    if not response.moves:
+        pushed = stiffness_at_rest(bench, [(each, design.load.moment_max_Nm or 1.0) for each in hertz])
+        return tuple(Check(one.frequency_hz, complex(np.inf), one.seen_Nm_rad) for one in pushed)
+    found = tangent(bench, "load", setup=setup)
+    seen = 1.0 / found.closed(np.exp(2j * np.pi * hertz * found.hold_s))
+    foreseen = [complex(stiffness_at(response, each)[0]) for each in hertz]
+    return tuple(map(Check, hertz.tolist(), foreseen, seen.tolist()))
 
 
 def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> tuple[AtRest, ...]:
     """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, moment in N m)."""
     made = []
     for frequency, moment in asked:
-        ticks = _ticks(design, frequency)
-        K = _injected(design, moment, ticks, False)
+        every = design.controller.position_loop.every  # a period is a whole number of them
+        ticks = max(4, round(1.0 / (frequency * design.controller.period_s * every))) * every
+        K = _injected(design, moment, ticks)
         made.append(AtRest(moment, 1.0 / (ticks * design.controller.period_s), K))
     return tuple(made)
 
 
-def _ticks(design: Design, frequency_hz: float) -> int:
-    """Ticks of a period, a whole number of position periods."""
-    every = design.controller.position.every if design.controller.position else 1
-    return max(4, round(1.0 / (frequency_hz * design.controller.period_s * every))) * every
-
-
-def _injected(design: Design, amplitude: float, ticks: int, linear: bool, skipped: int = SKIPPED) -> complex:
-    """Stiffness seen at a moment of a period of so many ticks, after so many periods."""
-    period, count = design.controller.period_s, (skipped + 2) * ticks
+def _injected(design: Design, amplitude: float, ticks: int) -> complex:
+    """Stiffness seen at a moment of a period of so many ticks, after some periods."""
+    period, count = design.controller.period_s, (SKIPPED + 2) * ticks
     turn = np.exp(-2j * np.pi * np.arange(ticks) / ticks)
-    moment = np.tile(-amplitude * turn.imag, skipped + 2)
-    run = simulate(
-        design, commands.hold(), count * period, series(np.arange(count) * period, moment),
-        friction_on=not linear, limits_on=not linear,
-    )  # fmt: skip
-    seen = run.output_angle_rad[skipped * ticks :].reshape(2, ticks) @ turn
-    given = moment[skipped * ticks :].reshape(2, ticks) @ turn
+    moment = np.tile(-amplitude * turn.imag, SKIPPED + 2)
+    run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
+    seen = run.output_angle_rad[SKIPPED * ticks :].reshape(2, ticks) @ turn
+    given = moment[SKIPPED * ticks :].reshape(2, ticks) @ turn
     return complex(given.sum() / seen.sum()) if seen.sum() != 0.0 else complex(np.inf)
 
 

@@ -66,7 +66,7 @@ class LostMotion:
 
 @dataclass(frozen=True)
 class Check:
-    """One frequency, a moment injected in the simulator, without dry friction, play or quantisation.
+    """One frequency, by the simulator's own derivative at rest, without dry friction and play.
 
     Both are inf where the output does not move, as behind a gear that locks.
     """

@@ -33,6 +33,7 @@ from nonlinear.bench.operating_motion import may_stand, on_its_stand, standing
 if TYPE_CHECKING:
     from actuator_lti.drive.operating import Operating
     from actuator_lti.loops import Loop, Loops
+    from actuator_lti.loops.limiters import Place as LimiterPlace
     from nonlinear import Tangent
 
 Complexes = npt.NDArray[np.complex128]
@@ -54,6 +55,7 @@ class Bench:
     model: Design
     _assembled: dict[tuple[Operating, bool], Loops] = field(default_factory=dict, init=False, repr=False)
     _setups: dict[str, LoopSetup] = field(default_factory=dict, init=False, repr=False)
+    _tangents: dict[object, Tangent] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def drive(self) -> Design:
@@ -126,7 +128,7 @@ class Bench:
     def place(self, name: str) -> Place:
         """One place, its tangent measured."""
         setup = self.setup(name)
-        found = tangent(self.drive, name, setup=setup)
+        found = self._tangent(name, setup)
         if name in self.figures:
             own = self.figures[name]
             closed = own.loop.plain_closed
@@ -140,31 +142,48 @@ class Bench:
             return Place(name=name, condition=setup.condition, tangent=found, predicted=response, poles=poles)
         return self._point(name, setup, found, loops)
 
+    def _tangent(self, name: str, setup: LoopSetup) -> Tangent:
+        """The tangent of a place; the outermost loop and the break point that it drives are one place."""
+        if name == "command":
+            return self._from_command[0]
+        if name == "load":
+            return tangent(self.drive, name, setup=setup)
+        key = (setup.outer, setup.point, setup.bias, setup.held)
+        if key not in self._tangents:
+            self._tangents[key] = tangent(self.drive, name, setup=setup)
+        return replace(self._tangents[key], place=name)
+
     def onsets(self) -> Iterator[Place]:
         """From the command to what stands in front of each limiter, at its last update before the next one.
 
         The amplitude at which a limiter first acts is its limit over that response.
         """
         setup, loops = self.setup("command"), self.loops("command")
-        limiters = [each for each in limiter_places(wire(loops.design)) if isfinite(each.limit)]
-        watched = [
-            (
-                each,
-                k,
-                Watched(signal, each.limiter.kind, each.every, each.every * setup.design.controller.period_s),
-            )
-            for each in limiters
+        for (limiter, k, seen), found in zip(self._watched, self._from_command[1:], strict=True):
+            name = f"{limiter.limiter.name}_onset".replace("-", "_")
+            path = loops.limiters[limiter.limiter.name]
+            yield Place(
+                name="command", condition=setup.condition, tangent=found,
+                predicted=partial(self._last, path, found.hold_s, k), poles=np.empty(0, complex),
+                quantity=name if seen.signal == limiter.signals[0] else f"{name}_integral",
+            )  # fmt: skip
+
+    @cached_property
+    def _watched(self) -> list[tuple[LimiterPlace, int, Watched]]:
+        """What stands in front of each limiter: its place, which of its signals, and how it is read."""
+        tick_s = self.drive.controller.period_s
+        return [
+            (each, k, Watched(signal, each.limiter.kind, each.every, each.every * tick_s))
+            for each in limiter_places(wire(self.loops("command").design))
+            if isfinite(each.limit)
             for k, signal in enumerate(each.signals, -len(each.signals))
         ]
-        found = tangents(setup, "command", [each[2] for each in watched]) if watched else iter(())
-        for (each, k, seen), one in zip(watched, found, strict=True):
-            name = f"{each.limiter.name}_onset".replace("-", "_")
-            path = loops.limiters[each.limiter.name]
-            yield Place(
-                name="command", condition=setup.condition, tangent=one,
-                predicted=partial(self._last, path, one.hold_s, k), poles=np.empty(0, complex),
-                quantity=name if seen.signal == each.signals[0] else f"{name}_integral",
-            )  # fmt: skip
+
+    @cached_property
+    def _from_command(self) -> list[Tangent]:
+        """From the command to the output, and to what stands in front of each limiter, measured at once."""
+        seen = [None, *(watched for _, _, watched in self._watched)]
+        return list(tangents(self.setup("command"), "command", seen))
 
     @staticmethod
     def _last(path: LimiterPath, hold_s: float, k: int, z: Complexes) -> Complexes:
@@ -194,12 +213,15 @@ class Bench:
             delayed=(lambda delay_s: self._delayed(delay_s)) if name == "u" else None,
         )  # fmt: skip
 
-    def _delayed(self, more_s: float) -> tuple[Tangent, Complexes]:
+    def _delayed(self, more_s: float) -> tuple[Tangent, Callable[[], Complexes]]:
         """Tangent at the voltage, and predicted poles over a base period, under a longer computing delay."""
         longer = Bench(_later(self.design, more_s), _later(self.model, more_s))
         setup = longer.setup("u")
-        predicted = periodic_loop_of(wire(longer.linear, setup.bias.operating(longer.drive)), "u")
-        return tangent(longer.drive, "u", setup=setup), predicted.modes()
+
+        def poles() -> Complexes:
+            return periodic_loop_of(wire(longer.linear, setup.bias.operating(longer.drive)), "u").modes()
+
+        return tangent(longer.drive, "u", setup=setup), poles
 
 
 def _later(design: Design, more_s: float) -> Design:

@@ -67,7 +67,8 @@ class Place:
     critical : callable
         Eigenvalues over one base period at a gain, by the linear writing.
     delayed : callable or None
-        Design with a longer computing delay, and its poles over one base period; only at the voltage.
+        Tangent under a longer computing delay, and what gives its predicted poles over one base period; only
+        at the voltage.
     quantity : str
         Name of the row that judges the response.
     """
@@ -80,7 +81,7 @@ class Place:
     figures: LoopFigures | None = None
     exact: ExactMargins | None = None
     critical: Callable[[float], Complexes] | None = None
-    delayed: Callable[[float], tuple[Tangent, Complexes]] | None = None
+    delayed: Callable[[float], tuple[Tangent, Callable[[], Complexes]]] | None = None
     quantity: str = "response"
 
     @property
@@ -301,10 +302,9 @@ def _delay_row(place: Place, delay_s: float) -> Row:
     """The computing delay lengthened to either side of its margin: the critical pole lies inside, outside."""
     assert place.delayed is not None
     outside, poles = place.delayed(delay_s * (1.0 + BESIDE))
-    critical = poles[int(np.argmax(np.abs(poles)))]
-    inside, poles = place.delayed(delay_s * (1.0 - BESIDE))
-    before = poles[int(np.argmin(np.abs(poles - critical)))]
-    sizes = [abs(nearest_pole(inside.A, before)), abs(nearest_pole(outside.A, critical))]
+    critical = max(poles(), key=abs)
+    inside, _ = place.delayed(delay_s * (1.0 - BESIDE))
+    sizes = [abs(nearest_pole(each.A, critical)) for each in (inside, outside)]
     rates = np.log(sizes)
     found = delay_s * (1.0 - BESIDE + 2.0 * BESIDE * float(-rates[0] / (rates[1] - rates[0])))
     words = f"spectral radius beside it {sizes[0] - 1.0:+.1e}, {sizes[1] - 1.0:+.1e}"

@@ -31,7 +31,7 @@ from analyses.validation.in_time import margin_shown, step_shown
 from analyses.validation.places import Bench
 from analyses.validation.result import Validation
 from analyses.validation.row import Row
-from analyses.validation.settings import Settings
+from analyses.validation.settings import FINDINGS, Settings
 from analyses.validation.small_signal import Place, small_signal
 from nonlinear.bench.on_the_bench import on_the_bench
 
@@ -115,7 +115,6 @@ class _Work:
         rows += [row for shown in margins.values() if shown is not None for row in shown.rows]
         rows += self._part("numbers of the design", self._values, [])
         self._step()
-        asked = self.settings
         return Validation(
             design=self.design,
             rows=tuple(rows),
@@ -124,23 +123,20 @@ class _Work:
             margins={name: shown for name, shown in margins.items() if shown is not None},
             sweeps={
                 name: sweep
-                for name in (stable if asked.sweep else ())
+                for name in (stable if "injected sweep" in self.settings.findings else ())
                 if name in places
                 and (sweep := self._shown("injected sweep", lambda b, n: bench_sweep(b, places[n]), name))
             },
             amplitude_margins=self._asked(
-                asked.amplitude_margins and bool(stable), "margins by amplitude",
-                lambda: tuple(margins_by_amplitude(self.bench)), (),
+                "margins by amplitude", bool(stable), lambda: tuple(margins_by_amplitude(self.bench)), ()
             ),
-            conditional=self._asked(asked.own and whole, "conditional stability", self._conditional, None),
-            settlings=self._asked(asked.own and whole, "rest after a step", self._settlings, ()),
-            rest_sweep=self._asked(asked.from_rest and whole, "motion from rest", self._rest, None),
-            counts=self._asked(asked.from_rest and whole, "counts of the encoders", self._counts, ()),
-            large_signals=self._asked(asked.large_signals and whole, "large signals", self._large, None),
-            friction=self._asked(asked.friction_effects and whole, "friction effects", self._friction, None),
-            specification=self._asked(
-                asked.specification and whole, "specification", self._specification, None
-            ),
+            conditional=self._asked("conditional stability", whole, self._conditional, None),
+            settlings=self._asked("rest after a step", whole, self._settlings, ()),
+            rest_sweep=self._asked("motion from rest", whole, self._rest, None),
+            counts=self._asked("motion from rest", whole, self._counts, ()),
+            large_signals=self._asked("large signals", whole, self._large, None),
+            friction=self._asked("friction effects", whole, self._friction, None),
+            specification=self._asked("specification", whole, self._specification, None),
             held_by_friction=self._held_by_friction(),
             notes=tuple(dict.fromkeys(self.notes)),
         )  # fmt: skip
@@ -166,9 +162,10 @@ class _Work:
         """What is shown of one loop."""
         return self._part(f"{what} of the {name} loop", lambda: work(self.bench, name), None)
 
-    def _asked(self, wanted: bool, name: str, work: Callable[[], T], otherwise: U) -> T | U:
-        """A finding, if it is asked for."""
-        made = self._part(name, work, otherwise) if wanted else otherwise
+    def _asked(self, name: str, possible: bool, work: Callable[[], T], otherwise: U) -> T | U:
+        """A finding, or what the drive itself does, if it is asked for."""
+        wanted = name in self.settings.findings if name in FINDINGS else self.settings.own
+        made = self._part(name, work, otherwise) if wanted and possible else otherwise
         self._step()
         return made
 

@@ -177,8 +177,8 @@ def tangent(
     return next(tangents(setup, place))
 
 
-def tangents(setup: LoopSetup, place: str, watched: Sequence[Watched] = ()) -> Iterator[Tangent]:
-    """From a place to each of some signals that are watched, measured at once; else to what comes back."""
+def tangents(setup: LoopSetup, place: str, watched: Sequence[Watched | None] = (None,)) -> Iterator[Tangent]:
+    """From a place to each of some signals that are watched (None: what comes back), measured at once."""
     measured, tick_s = Differences(setup, place, watched), setup.design.controller.period_s
     for parts, entry_errors, stated_error in measured.parts():
         yield Tangent(

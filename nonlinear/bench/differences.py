@@ -44,7 +44,7 @@ class Differences:
         Places of the numbers of the state that take part.
     """
 
-    def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched] = ()) -> None:
+    def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched | None] = (None,)) -> None:
         self.where = f"{setup.design.name}: {place}"
         self.injected = Injection(setup, place, watched)
         self.drive = self.injected.rows.running()
@@ -202,11 +202,15 @@ class Differences:
     def _differences(self, steps: Floats) -> tuple[Floats, Floats]:
         """Central differences over all numbers, one a row, and what rounding may make of them.
 
-        NaN where an event took place, or where the step is lost in the number.
+        NaN where the step is 0 or lost in the number, and where an event took place.
         """
-        K, both = steps.size, np.arange(2 * steps.size)
-        rows, places = np.tile(self.start, (2 * K, 1)), np.concatenate([self.places, self.places])
-        rows[both, places] += np.concatenate([steps, -steps])
+        asked = np.flatnonzero(steps > 0.0)
+        K, both = asked.size, np.arange(2 * asked.size)
+        columns = np.full((2, steps.size, self.moved.size + self.updates * self.injected.readings), np.nan)
+        if K == 0:
+            return columns[0], columns[1]
+        rows, places = np.tile(self.start, (2 * K, 1)), np.tile(self.places[asked], 2)
+        rows[both, places] += np.concatenate([steps[asked], -steps[asked]])
         ends = rows[both, places]
         after, back, flags = self._runs(rows)
         found = np.concatenate([after[:, self.moved], back.reshape(2 * K, -1)], axis=1)
@@ -214,7 +218,8 @@ class Differences:
         width = ends[:K] - ends[K:]
         width = np.where(calm[:K] & calm[K:] & (width > 0.0), width, np.nan)[:, None]
         size = np.maximum(np.abs(found[:K]), np.abs(found[K:]))
-        return (found[:K] - found[K:]) / width, np.spacing(size) / width
+        columns[:, asked] = (found[:K] - found[K:]) / width, np.spacing(size) / width
+        return columns[0], columns[1]
 
 
 class _Columns:

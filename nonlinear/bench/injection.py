@@ -11,7 +11,7 @@ import numpy as np
 from actuator_lti.drive.signals import Kind
 from nonlinear._kernels import layout as at
 from nonlinear.bench.lifted import Floats
-from nonlinear.bench.loop_setup import LoopSetup, every, target
+from nonlinear.bench.loop_setup import LoopSetup, every, stages_of, target
 from nonlinear.runs.running import Running
 
 RETURNED = {
@@ -47,15 +47,17 @@ class Watched:
 class Injection:
     """A place of a drive: where the signal is added, how much would be large there, and what is read.
 
-    Without signals that are watched one thing is read: what comes back.
+    What comes back, where ``watched`` has None; else the signal in front of a limiter.
     """
 
-    def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched] = ()) -> None:
+    def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched | None] = (None,)) -> None:
         design = setup.design
         self.place, self.rows, self.ratio = place, setup.row(), design.total_ratio
         self.at_start = place in ("command", "load")
-        self.outermost, self.watched = design.controller.outermost, watched
-        self.readings = max(len(watched), 1)
+        self.outermost, self.readings = design.controller.outermost, len(watched)
+        self.own = [k for k, each in enumerate(watched) if each is None]
+        others = [(k, each) for k, each in enumerate(watched) if each is not None]
+        self.watched = sorted(others, key=lambda one: -one[1].every)
         if place == "load":
             self.hold_ticks, self.at = 1, at.LOAD
         elif place == "command":
@@ -67,9 +69,9 @@ class Injection:
             probe = at.PROBES + at.POINTS.index(point) * at.PROBE_SIZE
             self.hold_ticks, self.at = setup.hold_ticks, probe + at.PROBE_SIGNAL + 1
             self.read_at = RETURNED[point]
-        there = {"i": at.S_CURRENT} | RETURNED | HELD
-        signals = [target(design, "velocity") if x.signal == "torque_command" else x.signal for x in watched]
-        self.watched_at = [there[signal] for signal in signals]
+        self.signals = {"i": at.S_CURRENT} | RETURNED | HELD
+        if "velocity" in stages_of(design):
+            self.signals["torque_command"] = RETURNED[target(design, "velocity")]
         self.size = setup.range if isfinite(setup.range) and setup.range > 0.0 else 1.0
         self.steady = float(self.rows.values[0, self.at])
 
@@ -79,12 +81,33 @@ class Injection:
             p[at.RARE_LOAD] = 1.0
 
     def run(self, drive: Running, states: Floats, values: Floats) -> Floats:
-        """Run every state to the next update with its own value; what is read, shape (states, readings)."""
-        if self.watched:
-            return self._watch(drive, states, values)
-        early = self._read(states, drive.p)
-        drive.each(states, self.hold_ticks, self.at, values)
-        return (early if self.at_start else self._read(states, drive.p))[:, None]
+        """Run every state to the next update with its own value; what is read, shape (states, readings).
+
+        A signal is read, or what it changed by, at its last update.  What stands in front of the torque
+        filters is no number of the state: that update is made once more without them.
+        """
+        seen, tick = np.empty((len(states), self.readings)), 0
+        if self.at_start:
+            seen[:, self.own] = self._read(states, drive.p)[:, None]
+        for k, watched in self.watched:
+            drive.each(states, self.hold_ticks - watched.every - tick, self.at, values)
+            tick, before = self.hold_ticks - watched.every, states
+            if watched.signal == "torque_command":
+                before, filters = states.copy(), drive.p[at.TORQUE_FILTERS]
+                drive.p[at.TORQUE_FILTERS] = 0.0
+                drive.each(before, 1, self.at, values)
+                drive.p[at.TORQUE_FILTERS] = filters
+            seen[:, k] = before[:, self.signals[watched.signal]]
+        drive.each(states, self.hold_ticks - tick, self.at, values)
+        if not self.at_start:
+            seen[:, self.own] = self._read(states, drive.p)[:, None]
+        for k, watched in self.watched:
+            after = states[:, self.signals[watched.signal]]
+            if watched.kind == "rate":
+                seen[:, k] = (after - seen[:, k]) / watched.period_s
+            elif watched.kind == "value" and watched.signal != "torque_command":
+                seen[:, k] = after
+        return seen
 
     def _read(self, s: Floats, p: Floats) -> Floats:
         """What comes back, negated; the output itself for command and load."""
@@ -93,29 +116,3 @@ class Injection:
         if self.place == "command" and self.outermost != "position":
             return s[:, at.S_CURRENT if self.outermost == "current" else at.S_SPEED].copy()
         return s[:, at.S_OUTPUT].copy() if p[at.ELASTIC_DRIVE] > 0.0 else s[:, at.S_ANGLE] / self.ratio
-
-    def _watch(self, drive: Running, states: Floats, values: Floats) -> Floats:
-        """What each signal is, or what it changed by, at its last update.
-
-        What stands in front of the torque filters is no number of the state: that update is made once more
-        without them.
-        """
-        before, tick = np.empty((len(states), self.readings)), 0
-        for k in sorted(range(self.readings), key=lambda k: -self.watched[k].every):
-            watched, seen = self.watched[k], states
-            drive.each(states, self.hold_ticks - watched.every - tick, self.at, values)
-            tick = self.hold_ticks - watched.every
-            if watched.signal == "torque_command":
-                seen, filters = states.copy(), drive.p[at.TORQUE_FILTERS]
-                drive.p[at.TORQUE_FILTERS] = 0.0
-                drive.each(seen, 1, self.at, values)
-                drive.p[at.TORQUE_FILTERS] = filters
-            before[:, k] = seen[:, self.watched_at[k]]
-        drive.each(states, self.hold_ticks - tick, self.at, values)
-        for k, watched in enumerate(self.watched):
-            after = states[:, self.watched_at[k]]
-            if watched.kind == "rate":
-                before[:, k] = (after - before[:, k]) / watched.period_s
-            elif watched.kind == "value" and watched.signal != "torque_command":
-                before[:, k] = after
-        return before

@@ -160,13 +160,15 @@ class Panel:
 
     def rule_x(self, at: float, words: str = "", label: str = "", **look: Any) -> None:
         """Draw an upright line."""
-        look = {"colour": "muted", "width": 1.0, **look}
-        self.items.append(Rule(at=float(at), across="x", look=Look(**look), words=words, label=label))
+        self._rule(at, "x", words, label, look)
 
     def rule_y(self, at: float, words: str = "", label: str = "", **look: Any) -> None:
         """Draw a level."""
-        look = {"colour": "muted", "width": 1.0, **look}
-        self.items.append(Rule(at=float(at), across="y", look=Look(**look), words=words, label=label))
+        self._rule(at, "y", words, label, look)
+
+    def _rule(self, at: float, across: Literal["x", "y"], words: str, label: str, look: Any) -> None:
+        made = Look(**{"colour": "muted", "width": 1.0, **look})
+        self.items.append(Rule(at=float(at), across=across, look=made, words=words, label=label))
 
     def band_x(self, low: float, high: float, label: str = "", **look: Any) -> None:
         """Shade a stretch of x."""

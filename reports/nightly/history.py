@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -207,8 +206,7 @@ class History:
         return self.state / NIGHTS / f"{run:06d}.json"
 
 
-@contextmanager
-def open_history(state: Path) -> Iterator[History]:
+def open_history(state: Path) -> History:
     """Open (or begin) the history of a state folder.
 
     Raises
@@ -218,8 +216,7 @@ def open_history(state: Path) -> Iterator[History]:
     """
     path = state / FILE
     if not path.exists() or not path.stat().st_size:
-        yield History(state, Index(id=secrets.token_hex(16)))
-        return
+        return History(state, Index(id=secrets.token_hex(16)))
     data = _read(path)
     head = _valid(_HEAD, data, path, "no history of a nightly build")
     if head.schema != SCHEMA:
@@ -232,7 +229,7 @@ def open_history(state: Path) -> Iterator[History]:
     sealed = _valid(_SEALED, data, path)
     if sha256(_INDEX.dump_json(sealed.index)) != sealed.sha256:
         raise _damaged(path, "is not what was written")
-    yield History(state, sealed.index)
+    return History(state, sealed.index)
 
 
 def _read(path: Path) -> bytes:

@@ -155,7 +155,8 @@ def _held(study: Study, site: Path, use: Settings, *, begun: bool = False) -> It
         memory.check(site, memory.Memory(), state)  # before one is begun
     if begun and not (state / FILE).exists():
         raise InputError("no night has been built here yet", where=str(site))
-    with hold(state, use.wait_s), open_history(state) as history:
+    with hold(state, use.wait_s):
+        history = open_history(state)
         if not use.accept_lost_history:
             memory.check(site, history.memory(), state)
         history.claim(study.name)

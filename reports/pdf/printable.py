@@ -100,9 +100,9 @@ def _verdict(item: Mapping[str, Any]) -> Tree:
         "cells": [
             clean(item.get("label"), 200),
             item["verdict"],
-            clean(item["shown"], 60) if item.get("shown") else show(item.get("value"), "sig:4"),
-            "" if item.get("shown") else clean(limit, 60),
-            "" if item.get("shown") else show_signed(item.get("distance")),
+            show(item.get("value"), "sig:4"),
+            clean(limit, 60),
+            show_signed(item.get("distance")),
             clean(item.get("unit"), 30),
         ],
         "id": clean(item.get("id"), 120),

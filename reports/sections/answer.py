@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from actuator_lti.asked.quantities import AT_A_GLANCE, QUANTITIES, reserve
 from analyses.linear.held_loops import HELD
@@ -78,13 +78,8 @@ def section(
 
 def believed(sections: Sequence[Section]) -> str:
     """Say in one line how far linear and simulated agree, and what is not proven."""
-    checks = [
-        item
-        for part in sections
-        for block in doc.walk(part)
-        if block["kind"] == "verdicts" and block.get("what") == "checks"
-        for item in block["items"]
-    ]
+    blocks = [block for part in sections for block in doc.walk(part)]
+    checks = doc.judged(block for block in blocks if block.get("what") == "checks")
     if not checks:
         return "Not checked by simulation."
     errors = [
@@ -126,23 +121,13 @@ def _bars(items: Sequence[VerdictItem], bounds: Corners | None) -> list[Bar]:
         for one in corner.verdicts:
             if one.value is not None and math.isfinite(one.value):
                 found.setdefault((one.id, one.loop), []).append(one.value)
-    return [
-        {
-            "id": item["id"],
-            "label": item["label"],
-            "value": item["value"],
-            "limit": item["limit"],
-            "comparison": item["comparison"],
-            "unit": item["unit"],
-            "verdict": item["verdict"],
-            "band": [min(values), max(values)] if (values := _corner_values(item, found)) else None,
-        }
-        for item in sorted(known, key=_nearness)
-    ]
+    return [_bar(item, found) for item in sorted(known, key=_nearness)]
 
 
-def _corner_values(item: VerdictItem, found: Mapping[tuple[str, str | None], list[float]]) -> list[float]:
-    return found.get((item["id"], item.get("loop")), [])
+def _bar(item: Mapping[str, Any], found: Mapping[tuple[str, str | None], list[float]]) -> Bar:
+    values = found.get((item["id"], item.get("loop")), [])
+    kept = {name: item[name] for name in Bar.__annotations__ if name != "band"}
+    return cast(Bar, {**kept, "band": [min(values), max(values)] if values else None})
 
 
 def move_words(design: Design, move: Move) -> str:

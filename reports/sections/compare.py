@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
-from analyses.specification.requirements import tally
 from reports import document as doc
 from reports.as_json import as_json
 from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
@@ -48,7 +47,12 @@ def text(comparison: Comparison | str) -> str | None:
 
 def brief(comparison: Comparison) -> Brief:
     """Which designs meet their requirements."""
-    return Brief(result(comparison), [overview(comparison)])
+    shown = compare_many.choice(comparison)
+    kept = ("design", "met", "missed", "unproven")
+    block = doc.with_columns(compare_best.designs(shown, note=""), kept)
+    left_out = len(comparison.all) - len(shown.all)
+    notes = [f"{left_out} more designs are in {compare_many.TABLE}"] if left_out else []
+    return Brief(result(comparison), [block], notes)
 
 
 def data(comparison: Comparison) -> Tree:
@@ -115,24 +119,6 @@ def batches(comparison: Comparison) -> list[list[Compared]]:
 def design_columns(designs: Sequence[Compared]) -> list[Column]:
     """Make a column a design."""
     return [doc.column(f"d{k}", one.variant.name, align="right") for k, one in enumerate(designs)]
-
-
-def overview(comparison: Comparison) -> Block:
-    """One line a design that the page shows: how many requirements it meets, and which it misses."""
-    comparison = compare_many.choice(comparison)
-    columns = [
-        doc.of("variant.name", "design", "Design"),
-        doc.of(lambda one: compare_best.met_words(one), "met", "Met"),
-        doc.of(lambda one: _those(one, Verdict.NOT_MET), "missed", "Not met"),
-        doc.of(lambda one: _those(one, Verdict.NOT_PROVEN), "unproven", "Not proven"),
-    ]
-    left_out = len(comparison.everything.all) - len(comparison.all)
-    note = f"{left_out} more designs are in {compare_many.TABLE}." if left_out else ""
-    return doc.listing("Requirements", comparison.all, columns, note, lambda one: tally(one.verdicts).role)
-
-
-def _those(one: Compared, word: Verdict) -> str:
-    return ", ".join(v.id for v in one.verdicts if v.verdict == word)
 
 
 def _named(one: Compared, verdict: RequirementVerdict) -> VerdictItem:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.quantities import reserve
+from actuator_lti.asked.verdict import Verdict
 from analyses.specification.requirements import tally
 from reports import document as doc
 from reports.document_schema import Block, Section
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 _MOST = 3
+_NOTE = "Gains and losses are changes of the distance to the limit, in percent of the limit."
 
 
 def section(comparison: Comparison) -> Section:
@@ -27,7 +29,7 @@ def section(comparison: Comparison) -> Section:
     if not wanted:
         return doc.section("best", "Which variant for what", [], result="The base states no requirement.")
     everything = comparison.everything
-    blocks = [_designs(comparison), _best(everything)]
+    blocks = [designs(comparison), _best(everything)]
     met = [one for one in everything.all if failed(one) == 0]
     missed = len(met) < len(everything.all) or bool(everything.refused)
     return doc.section(
@@ -73,23 +75,23 @@ def weakest(one: Compared) -> tuple[float, RequirementVerdict | None]:
     return min(known, key=lambda pair: pair[0], default=(math.inf, None))
 
 
-def _designs(comparison: Comparison) -> Block:
-    """One row a design: what it meets, its weakest point, what it gains and gives up against the base."""
+def designs(comparison: Comparison, note: str = _NOTE) -> Block:
+    """One row a design: what it meets and misses, its weakest point, gains and losses against the base."""
     base = comparison.base
     columns = [
         doc.of("variant.name", "design", "Design"),
-        doc.of(met_words, "met", "Requirements met"),
+        doc.of(lambda o: f"{tally(o.verdicts).met} of {len(o.verdicts)}", "met", "Met"),
+        doc.of(lambda o: _those(o, Verdict.NOT_MET), "missed", "Not met"),
+        doc.of(lambda o: _those(o, Verdict.NOT_PROVEN), "unproven", "Not proven"),
         doc.of(_weakest_words, "weakest", "Nearest to its limit"),
         doc.of(lambda o: "the base" if o is base else _changes(o, comparison, 1), "gains", "Gains most"),
         doc.of(lambda o: "" if o is base else _changes(o, comparison, -1), "gives", "Gives up most"),
     ]
-    note = "Gains and losses are changes of the distance to the limit, in percent of the limit."
     return doc.listing("Each design", comparison.all, columns, note, lambda one: tally(one.verdicts).role)
 
 
-def met_words(one: Compared) -> str:
-    """How many requirements a design meets."""
-    return f"{tally(one.verdicts).met} of {len(one.verdicts)}"
+def _those(one: Compared, word: Verdict) -> str:
+    return ", ".join(v.id for v in one.verdicts if v.verdict == word)
 
 
 def _weakest_words(one: Compared) -> str:

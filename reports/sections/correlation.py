@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from analyses.correlation.summary import agrees, moves_alike, summarise, worst_of
+from analyses.correlation.summary import BESIDE, agrees, moves_alike, summarise, worst_of
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -29,10 +29,6 @@ NAMES = {
     "voltage": "Voltage",
     "force": "Force",
 }
-
-
-BESIDE = ("speed", "velocity", "current", "force")
-"""Signals that stand beside the motion in the first sentence."""
 
 
 def section(result: CorrelationResult, number: int = 1, *, error_limit: float | None = None) -> Section:
@@ -78,13 +74,14 @@ def words(results: Sequence[CorrelationResult], error_limit: float | None = None
     )
     apart = [one.record for one in results if not moves_alike(one)]
     parts += [f"{record}: a fit below 0 %, the model moves otherwise." for record in apart]
-    far = max((s for r in results for s in r.signals.values()), key=lambda s: s.relative_error)
+    far = max((s for r in results for s in r.signals.values()), key=lambda s: s.share_of_motion)
     if error_limit is None and not wrong:
         one = "The record contradicts" if len(results) == 1 else "The records contradict"
         parts.append(f"{one} neither {'itself' if len(results) == 1 else 'themselves'} nor the design.")
     elif error_limit is not None:
-        over = far.relative_error > error_limit
-        parts.append(f"{'Above' if over else 'Within'} the limit of {100.0 * error_limit:g} %.")
+        over = far.share_of_motion > error_limit
+        side = "Above" if over else "Within"
+        parts.append(f"{side} the limit of {100.0 * error_limit:g} %: {far.name} {_share(far)}.")
     return " ".join(parts)
 
 
@@ -124,6 +121,7 @@ def comparison_table(result: CorrelationResult) -> Block:
     """One row a signal."""
     columns = [
         doc.of(lambda s: NAMES.get(s.name, s.name), "name", "Signal"),
+        doc.of("share_of_motion", "share", "Error of the motion", "%", scale=100.0, format="sig:4"),
         doc.of("relative_error", "relative", "Relative error", "%", scale=100.0, format="sig:4"),
         doc.of("fit_percent", "fit", "Fit", "%", format="fix:3"),
         doc.of("mean_error", "mean", "Mean |e|", format="sig:3"),
@@ -134,8 +132,8 @@ def comparison_table(result: CorrelationResult) -> Block:
         doc.of("delay_s", "delay", "Measured lags by", "ms", scale=1e3, format="fix:3"),
     ]
     note = (
-        "Relative error: norm of the difference over the norm of the measured signal. Fit: 100 % minus the "
-        "norm of the difference over that of the measured signal without its mean (normalised rms fit)."
+        "Error of the motion: norm of the difference over that of the measured signal about its mean (a flat "
+        "signal: over its norm); fit: 100 % less that. Relative error: over the norm of the measured signal."
     )
     return doc.listing(f"{result.design} against {result.record}", result.signals.values(), columns, note)
 
@@ -155,6 +153,6 @@ def signal_figure(signal: SignalComparison, first: str = "") -> Block:
     lower.curve(time, difference[rows], colour=style.RED, width=1.1)
     lower.y.label, lower.x.label = f"difference, {signal.unit}", "time, s"
     lower.x.limits(time[0], time[-1])
-    caption = f"{first}{name}: measured and model, relative error {100.0 * signal.relative_error:.3g} %"
+    caption = f"{first}{name}: measured and model, {_share(signal)} of the motion off"
     alt = f"{name} over time, measured and from the model, and the difference of the two"
     return doc.figure("correlation_signal", chart, caption=caption, alt=alt)

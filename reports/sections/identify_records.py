@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from analyses.estimation.parameters import parameter
 from reports import document as doc
-from reports.charts import style
-from reports.charts.style import Chart
 from reports.document_schema import Block, Section
+from reports.sections import residuals
 from reports.sections.identified import judged, parameter_table, value_words
 from reports.sections.record_tables import finding_table, input_table
 
@@ -45,7 +42,7 @@ def section(result: BenchResult) -> Section:
             *[doc.text(f"{part.name}: {note}") for note in (str(record.counts), *part.notes)],
         ]
     blocks += [finding_table(record.name, result.findings[record.name]) for record in result.validation]
-    blocks.append(_figure(model, axis))
+    blocks += residuals.blocks(model, result.residual_tests, axis)
     return judged(
         "dynamic-identification", "Dynamic identification", result, blocks,
         result=_result(result, axis), intro=_intro(result),
@@ -79,7 +76,9 @@ def _intro(result: BenchResult) -> str:
         f"Hz (Butterworth of order {recipe.filter_order}, forward and backward), differentiated twice, the "
         f"first {recipe.skip_samples} samples dropped, decimated by "
         f"{recipe.decimation}{f', {rest} rows at rest left out' if rest else ''}; inverse dynamic model by "
-        f"least squares. Relative residual {100.0 * model.relative_residual:.4f} %."
+        f"least squares. Relative residual {100.0 * model.relative_residual:.4f} %, fit "
+        f"{min(part.fit_percent for part in model.records):.2f} % (100 (1 - |y - yhat| / |y - mean(y)|)"
+        f"{', the lowest' if many else ''})."
     )
 
 
@@ -122,6 +121,9 @@ def _refined(refined: OutputErrorResult, axis: str) -> Block:
         "Simulation with each record's own command: the relative error of the signal that is fitted falls "
         f"from {100 * refined.error_before:.3f} % to {100 * refined.error_after:.3f} % in "
         f"{refined.iterations} iterations. These values are the design's."
+        + "".join(
+            f" {key} ended at a bound of its key: these records do not tell it." for key in refined.at_bound
+        )
     )
     return parameter_table("Refined by simulation", refined, note, axis=axis)
 
@@ -164,13 +166,3 @@ def scatter_table(model: JointModel, axis: str) -> Block:
         "does not determine is fixed at its joint value there."
     )
     return doc.table("Fits of single records", columns, rows, note)
-
-
-def _figure(model: JointModel, axis: str) -> Block:
-    unit = "N" if axis == "linear" else "N m"
-    chart = Chart(width=style.WIDE, height=320.0)
-    panel = chart.panel()
-    panel.curve(np.arange(len(model.residual)), model.residual, "residual")
-    panel.x.label, panel.y.label = "row after decimation", f"residual, {unit}"
-    caption, alt = "Residual of the inverse dynamic model", "Residual of the drive force over the record"
-    return doc.figure("residual", chart, caption=caption, alt=alt)

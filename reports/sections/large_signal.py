@@ -34,7 +34,8 @@ def section(result: LargeSignals) -> Section:
     scale, unit = output_unit(design.axis)
     items = _sawtooth_verdicts(result.sawtooth)
     rules = doc.details("How the map is read", [doc.text(words) for words in (CAUSE_RULE, CRITERIA)])
-    blocks = [doc.verdicts(items, what="checks"), _map_figure(result, scale, unit), rules]
+    blocks = [doc.verdicts(items, what="checks")] if items else []
+    blocks += [_map_figure(result, scale, unit), rules]
     if result.shift is not None:
         table = _shift_table(result.shift, design, scale, unit)
         blocks.append(doc.details("The linear limit in numbers", [table]))
@@ -48,7 +49,7 @@ def section(result: LargeSignals) -> Section:
         "model holds. Above them the limit that is reached first determines the output."
     )
     words = _result(result.bode, scale, unit, _linear(design))
-    status: Status = tally(items).role
+    status: Status = tally(items).role if items else "info"
     return doc.section(
         "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, told="info"
     )

@@ -18,7 +18,7 @@ from reports.document_schema import Block, Row, Section, State, Status
 from reports.numbers import short, to_minus
 from reports.sections import requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words
-from reports.terminal import Brief, side_by_side
+from reports.terminal import Brief, SideBySide
 
 if TYPE_CHECKING:
     from actuator_lti.bandwidth import Bandwidth
@@ -105,7 +105,7 @@ def brief(result: Margins) -> Brief:
     counts = [len(one.margins.gain_margins) + len(one.margins.phase_margins) for one in known.values()]
     crossings = [crossing_table(own)] if max(counts, default=0) > 2 else []
     notes = [*by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
-    return Brief(first["result"], [side_by_side(head, tables), *crossings, *judged["blocks"]], notes)
+    return Brief(first["result"], [SideBySide(head, tables), *crossings, *judged["blocks"]], notes)
 
 
 def _where(result: Margins) -> str:
@@ -258,7 +258,7 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
 
 def range_words(range_: Spread) -> str:
     """Say between which values a figure lies over the operating points; empty where they agree."""
-    least, most = short(range_.least, 3), "∞" if math.isinf(range_.most) else short(range_.most, 3)
+    least, most = ("∞" if math.isinf(end) else short(end, 3) for end in (range_.least, range_.most))
     return least if least == most else f"{least} ({range_.where}) to {most}"
 
 

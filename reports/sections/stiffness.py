@@ -72,7 +72,7 @@ def _compared(result: Stiffness) -> str:
     if not result.checks:
         return f"nothing is compared: {result.unproven}" if result.unproven else ""
     most = max(check.difference for check in result.checks)
-    words = f"moments injected at {len(result.checks)} frequencies agree to {most:.1e}, allowed {AGREED:g}"
+    words = f"small moments at {len(result.checks)} frequencies agree to {most:.1e}, allowed {AGREED:g}"
     if result.lost_motion_difference is not None:
         words += f", the lost motion to {result.lost_motion_difference:.1e}, allowed {READ:g}"
     return f"{words} (relative)"
@@ -151,9 +151,9 @@ def _at_rest(result: Stiffness, unit: str) -> Block:
 
 def _checks(result: Stiffness, unit: str) -> Block:
     note = (
-        "A small moment injected in the simulator, without play, quantisation, dry friction or friction by "
-        "load: predicted here is the linear stiffness of that drive, without the friction by load "
-        "that the curves have."
+        "The simulator's own derivative from a moment, at rest, without play, counts, dry friction or "
+        "friction by load: predicted here is the linear stiffness of that drive, without that "
+        "friction, which the curves have."
     )
     columns = [
         doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:4"),
@@ -163,4 +163,4 @@ def _checks(result: Stiffness, unit: str) -> Block:
         doc.of(lambda one: _or_infinite(abs(one.seen_Nm_rad)), "seen", "Simulated", unit, format="sig:6"),
         doc.of("difference", "difference", "Relative difference", format="sig:2"),
     ]
-    return doc.listing("Injected moment", result.checks, columns, note)
+    return doc.listing("Small moments", result.checks, columns, note)

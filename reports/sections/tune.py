@@ -22,7 +22,7 @@ def section(result: TuningResult) -> Section:
     """Make the section."""
     verdicts = doc.verdicts(_verdict(r) for r in result.requirements)
     blocks: list[Block] = [
-        *(verdicts, gains(result), requirements(result)),
+        *(verdicts, gains(result)),
         *([confirmed(result)] if result.confirmed else []),
         *([_curve(result)] if result.trade_off else []),
         *([checks(result)] if result.checks else []),
@@ -85,7 +85,9 @@ def _verdict(r: BindingRequirement) -> VerdictItem:
     return doc.verdict(
         f"tuning/{r.id}", f"{r.label}, worst corner", value=r.value, limit=r.limit, unit=r.unit,
         distance=r.distance, passed=r.relative >= 0.0,
-        reason="" if r.distance is not None else _amount(r),
+        reason="; ".join(filter(None, (
+            "" if r.distance is not None else _amount(r), "binds" if r.binds else "", f"at {_corner(r)}",
+        ))),
     )  # fmt: skip
 
 
@@ -106,23 +108,6 @@ def gains(result: TuningResult) -> Block:
         doc.of("object_unit", "object_unit", "in"),
     ]
     return doc.listing("Gains", result.gains, columns, note)
-
-
-def requirements(result: TuningResult) -> Block:
-    """Every requirement at its worst corner."""
-    columns = [
-        doc.of("label", "label", "Requirement"),
-        doc.of("value", "value", "Worst corner", format="sig:4"),
-        doc.of("limit", "limit", "Limit", format="sig:4"),
-        doc.of("distance", "distance", "Distance", format="sig:3"),
-        doc.of(lambda r: unit_words(r.unit), "unit", "Unit"),
-        doc.of("binds", "binds", "Binds", format="yesno"),
-        doc.of(_corner, "corner", "At"),
-    ]
-    return doc.listing(
-        "Requirements at their worst corner", result.requirements, columns,
-        status=lambda r: "pass" if r.relative >= 0.0 else "fail",
-    )  # fmt: skip
 
 
 def confirmed(result: TuningResult) -> Block:

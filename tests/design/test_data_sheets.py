@@ -2,6 +2,7 @@
 
 import json
 from math import pi, sqrt
+from pathlib import Path
 
 import pytest
 
@@ -309,5 +310,34 @@ def test_an_unknown_share_is_a_tolerance_from_none_to_all() -> None:
     ],
 )
 def test_a_sheet_that_says_it_twice_or_by_half(old: str, new: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        read_design_text(SHEET.replace(old, new), "sheet")
+
+
+def test_a_phase_margin_that_no_operating_point_bounds_is_infinite(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A current loop by a gain below R never crosses 0 dB, at no operating point."""
+    file = tmp_path / "mine.toml"
+    velocity = '[control.velocity]\ngain = "0.02 As/rad"\nintegral_time = "20 ms"\n'
+    position = '[control.position]\ngain = "40/s"\n'
+    file.write_text(f'{SHEET}[control.current]\ngain = "0.1 V/A"\n{velocity}{position}')
+    assert main(["margins", str(file)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Phase margin, operating ∞" in said
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            'back_emf_constant = "317',
+            'speed_constant = "317',
+            'back_emf_constant, which takes "317 rpm/V" too',
+        ),
+        ("efficiency = 0.9", 'backlash = "0.8 deg"', r"it is play of \[coupling\]"),
+    ],
+)
+def test_a_data_sheets_word_is_answered_with_the_key(old: str, new: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read_design_text(SHEET.replace(old, new), "sheet")

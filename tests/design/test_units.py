@@ -68,6 +68,15 @@ WRITTEN = [
     ("48'", "rad", 48 / 60 * pi / 180),
     ('30"', "rad", 30 / 3600 * pi / 180),
     ("48 VDC", "V", 48.0),
+    ("10.7 mVs/rad", "V*s/rad", 10.7e-3),
+    ("0.01 As/rad", "A*s/rad", 0.01),
+    ("25/s", "1/s", 25.0),
+    ("3000 min⁻¹", "rad/s", 100 * pi),
+    ("10 600 rpm", "rad/s", 10600 * pi / 30),
+    ("12\u202f345\u202f678 s", "s", 12345678.0),
+    ("140 KV", "rad/(V*s)", 140 * pi / 30),
+    (0, "s", 0.0),
+    ("0", "kg*m^2", 0.0),
     ("24 V DC", "V", 24.0),
     ("5 A dc", "A", 5.0),
     ("343/8", "1", 42.875),
@@ -105,6 +114,8 @@ def test_a_decimal_prefix_costs_no_digit(text: str) -> None:
         ("3 kg", "kg*m^2", "wrong dimension"),
         ("5.9 mN*m/A", "V*s/m", "wrong dimension"),
         ("55", "ohm", "no unit"),
+        ("0", "degC", "no unit"),
+        ("10 60 rpm", "rad/s", "not a unit"),
         (55, "ohm", "no unit"),
         ("1:43", "1", 'a reduction is written "43:1"'),
         ("16 kHz", "s", "a period of 6.25e-05 s"),
@@ -133,9 +144,7 @@ def test_what_is_no_quantity_is_refused_with_the_unit_wanted(text: object, unit:
     assert says in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "text", ["1 As", "1 Nms", "1 Vs/rad", "1 mkg", "1 kkg", "3 ^2", "3 )V", "3 (V", "3 *V", "3 ()"]
-)
+@pytest.mark.parametrize("text", ["1 mkg", "1 kkg", "3 ^2", "3 )V", "3 (V", "3 *V", "3 ()"])
 def test_what_can_be_read_in_two_ways_is_no_unit(text: str) -> None:
     with pytest.raises(InputError, match="unit"):
         parse_quantity(text, "V*s/rad")

@@ -168,11 +168,11 @@ def history(path: Path) -> None:
     for name, data in history_files().items():
         if name != FILE:
             (path.parent / NIGHTS / name).write_bytes(data)
-    with open_history(path.parent) as opened:
-        opened.memory()
-        for run in opened.runs:
-            for one in opened.night(run.id).results:
-                opened.figures(one)
+    opened = open_history(path.parent)
+    opened.memory()
+    for run in opened.runs:
+        for one in opened.night(run.id).results:
+            opened.figures(one)
 
 
 def entry(path: Path) -> None:

@@ -97,8 +97,8 @@ def test_a_lost_history_closes_the_gate_until_somebody_says_so(site, lose) -> No
     assert (site / "index.html").read_bytes() == index
     night(site, 12.0, AGAIN)
     night(site, 12.0)  # from here on it is known again
-    with open_history(state(site)) as history:
-        assert remembered(site) == history.memory()
+    history = open_history(state(site))
+    assert remembered(site) == history.memory()
 
 
 def test_a_site_of_an_older_version_or_a_damaged_summary_remembers_one_night(site) -> None:
@@ -160,10 +160,10 @@ def test_any_damage_is_told_or_harmless(site) -> None:
 
 
 def everything(site: Path) -> list[object]:
-    with open_history(state(site)) as history:
-        results = [result for run in history.runs for result in history.night(run.id).results]
-        figures = [(history.figures(result), history.inputs(result)) for result in results]
-        return [history.index, figures, history.matrix(results, ["GM: value"]).tolist()]
+    history = open_history(state(site))
+    results = [result for run in history.runs for result in history.night(run.id).results]
+    figures = [(history.figures(result), history.inputs(result)) for result in results]
+    return [history.index, figures, history.matrix(results, ["GM: value"]).tolist()]
 
 
 @pytest.mark.parametrize("name", ["", "000001.json", "000002.json"])
@@ -219,5 +219,5 @@ def test_a_changed_name_or_status_is_damage(site, old: str, new: str) -> None:
 )
 def test_a_value_of_another_kind_is_damage(site, change) -> None:
     rewritten(site, change)
-    with pytest.raises(InputError, match="is damaged"), open_history(state(site)):
-        pass
+    with pytest.raises(InputError, match="is damaged"):
+        open_history(state(site))

@@ -87,6 +87,19 @@ def test_a_value_can_be_held(files: dict[str, str], command: Command) -> None:
         assert (status, reason in err) == (2, True), err
 
 
+def test_a_torque_command_is_the_drive(tmp_path, command: Command) -> None:
+    columns = columns_of(motion(2))
+    columns["torque_command_Nm"] = 5.9e-3 * columns.pop("current_A")
+    path = write(tmp_path / "r.csv", columns)
+    result = command("identify", path, "--design", "ilr33-amber", "--json").data
+    uses = {row["meaning"]: row["use"] for row in result["inputs"]["r.csv"]}
+    assert uses["commanded motor torque"] == "drive: torque as commanded"
+    assert result["model"]["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.03)
+    assert result["model"]["parameters"]["inertia"]["value"] == pytest.approx(
+        load_design("ilr33-amber").inertia_kgm2, rel=0.01
+    )
+
+
 def test_one_direction_says_what_it_cannot_tell_apart(files: dict[str, str], command: Command) -> None:
     status, out, _ = command("identify", files["one way"], "--design", "ilr33-amber", "--json")
     result = json.loads(out)

@@ -180,6 +180,18 @@ def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:
     assert result.error_after < 0.05 * result.error_before
 
 
+def test_a_value_that_ends_at_its_bound_is_named() -> None:
+    """An output proportional to the friction, measured as of a negative one."""
+    key = "friction.viscous"
+
+    def output(tried: Design) -> np.ndarray:
+        return parameter_value(tried, key) * np.linspace(1.0, 2.0, 50)
+
+    result = refine_by_output_error(load_design("emps"), (key,), output, -np.linspace(1.0, 2.0, 50))
+    assert result[key] == 0.0
+    assert result.at_bound == (key,)
+
+
 def test_refinement_on_emps_lowers_the_force_error_and_is_what_is_written(emps_file: Path) -> None:
     design, record = load_design("emps"), open_record(emps_file)
     result = identify_bench(design, [record], settings=Settings(refine=True))

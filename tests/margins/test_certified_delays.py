@@ -13,8 +13,8 @@ from mpmath import mp, mpf
 
 from actuator_lti import DelaySystem
 from actuator_lti.margins import stability_margins
-from actuator_lti.margins.delay_form import in_series
-from actuator_lti.margins.exact_delay import exact_delay_loop
+from actuator_lti.margins.delays.exact import exact_delay_loop
+from actuator_lti.margins.delays.form import in_series
 from actuator_lti.margins.loop import rational_loop
 
 LOOPS = 12

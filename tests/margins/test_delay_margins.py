@@ -10,8 +10,8 @@ import pytest
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins import stability_margins
-from actuator_lti.margins.collocation import closed_loop_matrix
-from actuator_lti.margins.delay_form import delay_form, in_series
+from actuator_lti.margins.delays.collocation import closed_loop_matrix
+from actuator_lti.margins.delays.form import delay_form, in_series
 from actuator_lti.margins.loop import rational_loop
 from actuator_lti.systems.delay_system import DelaySystem
 

@@ -16,7 +16,7 @@ from margin_families import FAMILIES, Loop, near_the_border, over_twelve_decades
 from margin_truth import determined, difference, towards_the_border, truth_of
 
 from actuator_lti.margins import StabilityMargins, stability_margins
-from actuator_lti.margins.exact_charpoly import characteristic, numerator
+from actuator_lti.margins.exact.charpoly import characteristic, numerator
 from tests.margins.differential import ALL, tried
 
 TRUE_LOOPS = 60  # of each family, against the truth

@@ -48,15 +48,15 @@ def child(site: Path, round_: int) -> int:
 
 def check_history(state: Path) -> int:
     """Every finished night has all of its results, and the files are sound; how many finished."""
-    with open_history(state) as history:
-        for run in history.runs:
-            results = history.night(run.id).results
-            assert len(results) == DESIGNS, run
-            for result in results:
-                assert history.figures(result), result
-        assert len({run.id for run in history.runs}) == len(history.runs)
-        assert history.index.begun >= len(history.runs) + len(history.index.interrupted)
-        return len(history.runs)
+    history = open_history(state)
+    for run in history.runs:
+        results = history.night(run.id).results
+        assert len(results) == DESIGNS, run
+        for result in results:
+            assert history.figures(result), result
+    assert len({run.id for run in history.runs}) == len(history.runs)
+    assert history.index.begun >= len(history.runs) + len(history.index.interrupted)
+    return len(history.runs)
 
 
 def main(site: Path, kills: int, seed: int) -> dict[str, object]:

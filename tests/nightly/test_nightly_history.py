@@ -38,79 +38,79 @@ def add(history: History, values: Values | None, day: int = 1, unit: str = "dB",
 @settings(max_examples=25)
 def test_every_figure_comes_back_to_the_last_bit(tmp_path_factory, values) -> None:
     state = tmp_path_factory.mktemp("h")
-    with open_history(state) as history:
-        add(history, values)
-    with open_history(state) as history:
-        (result,) = history.results("a")
-        assert {n: f.value for n, f in history.figures(result).items()} == values
-        assert history.inputs(result) == {"parameters": {"p": "1"}}
+    history = open_history(state)
+    add(history, values)
+    history = open_history(state)
+    (result,) = history.results("a")
+    assert {n: f.value for n, f in history.figures(result).items()} == values
+    assert history.inputs(result) == {"parameters": {"p": "1"}}
 
 
 @pytest.mark.parametrize(
     ("more", "homes"), [({}, [1, 1, 1]), ({"unit": "deg"}, [1, 2, 2]), ({"gain": "2"}, [1, 2, 2])]
 )
 def test_what_is_as_before_refers_to_the_night_that_has_it(tmp_path, more, homes) -> None:
-    with open_history(tmp_path) as history:
-        add(history, {"x": 1.0, "y": None})
-        for day in (2, 3):
-            add(history, {"x": 1.0, "y": None}, day, **more)
-    with open_history(tmp_path) as history:
-        results = history.results("a")
-        assert [r.home for r in results] == homes
-        assert history.inputs(results[2]) == {"parameters": {"p": more.get("gain", "1")}}
-        assert history.figures(results[2])["x"].unit == more.get("unit", "dB")
+    history = open_history(tmp_path)
+    add(history, {"x": 1.0, "y": None})
+    for day in (2, 3):
+        add(history, {"x": 1.0, "y": None}, day, **more)
+    history = open_history(tmp_path)
+    results = history.results("a")
+    assert [r.home for r in results] == homes
+    assert history.inputs(results[2]) == {"parameters": {"p": more.get("gain", "1")}}
+    assert history.figures(results[2])["x"].unit == more.get("unit", "dB")
 
 
 def test_a_matrix_follows_figures_that_come_and_go(tmp_path) -> None:
-    with open_history(tmp_path) as history:
-        for day, values in enumerate([{"x": 1.0}, {"x": 2.0, "y": 5.0}, {"y": 6.0}, None], start=1):
-            add(history, values, day)
-        made = history.matrix(history.results("a"), ["x", "y"])
-        nan = math.nan
-        np.testing.assert_equal(made, [[1.0, nan], [2.0, 5.0], [nan, 6.0], [nan, nan]])
-        assert [r.run for r in history.results("a", last=2)] == [3, 4]
+    history = open_history(tmp_path)
+    for day, values in enumerate([{"x": 1.0}, {"x": 2.0, "y": 5.0}, {"y": 6.0}, None], start=1):
+        add(history, values, day)
+    made = history.matrix(history.results("a"), ["x", "y"])
+    nan = math.nan
+    np.testing.assert_equal(made, [[1.0, nan], [2.0, 5.0], [nan, 6.0], [nan, nan]])
+    assert [r.run for r in history.results("a", last=2)] == [3, 4]
 
 
 def test_a_night_enters_whole_or_not_at_all(tmp_path, monkeypatch) -> None:
     """The file of a night that the index does not know is none, and is written over."""
-    with open_history(tmp_path) as history:
-        add(history, {"x": 1.0})
-        monkeypatch.setattr(History, "_put", lambda *_: None)
-        add_fails = pytest.raises(StopIteration)
-        with add_fails:
-            add(history, {"x": 2.0}, 2)
-        monkeypatch.undo()
+    history = open_history(tmp_path)
+    add(history, {"x": 1.0})
+    monkeypatch.setattr(History, "_put", lambda *_: None)
+    add_fails = pytest.raises(StopIteration)
+    with add_fails:
+        add(history, {"x": 2.0}, 2)
+    monkeypatch.undo()
     assert len(list((tmp_path / "nights").iterdir())) == 2
-    with open_history(tmp_path) as history:
-        assert [run.id for run in history.runs] == [1]
-        history.start_run(started="2026-01-02T00:00:00Z", **ABOUT)
-    with open_history(tmp_path) as history:
-        assert add(history, {"x": 3.0}, 3).run == 3
-        assert history.index.interrupted == ["2026-01-02T00:00:00Z"]
-        assert [run.id for run in history.runs] == [1, 3]
+    history = open_history(tmp_path)
+    assert [run.id for run in history.runs] == [1]
+    history.start_run(started="2026-01-02T00:00:00Z", **ABOUT)
+    history = open_history(tmp_path)
+    assert add(history, {"x": 3.0}, 3).run == 3
+    assert history.index.interrupted == ["2026-01-02T00:00:00Z"]
+    assert [run.id for run in history.runs] == [1, 3]
 
 
 def test_a_newer_history_is_refused(tmp_path) -> None:
-    with open_history(tmp_path) as history:
-        add(history, {"x": 1.0})
+    history = open_history(tmp_path)
+    add(history, {"x": 1.0})
     index = json.loads((tmp_path / files.FILE).read_text())
     (tmp_path / files.FILE).write_text(json.dumps({**index, "version": files.VERSION + 1, "index": 3}))
-    with pytest.raises(InputError, match=r"has version 2.*use a newer"), open_history(tmp_path):
-        pass
+    with pytest.raises(InputError, match=r"has version 2.*use a newer"):
+        open_history(tmp_path)
 
 
 @pytest.mark.parametrize("text", ["no JSON", "[" * 100_000, "{}", '{"schema": "other", "version": 1}'])
 def test_what_is_no_history_is_refused(tmp_path, text) -> None:
     path: Path = tmp_path / files.FILE
     path.write_text(text)
-    with pytest.raises(InputError, match="no history of a nightly"), open_history(tmp_path):
-        pass
+    with pytest.raises(InputError, match="no history of a nightly"):
+        open_history(tmp_path)
     assert path.read_text() == text
 
 
 def test_the_history_of_one_study_is_not_taken_for_that_of_another(tmp_path) -> None:
-    with open_history(tmp_path) as history:
-        history.claim("one")
-        history.claim("one")
-        with pytest.raises(InputError, match="'one', not of 'two'"):
-            history.claim("two")
+    history = open_history(tmp_path)
+    history.claim("one")
+    history.claim("one")
+    with pytest.raises(InputError, match="'one', not of 'two'"):
+        history.claim("two")

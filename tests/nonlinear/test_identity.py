@@ -59,51 +59,45 @@ def assert_identical(
         assert np.abs(values - expected).max() <= 1e-9 * np.abs(expected).max(), name
 
 
-def assert_rigid(
-    design: Design, *, friction: bool = False, load_Nm: float = 0.0, limits: bool = True
+BY_DIFFERENCE = {"speed": "difference", "filter_time_s": 2e-4}
+RIGID = [
+    # delay, rates, feed-forward, encoder, friction and load, limits
+    *((delay, rates, 0.0, {}, None, True) for delay in (0.0, 0.5, 1.0, 1.5) for rates in ((1, 1), (2, 10))),
+    *((delay, rates, 0.0, {}, 4.0, True) for delay, rates in ((1.0, (1, 1)), (0.5, (2, 10)))),
+    (1.0, (1, 1), 0.0, {**BY_DIFFERENCE, "difference_samples": 1}, 0.0, False),
+    (1.5, (2, 10), 0.0, {**BY_DIFFERENCE, "difference_samples": 3}, 0.0, False),
+    (1.0, (2, 10), 0.2, {}, None, False),
+]
+
+
+@pytest.mark.parametrize(("delay", "rates", "feedforward", "encoder", "load_Nm", "limits"), RIGID)
+def test_rigid(
+    delay: float,
+    rates: tuple[int, int],
+    feedforward: float,
+    encoder: dict[str, object],
+    load_Nm: float | None,
+    limits: bool,
 ) -> None:
-    """The shipped rigid drive on a ramp with a sine upon it."""
+    """The shipped rigid drive on a ramp with a sine upon it; with a load also its constant friction."""
+    design = timed(load_design("ilr33-amber"), delay, rates, feedforward)
+    design = replace(design, encoder=replace(design.encoder, counts_per_rev=None, **encoder))
     start, T_v = -SPEED / design.controller.position.gain, design.controller.velocity.every * 1e-4
+    friction, load = load_Nm is not None, load_Nm or 0.0
     run = simulate(
-        design, commands.sine(1.5e-3, 7.0), TICKS * 1e-4, load_Nm,
+        design, commands.sine(1.5e-3, 7.0), TICKS * 1e-4, load,
         bias=commands.ramp(SPEED / design.total_ratio),
         initial=State(motor_angle_rad=start, motor_speed_rad_s=SPEED, speed_command_rad_s=SPEED),
         friction_on=friction, limits_on=limits,
     )  # fmt: skip
     known = {"w": SPEED, "th": start, "speed.filter": SPEED, "acc": T_v * SPEED, "ref_prev": start}
     known |= {f"estimate.D{k}": k * T_v * SPEED for k in range(1, 4)}
-    torque = -design.friction.dry_Nm(load_Nm) if friction else 0.0
-    linear = linear_run(design, run, known, torque, 0.0, load_Nm=load_Nm)  # no load moment beside it
+    torque = -design.friction.dry_Nm(load) if friction else 0.0
+    linear = linear_run(design, run, known, torque, 0.0, load_Nm=load)  # no load moment beside it
     assert (run.motor_speed_rad_s > 0).all()
     assert not any(use.active for use in run.limits.values())
     assert set(linear) < set(SIGNALS)
     assert_identical(run, linear, 100.0)
-
-
-def amber(delay: float, rates: tuple[int, int], feedforward: float = 0.0, **encoder: object) -> Design:
-    design = timed(load_design("ilr33-amber"), delay, rates, feedforward)
-    return replace(design, encoder=replace(design.encoder, counts_per_rev=None, **encoder))
-
-
-@every_rate
-@every_delay
-def test_without_dry_friction(delay: float, rates: tuple[int, int]) -> None:
-    assert_rigid(amber(delay, rates))
-
-
-@pytest.mark.parametrize(("delay", "rates"), [(1.0, (1, 1)), (0.5, (2, 10))])
-def test_with_constant_friction_torque(delay: float, rates: tuple[int, int]) -> None:
-    assert_rigid(amber(delay, rates), friction=True, load_Nm=4.0)
-
-
-@pytest.mark.parametrize(("delay", "rates", "samples"), [(1.0, (1, 1), 1), (1.5, (2, 10), 3)])
-def test_with_speed_by_difference(delay: float, rates: tuple[int, int], samples: int) -> None:
-    design = amber(delay, rates, speed="difference", difference_samples=samples, filter_time_s=2e-4)
-    assert_rigid(design, friction=True, limits=False)
-
-
-def test_with_feedforward() -> None:
-    assert_rigid(amber(1.0, (2, 10), feedforward=0.2), limits=False)
 
 
 @dataclass(frozen=True)

@@ -74,31 +74,6 @@ def test_fractional_delay_has_the_phase_of_a_delay(delay: float) -> None:
         assert error < (wT / 2.0) ** taps.size * 2.0
 
 
-def test_instability_beyond_the_delay_margin() -> None:
-    """Velocity loop, limits off, no dry friction: oscillations die out below the margin and grow above it."""
-    from actuator_lti import stability_margins
-
-    design = load_design("ilr33-amber")
-    loop = assemble_loops(design).break_points["i_ref"]
-    samples = stability_margins(loop.open_loop).delay_margin_s / design.controller.period_s
-    sizes = []
-    for share in (0.995, 1.005):
-        probe = Probe(point="i_ref", delay_samples=share * samples)
-        run = simulate(
-            design,
-            commands.step(1e-4),
-            3.0,
-            probes=[probe],
-            friction_on=False,
-            limits_on=False,
-            raise_on_failure=False,
-        )
-        w = np.abs(run.motor_speed_rad_s)
-        sizes.append(w[-3000:].max() / w[6000:9000].max())
-    assert sizes[0] < 0.9
-    assert sizes[1] > 1.1
-
-
 def test_refusals() -> None:
     design = load_design("emps")
     with pytest.raises(InputError, match="no such stage"):

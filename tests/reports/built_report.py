@@ -10,10 +10,8 @@ from reports.sections.validation import section
 
 def validated() -> list[dict[str, Any]]:
     """Give the sections of a coarse validation of ilr33-amber."""
-    coarse = Settings(
-        amplitude_margins=False, rest_frequencies=10, map_counts=(10, 16), friction_effects=False,
-        specification=False,
-    )  # fmt: skip
+    findings = ("injected sweep", "motion from rest", "large signals")
+    coarse = Settings(findings=findings, rest_frequencies=10, map_counts=(10, 16))
     return section(validate(load_design("ilr33-amber"), coarse))
 
 

@@ -14,7 +14,7 @@ from actuator_lti.design import load_design, write_design
 from reports import document as doc
 from reports.cli.app import PANELS, build
 from reports.cli.main import main
-from reports.terminal import print_blocks, side_by_side
+from reports.terminal import SideBySide, print_blocks
 
 NO_DESIGN = {
     "designs",
@@ -121,7 +121,7 @@ def test_side_by_side_tables_are_stacked_rather_than_broken(width: int, monkeypa
         doc.column("pm", "Phase", "deg"),
     ]
     rows = [{"name": name, "gain": 10.5 + k, "pm": f"{k}23456789"} for k, name in enumerate(names)]
-    print_blocks([side_by_side("A head", [doc.table("A", columns, rows)])])
+    print_blocks([SideBySide("A head", [doc.table("A", columns, rows)])])
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= width
     for row in rows:

@@ -10,7 +10,7 @@ from itertools import pairwise
 from flint import acb, arb, fmpq, fmpq_poly
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.exact_delay import HIGHEST_ORDER, ExactDelayLoop, Quasi, at
+from actuator_lti.margins.delays.exact import HIGHEST_ORDER, ExactDelayLoop, Quasi, at
 
 _MOST_INTERVALS = 60_000
 _NARROWEST = 1e-13
@@ -174,15 +174,20 @@ def zeros(axis: Axis, q: Form, edges: list[float]) -> list[arb]:
         if slope > 0 or slope < 0:
             result += _root(axis, q, low, high)
             continue
-        if count > _MOST_INTERVALS:
-            raise Undetermined(
-                f"{count} certified intervals reach no farther than {low:.6g} rad/s of {edges[-1]:.6g}"
-            )
-        if high - low < _NARROWEST * high:
-            raise Undetermined(f"what the loop does near {low:.10g} rad/s could not be told: a touch")
-        middle = 0.5 * (low + high)
-        stack += [(middle, high), (low, middle)]
+        stack += _halves(low, high, count, edges[-1], "what the loop does", ": a touch")
     return result
+
+
+def _halves(
+    low: float, high: float, count: int, end: float, what: str, why: str
+) -> list[tuple[float, float]]:
+    """Both halves of an interval, the second first, unless there are too many or it is too narrow."""
+    if count > _MOST_INTERVALS:
+        raise Undetermined(f"{count} certified intervals reach no farther than {low:.6g} rad/s of {end:.6g}")
+    if high - low < _NARROWEST * high:
+        raise Undetermined(f"{what} near {low:.10g} rad/s could not be told{why}")
+    middle = 0.5 * (low + high)
+    return [(middle, high), (low, middle)]
 
 
 def _enclosed(q: Form, enclosure: Enclosure) -> tuple[arb, arb]:
@@ -277,12 +282,5 @@ def turn(axis: Axis, edges: list[float]) -> arb:
             )
             last = here
             continue
-        if count > _MOST_INTERVALS:
-            raise Undetermined(
-                f"{count} certified intervals reach no farther than {low:.6g} rad/s of {edges[-1]:.6g}"
-            )
-        if high - low < _NARROWEST * high:
-            raise Undetermined(f"1 + L could not be told from zero near {low:.10g} rad/s")
-        middle = 0.5 * (low + high)
-        stack += [(middle, high), (low, middle)]
+        stack += _halves(low, high, count, edges[-1], "the turn of 1 + L", " from one through zero")
     return total

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from flint import fmpz, fmpz_poly
 
-from actuator_lti.margins.certified_roots import Polynomial, half_planes
-from actuator_lti.margins.exact_charpoly import characteristic, numerator
+from actuator_lti.margins.exact.charpoly import characteristic, numerator
+from actuator_lti.margins.exact.roots import Polynomial, half_planes
 from actuator_lti.margins.given import ULP, Given
 
 _S = fmpz_poly([0, 1])

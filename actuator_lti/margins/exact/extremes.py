@@ -7,9 +7,9 @@ import math
 from flint import arb, ctx, fmpz_poly
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.certified_roots import all_roots, positive_roots, split
 from actuator_lti.margins.distances import Distance
-from actuator_lti.margins.exact_loop import ExactLoop
+from actuator_lti.margins.exact.loop import ExactLoop
+from actuator_lti.margins.exact.roots import all_roots, positive_roots, split
 
 _FIRST_BITS, _MOST_BITS = 96, 1 << 14
 _ZERO = 1e-18
@@ -18,10 +18,10 @@ _ZERO = 1e-18
 def smallest(loop: ExactLoop, distance: Distance) -> tuple[float, float]:
     """Smallest value of a distance and its w."""
     above, below = distance.over(loop.N, loop.D)
-    return _smallest(split(above).square, split(below).square)
+    return least(split(above).square, split(below).square)
 
 
-def _smallest(above: fmpz_poly, below: fmpz_poly) -> tuple[float, float]:
+def least(above: fmpz_poly, below: fmpz_poly) -> tuple[float, float]:
     """Smallest sqrt(above/below) over v >= 0, infinity included, and w = sqrt(v)."""
     if below.degree() < 0:
         return math.inf, 0.0

@@ -10,7 +10,8 @@ from functools import cached_property
 from flint import acb, arb, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.certified_roots import (
+from actuator_lti.margins.exact.loop import ExactLoop
+from actuator_lti.margins.exact.roots import (
     HalfPlanes,
     Split,
     all_roots,
@@ -19,7 +20,7 @@ from actuator_lti.margins.certified_roots import (
     positive_roots,
     split,
 )
-from actuator_lti.margins.exact_loop import ExactLoop
+from actuator_lti.margins.single import GainMargin, PhaseMargin
 from actuator_lti.margins.trust import TOUCH
 
 _FIRST_BITS, _MOST_BITS = 96, 1 << 14
@@ -34,6 +35,15 @@ class Crossing:
     w: float
     L: complex
     touch: bool = False
+
+    def gain_margin(self, rad_s: float) -> GainMargin:
+        """As one of the negative real axis, at a frequency of its own."""
+        return GainMargin(float(1.0 / abs(self.L)), rad_s, self.touch)
+
+    def phase_margin(self, rad_s: float) -> PhaseMargin:
+        """As one of the unit circle."""
+        deg = math.degrees(math.atan2(-self.L.imag, -self.L.real))
+        return PhaseMargin((deg if deg > -180.0 else 180.0) + 0.0, rad_s, self.touch)
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ import numpy as np
 from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_poly
 
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.margins.certified_roots import NOTHING_HIDDEN, HalfPlanes, half_planes
-from actuator_lti.margins.delay_form import DelayForm
-from actuator_lti.margins.exact_loop import exact_loop, neighbours
+from actuator_lti.margins.delays.form import DelayForm
+from actuator_lti.margins.exact.loop import exact_loop, neighbours
+from actuator_lti.margins.exact.roots import NOTHING_HIDDEN, HalfPlanes, half_planes
 from actuator_lti.margins.given import ULP, Given
 
 _MOST_DELAYS = 8

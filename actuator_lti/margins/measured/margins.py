@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,9 +13,9 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import delay_margins
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.loop import Complex, Real
-from actuator_lti.margins.measured_bounds import Bounds, Strip, bounds
-from actuator_lti.margins.measured_data import MeasuredResponse, measured_response
-from actuator_lti.margins.measured_distance import distance_ranges
+from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds
+from actuator_lti.margins.measured.data import MeasuredResponse, measured_response
+from actuator_lti.margins.measured.distance import distance_ranges
 from actuator_lti.margins.results import Agreement, DiskMargin, GainMargin, PhaseMargin, StabilityMargins
 
 _MOST_UNRESOLVED = 0.5
@@ -180,54 +181,52 @@ def passed(strip: Strip, level: float, group: Group) -> tuple[int, float] | None
     return first + k, float(part[k] / (part[k] - part[k + 1]))
 
 
-def _phase_margins(omega: Real, result: Bounds) -> tuple[tuple[PhaseMargin, ...], list[str]]:
-    out, notes = [], []
-    gain, phase = result.log_gain, result.phase
-    for group in single_passages(gain, 0.0):
-        at = passed(gain, 0.0, group)
-        if at is None:
-            if not result.unresolved[group.first : group.last + 1].all():  # told already
-                notes.append(
-                    f"{group.text(omega)} the gain comes as near to one as it is known: "
-                    "crossings there are neither sure nor excluded"
-                )
+def _passages(
+    omega: Real, result: Bounds, strip: Strip, level: float, notes: list[str], what: str
+) -> Iterator[tuple[Group, int, float]]:
+    """Where a level is surely passed: group, interval and place in it; where that is open, a note."""
+    for group in single_passages(strip, level):
+        if strip is result.phase and result.lost[group.first : group.last + 2].any():
             continue
-        k, t = at
-        deg = math.degrees(_chord(phase.middle, k, t)) + 180.0
+        at = passed(strip, level, group)
+        if at is not None:
+            yield group, *at
+        elif not result.unresolved[group.first : group.last + 1].all():  # told already
+            notes.append(
+                f"{group.text(omega)} {what} as it is known: crossings there are neither sure nor excluded"
+            )
+
+
+def _bracket(omega: Real, group: Group) -> tuple[float, float]:
+    return float(omega[group.first]), float(omega[group.last + 1])
+
+
+def _phase_margins(omega: Real, result: Bounds) -> tuple[tuple[PhaseMargin, ...], list[str]]:
+    out, notes = [], list[str]()
+    near = "the gain comes as near to one"
+    for group, k, t in _passages(omega, result, result.log_gain, 0.0, notes, near):
+        deg = math.degrees(_chord(result.phase.middle, k, t)) + 180.0
         turns = 360.0 * math.ceil((deg - 180.0) / 360.0)
-        low, high = (math.degrees(each) + 180.0 - turns for each in group.over(phase))
+        low, high = (math.degrees(each) + 180.0 - turns for each in group.over(result.phase))
         if high - low >= 360.0:
             low, high = -180.0, 180.0
-        bracket = float(omega[group.first]), float(omega[group.last + 1])
-        out.append(PhaseMargin(deg - turns, between(omega, k, t), False, bracket, (low, high)))
+        known = _bracket(omega, group), (low, high)
+        out.append(PhaseMargin(deg - turns, between(omega, k, t), False, *known))
     return tuple(out), notes
 
 
 def _gain_margins(omega: Real, result: Bounds) -> tuple[tuple[GainMargin, ...], list[str]]:
-    out, notes = [], []
-    gain, phase = result.log_gain, result.phase
-    lowest, highest = float(phase.low.min()), float(phase.high.max())
+    out, notes = [], list[str]()
+    lowest, highest = float(result.phase.low.min()), float(result.phase.high.max())
+    near = "the phase comes as near to -180 deg"
     for m in range(
         math.ceil((lowest / math.pi - 1.0) / 2.0), math.floor((highest / math.pi - 1.0) / 2.0) + 1
     ):
-        level = (2 * m + 1) * math.pi
-        for group in single_passages(phase, level):
-            if result.lost[group.first : group.last + 2].any():
-                continue
-            at = passed(phase, level, group)
-            if at is None:
-                if not result.unresolved[group.first : group.last + 1].all():  # told already
-                    notes.append(
-                        f"{group.text(omega)} the phase comes as near to -180 deg as it is known: "
-                        "crossings there are neither sure nor excluded"
-                    )
-                continue
-            low, high = group.over(gain)
-            ratio = math.exp(-_chord(gain.middle, *at))
-            bracket = float(omega[group.first]), float(omega[group.last + 1])
-            out.append(
-                GainMargin(ratio, between(omega, *at), False, bracket, (_inverse(high), _inverse(low)))
-            )
+        for group, k, t in _passages(omega, result, result.phase, (2 * m + 1) * math.pi, notes, near):
+            low, high = group.over(result.log_gain)
+            ratio = math.exp(-_chord(result.log_gain.middle, k, t))
+            known = _bracket(omega, group), (_inverse(high), _inverse(low))
+            out.append(GainMargin(ratio, between(omega, k, t), False, *known))
     return tuple(sorted(out, key=lambda margin: margin.frequency_rad_s)), notes
 
 

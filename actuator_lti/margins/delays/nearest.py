@@ -9,9 +9,9 @@ from itertools import pairwise
 from flint import arb, fmpq
 from scipy.optimize import minimize_scalar
 
+from actuator_lti.margins.delays.axis import Axis, Form, zeros
+from actuator_lti.margins.delays.exact import HIGHEST_ORDER
 from actuator_lti.margins.distances import Distance
-from actuator_lti.margins.exact_axis import Axis, Form, zeros
-from actuator_lti.margins.exact_delay import HIGHEST_ORDER
 
 _SLACK = 1e-8  # relative: how much lower a smallest distance may be without being found
 _AT_END = (0.9, 0.99, 0.999, 0.9999, 1.0 - _SLACK)  # of that at infinity: below which a smaller one is sought

@@ -7,18 +7,13 @@ from dataclasses import replace
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
-from actuator_lti.margins.determined import FAR_DB, Settled, settled
 from actuator_lti.margins.distances import DISK, MODULUS
-from actuator_lti.margins.exact_extremes import smallest
-from actuator_lti.margins.exact_findings import Crossing, Findings
-from actuator_lti.margins.exact_loop import ExactLoop, exact_loop, neighbours
+from actuator_lti.margins.exact.crossings import Findings
+from actuator_lti.margins.exact.determined import FAR_DB, Settled, settled
+from actuator_lti.margins.exact.extremes import smallest
+from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.given import ULP, Given
-from actuator_lti.margins.results import (
-    Agreement,
-    GainMargin,
-    PhaseMargin,
-    StabilityMargins,
-)
+from actuator_lti.margins.results import Agreement, StabilityMargins
 
 _METHOD = "roots of exact polynomials, isolated in certified intervals; no grid"
 _MOVED = 1e-9
@@ -55,19 +50,12 @@ def _margins(given: Given, base: Findings, result: Settled) -> StabilityMargins:
     def frequency(w: float) -> float:
         return w if T is None else 2.0 * math.atan(w) / T
 
-    def gain_margin(c: Crossing) -> GainMargin:
-        return GainMargin(float(1.0 / abs(c.L)), frequency(c.w), c.touch)
-
-    def phase_margin(c: Crossing) -> PhaseMargin:
-        deg = math.degrees(math.atan2(-c.L.imag, -c.L.real))
-        return PhaseMargin((deg if deg > -180.0 else 180.0) + 0.0, frequency(c.w), c.touch)
-
     figures = None
     if result.problem is None:
         modulus, disk = (smallest(base.loop, distance) for distance in (MODULUS, DISK))
         figures = Figures(
-            tuple(gain_margin(c) for c in result.reals if not out_of_sight(c.L)),
-            tuple(map(phase_margin, result.gains)),
+            tuple(c.gain_margin(frequency(c.w)) for c in result.reals if not out_of_sight(c.L)),
+            tuple(c.phase_margin(frequency(c.w)) for c in result.gains),
             (modulus[0], frequency(modulus[1])),
             (disk[0], frequency(disk[1])),
         )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from actuator_lti.margins.loop import Complex, Real
-from actuator_lti.margins.measured_bounds import Bounds, Strip
-from actuator_lti.margins.measured_data import at_once
+from actuator_lti.margins.measured.bounds import Bounds, Strip
+from actuator_lti.margins.measured.data import at_once
 
 _PIECES = 32  # of an interval between two points
 Range = tuple[float, float]

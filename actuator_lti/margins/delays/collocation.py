@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_lti.margins.delay_form import DelayForm
+from actuator_lti.margins.delays.form import DelayForm
 from actuator_lti.margins.loop import Real
 
 _FEWEST, _MOST = 16, 90

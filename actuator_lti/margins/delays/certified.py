@@ -8,14 +8,14 @@ from flint import acb, arb, ctx
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
-from actuator_lti.margins.delay_nearest import smallest
-from actuator_lti.margins.determined import difference
+from actuator_lti.margins.delays.axis import GAIN, IMAGINARY, Axis, turn, zeros
+from actuator_lti.margins.delays.exact import ExactDelayLoop
+from actuator_lti.margins.delays.nearest import smallest
 from actuator_lti.margins.distances import DISK, MODULUS
-from actuator_lti.margins.exact_axis import GAIN, IMAGINARY, Axis, turn, zeros
-from actuator_lti.margins.exact_delay import ExactDelayLoop
-from actuator_lti.margins.exact_findings import Crossing
+from actuator_lti.margins.exact.crossings import Crossing
+from actuator_lti.margins.exact.determined import difference
 from actuator_lti.margins.given import ULP
-from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
+from actuator_lti.margins.results import Agreement, StabilityMargins
 from actuator_lti.margins.trust import TOUCH
 
 _BITS = 128
@@ -59,12 +59,8 @@ def certified_delayed_margins(
     gains, reals, unstable, listed_to = answer
     low, high = (0.0, listed_to) if band is None else band
     figures = Figures(
-        tuple(GainMargin(1.0 / abs(c.L), c.w) for c in reals if low <= c.w <= high and not out_of_sight(c.L)),
-        tuple(
-            PhaseMargin(math.degrees(math.atan2(-c.L.imag, -c.L.real)), c.w)
-            for c in gains
-            if low <= c.w <= high
-        ),
+        tuple(c.gain_margin(c.w) for c in reals if low <= c.w <= high and not out_of_sight(c.L)),
+        tuple(c.phase_margin(c.w) for c in gains if low <= c.w <= high),
         near[0],
         near[1],
     )

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_lti.margins.certified_roots import half_planes
-from actuator_lti.margins.exact_findings import Crossing, Findings, crossings
+from actuator_lti.margins.exact.crossings import Crossing, Findings, crossings
+from actuator_lti.margins.exact.roots import half_planes
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import Complex, Mask, Real
 

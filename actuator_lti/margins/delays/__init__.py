@@ -1,0 +1,1 @@
+"""Loops with exact delays: form, poles by collocation, certified intervals."""

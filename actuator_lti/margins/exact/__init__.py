@@ -1,0 +1,1 @@
+"""Rational loops in exact arithmetic on their doubles: roots, crossings, what the data determine."""

@@ -1,0 +1,1 @@
+"""Margins from frequency-response data, each with its range."""

@@ -1,0 +1,220 @@
+"""Motions within a drive's limits that tell its values as closely as asked: the plan of an experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import product
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.correlation.closed_loop import model_signals
+from analyses.estimation.arrays import FloatArray
+from analyses.estimation.fit import COVERAGE, Fit
+from analyses.estimation.least_squares import Information, information_of, joint_covariance, told_apart
+from analyses.identification.joint_model import JointModel, default_value
+from analyses.identification.rows import Rows, record_rows
+from analyses.records.record import Record, RowCounts
+
+SEGMENT_S = 4.0
+RISE_S = 0.4
+PERIOD_S = 1e-3
+CYCLES = (1, 2, 4, 8, 16)
+SHAPES = {
+    "two sines": ((1.0, 1.0), (2.0, 0.3)),
+    "triangle": ((1.0, 1.0), (3.0, -1.0 / 9.0), (5.0, 1.0 / 25.0)),
+}
+"""Harmonics of a segment and their sizes; the speed passes zero quickly, so that no drive sticks there."""
+USED = 0.8
+"""Share of full deflection, speed and current that a motion takes: the drive may differ from its design."""
+DRAWS = 8
+MOST_SEGMENTS = 60
+
+
+@dataclass(frozen=True, kw_only=True)
+class Segment:
+    """One motion of 4 s from rest to rest, its peaks at the motor, and what a record of it would tell."""
+
+    shape: str
+    cycles: int
+    amplitude: float
+    speed: float
+    drive_rms: float
+    command: FloatArray = field(repr=False)
+    information: Information = field(repr=False)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """The motions, one after the other, and the intervals that they are expected to give.
+
+    ``expected`` has the design's own values; ``half_widths`` are half the 95 % intervals over the value (of
+    the offset: over the dry friction), ``within`` what was asked. ``measured`` counts the records that are
+    there already, ``command`` is that of all motions at ``time_s``, at the output.
+    """
+
+    design: Design
+    within: float
+    noise: float
+    measured: int
+    segments: tuple[Segment, ...]
+    expected: Fit
+    half_widths: dict[str, float]
+    time_s: FloatArray = field(repr=False)
+    command: FloatArray = field(repr=False)
+
+    @property
+    def passed(self) -> bool:
+        """Whether every interval is expected to be as small as asked."""
+        return all(width <= self.within for width in self.half_widths.values())
+
+
+def plan_motions(
+    design: Design,
+    *,
+    within: float,
+    noise: float,
+    measured: JointModel | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Plan:
+    """Choose motions, one after the other, until every interval is expected to be as small as asked.
+
+    The next one is that which lowers the sum of the squared intervals, each over what was asked, most
+    (A-optimal). Intervals follow from the rows that a fit makes of the simulated motion, and from noise that
+    went the same way: the covariance is the fit's own.
+
+    Parameters
+    ----------
+    within : float
+        Half of each 95 % interval, over the value.
+    noise : float
+        White, of the recorded current (V: voltage, of a drive without one) at 1 kHz, rms.
+    measured : JointModel, optional
+        What records tell that are there already; the plan adds to it.
+
+    Raises
+    ------
+    InputError
+        For a drive without a position loop, or without noise: any motion then tells everything.
+    """
+    if design.controller.position is None:
+        raise InputError("a plan of motions needs a position loop", where=design.name)
+    if not noise > 0.0:
+        raise InputError("the noise of the recorded current is needed: --noise, or instruments.current_noise")
+    if measured is not None and measured.form != "symmetric":
+        raise InputError("a plan adds to records that were fitted with symmetric friction")
+    family = list(product(SHAPES, CYCLES))
+    rows, made = [], []
+    for k, (shape, cycles) in enumerate(family, 1):
+        command, record = _largest(design, shape, cycles)
+        rows.append(record_rows(design, record, "symmetric", None))
+        made.append((shape, cycles, command, record))
+        if progress is not None:
+            progress(k, len(family))
+    kept, _ = told_apart(np.concatenate([one.w for one in rows]), rows[0].names)
+    names = tuple(rows[0].names[k] for k in kept)
+    segments = [
+        Segment(
+            shape=shape,
+            cycles=cycles,
+            amplitude=float(np.max(np.abs(command))),
+            speed=float(np.max(np.abs(own.speed))),
+            drive_rms=float(np.sqrt(np.mean(record[_drive(design)] ** 2))),
+            command=command,
+            information=_information(design, record, own, kept, noise),
+        )
+        for (shape, cycles, command, record), own in zip(made, rows, strict=True)
+    ]
+    values = np.array([default_value(design, name) for name in names])
+    size = np.array([abs(v) if v else default_value(design, "dry") for v in values]) * within / COVERAGE
+    there = [] if measured is None else _of_measured(measured, names)
+    chosen = _chosen(segments, there, size)
+    command = np.concatenate([one.command for one in chosen] or [np.zeros(0)])
+    covariance = joint_covariance([*there, *(one.information for one in chosen)])
+    return Plan(
+        design=design,
+        within=within,
+        noise=noise,
+        measured=len(there),
+        segments=tuple(chosen),
+        expected=Fit(names=names, values=values, covariance=covariance),
+        half_widths=dict(zip(names, (within * np.sqrt(np.diag(covariance)) / size).tolist(), strict=True)),
+        time_s=_times(len(command)),
+        command=command,
+    )
+
+
+def _chosen(segments: Sequence[Segment], there: Sequence[Information], size: FloatArray) -> list[Segment]:
+    """The best segment again and again, alike ones together; a first one tells all values alone."""
+    chosen: list[Segment] = []
+    parts = list(there)
+
+    def spread(one: Segment) -> float:
+        return float(np.sum(np.diag(joint_covariance([*parts, one.information])) / size**2))
+
+    while len(chosen) < MOST_SEGMENTS:
+        if parts and np.all(np.diag(joint_covariance(parts)) <= size**2):
+            break
+        chosen.append(min(segments, key=spread))
+        parts.append(chosen[-1].information)
+    return sorted(chosen, key=segments.index)
+
+
+def _largest(design: Design, shape: str, cycles: int) -> tuple[FloatArray, Record]:
+    """The motion as large as deflection, speed and every other limit allow, and its simulated record."""
+    time = _times(round(SEGMENT_S / PERIOD_S))
+    edge = np.minimum(np.minimum(time, time[-1] - time) / RISE_S, 1.0)
+    turn = 2.0 * np.pi * cycles / SEGMENT_S * time
+    wave = sum(size * np.sin(k * turn) for k, size in SHAPES[shape]) * np.sin(0.5 * np.pi * edge) ** 2
+    wave = wave / np.max(np.abs(wave))
+    rate = float(np.max(np.abs(np.gradient(wave, PERIOD_S)))) * design.total_ratio
+    amplitude = USED * min(design.validation.full_deflection_rad, design.limits.speed_rad_s / rate)
+    own = design.limits
+    for _ in range(24):
+        record, limits = _simulated(design, time, amplitude * wave)
+        drive = record[_drive(design)]
+        cool = float(np.sqrt(np.mean(drive**2))) <= USED * own.continuous_current_A
+        small = float(np.max(np.abs(drive))) <= USED * own.peak_current_A
+        if (_drive(design) != "current" or (cool and small)) and not any(limits.values()):
+            return amplitude * wave, record
+        amplitude *= USED
+    raise InputError(f"no motion of {cycles / SEGMENT_S:g} Hz stays off the drive's limits", design.name)
+
+
+def _times(count: int) -> FloatArray:
+    return np.asarray(PERIOD_S * np.arange(count), dtype=np.float64)
+
+
+def _drive(design: Design) -> str:
+    return "voltage" if design.effective_motor.torque_constant_Nm_A is None else "current"
+
+
+def _simulated(design: Design, time: FloatArray, command: FloatArray) -> tuple[Record, dict[str, float]]:
+    """A record of a command as the design would have made it, and the limits that act."""
+    wanted, place = ("position_reference", "position") if design.axis == "linear" else ("reference", "angle")
+    blank = {place: np.zeros(len(time)), _drive(design): np.zeros(len(time))}
+    bare = Record(name="plan", time_s=time, signals={wanted: command, **blank}, units={}, counts=RowCounts())
+    signals, limits = model_signals(design, bare, blank)
+    return replace(bare, signals={**bare.signals, **signals}), limits
+
+
+def _information(
+    design: Design, record: Record, rows: Rows, kept: Sequence[int], noise: float
+) -> Information:
+    """What the rows of a motion tell where its drive signal has white noise, which goes the rows' way."""
+    name, rng = _drive(design), np.random.default_rng(0)
+    rests = []
+    for _ in range(DRAWS):
+        noisy = {**record.signals, name: record[name] + noise * rng.standard_normal(len(record))}
+        own = record_rows(design, replace(record, signals=noisy), "symmetric", None)
+        rests.append(own.y - rows.y)
+    return information_of(rows.w[:, list(kept)], np.concatenate(rests))
+
+
+def _of_measured(model: JointModel, names: Sequence[str]) -> list[Information]:
+    """What measured records tell of the values of the plan."""
+    place = [model.names.index(name) if name in model.names else -1 for name in names]
+    wide = (np.column_stack([part.w, np.zeros(len(part.w))]) for part in model.records)
+    return [information_of(w[:, place], part.noise) for w, part in zip(wide, model.records, strict=True)]
