@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,11 +53,12 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
     chart = Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
     top, bottom = chart.column(1.0, 1.0)
     made: list[tuple[Curve, np.ndarray]] = []
-    for one in drawn:
-        result = one.loops.get(name)
-        if result is None or (closed and not result.stable):
-            continue
-        grid = frequency_grid(result, 140)
+    known = [(one, one.loops[name]) for one in drawn if name in one.loops]
+    known = [(one, result) for one, result in known if result.stable or not closed]
+    lowest = min((frequency_grid(result, 140)[0] for _, result in known), default=0.0)
+    for one, result in known:
+        own = frequency_grid(result, 140)
+        grid = np.unique(np.concatenate([np.geomspace(lowest, own[0], 20), own]))
         response = answer_curve(result, grid) if closed else curve(result.loop.plain_open, grid)
         magnitude = response.magnitude_db - (_dc_db(result) if closed else 0.0)
         label, look = one.variant.name[:60], _look(len(made))
@@ -65,8 +67,9 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
         made.append((response, magnitude))
     if not made:
         return []
-    style.bound(top, [y for _, magnitude in made for y in magnitude], span=70.0, top_room=0.1)
-    style.phase_axis(bottom, [y for response, _ in made for y in response.phase_deg], span=450.0, room=0.05)
+    whole = math.inf  # curves are cut nowhere: where two differ is what is looked for
+    style.bound(top, [y for _, magnitude in made for y in magnitude], span=whole, top_room=0.1)
+    style.phase_axis(bottom, [y for response, _ in made for y in response.phase_deg], span=whole, room=0.05)
     hertz = [response.frequency_hz for response, _ in made]
     style.frequency(bottom, (min(f[0] for f in hertz), max(f[-1] for f in hertz)))
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
