@@ -298,7 +298,7 @@ def _shade(panel: Axes, time: np.ndarray, where: np.ndarray, colour: str) -> Non
 
 @face
 def plot_onset(onset: Onset, *, linear_axis: bool = False, axes: Any = None) -> Axes:
-    """The border of linear validity: the command amplitude over frequency at which each limiter sets in.
+    """The limit of linear validity: the command amplitude over frequency at which each limiter sets in.
 
     Examples
     --------

@@ -100,7 +100,7 @@ class LimiterPath:
 
 @dataclass(frozen=True)
 class Onset:
-    """The border of linear validity: smallest A_k over the limiters, and which one it is.
+    """The limit of linear validity: smallest A_k over the limiters, and which one it is.
 
     Attributes
     ----------

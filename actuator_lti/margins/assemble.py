@@ -105,7 +105,7 @@ def hidden_notes(at_zero: int, border: tuple[tuple[float, int], ...] = (), right
         at = f"{at_zero} at zero frequency" if at_zero else ""
         pairs = ", ".join(f"{times} pair(s) at {w:.6g}" for w, times in border)
         notes.append(
-            f"modes on the border of stability that the loop neither drives nor sees are left out "
+            f"modes on the stability boundary that the loop neither drives nor sees are left out "
             f"({', '.join(filter(None, (at, pairs)))} of the s-plane): the margins are those of what is "
             "seen; inside, the loop is not asymptotically stable"
         )

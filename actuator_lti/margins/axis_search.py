@@ -65,7 +65,7 @@ def search(loop: Factored, low: float, high: float, listed_to: float = math.inf)
     Raises
     ------
     Doubtful
-        The loop comes so near to a line that its side could not be told.
+        The loop comes so near to a line that its side could not be determined.
     """
     ends = [low, *([listed_to] if low < listed_to < high else []), high]
     return _searched(loop, ends, _search.CIRCLE, 0.0, listed_to)

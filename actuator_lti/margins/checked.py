@@ -137,7 +137,7 @@ def _reason(real_L: Complex, twice: bool, sure: bool) -> str:
     stability = "poles and Nyquist count agree" if twice else "stability by the Nyquist count alone"
     return (
         f"{stability}, intervals leave no crossing out, every gain margin puts a closed-loop "
-        f"pole on the border (residual {residual:.0e})"
+        f"pole on the stability boundary (residual {residual:.0e})"
         + (", no pole lies within its own error of it" if sure else "")
     )
 
@@ -145,13 +145,13 @@ def _reason(real_L: Complex, twice: bool, sure: bool) -> str:
 def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | None) -> None:
     """Poles that are clear of the border, but for exact ones at zero frequency."""
     if poles.doubtful or (closed is not None and (closed.border or closed.doubtful)):
-        raise Doubtful("a pole may lie on either side of the border")
+        raise Doubtful("a pole may lie on either side of the stability boundary")
     if poles.border != poles.at_dc:
-        raise Doubtful("poles on the border")
+        raise Doubtful("poles on the stability boundary")
     if hardly_placed(loop, poles.values, False):
-        raise Doubtful("rounding of the coefficients moves a pole over the border")
+        raise Doubtful("rounding of the coefficients moves a pole across the stability boundary")
     if closed is not None and hardly_placed(loop, closed.values, True):
-        raise Doubtful("rounding of the coefficients moves a closed-loop pole over the border")
+        raise Doubtful("rounding of the coefficients moves a closed-loop pole across the stability boundary")
 
 
 def _trust_factors(loop: RationalLoop, poles: SortedPoles, factors: Factored) -> None:

@@ -1,4 +1,4 @@
-"""A loop by its factors on the border of stability, with the range of gain and phase over whole intervals.
+"""A loop by its factors on the stability boundary, with the range of gain and phase over whole intervals.
 
 On s = j w every factor (s - r) moves steadily between few places: its gain falls to w = Im r and rises from
 there, its phase turns one way, and both rates have one peak. Between these places the sum of what the factors

@@ -70,7 +70,7 @@ class RationalLoop:
         return float(x if self.in_z else 2.0 * math.atan(x)) / self.period_s
 
     def point(self, x: Real) -> Complex:
-        """Point of the border of stability: j x, or exp(j x)."""
+        """Point of the stability boundary: j x, or exp(j x)."""
         return np.exp(1j * x) if self.in_z else 1j * x
 
     def at(self, points: Any) -> Any:
@@ -78,7 +78,7 @@ class RationalLoop:
         return self._values(points - 1.0 if self._about_one else points)
 
     def response(self, x: Real) -> Complex:
-        """L on the border of stability."""
+        """L on the stability boundary."""
         return self._values(self._variable(x))
 
     def response_and_slope(self, x: Real) -> tuple[Complex, Complex]:

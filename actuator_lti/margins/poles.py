@@ -1,4 +1,4 @@
-"""Poles sorted by the border of stability, each with the accuracy that its eigenvalue has."""
+"""Poles sorted by the stability boundary, each with the accuracy that its eigenvalue has."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SAFE = 10.0
 
 @dataclass(frozen=True)
 class SortedPoles:
-    """Poles of a system by the border of stability.
+    """Poles of a system by the stability boundary.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class SortedPoles:
     at_dc : int
         How many of these lie at zero frequency.
     doubtful : bool
-        Some pole, other than those at zero frequency, may lie on either side of the border.
+        Some pole, other than those at zero frequency, may lie on either side of the stability boundary.
     """
 
     values: Complex
@@ -62,7 +62,7 @@ def polynomial_roots(p: Real) -> Complex:
 
 
 def sorted_poles(A: Real, in_z: bool) -> SortedPoles:
-    """Sort the eigenvalues of A (balanced) by the border of stability.
+    """Sort the eigenvalues of A (balanced) by the stability boundary.
 
     The error of an eigenvalue is bounded by 10 n eps (|v|* |A| |w|) / |v* w| with the left and right
     eigenvectors v and w, entry by entry. It is on the border where that bound reaches the border and is much

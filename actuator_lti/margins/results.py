@@ -58,13 +58,14 @@ class StabilityMargins:
     - ``"certified"``: by exact arithmetic on the given doubles and roots in certified intervals; the same
       for data 8 ulp away.
     - ``"checked"``: in double precision; poles and Nyquist count agree, the parity of the crossovers is
-      right, no pole lies within its own error of the border, and each figure has a small bound of its error.
+      right, no pole lies within its own error of the stability boundary, and each figure has a small bound
+      of its error.
     - ``"withheld"``: 8 ulp of the entries change the answer, so the data do not determine it.
 
     Attributes
     ----------
     stable : bool or None
-        Whether the closed loop is stable; a pole on the border is not stable.
+        Whether the closed loop is stable; a pole on the stability boundary is not stable.
     verdict : str
         ``"stable"``, ``"unstable"``, ``"on the border"`` or ``"undecided"``.
     gain_margins, phase_margins, delay_margins : tuple

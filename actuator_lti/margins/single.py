@@ -169,7 +169,7 @@ class Agreement:
     unstable_poles, unstable_nyquist : int or None
         Closed-loop poles outside the stable region by either way; ``None`` where a way does not apply.
     border_poles : int
-        Closed-loop poles on the border itself.
+        Closed-loop poles on the stability boundary itself.
     """
 
     unstable_poles: int | None
@@ -185,7 +185,7 @@ class Agreement:
 
     def __str__(self) -> str:
         if self.border_poles:
-            return f"{self.border_poles} closed-loop pole(s) on the border"
+            return f"{self.border_poles} closed-loop pole(s) on the stability boundary"
         if self.unstable_poles is None and self.unstable_nyquist is None:
             return "neither poles nor a Nyquist count"
         if self.unstable_poles is None or self.unstable_nyquist is None:

@@ -89,7 +89,7 @@ def rounded_size(loop: RationalLoop, points: Complex) -> Real:
 
 
 def hardly_placed(loop: RationalLoop, poles: Complex, closed: bool) -> bool:
-    """Whether rounding of the given coefficients in z may carry a pole over the border of stability."""
+    """Whether rounding of the given coefficients in z may carry a pole across the stability boundary."""
     if loop.in_z_size is None or loop.numerator is None or loop.denominator is None or not poles.size:
         return False
     p = loop.denominator + loop.numerator if closed else loop.denominator

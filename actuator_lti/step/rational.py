@@ -68,7 +68,7 @@ def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float]:
         if motion is not None:
             return motion, answer
         bits *= 2
-    raise NumericalError("the poles of the step response lie too close together to be told apart")
+    raise NumericalError("the poles of the step response lie too close together to be separated")
 
 
 def free_motion(rest: flint.acb_poly, poles: _Poles, sampled: bool, start: float = 0.0) -> Motion | None:

@@ -16,7 +16,7 @@ from analyses.estimation.fit import Fit
 from analyses.estimation.means import autocovariance
 
 LEAST_OWN_SHARE = 0.03
-"""A column of which less than this is its own, beside those before it, is not told apart from them."""
+"""A column of which less than this is its own, beside those before it, is not separated from them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +31,7 @@ class NotTold:
     moves: Mapping[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        return f"cannot be told from {' and '.join(self.like)}" if self.like else "is not excited at all"
+        return f"cannot be separated from {' and '.join(self.like)}" if self.like else "is not excited at all"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +54,7 @@ def told_apart(w: FloatArray, names: Sequence[str]) -> tuple[tuple[int, ...], tu
     >>> w = np.column_stack([np.arange(4.0), np.ones(4), np.ones(4), np.zeros(4)])
     >>> kept, left = told_apart(w, ("viscous", "dry", "offset", "load"))
     >>> kept, [f"{one.name} {one}" for one in left]
-    ((0, 1), ['offset cannot be told from dry', 'load is not excited at all'])
+    ((0, 1), ['offset cannot be separated from dry', 'load is not excited at all'])
     """
     kept: list[int] = []
     basis: list[FloatArray] = []

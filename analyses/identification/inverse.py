@@ -121,7 +121,7 @@ def _fitted(
         model = _fitted(design, blocks, form, {**held, **again}, given)
         said = {
             name: Fixed(
-                value=again[name], reason="would come out negative: not told, the design's value kept"
+                value=again[name], reason="would come out negative: not determined, the design's value kept"
             )
             for name in negative
         }
@@ -193,7 +193,7 @@ def _singles(
         kept, _ = told_apart(block.w[:, columns], free)
         own = tuple(free[k] for k in kept)
         rest = {
-            name: Fixed(value=float(value), reason="told by other records")
+            name: Fixed(value=float(value), reason="determined by other records")
             for name, value in zip(free, values, strict=True)
             if name not in own
         }

@@ -102,7 +102,7 @@ class LoopSurvey:
     budgets : mapping of str to DelayBudget
         At the lowest gain crossover of each loop that has one.
     onset : Onset or None
-        The border of linear validity; ``None`` where nothing limits.
+        The limit of linear validity; ``None`` where nothing limits.
     refused : tuple of str
         Loops of the other forms and operating points whose margins were not found, and why.
     """
@@ -206,7 +206,7 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     step(4)
     budgets = attempt("delay budgets", lambda: _budgets(design, forms["sampled"]), {})
     step(5)
-    border = attempt("border of linear validity", lambda: _onset(loops, forms["sampled"]), None)
+    border = attempt("limit of linear validity", lambda: _onset(loops, forms["sampled"]), None)
     step(6)
     return LoopSurvey(
         design, loops, forms, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
@@ -234,7 +234,7 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
     states = len(loop.plain_open.A)
     if exact is not None and states > MOST_STATES:
         why = f"the fundamental has {states} states; up to {MOST_STATES} are certified in a report"
-        return BreakPoint(None, exact, f"{why}; the exact borders of stability are below")
+        return BreakPoint(None, exact, f"{why}; the exact stability limits are below")
     try:
         return BreakPoint(loop_figures(loop, bandwidth=False, step=False, certify=True), exact)
     except (InputError, NumericalError) as error:
@@ -312,7 +312,7 @@ def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, De
 
 
 def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
-    """Give the border of linear validity around the bandwidth of the outermost loop."""
+    """Give the limit of linear validity around the bandwidth of the outermost loop."""
     from actuator_lti.loops.limiters import onset
 
     outermost = loops.design.controller.outermost

@@ -95,7 +95,7 @@ def _turns(omega_rad_s: np.ndarray, values: np.ndarray, phase: np.ndarray) -> fl
 
 
 def response_at(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:
-    """Evaluate a system on the border of stability: at s = jw, or z = exp(jwT) where it is sampled."""
+    """Evaluate a system on the stability boundary: at s = jw, or z = exp(jwT) where it is sampled."""
     omega = np.asarray(omega_rad_s, dtype=float)
     points = np.exp(1j * omega * system.dt) if system.dt else 1j * omega
     if not all(hasattr(system, part) for part in "ABCD") or (system.ninputs, system.noutputs) != (1, 1):

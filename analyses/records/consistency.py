@@ -27,7 +27,7 @@ LARGEST_GAIN = 1.5
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """One thing that was looked at: what, whether it agrees (None: it could not be told), and in words."""
+    """One thing that was looked at: what, whether it agrees (None: not determined), and in words."""
 
     subject: str
     passed: bool | None

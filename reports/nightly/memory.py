@@ -71,6 +71,6 @@ def check(site: Path, now: Memory, state: Path) -> None:
     else:
         return
     raise HistoryLost(
-        f"{state / 'history.json'}: {what}, but the site knows of {before}: regressions cannot be told."
+        f"{state / 'history.json'}: {what}, but the site knows of {before}: regressions cannot be determined."
         " Restore the state folder from a copy, or begin anew on purpose with --accept-lost-history"
     )

@@ -43,9 +43,9 @@ def section(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures])
     if exact:
         words = (
             "A fast loop cut inside slower ones is periodically time-varying; the rows above describe its "
-            "fundamental. The exact borders of stability follow from the eigenvalues over one period."
+            "fundamental. The exact stability limits follow from the eigenvalues over one period."
         )
-        blocks += [doc.text(words), doc.listing("Exact borders of periodic loops", exact, EXACT_COLUMNS)]
+        blocks += [doc.text(words), doc.listing("Stability limits of periodic loops", exact, EXACT_COLUMNS)]
     intro = (
         "In the finished drive a gain error or a delay occurs at one point, with every other loop closed. "
         "The matrix shows what the drive tolerates at each point."

@@ -104,7 +104,7 @@ def test_one_direction_says_what_it_cannot_tell_apart(files: dict[str, str], com
     status, out, _ = command("identify", files["one way"], "--design", "ilr33-amber", "--json")
     result = json.loads(out)
     assert status == 0
-    told = "cannot be told from dry: the design's value kept; an error of it moves dry by -1 times it"
+    told = "cannot be separated from dry: the design's value kept; an error of it moves dry by -1 times it"
     assert result["model"]["fixed"]["offset"]["reason"] == told
     for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
         value, std = (result["model"]["parameters"][name][key] for key in ("value", "standard_error"))

@@ -1,4 +1,4 @@
-"""Ends of the axis, tangencies, poles on the border, hidden modes, refusals."""
+"""Ends of the axis, tangencies, poles on the stability boundary, hidden modes, refusals."""
 
 from __future__ import annotations
 

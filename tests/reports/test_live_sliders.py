@@ -184,7 +184,7 @@ def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path) -> None:
     settled(page, lambda: page.click(".dropped button"))
     page.wait_for_selector("#hands-on[data-behind=done]")
     assert page.inner_text(".record") == ""
-    assert page.locator('[data-chart="run"] .keys li', has_text="record").is_hidden()
+    page.locator('[data-chart="run"] .keys li', has_text="record").wait_for(state="hidden")
     page.evaluate(DROP, ["bench.png", "\0PNG"])
     page.wait_for_function("() => document.querySelector('.record').innerText.includes('bench.png: no text')")
 

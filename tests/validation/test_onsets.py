@@ -24,7 +24,7 @@ def rows(design: Design, model: Design | None = None) -> dict[str, Row]:
 
 @pytest.mark.parametrize("name", shipped_designs())
 def test_every_limit_of_a_shipped_drive(name: str) -> None:
-    """Each limiter that the border of linear validity lists has its row, and it is met."""
+    """Each limiter that the limit of linear validity lists has its row, and it is met."""
     design = load_design(name)
     bench = Bench(design, design)
     border = onset(bench.loops("command"), [10.0])

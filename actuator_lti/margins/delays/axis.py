@@ -153,7 +153,7 @@ def zeros(axis: Axis, q: Form, edges: list[float]) -> list[arb]:
     Raises
     ------
     NumericalError
-        Some zero could not be told: a touch, or too many turns.
+        Some zero could not be determined: a touch, or too many turns.
     """
     result: list[arb] = []
     stack = [(a, b) for a, b in pairwise(edges)][::-1]
@@ -163,7 +163,7 @@ def zeros(axis: Axis, q: Form, edges: list[float]) -> list[arb]:
         count += 1
         if low == 0.0 and order_at_zero:
             if high < _NARROWEST * edges[1]:
-                raise NumericalError("a crossing next to zero frequency could not be told")
+                raise NumericalError("a crossing next to zero frequency could not be determined")
             if not _order_holds(axis, q, high, order_at_zero):
                 stack += [(0.5 * high, high), (0.0, 0.5 * high)]
             continue
@@ -185,7 +185,7 @@ def _halves(
     if count > _MOST_INTERVALS:
         raise Undetermined(f"{count} certified intervals reach no farther than {low:.6g} rad/s of {end:.6g}")
     if high - low < _NARROWEST * high:
-        raise Undetermined(f"{what} near {low:.10g} rad/s could not be told{why}")
+        raise Undetermined(f"{what} near {low:.10g} rad/s could not be determined{why}")
     middle = 0.5 * (low + high)
     return [(middle, high), (low, middle)]
 
@@ -204,7 +204,7 @@ def _root(axis: Axis, q: Form, low: float, high: float) -> list[arb]:
     """The only zero of a monotone q on [low, high), if there is one; Newton, held by bisection."""
     a, b = (q.at(*axis.values(arb(x))) for x in (low, high))
     if not (a > 0 or a < 0) or not (b > 0 or b < 0):
-        raise NumericalError(f"a crossing at {low:.10g} rad/s itself could not be told")
+        raise NumericalError(f"a crossing at {low:.10g} rad/s itself could not be determined")
     if (a > 0) == (b > 0):
         return []
     rising = b > 0

@@ -46,7 +46,7 @@ def certified_delayed_margins(
     Raises
     ------
     NumericalError
-        Something could not be told.
+        Something could not be determined.
     """
     with ctx.workprec(_BITS):
         answer, problem = _compared(loops, band, merge=False)
@@ -118,7 +118,7 @@ def _compared(
     problem = None
     for gains, reals, unstable, _ in others:
         if unstable != answer[2]:
-            problem = f"{ULP} ulp of the entries move a closed-loop pole over the border of stability"
+            problem = f"{ULP} ulp of the entries move a closed-loop pole across the stability boundary"
         problem = problem or difference(answer[0], gains, "|L| = 1")
         problem = problem or difference(answer[1], reals, "the real axis")
     return answer, problem
@@ -146,7 +146,7 @@ def _crossing(axis: Axis, x: arb) -> Crossing:
     N, D = axis.values(x)
     L = N / D
     if L.rel_accuracy_bits() < 56:
-        raise NumericalError(f"a crossing near {float(x.mid()):.10g} rad/s could not be told from a pole")
+        raise NumericalError(f"the crossing near {float(x.mid()):.10g} rad/s is not separated from a pole")
     return Crossing(float(x.mid()), complex(L))
 
 
@@ -157,5 +157,5 @@ def _unstable(axis: Axis, edges: list[float]) -> int:
     count = arb(n) / 2 - (turn(axis, edges) - end.log().imag) / arb.pi()
     whole = count.unique_fmpz()
     if whole is None:
-        raise NumericalError("the number of unstable poles could not be told")
+        raise NumericalError("the number of unstable poles could not be determined")
     return int(whole)

@@ -131,4 +131,4 @@ def _told(f: Quasi, others: list[Quasi]) -> Quasi:
         if own != 0 and all(abs(near[k] / own - 1) < _SAME for near in series[1:]):
             (p, tau), *rest = f.terms
             return Quasi(((p - fmpq_poly([series[0][j] for j in range(k)]), tau), *rest))
-    raise NumericalError("the response could not be told from zero at zero frequency")
+    raise NumericalError("the response could not be separated from zero at zero frequency")

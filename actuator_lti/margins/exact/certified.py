@@ -27,7 +27,7 @@ def certified_margins(given: Given) -> StabilityMargins:
     Raises
     ------
     InputError
-        The closed loop is not well posed, or a pole on the border of stability is cancelled.
+        The closed loop is not well posed, or a pole on the stability boundary is cancelled.
     NumericalError
         The gain is one at every frequency.
     """
@@ -74,7 +74,7 @@ def _margins(given: Given, base: Findings, result: Settled) -> StabilityMargins:
 def _reason(result: Settled) -> str:
     moved = f"move a crossing by {result.moved:.1g}" if result.moved > _MOVED else "change nothing"
     if result.border:
-        return "exact arithmetic on the given doubles: poles lie exactly on the border of stability"
+        return "exact arithmetic on the given doubles: poles lie exactly on the stability boundary"
     return f"exact arithmetic on the given doubles, certified roots; {ULP} ulp of the entries {moved}"
 
 

@@ -152,7 +152,7 @@ def _crossings(
                     for (v, touch), L in zip(met, values, strict=True)
                 ]
         bits *= 2
-    raise NumericalError("a crossing of the loop could not be told from a zero or a pole beside it")
+    raise NumericalError("a crossing of the loop could not be separated from a zero or a pole beside it")
 
 
 def _merged(

@@ -163,7 +163,7 @@ def _by_movement(
     if hidden > 1:
         problem = f"{ULP} ulp of the entries decide about several modes at zero frequency"
     elif np.count_nonzero(near & ~exact & ~at_dc) or np.count_nonzero(at_dc & ~exact) > hidden:
-        problem = f"{ULP} ulp of the entries move a closed-loop pole over the border of stability"
+        problem = f"{ULP} ulp of the entries move a closed-loop pole across the stability boundary"
     if problem is not None:
         return None, 0, 0, problem
     return unstable, base.closed_at_end + int(np.count_nonzero(exact | at_dc)) - hidden, hidden, None

@@ -41,7 +41,7 @@ def least(above: fmpz_poly, below: fmpz_poly) -> tuple[float, float]:
                 value, w = min([*candidates, *stationary])
                 return (value, w) if value > _ZERO else (0.0, w)
         bits *= 2
-    raise NumericalError("the smallest distance to -1 could not be told")
+    raise NumericalError("the smallest distance to -1 could not be determined")
 
 
 def _settled(value: arb) -> bool:

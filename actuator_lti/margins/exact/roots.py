@@ -147,4 +147,4 @@ def _told_from_axis(p: fmpz_poly) -> list[tuple[acb, int]]:
             if all(root.real > 0 or root.real < 0 for root, _ in roots):
                 return roots
         bits *= 2
-    raise NumericalError("a closed-loop pole could not be told from the border of stability")
+    raise NumericalError("a closed-loop pole could not be separated from the stability boundary")

@@ -21,7 +21,7 @@ from actuator_lti.margins.results import Agreement, DiskMargin, GainMargin, Phas
 _MOST_UNRESOLVED = 0.5
 _TOLD = 6
 _NOTES = (
-    "measured data: stability cannot be told from them, and outside of their band nothing is known",
+    "measured data: stability cannot be determined from them, and outside of their band nothing is known",
     "each crossing lies between two points (bracket_rad_s); the figure between them is interpolated, it lies "
     "in ratio_range or deg_range as far as the loop between the points is no more curved than about them",
     "modulus and disk margin are the smallest values at measured points; over the band and within the noise "
@@ -235,7 +235,7 @@ def _inverse(log_gain: float) -> float:
 
 
 def _reason(omega: Real, result: Bounds) -> str:
-    reason = "measured points: the figures lie in their ranges, stability is not told"
+    reason = "measured points: the figures lie in their ranges, stability is not determined"
     if not result.unresolved.any():
         return reason
     k, count = int(result.unresolved.argmax()), np.count_nonzero(result.unresolved)

@@ -63,7 +63,7 @@ const drawMap = (cells) => {
 const timedPieces = (found) => data.loops.filter((name) => found.loops[name].waits).map((name) => () => {
   view(x.p_at(), found.row.length).set(found.row);
   found.loops[name] = figures(stageOf(name), 1);
-  state("");
+  state();
 });
 const periodicPieces = (found) => Object.keys(data.points).filter((name) => found.points[name].n === BEHIND).map((name) => () => {
   view(x.p_at(), found.row.length).set(found.row);

@@ -40,18 +40,18 @@ const runNow = (whole) => {
 const runOn = () => runNow(true);
 const update = () => {
   const began = performance.now();
-  let refused = "";
+  desk.refused = "";
   drawPins();
   const why = refusalOf(past.values), apart = why && `Refused, nothing follows: ${why}.`, found = apart ? null : compute(past.values);
   if (found && data.loops.every((name) => found.loops[name].n !== 0)) { desk.now = found; lastGood = past.values; } else {
-    refused = apart || "The last value needs another structure of the drive: save the file and make a new report.";
+    desk.refused = apart || "The last value needs another structure of the drive: save the file and make a new report.";
     desk.now = { ...desk.now, ...compute(keys.map((key, k) => lastGood[k])) };
   }
   show();
   table();
   sideBySide();
-  state(refused);
-  find('[data-do="pin"]').disabled = Boolean(refused) || !free();
+  state();
+  find('[data-do="pin"]').disabled = Boolean(desk.refused) || !free();
   drawLoop(desk.shown);
   drawBorder("as changed", borderOf(desk.now.row, border.grid));
   if (runTook < LONG_RUN) runNow(false);

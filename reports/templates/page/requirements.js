@@ -16,8 +16,8 @@ export const judged = (found) => data.requirements.map((item, k) => {
 export const calm = (value, unit) => (["dB", "deg", "%"].includes(unit) && Math.abs(value) < 1 ? Math.round(value * 1e4) / 1e4 : value); // no -3e-5 dB
 
 // the line at the top, and the table of requirements
-export const state = (refused) => {
-  const line = find(".state"), all = judged(desk.now), was = judged(desk.before), total = all.length;
+export const state = () => {
+  const { refused } = desk, line = find(".state"), all = judged(desk.now), was = judged(desk.before), total = all.length;
   const fails = all.filter(({ met }) => met === false), old = was.filter(({ met }) => met === false), open = all.filter(({ met, words }) => met === null && words !== "…");
   const unstable = data.loops.filter((name) => desk.now.loops[name].figures && desk.now.loops[name].figures[STABLE] !== 1);
   const unknown = data.loops.filter((name) => desk.now.loops[name].n === DOUBT), words = [];
@@ -36,8 +36,9 @@ export const state = (refused) => {
 };
 const placed = (item) => (item.loop ? LOOP_NAMES[item.loop] : item.load ? `at ${minus(String(item.load))} ${data.axis === "linear" ? "N" : "N m"}` : "");
 const demands = (all, was) => {
-  const box = find("table.demands");
-  box.closest(".scroll").hidden = !all.length;
+  const box = find("table.demands"), fold = box.closest("details");
+  fold.hidden = !all.length;
+  if (all.some(({ met, words }) => met !== true && words !== "…")) fold.open = true;
   const limit = ({ minimum, maximum }) => [minimum !== null ? `≥ ${minus(String(minimum))}` : "", maximum !== null ? `≤ ${minus(String(maximum))}` : ""].filter(Boolean).join(", ");
   const rest = all.map(({ item, value, met, words }, k) => {
     const row = html("tr"), th = heading(item.words[0].toUpperCase() + item.words.slice(1), "left", "row"), last = html("td", "left");
