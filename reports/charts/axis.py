@@ -44,10 +44,14 @@ class Axis:
         for each in (array, array[array > 0.0]):  # whether the axis is logarithmic may be said later
             self.seen += [float(each.min()), float(each.max())] if len(each) else []
 
+    def shown(self) -> list[float]:
+        """Give the least and the largest value seen that the axis, as it is now, has a place for."""
+        seen = [value for value in self.seen if value > 0.0 or not self.log]
+        return [min(seen), max(seen)] if seen else []
+
     def span(self) -> tuple[float, float]:
         """Give both ends: those set, or the values with some room."""
-        seen = [value for value in self.seen if value > 0.0 or not self.log]
-        low, high = min(seen, default=1.0 if self.log else 0.0), max(seen, default=1.0)
+        low, high = self.shown() or (1.0 if self.log else 0.0, 1.0)
         if self.log:
             room = (high / low) ** MARGIN if high > low else 2.0
             ends = (low / room, high * room)

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
+from reports.charts.axis import Axis
 from reports.charts.chart import Chart, Column
 
 DIGITS = 6
@@ -71,6 +72,8 @@ def _plain(value: Any) -> Any:
             made["panels"] = [{k: v for k, v in p.items() if k != "x"} for p in made["panels"][:-1]] + made[
                 "panels"
             ][-1:]
+        if isinstance(value, Axis) and value.seen:
+            made["seen"] = _plain(value.shown())
         return made
     if isinstance(value, np.ndarray):
         return [_number(item) for item in value.tolist()]

@@ -76,7 +76,7 @@ def test_a_pole_that_8_ulp_carry_over_the_border_is_not_said_to_be_on_it(k: int)
         assert m.evidence == "withheld" or m.agreement.unstable_poles == unstable
         assert not m.agreement.border_poles
         if m.evidence == "withheld":
-            assert "over the border" in m.evidence_reason
+            assert "across the stability boundary" in m.evidence_reason
             assert m.agreement.unstable_poles is None
 
 

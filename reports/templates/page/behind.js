@@ -20,9 +20,13 @@ const nextPiece = () => {
 export const fillBehind = () => {
   clearTimeout(waits);
   root.dataset.behind = "waits";
-  pieces = [...(desk.late ? [desk.late] : []), ...timedPieces(desk.now), ...periodicPieces(desk.before), ...(desk.now === desk.before ? [] : periodicPieces(desk.now)), table, sideBySide, ...mapPieces(desk.now)];
-  desk.late = null;
+  pieces = [...(desk.late ? [runLate] : []), ...timedPieces(desk.now), ...periodicPieces(desk.before), ...(desk.now === desk.before ? [] : periodicPieces(desk.now)), table, sideBySide, ...mapPieces(desk.now)];
   waits = setTimeout(nextPiece, QUIET);
+};
+const runLate = () => { // taken when it runs: what waits may be listed anew before
+  const late = desk.late;
+  desk.late = null;
+  late();
 };
 const mapPieces = (found) => {
   const loop = found.loops[outer];

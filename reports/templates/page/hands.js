@@ -41,6 +41,7 @@ const runOn = () => runNow(true);
 const update = () => {
   const began = performance.now();
   desk.refused = "";
+  desk.late = null;
   drawPins();
   const why = refusalOf(past.values), apart = why && `Refused, nothing follows: ${why}.`, found = apart ? null : compute(past.values);
   if (found && data.loops.every((name) => found.loops[name].n !== 0)) { desk.now = found; lastGood = past.values; } else {
