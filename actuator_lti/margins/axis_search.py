@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.axis import _nearest, _search
-from actuator_lti.axis._factors import BOUNDS
+from actuator_lti.axis._factors import BOUNDS, slot
 from actuator_lti.axis.library import LIBRARY
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.factors_on_axis import Factored
@@ -133,4 +133,4 @@ def _row(loop: Factored) -> tuple[int, Real]:
 
 
 def _lent(loop: Factored) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    return np.empty((_search.DEEPEST + 2) * (4 * loop.roots.size + 5)), np.empty(BOUNDS)
+    return np.empty((_search.DEEPEST + 2) * slot(loop.roots.size)), np.empty(BOUNDS)

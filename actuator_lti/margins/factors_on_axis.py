@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from actuator_lti.axis._factors import slot
 from actuator_lti.axis.library import LIBRARY
 from actuator_lti.margins.loop import Complex, Real
 
@@ -99,7 +100,7 @@ class Factored:
 
     def log_at(self, w: float) -> tuple[float, float]:
         """The same at one frequency."""
-        parts = np.empty(4 * self.roots.size + 5)
+        parts = np.empty(slot(self.roots.size))
         LIBRARY.functions.evaluated(self.roots.size, self.table, w, parts, 0)
         gain, phase = parts[-5:-3].tolist()
         return gain, phase
