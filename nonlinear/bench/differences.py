@@ -84,8 +84,6 @@ class Differences:
             for k in range(readings)
         ]
         for columns, (left, right) in self._tried(rows):
-            first, _ = columns.best(left, right)
-            left, right = self._felt(first)  # what is felt of an error is known once the response is
             whole, off = columns.best(left, right)
             yield self._split(whole), off, float(np.max(np.einsum("zi,ik,zk->z", left, off, right)))
 
@@ -174,6 +172,7 @@ class Differences:
         Of each column until it had three without an event, and the last did not bend.
         """
         steps, going, tried = FAR * self.scale, np.ones(self.scale.size, bool), list[tuple[Floats, Floats]]()
+        felt = list[tuple[Floats, Floats]]()
         for _ in range(MOST_DECADES):
             tried.append(self._differences(np.where(going, steps, 0.0)))
             steps = 0.1 * steps
@@ -187,7 +186,7 @@ class Differences:
             columns = [_Columns(values[:, :, each], rounding[:, :, each]) for each in rows]
             going = ~columns[0].free
             if not going.any():
-                felt = [self._felt(each.last) for each in columns]
+                felt = felt or [self._felt(each.last) for each in columns]
                 for one, (left, right) in zip(columns, felt, strict=True):
                     going = going | one.bend(left, right)
                 if not going.any():
