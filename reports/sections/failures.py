@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analyses.motion.settling import largest_swing, words
+from analyses.motion.settling import noticed, words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -35,7 +35,7 @@ def section(result: Failures) -> Section:
     load, asked = load_unit(result.design), result.asked
     stop, near = f"{scale * asked.stop_rad:.4g} {unit}", f"{scale * asked.deflection_rad:.4g} {unit}"
     detected = f"{1e3 * asked.detection_s:.4g} ms"
-    swing = largest_swing(result.before)
+    swing = noticed(result.design, result.before)
     held = "has come to rest"
     if swing is not None:
         held = f"does not come to rest ({words(swing.rest, scale, unit)})"
@@ -60,7 +60,7 @@ def summary(result: Failures) -> str:
     size = short(scale * worst.at_detection_rad, 3)
     when = f"{1e3 * result.asked.detection_s:.4g} ms"
     stop = "" if worst.to_stop_s is None else f"; it reaches the stop after {1e3 * worst.to_stop_s:.3g} ms"
-    if largest_swing(result.before) is not None:
+    if noticed(result.design, result.before) is not None:
         stop += "; the drive does not come to rest before it"
     return f"{NAMES[worst.name]} moves the output most until it is detected: {size} {unit} in {when}{stop}."
 

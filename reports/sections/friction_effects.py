@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.design.model import Command
-from analyses.motion.settling import largest_swing
+from actuator_lti.design.model import Command, Design
+from analyses.motion.settling import accepted_rad, judged_by, noticed, verdict_of
 from analyses.motion.settling import words as end_words
 from reports import document as doc
 from reports.charts import style
@@ -33,7 +33,7 @@ def section(result: FrictionEffects) -> Section:
         return doc.section("friction-effects", title, [], result=f"Not applicable: {result.reason}.")
     fine, small = fine_unit(result.design.axis)
     load = load_unit(result.design)
-    items = [_cycle_verdict(point, fine, small, load) for point in result.points]
+    items = [_cycle_verdict(result.design, point, fine, small, load) for point in result.points]
     blocks = [doc.verdicts(items, what="checks"), _threshold_table(result, fine, small, load)]
     figure = _figure(result, fine, small, load)
     blocks += [figure] if figure else []
@@ -50,14 +50,14 @@ def section(result: FrictionEffects) -> Section:
     )
 
 
-def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> VerdictItem:
+def _cycle_verdict(design: Design, point: FrictionPoint, fine: float, small: str, load: str) -> VerdictItem:
     """Say whether friction keeps the drive hunting, and whether that was predicted."""
-    cycles, swing = point.cycles, point.cycles.hunting
+    cycles, swing = point.cycles, noticed(design, point.cycles.settlings)
     predicted = _predicted_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
         result = f"at rest after steps of {len(cycles.settlings)} sizes"
     else:
-        result = end_words(swing.rest, fine, small)
+        result = "; ".join(filter(None, (end_words(swing.rest, fine, small), judged_by(design))))
     agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
@@ -65,10 +65,10 @@ def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> 
         f"validation-hunting-{point.load_Nm:g}",
         f"No limit cycle of friction after small steps at {point.load_Nm:g} {load}",
         value=0.0 if swing is None else fine * swing.swing_rad,
-        limit=0.0,
+        limit=fine * accepted_rad(design),
         unit=small,
         distance=None,
-        passed=swing is None,
+        passed={"met": True, "not met": False}.get(verdict_of(design, swing)),
         comparison="<=",
         reason=f"{predicted}; simulated: {result}; {agree}",
     )
@@ -214,7 +214,7 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
 def _summary(result: FrictionEffects, fine: float, small: str) -> str:
     """Say what becomes of the steady-state error, as the steps show it."""
     settlings = [one for point in result.points for one in point.cycles.settlings]
-    swing = largest_swing(settlings)
+    swing = noticed(result.design, settlings)
     if swing is not None:
         return f"Friction keeps the drive from rest after a step: {end_words(swing.rest, fine, small)}."
     left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]

@@ -9,6 +9,7 @@ from typing import Any, cast
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.drive.signals import LIMITERS
+from analyses.motion.settling import waiver_of_rest
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
@@ -106,7 +107,7 @@ def result(validation: Validation) -> str:
     """Say how many predictions are met, and what the drive does that it must not."""
     words = [validation.tally.words("predictions"), *validation.failures]
     words += [f"stability of the {name} loop not known" for name in validation.undecided]
-    return " ".join(f"{capital(each)}." for each in words)
+    return " ".join(f"{capital(each)}." for each in (*words, validation.rest_words) if each)
 
 
 def findings(validation: Validation) -> list[Finding]:
@@ -141,10 +142,10 @@ def verdict_items(validation: Validation) -> list[VerdictItem]:
         _item(f"stable-{name}", f"{loop_name(name)}: stable", None, None, None, "not known")
         for name in validation.undecided
     ]
-    swing = validation.hunting
-    if swing is not None and swing.rest.verdict == "still moving":
-        reason = f"still moving after {swing.rest.after_s:.3g} s"
-        items.append(_item("rest", "Comes to rest after a step", None, None, None, reason))
+    if validation.rest is Verdict.NOT_PROVEN:
+        waiver = waiver_of_rest(validation.design)
+        item = _item("rest", "Comes to rest after a step", None, None, None, validation.rest_words)
+        items.append({**item, "waiver": waiver.words if waiver else ""})
     return items
 
 
