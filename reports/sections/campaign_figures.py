@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from analyses.identification.campaign import CampaignResult
+from analyses.identification.surface_fit import SurfaceFit
+from analyses.records.record import Record
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block
 from reports.sections.thinning import kept_rows
-
-if TYPE_CHECKING:
-    from analyses.identification.campaign import CampaignResult
-    from analyses.identification.surface_fit import SurfaceFit
-    from analyses.records.record import Record
 
 NAMES = ("C0", "Cv", "CM")
 

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, drive_cases
+from analyses.comparison.variants import Compared, Comparison
+from analyses.linear.responses import Curve, answer_curve, curve, frequency_grid
+from analyses.specification.sensitivity import Sensitivity
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section
 from reports.sections.names import LOOPS
-
-if TYPE_CHECKING:
-    from analyses.comparison.variants import Compared, Comparison
-    from analyses.linear.responses import Curve
-    from analyses.specification.sensitivity import Sensitivity
 
 MOST_CURVES = 7
 MOST_BARS = 10
@@ -47,8 +45,6 @@ def overlays(comparison: Comparison) -> Section:
 
 
 def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[Block]:
-    from analyses.linear.responses import answer_curve, curve, frequency_grid
-
     which = "closed loop" if closed else "open loop"
     chart = Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
     top, bottom = chart.column(1.0, 1.0)

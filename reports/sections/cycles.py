@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.motion.settling import judged_by, verdict_of, words
+from analyses.limit_cycles import Confirmation, LimitCycles
+from analyses.motion.settling import Settling, judged_by, verdict_of, words
 from reports import document as doc
 from reports.document_schema import Block, Section
 from reports.sections.names import fine_unit, load_unit
-
-if TYPE_CHECKING:
-    from analyses.limit_cycles import Confirmation, LimitCycles
-    from analyses.motion.settling import Settling
 
 CAUSES = {
     "play": "play",

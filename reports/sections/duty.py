@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from actuator_lti.asked.verdict import Verdict
+from analyses.duty import Duty, Heating
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Row, Section
 from reports.sections.names import load_unit, output_unit
-
-if TYPE_CHECKING:
-    from analyses.duty import Duty, Heating
 
 _SHOWN = 400
 

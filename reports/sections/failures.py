@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from analyses.failures import Failures
 from analyses.motion.settling import noticed, words
 from reports import document as doc
 from reports.charts import style
@@ -13,9 +14,6 @@ from reports.charts.style import Chart
 from reports.document_schema import Block, Section, Severity
 from reports.numbers import short
 from reports.sections.names import load_unit, output_unit
-
-if TYPE_CHECKING:
-    from analyses.failures import Failures
 
 NAMES = {
     "hard-over": "Hard-over of the power stage",

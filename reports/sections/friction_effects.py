@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.design.model import Command, Design
-from analyses.motion.settling import accepted_rad, judged_by, noticed, verdict_of
+from analyses.friction_effects import FrictionEffects
+from analyses.friction_effects.cycles import LimitCycles
+from analyses.friction_effects.result import FrictionPoint
+from analyses.motion.settling import Settling, accepted_rad, judged_by, noticed, verdict_of
 from analyses.motion.settling import words as end_words
 from reports import document as doc
 from reports.charts import style
@@ -15,13 +18,6 @@ from reports.charts.style import Chart
 from reports.document_schema import Block, Section, Severity, Status, VerdictItem
 from reports.sections.names import fine_unit, load_unit
 from reports.verdict_summary import tally
-
-if TYPE_CHECKING:
-    from analyses.friction_effects import FrictionEffects
-    from analyses.friction_effects.cycles import LimitCycles
-    from analyses.friction_effects.result import FrictionPoint
-    from analyses.motion.settling import Settling
-
 
 LEFT = 1e-3  # of a step: an error that is spoken of
 

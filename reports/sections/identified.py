@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
+from analyses.identification.verdict import Identified, Item
 from reports import document as doc
 from reports.document_schema import Block, Row, Section, Status, VerdictItem
 from reports.numbers import show
-
-if TYPE_CHECKING:
-    from analyses.estimation.fit import Fit
-    from analyses.identification.verdict import Identified, Item
 
 
 def judged(

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 from analyses.estimation.parameters import parameter
+from analyses.identification.plan import Plan
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Section, Status
 from reports.sections.identified import parameter_table
 from reports.sections.thinning import kept_rows
-
-if TYPE_CHECKING:
-    from analyses.identification.plan import Plan
 
 NEXT = "What the records at hand tell is counted; these motions are what to measure next."
 

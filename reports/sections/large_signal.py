@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from actuator_lti.design.model import Command
+from actuator_lti.design.model import Command, Design
+from analyses.large_signal import LargeSignals
+from analyses.large_signal.bode import AmplitudeBode
+from analyses.large_signal.border import LimitShift
+from analyses.large_signal.classify import CAUSE_RULE, CAUSES, CRITERIA
+from analyses.large_signal.map import AmplitudeMap
+from analyses.large_signal.sawtooth import (
+    FAST,
+    GAIN_TOLERANCE,
+    LAG_TOLERANCE_DEG,
+    REVERSAL_DEG,
+    Sawtooth,
+    SawtoothRun,
+)
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -17,19 +30,9 @@ from reports.sections.limits import words_of
 from reports.sections.names import figure_column, load_unit, output_unit
 from reports.verdict_summary import tally
 
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.large_signal import LargeSignals
-    from analyses.large_signal.bode import AmplitudeBode
-    from analyses.large_signal.border import LimitShift
-    from analyses.large_signal.map import AmplitudeMap
-    from analyses.large_signal.sawtooth import Sawtooth, SawtoothRun
-
 
 def section(result: LargeSignals) -> Section:
     """Make the section from `analyses.large_signal.large_signals`."""
-    from analyses.large_signal.classify import CAUSE_RULE, CRITERIA
-
     design = result.design
     scale, unit = output_unit(design.axis)
     items = _sawtooth_verdicts(result.sawtooth)
@@ -101,8 +104,6 @@ def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
 
 def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
     """Judge the rate-limit formulas, where they apply."""
-    from analyses.large_signal.sawtooth import GAIN_TOLERANCE, LAG_TOLERANCE_DEG
-
     if not (sawtooth.runs and sawtooth.applicable):
         return []
     gain = max(abs(run.gain_error) for run in sawtooth.runs)
@@ -145,8 +146,6 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
 
 def _map_words(amplitude_map: AmplitudeMap) -> str:
     """Say in words what the map shows."""
-    from analyses.large_signal.classify import CAUSES
-
     shares = {name: amplitude_map.share((name,)) for name in CAUSES}
     parts = [f"{name} {share:.0%}" for name, share in shares.items() if share > 0.0]
     return "Map of amplitude and frequency; share of the points by what acts: " + ", ".join(parts)
@@ -248,8 +247,6 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: s
 
 def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[Block]:
     """Make the sawtooth, or say why there is none."""
-    from analyses.large_signal.sawtooth import FAST, REVERSAL_DEG
-
     if not sawtooth.runs:
         return [doc.text(f"Sawtooth: not applicable, {sawtooth.reason}.")]
     limit = scale * sawtooth.rate_limit_rad_s

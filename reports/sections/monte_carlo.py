@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
+from analyses.monte_carlo import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
+from analyses.specification.verdicts import RequirementVerdict
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -18,10 +20,6 @@ from reports.sections.margins import finite
 from reports.sections.names import unit_words
 from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
-
-if TYPE_CHECKING:
-    from analyses.monte_carlo import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
-    from analyses.specification.verdicts import RequirementVerdict
 
 _SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
 

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analyses.identification.joint_model import JointModel, RecordFit
+from analyses.identification.residuals import ResidualTest
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block
 from reports.sections.thinning import kept_rows
-
-if TYPE_CHECKING:
-    from analyses.identification.joint_model import JointModel, RecordFit
-    from analyses.identification.residuals import ResidualTest
 
 
 def blocks(model: JointModel, tests: Sequence[ResidualTest], axis: str) -> list[Block]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.model import Design
+from analyses.specification import Specification
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -15,10 +17,6 @@ from reports.findings import Finding
 from reports.numbers import short, significant
 from reports.sections.limits import words_of
 from reports.sections.names import load_unit, output_unit
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.specification import Specification
 
 ALIKE = 0.05  # relative: closed form and simulation are not told apart in the headline
 BOUND_COLOURS = {

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from actuator_lti.design import write_design
 from actuator_lti.files.atomic import write_text
+from analyses.specification.verdicts import RequirementVerdict
+from analyses.tuning import BindingRequirement, TuningResult
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section, VerdictItem
 from reports.sections.names import output_unit, unit_words
-
-if TYPE_CHECKING:
-    from analyses.specification.verdicts import RequirementVerdict
-    from analyses.tuning import BindingRequirement, TuningResult
 
 
 def section(result: TuningResult) -> Section:

@@ -16,6 +16,15 @@ from reports import document as doc
 from reports.document_schema import Block, Counts, Section, Severity, Status, VerdictItem
 from reports.findings import Finding
 from reports.numbers import capital
+from reports.sections import (
+    conditional,
+    counts,
+    friction_effects,
+    from_rest,
+    in_time,
+    large_signal,
+    specification,
+)
 from reports.sections.conditional import findings_of
 from reports.sections.names import LOOPS, POINTS, QUANTITIES, unit_words
 from reports.terminal import Brief
@@ -43,8 +52,6 @@ NOISE = 1e-9  # of the value: a smaller error changes with the order in which su
 
 def section(validation: Validation) -> list[Section]:
     """Make all sections of a validation, verdicts first."""
-    from reports.sections import conditional, counts, from_rest, in_time
-
     made = [summary(validation), *in_time.sections(validation)]
     if validation.rest_sweep is not None:
         made += from_rest.sections(validation.rest_sweep, validation.design.axis)
@@ -57,8 +64,6 @@ def section(validation: Validation) -> list[Section]:
 
 def _others(validation: Validation) -> list[Section]:
     """Make the sections of large signals, friction and specification, as far as they were asked for."""
-    from reports.sections import friction_effects, large_signal, specification
-
     shown: list[tuple[Callable[[Any], Section], Any]] = [
         (large_signal.section, validation.large_signals),
         (friction_effects.section, validation.friction),
