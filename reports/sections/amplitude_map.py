@@ -41,14 +41,12 @@ def chart(result: LargeSignals, scale: float, unit: str) -> Chart:
     made = Chart(
         width=style.WIDE, height=500.0, legend=True, legend_title="waveform; first reached, linear loop"
     )
-    panel, shown = made.panel(), result.map
+    panel, shown = made.panel("command frequency, Hz", f"command amplitude, {unit}", "xy"), result.map
     x, y = shown.frequency_hz, scale * shown.amplitude_rad
     xe, ye = _edges(x), _edges(y)
-    panel.x.log = panel.y.log = True
     panel.x.limits(xe[0], xe[-1])
     panel.y.limits(ye[0], ye[-1])
     panel.x.grid = panel.y.grid = False
-    panel.x.label, panel.y.label = "command frequency, Hz", f"command amplitude, {unit}"
     _regions(panel, CAUSES, shown.cause, xe, ye)
     _glyphs(panel, WAVEFORMS, shown.waveform, x, y)
     _lines(panel, result, scale)

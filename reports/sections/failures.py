@@ -98,8 +98,7 @@ def _figure(result: Failures, scale: float, unit: str, load: str) -> Block:
         time = case.time_s[keep] * per_s
         top.curve(time, scale * case.deflection_rad[keep], NAMES[case.name], **style.series(k))
         bottom.curve(time, case.moment_Nm[keep], NAMES[case.name], **style.series(k))
-    top.rule_y(scale * asked.stop_rad, "stop", colour=style.RED, dash=1)
-    top.y.see([scale * asked.stop_rad])
+    top.rule_y(scale * asked.stop_rad, "stop", seen=True, colour=style.RED, dash=1)
     for panel in (top, bottom):
         panel.rule_x(asked.detection_s * per_s, "detected" if panel is top else "")
     top.y.label, bottom.y.label = f"deflection, {unit}", f"moment, {load}"

@@ -63,7 +63,6 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: float, small: str
         value=0.0 if swing is None else fine * swing.swing_rad,
         limit=fine * accepted_rad(design),
         unit=small,
-        distance=None,
         passed={"met": True, "not met": False}.get(verdict_of(design, swing)),
         comparison="<=",
         reason=f"{predicted}; simulated: {result}; {agree}",
@@ -183,24 +182,21 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
     if not loops:
         return None
     chart = Chart(width=style.WIDE, height=330.0)
-    panel = chart.panel(title="Position error over a slow triangle of the command")
-    panel.by_point = True
+    title = "Position error over a slow triangle of the command"
+    panel = chart.panel(f"command, {small}", f"output less command, {small}", title=title, by_point=True)
     for k, (label, loop) in enumerate(loops):
         x, y = fine * loop.command_rad, fine * (loop.output_rad - loop.command_rad)
         panel.curve(np.append(x, x[0]), np.append(y, y[0]), label, **style.series(k))
     panel.rule_y(0.0)
-    panel.x.label, panel.y.label = f"command, {small}", f"output less command, {small}"
     if waits:
-        panel = chart.panel(title="Wait before a small step moves the output")
-        panel.x.log = panel.y.log = True
-        panel.x.label, panel.y.label = f"step, {small}", "time to first motion, ms"
+        title = "Wait before a small step moves the output"
+        panel = chart.panel(f"step, {small}", "time to first motion, ms", "xy", title=title)
     for k, (label, waiting) in enumerate(waits):
         sizes = [fine * one.amplitude_rad for one in waiting]
         seen = [None if one.simulated_s is None else 1e3 * one.simulated_s for one in waiting]
-        look: style.Style = {"colour": style.SERIES[k % 7], "marker": "os^D"[k % 4], "size": 6.0}
         predicted = [1e3 * one.predicted_s for one in waiting]
         panel.curve(sizes, predicted, f"{label}: predicted", **style.series(k))
-        panel.points(sizes, seen, f"{label}: simulated", **look)
+        panel.points(sizes, seen, f"{label}: simulated", **style.marked(k))
     caption = "Position error over a slow triangular command; without friction only the small lag remains."
     if waits:
         caption += " Right: a step below the threshold waits until the speed integrator reaches breakaway."

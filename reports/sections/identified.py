@@ -50,9 +50,8 @@ def _verdict(item: Item) -> VerdictItem:
     limit = None if item.limit is None else 100.0 * item.limit
     unit, comparison = "" if value is None else "%", "" if limit is None else "<="
     return doc.verdict(
-        item.id, item.label, value=value, limit=limit, unit=unit, comparison=comparison,
-        distance=None if value is None or limit is None else limit - value,
-        passed=item.passed, reason=item.reason,
+        item.id, item.label, value=value, limit=limit, unit=unit, comparison=comparison, passed=item.passed,
+        reason=item.reason,
     )  # fmt: skip
 
 

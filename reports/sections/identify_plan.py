@@ -49,9 +49,8 @@ def section(plan: Plan) -> Section:
     if plan.segments:
         rows = kept_rows([plan.command])
         chart = Chart(width=style.WIDE, height=260.0)
-        panel = chart.panel()
+        panel = chart.panel("time, s", f"command at the output, {unit}")
         panel.curve(plan.time_s[rows], plan.command[rows], "command", colour=style.BLUE)
-        panel.x.label, panel.y.label = "time, s", f"command at the output, {unit}"
         caption = "Command of all motions, one after the other"
         blocks.append(doc.figure("plan", chart, caption=caption, alt=caption))
     intro = (

@@ -50,11 +50,9 @@ def response_figures(result: FrequencyResult) -> list[Block]:
             continue
         measured, _ = response(lines, signal, lines.names[0])
         chart = Chart(width=style.WIDE, height=320.0)
-        panel = chart.panel()
-        panel.x.log = panel.y.log = True
+        panel = chart.panel("frequency, Hz", f"{label} over torque, rad/(N m)", "xy")
         panel.points(hertz, np.abs(measured), "measured", colour=style.BLUE)
         panel.curve(hertz, np.abs(model[k]), "two-mass model", **style.series(1))
-        panel.x.label, panel.y.label = "frequency, Hz", f"{label} over torque, rad/(N m)"
         caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
         alt = f"Magnitude of {label} over motor torque against frequency, measured and fitted"
         figures.append(doc.figure("response", chart, caption=caption, alt=alt))

@@ -120,7 +120,6 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
             limit=scale * limit,
             unit=unit,
             comparison="<=",
-            distance=scale * (limit - error),
             passed=error <= limit,
         )
         for key, label, error, limit, scale, unit in rows
@@ -183,7 +182,7 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
         for k, (fraction, amplitude) in enumerate(
             zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True)
         ):
-            look = {**style.series(k), "marker": "os^Dv<>"[k % 7], "size": 4.4, "every": 6}
+            look = {**style.series(k), **style.marked(k, 4.4), "every": 6}
             label = f"{100.0 * fraction:g} % ({scale * amplitude:.3g} {unit})"
             panel.curve(amplitude_bode.frequency_hz, values[k], label, **look)
     style.bound(gain, np.ravel(amplitude_bode.gain_db), span=45.0, top_room=0.12)
@@ -193,7 +192,9 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
     phase.rule_y(-90.0, dash=1)
     style.frequency(phase, amplitude_bode.frequency_hz)
     gain.y.label, phase.y.label = "gain of the fundamental, dB", "phase, deg"
-    _bandwidths(chart.panel(title="Bandwidth against amplitude"), amplitude_bode, scale, unit, full)
+    size = f"command amplitude, {unit} (dotted: full deflection)"
+    panel = chart.panel(size, "frequency, Hz", "xy", title="Bandwidth against amplitude")
+    _bandwidths(panel, amplitude_bode, scale, unit, full)
     caption = (
         "Fundamental of the output relative to the command at several amplitudes, simulated at no load with "
         "friction and limits. Right: frequencies of −3 dB and −90° against amplitude. Gaps: not steady."
@@ -207,16 +208,12 @@ def _bandwidths(panel: Panel, result: AmplitudeBode, scale: float, unit: str, fu
         (result.minus3db_hz, result.linear_minus3db_hz, "−3 dB", style.GREEN, "o", 0),
         (result.minus90deg_hz, result.linear_minus90deg_hz, "−90°", style.PURPLE, "D", 1),
     )
-    panel.x.log = panel.y.log = True
     for values, level, label, colour, marker, dash in pairs:
         sizes = scale * result.all_amplitude_rad
         panel.curve(sizes, values, label, colour=colour, marker=marker, size=5.0, dash=dash)
         if level is not None and math.isfinite(level):
-            panel.y.see([level])
-            panel.rule_y(level, f"linear {style.hertz(level)}", colour=colour, dash=2)
+            panel.rule_y(level, f"linear {style.hertz(level)}", seen=True, colour=colour, dash=2)
     panel.rule_x(full * scale, dash=2)
-    panel.x.label = f"command amplitude, {unit} (dotted: full deflection)"
-    panel.y.label = "frequency, Hz"
 
 
 def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str) -> Block:
