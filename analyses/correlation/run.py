@@ -9,7 +9,7 @@ from actuator_lti.design.model import Design
 from analyses.correlation.asked import Asked
 from analyses.correlation.closed_loop import CorrelationResult, correlate_record
 from analyses.correlation.summary import SignalSummary, agrees, summarise, worst_of
-from analyses.records import open_record
+from analyses.records import open_records
 from analyses.records.record import named_apart
 
 
@@ -46,7 +46,7 @@ def correlate(
     design: Design, asked: Asked, *, progress: Callable[[int, int], None] | None = None
 ) -> Correlation:
     """Run the model with each record's own command, load and supply, and compare."""
-    records = [open_record(path) for path in asked.records]
+    records = [record for path in asked.records for record in open_records(path)]
     results = [
         correlate_record(design, record, command=asked.command, progress=progress)
         for record in named_apart(records)
