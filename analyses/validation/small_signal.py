@@ -9,8 +9,8 @@ A gain margin is a gain K and a point on the unit circle where, with G the tange
 
     det(I + (K - 1) G(lambda)) = 0,   |lambda| = 1:
 
-there the simulator has a closed-loop pole.  It is solved for K and the angle from the predicted ones, and the
-same pole is followed to K (1 - 1e-6) and K (1 + 1e-6), where it lies on either side of the circle.
+there the simulator has a closed-loop pole.  It is solved for K and the angle from the predicted ones; how the
+pole moves with K says on which side of the circle it lies at K (1 - 1e-6) and at K (1 + 1e-6).
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ BESIDE = 1e-6  # of a margin: where the pole has to lie on either side of the ci
 DB = 20.0 / np.log(10.0)  # of a relative change
 ROUNDING = 1e-12  # of the norm of A, that an eigenvalue is computed with
 NEWTON_STEPS = 25
+NEAR, LEAST_ANGLE = 1e-6, 1e-12  # of an angle: a step beside it; that of z = 1
 MOST_LOG = 70.0  # of a gain
 
 
@@ -175,32 +176,69 @@ def _poles(place: Place) -> Row:
     return replace(row, predicted=None, found=None, error=worst)
 
 
-def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | None:
-    """Gain and angle of the closed-loop pole on the circle nearest to those given: its size by secants."""
-    point = complex(np.exp(1j * angle))
-    before = log_gain = float(np.log(gain))
-    last = 0.0
-    for k in range(NEWTON_STEPS):
-        point, _ = _pole(t, float(np.exp(log_gain)), point)
-        if point == 0.0:
-            return None
-        size = float(np.log(np.abs(point)))
-        if k and size == last:
-            break
-        move = BESIDE if k == 0 else -size * (log_gain - before) / (size - last)
-        before, last, log_gain = log_gain, size, log_gain + move
-        if not np.isfinite(log_gain) or abs(log_gain) > MOST_LOG:
-            return None
-        if abs(move) < 1e-14:
-            break
-    return float(np.exp(log_gain)), abs(float(np.angle(point)))
+@dataclass(frozen=True)
+class _Crossing:
+    """A closed-loop pole on the circle: gain, angle over a base period, and which way it goes with the gain.
+
+    ``outward``: how far outside the circle it lies for a relative change of the gain of 1; ``error``: of the
+    gain, relative, that follows from the stated error of the pole, where that of the response does not count.
+    """
+
+    gain: float
+    angle: float
+    outward: float
+    error: float | None = None
 
 
-def _pole(t: Tangent, gain: float, point: complex) -> tuple[complex, float]:
-    """The pole at a gain nearest to a point, and its stated error."""
-    poles, errors = t.poles_at(gain)
-    k = int(np.argmin(np.abs(poles - point)))
-    return complex(poles[k]), float(errors[k])
+def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
+    """The crossing nearest to a gain and an angle: where the gain of a pole there is real, by secants."""
+    if angle < LEAST_ANGLE:
+        return _crossing_at_rest(t, gain)
+
+    def at(turned: float) -> complex:
+        values = np.linalg.eigvals(t.lifted(np.exp(1j * turned)))
+        gains = 1.0 - 1.0 / values[values != 0.0]
+        return complex(gains[int(np.argmin(np.abs(gains - gain)))]) if gains.size else complex(np.nan)
+
+    step = NEAR * min(angle, 1.0)
+    before, last = angle - step, at(angle - step)
+    for _ in range(NEWTON_STEPS):
+        now = at(angle)
+        slope = (now - last).imag / (angle - before)
+        if abs(angle - pi) < LEAST_ANGLE or slope == 0.0 or not np.isfinite(slope):
+            break
+        move = -now.imag / slope
+        if abs(move) < 1e-14 * angle:
+            break
+        before, last, angle = angle, now, angle + float(np.clip(move, -0.5 * angle, 0.5 * (pi - angle)))
+    if not np.isfinite(now) or abs(now.imag) > RESOLVED * abs(now):
+        return None
+    z = complex(np.exp(1j * angle))
+    change = 1j * z / ((now - at(angle - step)) / step)  # of the pole with the gain
+    return _Crossing(now.real, angle, now.real * (z.conjugate() * change).real)
+
+
+def _crossing_at_rest(t: Tangent, gain: float) -> _Crossing | None:
+    """The gain at which a real pole passes 1, beside modes at rest that no gain moves, by secants."""
+
+    def at(log_gain: float) -> tuple[float, float]:
+        poles, errors = t.poles_at(float(np.exp(log_gain)))
+        k = int(np.argmin(np.abs(poles - 1.0)))
+        return float(poles[k].real) - 1.0, float(errors[k])
+
+    before = float(np.log(gain))
+    (last, blur), now = at(before), before + BESIDE
+    for _ in range(NEWTON_STEPS):
+        size, blur = at(now)
+        slope = (size - last) / (now - before)
+        if slope == 0.0:
+            break
+        before, last, now = now, size, now - size / slope
+        if not abs(now) < MOST_LOG:
+            return None
+        if abs(now - before) < 1e-14:
+            break
+    return _Crossing(float(np.exp(now)), 0.0, slope, blur / max(abs(slope), 1e-300))
 
 
 def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int | None) -> Row:
@@ -212,24 +250,15 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
     found = _crossing(t, ratio, angle)
     if found is None:
         return place.judged(name, ratio, None, place.within, scale, "1", "no closed-loop pole crosses there")
-    gain, turned = found
-    beside = [_pole(t, ratio * x, np.exp(1j * turned)) for x in (1.0 - BESIDE, 1.0 + BESIDE)]
-    sides = [abs(pole) - 1.0 for pole, _ in beside]
-    slope = abs(sides[1] - sides[0]) / (2.0 * BESIDE)  # over the relative gain
-    blur = max(error for _, error in beside) / max(slope, 1e-300) * ratio / scale
-    within = max(WITHIN, SURE * blur)
-    if turned > 0.0:  # of the response there, else a mode at rest is in it: the tighter bound of the two
-        within = min(within, place.within_at(turned / t.B.shape[1]))
-    hertz = turned / (2.0 * pi * t.period_s)
-    words = f"{hertz:.6g} Hz; pole beside the circle by {sides[0]:+.1e}, {sides[1]:+.1e}"
-    row = place.judged(name, ratio, gain, within, scale, "1", words)
-    crossed = sides[0] < 0.0 < sides[1] if outward == 1 else sides[1] < 0.0 < sides[0]
-    if (
-        outward is not None
-        and row.error < 0.1 * BESIDE * ratio
-        and not crossed
-        and max(map(abs, sides)) > 1e-13
-    ):
+    if found.error is None:
+        within = place.within_at(found.angle / t.B.shape[1])
+    else:
+        within = max(WITHIN, SURE * found.error * ratio / scale)
+    hertz = found.angle / (2.0 * pi * t.period_s)
+    side = BESIDE * found.outward
+    words = f"{hertz:.6g} Hz; pole beside the circle by {-side:+.1e}, {side:+.1e}"
+    row = place.judged(name, ratio, found.gain, within, scale, "1", words)
+    if outward is not None and row.error < 0.1 * BESIDE * ratio and outward * side < 0.0:
         return replace(row, verdict=Verdict.NOT_MET, because=f"{words}: it crosses the other way")
     return row
 
