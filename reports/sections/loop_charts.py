@@ -243,7 +243,9 @@ def _step_figures(panel: Panel, figures: StepFigures, drawn: Response, scale: fl
     panel.rule_y(final)
     part = np.asarray(figures.response) / final
     if (part >= 0.9).any():
-        start = float(figures.time_s[int(np.argmax(part >= 0.1))])
+        # both series are parts of the response, each thinned in its own way: the earlier is nearer
+        found = ((figures.time_s, part), (time, np.asarray(response) / final))
+        start = min(float(at[np.argmax(one >= 0.1)]) for at, one in found if (one >= 0.1).any())
         for t in (start, start + float(figures.rise_time_s)):
             if t <= last:
                 there = response[np.searchsorted(time, t * (1.0 + 1e-12), side="right") - 1]

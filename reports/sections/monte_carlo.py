@@ -15,7 +15,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Section, VerdictItem
-from reports.numbers import significant
+from reports.numbers import or_none
 from reports.sections.margins import finite
 from reports.sections.names import unit_words
 from reports.sections.requirements import label, limit_words
@@ -40,8 +40,8 @@ def section(result: MonteCarloResult) -> Section:
     blocks += [doc.remark(note) for note in result.notes]
     blocks.append(doc.facts([
         doc.fact("Samples", result.samples), doc.fact("Seed", result.seed),
-        doc.fact("Parameters that vary", ", ".join(result.paths)),
     ]))  # fmt: skip
+    blocks.append(doc.remark(f"Parameters that vary: {', '.join(result.paths)}."))
     intro = (
         f"{result.samples} designs drawn from the tolerances; sampled loops. An optimiser seeks the worst "
         "case in the whole tolerance box, as sampling alone does not find it."
@@ -177,7 +177,7 @@ def _words(name: str) -> str:
 
 
 def _figures(result: MonteCarloResult) -> list[Block]:
-    """Draw the distribution behind every requirement, three a figure."""
+    """Draw the distribution behind every requirement, at most three a figure, in rows of like length."""
     shown = [
         (odds, result.columns[name])
         for odds in result.odds
@@ -186,9 +186,10 @@ def _figures(result: MonteCarloResult) -> list[Block]:
         if len(result.columns[name].counts) >= 2  # the same in every sample: nothing to draw
     ]
     blocks = []
-    for first in range(0, len(shown), 3):
-        part = shown[first : first + 3]
-        chart = Chart(width=style.WIDE * len(part) / 3.0, height=250.0, legend=True)
+    rows = -(-len(shown) // 3)
+    for row in range(rows):
+        part = shown[row * len(shown) // rows : (row + 1) * len(shown) // rows]
+        chart = Chart(width=style.WIDE, height=250.0, legend=True)
         for odds, column in part:
             _histogram(chart.panel(title=_words(column.name)), result, odds, column)
         names = ", ".join(_words(column.name) for _, column in part)
@@ -226,7 +227,7 @@ def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: Colum
 def _driver_table(result: MonteCarloResult) -> Block:
     """Say of each required figure which tolerances move it most, and between which values."""
     strongest: dict[str, list[Driver]] = {}
-    for one in result.drivers:
+    for one in (each for each in result.drivers if each.swing != 0.0):
         strongest.setdefault(one.column, []).append(one)
     places = [("first", "Driven most by"), ("second", "then by"), ("third", "then by")]
     columns = [
@@ -240,11 +241,11 @@ def _driver_table(result: MonteCarloResult) -> Block:
 
 def _driver(place: int) -> Callable[[tuple[str, list[Driver]]], str]:
     def words(item: tuple[str, list[Driver]]) -> str:
-        if place >= len(item[1]) or item[1][place].swing == 0.0:
+        if place >= len(item[1]):
             return ""
         one = item[1][place]
-        ends = ["none" if value is None else significant(value, 3) for value in (one.low, one.high)]
-        return f"{one.path}: {ends[0]} to {ends[1]}"
+        told = ([or_none(value, digits) for value in (one.low, one.high)] for digits in range(3, 7))
+        return next((f"{one.path}: {low} to {high}" for low, high in told if low != high), "")
 
     return words
 
