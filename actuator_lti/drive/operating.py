@@ -141,7 +141,8 @@ def segments(points: tuple[FrictionPoint, ...]) -> list[tuple[float, float]]:
 
 
 def _map_slope(points: tuple[FrictionPoint, ...], speed: float) -> Any:
-    (_, slope), *others = segments(points)
+    first, *others = segments(points)
+    slope: Any = first[1]
     for start, following in others:
         slope = np.where(start <= speed, following, slope)[()]
     return slope
