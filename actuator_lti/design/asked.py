@@ -107,8 +107,8 @@ class Waiver:
     """
 
     requirement: Annotated[str, text("id of the requirement or check")]
-    reason: Annotated[str, label("why it is waived")]
-    date: Annotated[str, day("when it was waived")]
+    reason: Annotated[str, label("reason for the waiver")]
+    date: Annotated[str, day("day of the waiver")]
 
     @property
     def words(self) -> str:

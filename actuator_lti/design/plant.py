@@ -318,10 +318,21 @@ class Friction:
     points: tuple[FrictionPoint, ...] = ()
 
     def map(self, direction: int = 1) -> tuple[FrictionPoint, ...]:
-        """Points of the friction map for motion forward (1) or backward (-1), by rising speed."""
+        """Points of the friction map for motion forward (1) or backward (-1), by rising speed.
+
+        Of many designs at once, where a speed is an array, each design's points are in its own order.
+        """
         other = "reverse" if direction > 0 else "forward"
-        chosen = (point for point in self.points if point.direction != other)
-        return tuple(sorted(chosen, key=lambda point: point.speed_rad_s))
+        chosen = [point for point in self.points if point.direction != other]
+        if all(np.ndim(point.speed_rad_s) == 0 for point in chosen):
+            return tuple(sorted(chosen, key=lambda point: point.speed_rad_s))
+        values = np.stack(np.broadcast_arrays(*(v for p in chosen for v in (p.speed_rad_s, p.torque_Nm))))
+        order = np.argsort(values[::2], axis=0)
+        speeds, torques = (np.take_along_axis(values[k::2], order, axis=0) for k in (0, 1))
+        return tuple(
+            replace(point, speed_rad_s=speed, torque_Nm=torque)
+            for point, speed, torque in zip(chosen, speeds, torques, strict=True)
+        )
 
     def dry_Nm(self, load_Nm: float, direction: int = 1) -> float:
         """Dry friction torque Tc at a load torque (either sign), for motion forward (1) or backward (-1)."""

@@ -140,8 +140,12 @@ def segments(points: tuple[FrictionPoint, ...]) -> list[tuple[float, float]]:
     return result or [(0.0, 0.0)]
 
 
-def _map_slope(points: tuple[FrictionPoint, ...], speed: float) -> float:
-    return [slope for start, slope in segments(points) if start <= speed][-1]
+def _map_slope(points: tuple[FrictionPoint, ...], speed: float) -> Any:
+    first, *others = segments(points)
+    slope: Any = first[1]
+    for start, following in others:
+        slope = np.where(start <= speed, following, slope)[()]
+    return slope
 
 
 def _described(design: Design, at: Operating, way: int) -> Any:

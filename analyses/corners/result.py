@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.model import Design
 from analyses.corners.asked import Asked
 from analyses.linear.loop_figures import LoopFigures
@@ -33,20 +34,34 @@ class Corner:
     verdicts: tuple[RequirementVerdict, ...]
 
     @property
+    def tally(self) -> Tally:
+        """The requirements, and that every loop is stable."""
+        return tally(self.verdicts) + Tally.of(Verdict.of(one.sound) for one in self.figures.values())
+
+    @property
     def passed(self) -> bool:
         """Whether no requirement fails and every loop is stable."""
-        return tally(self.verdicts).passes and all(one.sound for one in self.figures.values())
+        return self.tally.passes
 
 
 @dataclass(frozen=True)
 class Corners:
-    """All corners of a design, the nominal drive first."""
+    """All corners of a design, the nominal drive first.
+
+    ``left_out``: requirements on what only an analysis of one design finds; they are not proven at corners.
+    """
 
     design: Design
     asked: Asked
     corners: tuple[Corner, ...]
+    left_out: tuple[RequirementVerdict, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of all corners, and of what is left out there."""
+        return sum((corner.tally for corner in self.corners), tally(self.left_out)).verdict
 
     @property
     def passed(self) -> bool:
-        """Whether every corner passes."""
-        return all(corner.passed for corner in self.corners)
+        """Whether every corner passes, and nothing is left out that is not waived."""
+        return self.verdict.passes()

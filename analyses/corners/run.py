@@ -27,7 +27,8 @@ def corners(design: Design, asked: Asked | None = None) -> Corners:
     """Figures and requirements of a drive when hot, cold, on a low supply, and at the worst tolerances.
 
     Each corner is a design of its own, put through the same loops as the nominal one. Requirements on what an
-    analysis finds (`actuator_lti.asked.quantities.ANALYSIS_QUANTITIES`) are left out.
+    analysis finds (`actuator_lti.asked.quantities.ANALYSIS_QUANTITIES`) are left out: not proven, but for
+    those on the margins at the corners themselves.
 
     Examples
     --------
@@ -36,7 +37,14 @@ def corners(design: Design, asked: Asked | None = None) -> Corners:
     ['nominal', 'hot', 'cold', 'low supply', 'hot, low supply', 'worst gain margin', 'worst phase margin']
     """
     asked = Asked.of(design) if asked is None else asked
-    return Corners(design, asked, tuple(_judged(*each) for each in _made(design, asked)))
+    others = [QUANTITIES[one.quantity] for one in design.requirements]
+    left_out = tuple(
+        verdict
+        for one, quantity in zip(design.requirements, others, strict=True)
+        if quantity.scope == "analysis" and not quantity.cornered
+        for verdict in judged(design, one, {}, _not_here)
+    )
+    return Corners(design, asked, tuple(_judged(*each) for each in _made(design, asked)), left_out)
 
 
 def _judged(name: str, words: str, design: Design) -> Corner:

@@ -40,9 +40,9 @@ class Asked:
         """Refuse what is no duty."""
         for name in ("amplitude_rad", "frequency_hz", "cycle_s"):
             if not 0.0 < getattr(self, name) < inf:
-                raise InputError(f"{name} = {getattr(self, name)}: must be positive")
+                raise InputError(f"{name} = {getattr(self, name):.6g}: must be positive")
         if not 0.0 < self.share <= 1.0:
-            raise InputError(f"share = {self.share}: allowed: above 0, at most 1")
+            raise InputError(f"share = {self.share:g}: allowed: above 0, at most 1")
         if not isfinite(self.load_Nm):
             raise InputError(f"load_Nm = {self.load_Nm}: must be finite")
         if self.share < 1.0 and self.share * self.cycle_s * self.frequency_hz < 1.0:

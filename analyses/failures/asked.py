@@ -50,7 +50,7 @@ class Asked:
         """Refuse what cannot be answered."""
         for name in ("stop_rad", "deflection_rad", "detection_s", "watched_s"):
             if not 0.0 < getattr(self, name) < inf:
-                raise InputError(f"{name} = {getattr(self, name)}: must be positive")
+                raise InputError(f"{name} = {getattr(self, name):.6g}: must be positive")
         if self.deflection_rad > self.stop_rad:
             raise InputError(
                 f"deflection {self.deflection_rad:g}: must not be beyond the stop, {self.stop_rad:g}"

@@ -1,4 +1,4 @@
-"""The smallest command that moves the output, simulated beside what the controllers' gains foresee."""
+"""The smallest command that moves the output, simulated beside what the controllers' gains predict."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Threshold:
     Attributes
     ----------
     static : StaticThreshold
-        What the gains foresee.
+        What the gains predict.
     waiting : tuple of Waiting
         Steps below the threshold, where a controller integrates and none differentiates the step.
     simulated_rad : float or None

@@ -24,9 +24,9 @@ class LimitCycles:
     Attributes
     ----------
     confirmations : tuple of Confirmation
-        Empty: the describing function foresees none.
+        Empty: the describing function predicts none.
     stick_slip : StickSlipCycle or None
-        What the analysis of rest, breakaway and slip foresees beside it.
+        What the analysis of rest, breakaway and slip predicts beside it.
     settlings : tuple of Settling
         Steps of several sizes, the last ones below the threshold: the drive rests, breaks away, and may hunt.
     """
@@ -49,7 +49,7 @@ class LimitCycles:
     def described(self) -> bool:
         """Whether the describing function is right about friction.
 
-        A stable cycle is foreseen exactly where a step ends in one, and every foreseen one is confirmed.
+        A stable cycle is predicted exactly where a step ends in one, and every predicted one is confirmed.
         """
         stable = any(item.cycle.stable for item in self.confirmations)
         return all(item.verdict == "confirmed" for item in self.confirmations) and stable == self.by_friction
@@ -68,9 +68,9 @@ def limit_cycles(
     step_rad: float,
     threshold_rad: float | None = None,
     stick_slip: StickSlipCycle | None = None,
-    foreseen: tuple[Cycle, ...] | None = None,
+    predicted: tuple[Cycle, ...] | None = None,
 ) -> LimitCycles:
-    """Foresee limit cycles, look for them in the simulator, and wait what steps end in.
+    """Predict limit cycles, look for them in the simulator, and wait what steps end in.
 
     Parameters
     ----------
@@ -79,14 +79,14 @@ def limit_cycles(
     threshold_rad : float, optional
         Command that breaks away at once; a step of `BELOW` of it is waited for too.
     stick_slip : StickSlipCycle, optional
-        A cycle foreseen by `analyses.friction_effects.stick_slip`; a step of its size is waited for too.
-    foreseen : tuple of Cycle, optional
+        A cycle predicted by `analyses.friction_effects.stick_slip`; a step of its size is waited for too.
+    predicted : tuple of Cycle, optional
         By describing function, if known already.
     """
     design = quiet(design)
-    if foreseen is None:
-        foreseen = described_cycles(design, load_Nm)
-    checked = tuple(confirm(design, cycle) for cycle in foreseen)
+    if predicted is None:
+        predicted = described_cycles(design, load_Nm)
+    checked = tuple(confirm(design, cycle) for cycle in predicted)
     sizes = [step_rad, 0.1 * step_rad] + ([BELOW * threshold_rad] if threshold_rad else [])
     sizes += [stick_slip.output_amplitude_rad] if stick_slip is not None else []
     return LimitCycles(checked, stick_slip, tuple(settle(design, load_Nm, size) for size in sizes))

@@ -1,4 +1,4 @@
-"""Limit cycles of play and of a quantised position sensor: foreseen by describing function, then sought."""
+"""Limit cycles of play and of a quantised position sensor: predicted by describing function, then sought."""
 
 from typing import TYPE_CHECKING
 

@@ -2,13 +2,13 @@
 
 Play: the coupling's torque is a dead zone of the twist.  For a twist of amplitude A its fundamental is that
 of the coupling with k and c times ``n(x) = 1 - (2/pi)(asin x + x sqrt(1 - x^2))``, x = b/A (the damping acts
-in contact only, and its share is the same n).  A cycle is foreseen where an oscillating eigenvalue of the
+in contact only, and its share is the same n).  A cycle is predicted where an oscillating eigenvalue of the
 closed loop lies on the unit circle.  Dry friction of either side adds ``4 Tc/(pi W)``, W the amplitude of its
 speed in the same cycle; friction by load is left out.
 
 Quantisation: an angle that swings about the edge of a count is a relay of one count, ``2 q/(pi A)`` up to
 A = q.  The sensor multiplies the loop that it stands in by it (the output's that of the position, the
-motor's that of the speed made of it), so a cycle is foreseen at the gain g that brings this loop to its
+motor's that of the speed made of it), so a cycle is predicted at the gain g that brings this loop to its
 border: ``A = 2 q/(pi g)``, stable.
 """
 

@@ -1,4 +1,4 @@
-"""Stick-slip hunting, foreseen exactly where a describing function is blind: rest, breakaway, slip, rest.
+"""Stick-slip hunting, predicted exactly where a describing function is blind: rest, breakaway, slip, rest.
 
 A speed integral winds up while the rotor rests at an error E, until the drive torque reaches breakaway; then
 the drive is the sampled linear loop with the smaller sliding friction until the speed returns to zero.  A

@@ -50,6 +50,9 @@ def compared(
     from analyses.comparison.variants import compare
 
     engine = asked.engine if asked.workers or asked.scheduler else None  # else one after the other
+    if engine is not None and not study.variants:
+        given = f"--workers {asked.workers}" if asked.scheduler is None else f"--scheduler {asked.scheduler}"
+        raise InputError(f"{given}: computes variants, and {study.name} has none; allowed: a study, or --set")
     return compare(study, validation=asked.validate, progress=progress, engine=engine, folder=out / "designs")
 
 

@@ -31,7 +31,7 @@ _USAGE_ERRORS: type[Exception] = typer.BadParameter.__mro__[2]
 _LONGEST = 1000  # characters of a line on standard error
 _PLAIN = {  # what typer says, and what it means
     "Input should be a valid number, unable to parse string as a number": (
-        "allowed: a number with a decimal point, without unit"
+        "allowed: a number, such as 0.5, without its unit"
     ),
     "Input should be a valid integer, unable to parse string as an integer": (
         "allowed: a whole number, such as 1000"

@@ -30,11 +30,12 @@ def remarks(items: Sequence[AmplitudeMargin]) -> list[str]:
     """Say where large motion takes more than a tenth of a margin, worst case of each loop and kind."""
     worst: dict[tuple[str, str], AmplitudeMargin] = {}
     for item in items:
-        known = worst.get((item.loop, item.kind))
         if item.value is None or item.value > WORTH_SAYING * item.linear:
             continue
+        key = item.loop, "" if _already(item) else item.kind  # as designed: whatever is varied
+        known = worst.get(key)
         if known is None or item.value < (known.value or item.value):
-            worst[item.loop, item.kind] = item
+            worst[key] = item
     return [remark(item) for item in worst.values()]
 
 

@@ -40,10 +40,13 @@ def section(result: Corners) -> Section:
 def summary(result: Corners) -> str:
     """Say at which corners the drive does not do."""
     failed = [corner.name for corner in result.corners if not corner.passed]
+    open_ones = [one.id for one in result.left_out if not one.passes]
+    more = f" Not judged at corners: {', '.join(open_ones)}." if open_ones else ""
     if not failed:
-        return f"Every loop is stable and every requirement met at all {len(result.corners)} corners."
+        every = "every other requirement" if more else "every requirement"
+        return f"Every loop is stable and {every} met at all {len(result.corners)} corners.{more}"
     share = f"{len(failed)} of {len(result.corners)} corners"
-    return f"At {share} a loop is not stable or a requirement not met: {'; '.join(failed)}."
+    return f"At {share} a loop is not stable or a requirement not met: {'; '.join(failed)}.{more}"
 
 
 def unmet(corner: Corner) -> str:

@@ -120,7 +120,8 @@ def _margin(shown: MarginShown) -> Block:
         panel.points(scale * run.time_s, run.amplitude, f"{words}, simulated", **look | {"size": 4.0})
     decibel = 20.0 * math.log10(shown.ratio)
     caption = (
-        f"{LOOPS[shown.place]}: gain margin {decibel:.2f} dB at {shown.frequency_hz:.4g} Hz. The run inside "
-        "dies out, the run outside grows (circles), each by the predicted factor (lines)."
+        f"{LOOPS[shown.place]}: gain margin on the operating motion {decibel:.2f} dB at "
+        f"{shown.frequency_hz:.4g} Hz. The run inside dies out, the run outside grows (circles), each by the "
+        "predicted factor (lines)."
     )
     return doc.figure("margin_runs", chart, caption=caption, alt=caption, layout="half")

@@ -14,7 +14,7 @@ from actuator_lti.batch._figures import DC_GAIN
 from actuator_lti.batch.static import drive_figures
 from actuator_lti.design import parameter_value, with_overrides, with_values
 from actuator_lti.design.access import stacked
-from actuator_lti.design.model import Command, Design, Encoder, Filter, Load, PositionLoop
+from actuator_lti.design.model import Command, Design, Encoder, Filter, FrictionPoint, Load, PositionLoop
 from actuator_lti.drive.angle import moment_slope
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
@@ -28,6 +28,10 @@ FILTERS = (
     Filter(kind="notch", frequency_rad_s=900.0, width_rad_s=300.0, depth=0.1),
     Filter(kind="leadlag", zero_rad_s=500.0, pole_rad_s=1500.0),
     Filter(kind="lowpass", frequency_rad_s=3000.0, on="speed"),
+)
+MAP = tuple(
+    FrictionPoint(speed_rad_s=speed, torque_Nm=torque)
+    for speed, torque in ((0.0, 3e-3), (20.0, 2e-3), (90.0, 2.6e-3), (400.0, 4e-3))
 )
 
 
@@ -63,6 +67,7 @@ DRIVES = {
     "speed drive": drive_d(),
     "torque drive": replace(drive_d(), controller=replace(drive_d().controller, velocity=None)),
     "everything": everything(),
+    "friction map": replace(amber(), friction=replace(amber().friction, points=MAP)),
 }
 
 

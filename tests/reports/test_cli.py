@@ -162,6 +162,8 @@ def test_a_failed_requirement_is_status_1(tmp_path, capsys) -> None:
         (["tune", "--place", "spring"], "--place 'spring': allowed: notch"),
         (["tune", "--aim", "least"], "Invalid value for '--aim': 'least' is not one of"),
         (["montecarlo", "--samples", "1e3"], "'--samples': allowed: a whole number, such as 1000"),
+        (["montecarlo", "--at-least", "x"], "'--at-least': allowed: a number, such as 0.5, without its unit"),
+        (["compare", "emps", "--workers", "2"], "--workers 2: computes variants, and emps has none"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(arguments: list[str], words: str, capsys) -> None:

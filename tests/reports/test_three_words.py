@@ -14,6 +14,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import design_hash, load_design, read_design_text, write_design
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.errors import InputError
+from analyses.corners import corners
 from analyses.isolation import drain
 from analyses.linear import loop_figures
 from analyses.margins import run
@@ -21,6 +22,7 @@ from analyses.validation import CHECKS, validate
 from reports import document as doc
 from reports.cli.app import build
 from reports.cli.main import main
+from reports.sections.corners import summary as corners_summary
 from reports.sections.validation import section
 from reports.verdict_summary import verdict_of, verdict_words
 
@@ -66,6 +68,21 @@ def test_margins_and_report_say_the_same(
     page = (folder / "report.html").read_text()
     assert f'<p class="overall {"info" if waivers else "warn"}">' in page
     assert ("the motor is outside" in page) is bool(waivers)
+
+
+@pytest.mark.parametrize("waivers", [(), (WAIVED,)])
+def test_what_corners_and_samples_leave_out_is_not_proven(
+    waivers: tuple[Waiver, ...], tmp_path, capsys
+) -> None:
+    design, out = asking(*waivers), str(tmp_path / "out")
+    drawn = ("montecarlo", "--samples", "4", "--no-worst", "--quiet", "--out", out)
+    for call in (("corners", "--quiet"), drawn):
+        code, said = status(tmp_path / "d.toml", design, capsys, *call)
+        assert (code, said.startswith("PASS")) == ((0, True) if waivers else (1, False))
+        assert said.startswith("NOT PROVEN") is not bool(waivers)
+    made = corners(design)
+    assert made.verdict == ("met" if waivers else "not proven")
+    assert ("Not judged at corners: hot." in corners_summary(made)) is not bool(waivers)
 
 
 def test_a_loop_whose_stability_is_not_known_is_no_pass(monkeypatch, capsys) -> None:
