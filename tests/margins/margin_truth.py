@@ -67,6 +67,28 @@ def truth_of(loop: control.LTI, part: Fraction = Fraction(0)) -> Facts:
     return Facts(unstable, sorted(g for g in gains if g[1] <= FARTHEST), phases)
 
 
+def behind_delay(loop: control.LTI, delay_s: float) -> Facts:
+    """Unstable poles and phase margins of a continuous loop behind a delay; no gain margins.
+
+    Poles pass over the axis only where |L| = 1: into the right half plane, by pairs, where it falls, and back
+    where it rises, at the delay that uses up the phase margin and after each further turn (Walton and
+    Marshall, Direct method for TDS stability analysis, IEE Proc. D 134, 1987).
+    """
+    free = truth_of(loop)
+    num, den = polynomials(loop)
+    (ne, no), (de, do) = even_odd(num), even_odd(den)
+    v = fmpz_poly([0, 1])
+    slope = (ne * ne + v * no * no - de * de - v * do * do).derivative()
+    unstable, phases = free.unstable, []
+    for w, deg in free.phases:
+        turns = (w * delay_s - math.radians(deg % 360.0)) / (2.0 * math.pi)
+        with ctx.workprec(BITS[0]):
+            falls = slope(arb(w) ** 2) < 0
+        unstable += (2 if falls else -2) * max(math.floor(turns) + 1, 0)
+        phases.append((w, -math.degrees(math.remainder(w * delay_s - math.radians(deg), 2.0 * math.pi))))
+    return Facts(unstable, [], phases)
+
+
 def polynomials(loop: control.LTI) -> tuple[fmpz_poly, fmpz_poly]:
     """Numerator and denominator of the very doubles, lowest power first, times one number."""
     if isinstance(loop, control.TransferFunction):
