@@ -68,25 +68,21 @@ def truth_of(loop: control.LTI, part: Fraction = Fraction(0)) -> Facts:
 
 
 def behind_delay(loop: control.LTI, delay_s: float) -> Facts:
-    """Unstable poles and phase margins of a continuous loop behind a delay; no gain margins.
+    """Unstable poles and phase margins of a strictly proper continuous loop behind a delay; no gain margins.
 
     Poles pass over the axis only where |L| = 1: into the right half plane, by pairs, where it falls, and back
     where it rises, at the delay that uses up the phase margin and after each further turn (Walton and
-    Marshall, Direct method for TDS stability analysis, IEE Proc. D 134, 1987).
+    Marshall, Direct method for TDS stability analysis, IEE Proc. D 134, 1987). The last one falls, and they
+    alternate.
     """
     free = truth_of(loop)
-    num, den = polynomials(loop)
-    (ne, no), (de, do) = even_odd(num), even_odd(den)
-    v = fmpz_poly([0, 1])
-    slope = (ne * ne + v * no * no - de * de - v * do * do).derivative()
-    unstable, phases = free.unstable, []
-    for w, deg in free.phases:
-        turns = (w * delay_s - math.radians(deg % 360.0)) / (2.0 * math.pi)
-        with ctx.workprec(BITS[0]):
-            falls = slope(arb(w) ** 2) < 0
-        unstable += (2 if falls else -2) * max(math.floor(turns) + 1, 0)
-        phases.append((w, -math.degrees(math.remainder(w * delay_s - math.radians(deg), 2.0 * math.pi))))
-    return Facts(unstable, [], phases)
+    unstable, into, phases = free.unstable, 2, []
+    for w, deg in reversed(free.phases):
+        turns = math.floor((delay_s * w - math.radians(deg % 360.0)) / (2.0 * math.pi)) + 1
+        unstable += into * max(turns, 0)
+        into = -into
+        phases.append((w, -math.degrees(math.remainder(delay_s * w - math.radians(deg), 2.0 * math.pi))))
+    return Facts(unstable, [], phases[::-1])
 
 
 def polynomials(loop: control.LTI) -> tuple[fmpz_poly, fmpz_poly]:
