@@ -13,6 +13,8 @@ from ._figures import (
     FINAL,
     GAIN_CROSSOVERS,
     HIDDEN,
+    MODULUS,
+    MODULUS_X,
     PEAK_T,
     PHASE_CROSSOVERS,
     RADIUS,
@@ -147,18 +149,19 @@ def _null_vector(n, system, transposed, vector):
 
 
 @kernel
-def _closed_dc(n, a, b, c, closed, poles, system, left, right):
-    """T at DC: c (I - A + closed b c)^-1 b, without the modes at DC that it does not show.
+def _at_dc(n, a, b, c, closed, poles, first, system, left, right):
+    """c (I - A + closed b c)^-1 b without the modes at DC that do not show: T, or L where ``closed`` is 0.
 
-    Each is moved away by v w' of its right and left eigenvectors. A is as it is, not yet of Hessenberg form,
-    which keeps 16 digits of A but not of slow poles, the differences of A and the identity.
+    Each of these, found among the poles from ``first`` on, is moved away by v w' of its right and left
+    eigenvectors. A is as it is, not yet of Hessenberg form, which keeps 16 digits of A but not of slow poles,
+    the differences of A and the identity.
     """
     for i in range(n):
         for j in range(n):
             system[i * n + j] = closed * b[i] * c[j] - a[i * n + j]
         system[i * n + i] = 1.0 - a[i * n + i] + closed * b[i] * c[i]
     for k in range(n):
-        if math.hypot(poles[2 * n + k] - 1.0, poles[3 * n + k]) <= HIDDEN:
+        if math.hypot(poles[first + k] - 1.0, poles[first + n + k]) <= HIDDEN:
             _null_vector(n, system, False, right)
             _null_vector(n, system, True, left)
             for i in range(n):
@@ -185,16 +188,27 @@ def _closed_figures(count, n, a, b, c, lead, dc, row, xs, rs, ss, work, state, e
 
 
 @kernel
-def _open_figures(count, n, a, b, c, row, xs, rs, ss, work, state, exchanged):
+def _open_dc(dc, at_rest):
+    """L at DC: infinite for an integrator, else what was found where it fits T, the more exact one."""
+    if not abs(1.0 - dc) > 1e-9:
+        return math.inf
+    around = dc / (1.0 - dc)
+    return at_rest if abs(at_rest - around) < 1e-3 * abs(around) else around
+
+
+@kernel
+def _open_figures(count, n, a, b, c, at_rest, row, xs, rs, ss, work, state, exchanged):
     """Crossovers and modulus margin of an open loop whose response is scanned."""
     row[GAIN_CROSSOVERS], row[PHASE_CROSSOVERS] = 0.0, 0.0
     dc = row[DC_GAIN]
-    open_dc = dc / (1.0 - dc) if abs(1.0 - dc) > 1e-9 else math.inf
+    open_dc = 0.0 if math.isnan(dc) else _open_dc(dc, at_rest)
     at_r, at_i = response_at(n, a, b, c, math.pi, work, state, exchanged)
     crossovers(GAIN, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
     crossovers(PHASE, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
     ends(open_dc, at_r, count, xs, rs, row)
     modulus(count, xs, rs, ss, at_r, at_i, row, n, a, b, c, work, state, exchanged)
+    if abs(1.0 + open_dc) < row[MODULUS]:
+        row[MODULUS], row[MODULUS_X] = abs(1.0 + open_dc), 0.0
 
 
 @kernel
@@ -217,7 +231,8 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
     figures are written. The other rows lend their space: see `many_loops`.
     """
     balance(n, a, b, c)
-    dc = _closed_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, poles, work, exchanged, state)
+    at_rest = _at_dc(n, a, b, c, 0.0, poles, 0, work, exchanged, state)
+    dc = _at_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, poles, 2 * n, work, exchanged, state)
     hessenberg(n, a, b, c, state)
     for i in range(n):
         a[i * n + i] -= 1.0
@@ -227,7 +242,7 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
     row[STABLE] = 1.0 if row[RADIUS] < 1.0 else 0.0
     _closed_figures(count, n, a, b, c, lead, dc, row, xs, rs, ss, work, state, exchanged)
     if not math.isnan(lead):
-        _open_figures(count, n, a, b, c, row, xs, rs, ss, work, state, exchanged)
+        _open_figures(count, n, a, b, c, at_rest, row, xs, rs, ss, work, state, exchanged)
     if time_figures:
         for i in range(n):
             a[i * n + i] += 1.0

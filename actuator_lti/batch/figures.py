@@ -295,7 +295,6 @@ def _fill(
 def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -> None:
     """Write the figures of a stacked open loop (lead NaN: of a closed loop's response)."""
     from actuator_lti.batch.library import many_loops
-    from actuator_lti.batch.rest import at_rest
     from actuator_lti.batch.withheld import withhold
 
     A, B, C = _stacked(block, len(rows))
@@ -307,7 +306,6 @@ def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -
     poles[~finite] = np.nan
     many_loops(A, B, C, poles, leads, time_figures, rows)
     if not np.isnan(leads).any():
-        at_rest(A, B, C, rows)
         withhold(A, B, C, poles, rows)
 
 

@@ -89,7 +89,7 @@ def _told(A: np.ndarray, B: np.ndarray, C: np.ndarray, points: np.ndarray) -> np
     """How many of its own rounding errors the response of one design is; 0 where it has a pole there.
 
     At zero frequency it is that of the loop without a mode at rest that it does not show, as its figures are
-    (`actuator_lti.batch.rest`).
+    (`_at_dc`).
     """
     result = np.zeros(points.shape)
     here = points == 1.0

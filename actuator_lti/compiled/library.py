@@ -204,7 +204,13 @@ class Library:
     def _compile_in_checkout(self, path: Path) -> None:
         if not os.access(self.folder, os.W_OK):
             raise InputError(f"{path.name}: no compiled kernels of these sources; allowed: {_BUILD} first")
-        self.build()
+        try:
+            self.build()
+        except InputError as error:
+            raise InputError(
+                f"{error}; then {_BUILD}: margins and simulations run as compiled kernels, which wheels hold "
+                "and this checkout does not yet"
+            ) from None
 
     def loaded(self, path: Path) -> Any:
         """The entries of a library file of this text."""

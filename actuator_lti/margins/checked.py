@@ -10,8 +10,6 @@ from actuator_lti.axis._search import FAR_LOG
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, out_of_sight, within
 from actuator_lti.margins.axis_parts import axis_ends, axis_parts, distances_over, merged
-from actuator_lti.margins.delays.collocation import closed_loop_matrix, points_for
-from actuator_lti.margins.delays.form import in_series
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.factored import Response, factored
 from actuator_lti.margins.factors_on_axis import Factored
@@ -65,7 +63,7 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
     real_x, real_L = response.polished(real_w, gain=False)
     _trust_crossings(loop, gain_x, real_x, ends)
     count = poles.unstable - half_turns_about(factors, response, parts, ends, real_L, rising)
-    second = _poles_behind_delay(loop, delay_s, gain_x) if closed is None else closed.unstable
+    second = _poles_behind_delay(response, gain_x) if closed is None else closed.unstable
     if second is not None and count != second:
         raise Doubtful("poles and Nyquist count disagree")
     listed = np.log(np.abs(real_L)) >= -FAR_LOG
@@ -123,13 +121,24 @@ def _tail_note(
     return (f"gain margins above {-20.0 * math.log10(floor):.4g} dB beyond {top:.4g} rad/s are not listed",)
 
 
-def _poles_behind_delay(loop: RationalLoop, delay_s: float, gain_x: Real) -> int | None:
-    """Unstable closed-loop poles by collocation; ``None``: part of a sample, or too many turns."""
+def _poles_behind_delay(response: Response, gain_x: Real) -> int | None:
+    """Unstable closed-loop poles of a continuous loop behind a delay, from those without and the crossovers.
+
+    As the delay grows, poles pass over the axis only where |L| = 1: by pairs into the right half plane where
+    it falls, and back where it rises, at the delay that uses up the phase margin and after each further turn
+    (Walton and Marshall, Direct method for TDS stability analysis, IEE Proc. D 134, 1987).
+    """
+    loop = response.loop
     if loop.period_s is not None:
+        return None  # part of a sample: no function of z
+    free = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), False)
+    if free.doubtful or free.border:
         return None
-    form = in_series(loop, delay_s)
-    points = points_for(form, 2.0 * float(gain_x.max(initial=0.0)))
-    return None if points is None else sorted_poles(closed_loop_matrix(form, points), False).unstable
+    L, slope = loop.response_and_slope(gain_x)
+    lead = np.angle(-L) % (2.0 * np.pi)
+    passed = np.floor((response.delay * gain_x - lead) / (2.0 * np.pi)) + 1.0
+    into = np.where((slope / L).real < 0.0, 2.0, -2.0)
+    return free.unstable + int((into * np.maximum(passed, 0.0)).sum())
 
 
 def _reason(real_L: Complex, twice: bool, sure: bool) -> str:

@@ -30,9 +30,9 @@ def stability_margins(
     A rational loop, alone or behind a delay, is taken as its factors: the change of each over an interval of
     frequency is known, and intervals are split until the loop stays off the unit circle and the negative real
     axis in each, or moves over them one way; no crossing is left out. Stability is found twice where it can
-    be, from closed-loop poles (with delays, by collocation) and from the Nyquist curve. Delays inside, and
-    what double precision cannot check in this way, are worked out in exact arithmetic; ``.evidence`` says how
-    the answer is known. Quoted are, see
+    be, from closed-loop poles (behind a delay, from those without it) and from the Nyquist curve. Delays
+    inside, and what double precision cannot check in this way, are worked out in exact arithmetic;
+    ``.evidence`` says how the answer is known. Quoted are, see
     `StabilityMargins`: the gain margin nearest to 0 dB, the phase margin nearest to 0 deg with its sign, the
     smallest delay margin (0 for an unstable loop), the smallest distance to -1.
 

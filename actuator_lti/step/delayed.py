@@ -9,7 +9,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
-from actuator_lti.margins.delays.collocation import open_loop_matrix
+from actuator_lti.margins.delays.collocation import state_matrix
 from actuator_lti.margins.delays.form import DelayForm, characteristic, delay_form
 from actuator_lti.margins.delays.response import DelayResponse
 from actuator_lti.margins.loop import Complex, Real
@@ -45,7 +45,7 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
         Not stable, a final value of zero, or a response that would take too many points.
     """
     form = delay_form(system)
-    poles, at_rest = sorted_poles(open_loop_matrix(form, _POINTS), False), DelayResponse.of(form)
+    poles, at_rest = sorted_poles(state_matrix(form, _POINTS), False), DelayResponse.of(form)
     if at_rest.order > 0 or poles.unstable or poles.border > 1:
         raise InputError(UNSTABLE)
     final = 0.0 if at_rest.order else at_rest.lead

@@ -153,7 +153,10 @@ def test_a_checkout_compiles_at_its_first_call_and_drops_what_is_old(library: Li
 def test_without_a_compiler_an_error_says_which(library: Library, monkeypatch) -> None:
     monkeypatch.setattr(compiler, "system_compiler", lambda: None)
     monkeypatch.setattr(compiler, "zig_command", lambda: None)
-    with pytest.raises(InputError, match="allowed: gcc, clang, or pip install ziglang"):
+    with pytest.raises(
+        InputError,
+        match=r"allowed: gcc, clang, or pip install ziglang; then python -m nonlinear\.native: margins",
+    ):
         _ = library.functions
     assert not library.path().parent.exists()
 

@@ -67,6 +67,24 @@ def truth_of(loop: control.LTI, part: Fraction = Fraction(0)) -> Facts:
     return Facts(unstable, sorted(g for g in gains if g[1] <= FARTHEST), phases)
 
 
+def behind_delay(loop: control.LTI, delay_s: float) -> Facts:
+    """Unstable poles and phase margins of a strictly proper continuous loop behind a delay; no gain margins.
+
+    Poles pass over the axis only where |L| = 1: into the right half plane, by pairs, where it falls, and back
+    where it rises, at the delay that uses up the phase margin and after each further turn (Walton and
+    Marshall, Direct method for TDS stability analysis, IEE Proc. D 134, 1987). The last one falls, and they
+    alternate.
+    """
+    free = truth_of(loop)
+    unstable, into, phases = free.unstable, 2, []
+    for w, deg in reversed(free.phases):
+        turns = math.floor((delay_s * w - math.radians(deg % 360.0)) / (2.0 * math.pi)) + 1
+        unstable += into * max(turns, 0)
+        into = -into
+        phases.append((w, -math.degrees(math.remainder(delay_s * w - math.radians(deg), 2.0 * math.pi))))
+    return Facts(unstable, [], phases[::-1])
+
+
 def polynomials(loop: control.LTI) -> tuple[fmpz_poly, fmpz_poly]:
     """Numerator and denominator of the very doubles, lowest power first, times one number."""
     if isinstance(loop, control.TransferFunction):

@@ -10,9 +10,8 @@ import pytest
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins import stability_margins
-from actuator_lti.margins.delays.collocation import closed_loop_matrix
-from actuator_lti.margins.delays.form import delay_form, in_series
-from actuator_lti.margins.loop import rational_loop
+from actuator_lti.margins.delays.collocation import state_matrix
+from actuator_lti.margins.delays.form import delay_form
 from actuator_lti.systems.delay_system import DelaySystem
 
 s = control.tf("s")
@@ -83,8 +82,8 @@ def test_a_double_integrator_close_to_the_negative_axis_takes_no_endless_splitti
 
 
 def test_collocated_poles_are_those_of_the_exact_delay() -> None:
-    form = in_series(rational_loop(control.tf([100], [1, 0])), 0.005)
-    values = np.linalg.eigvals(closed_loop_matrix(form, 24))
+    closed = (DelaySystem.from_system(control.tf([100], [1, 0])) * DelaySystem.delay(0.005)).feedback()
+    values = np.linalg.eigvals(state_matrix(delay_form(closed), 24))
     rightmost = values[np.argmax(values.real)]
     assert abs(rightmost + 100 * np.exp(-0.005 * rightmost)) < 1e-7  # s + K exp(-s T) = 0
 
@@ -98,7 +97,7 @@ def test_nested_loops_with_delays_have_as_many_unstable_poles_as_collocation_fin
         inner = (DelaySystem.from_system(k1 / (s * (s / 2000 + 1))) * DelaySystem.delay(t1)).feedback()
         loop = inner * DelaySystem.delay(t2) * DelaySystem.from_system(k2 / s)
         m = stability_margins(loop)
-        poles = np.linalg.eigvals(closed_loop_matrix(delay_form(loop), 40))
+        poles = np.linalg.eigvals(state_matrix(delay_form(loop.feedback()), 40))
         assert m.agreement.unstable_poles == np.count_nonzero(poles.real > 0.0)
         verdicts.append(m.stable)
     assert True in verdicts

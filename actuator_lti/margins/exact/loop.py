@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from flint import fmpz, fmpz_poly
+from flint import fmpz, fmpz_mat, fmpz_poly
 
-from actuator_lti.margins.exact.charpoly import characteristic, numerator
 from actuator_lti.margins.exact.roots import Polynomial, half_planes
 from actuator_lti.margins.given import ULP, Given
 
@@ -121,12 +120,27 @@ def _by_matrices(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
     if not n:
         return fmpz_poly(d), fmpz_poly([1 << shift])
     whole = [A[k * n : k * n + n] for k in range(n)]
-    below = characteristic(whole)
+    below = fmpz_mat(whole).charpoly()
     above = numerator(whole, b, c, below)
     # of 2^shift A: below is 2^(shift n) det(sI - A) at s 2^-shift, above has one power less
     D, N = _unscaled(below, shift), _unscaled(above, shift)
     power = shift_b + shift_c
     return N * (1 << (2 * shift)) + D * (d[0] << power), D * (1 << (shift + power))
+
+
+def numerator(rows: list[list[int]], b: list[int], c: list[int], below: fmpz_poly) -> fmpz_poly:
+    """c adj(z I - M) b, where ``below`` is det(z I - M).
+
+    It is the polynomial part of ``below`` times the sum of c M^k b z^(-1-k).
+    """
+    n = len(rows)
+    M, state, out = fmpz_mat(rows), fmpz_mat(n, 1, b), fmpz_mat(1, n, c)
+    answer = []
+    for _ in range(n):
+        answer.append((out * state)[0, 0])
+        state = M * state
+    product = below * fmpz_poly(answer[::-1])
+    return product.right_shift(n) if product.degree() >= n else fmpz_poly()
 
 
 def _unscaled(p: fmpz_poly, shift: int) -> fmpz_poly:
