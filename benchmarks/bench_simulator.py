@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 
 from actuator_lti import load_design
 from actuator_lti.design.model import Coupling, Design, Filter, LoadFriction
@@ -21,6 +22,7 @@ from nonlinear import Rows, commands, loads, simulate
 from nonlinear._kernels import layout as at
 from nonlinear.native import call
 
+Floats = npt.NDArray[np.float64]
 GROUP = "simulator"
 DURATION_S = 10.0
 FIRST_CALL = """
@@ -48,6 +50,7 @@ def rows(quick: bool = False) -> Iterator[Row]:
         comparison=">=",
         note=f"{1e9 * best / row[at.TICKS]:.1f} ns a tick",
     )
+    yield from other_plants(best / row[at.TICKS], 1 if quick else 5)
     yield from wider_drives(1 if quick else 5)
     yield two_mass_with_play(best, quick)
     yield two_threads(quick)
@@ -78,8 +81,9 @@ def seconds_of(row: np.ndarray, repeats: int) -> float:
 
 def room(row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Arrays for a history."""
-    ticks = int(row[at.TICKS])
-    return np.zeros((8, ticks)), np.zeros(ticks, np.uint16)
+    ticks, elastic = int(row[at.TICKS]), int(row[at.ELASTIC_DRIVE])
+    columns = 8 + at.ELASTIC_COLUMNS * elastic + int(row[at.VARYING_LOAD].any())
+    return np.zeros((columns, ticks)), np.zeros(ticks, np.uint16)
 
 
 def best_of(work: Callable[[], object], repeats: int, clock: Callable[[], float] = time.thread_time) -> float:
@@ -99,7 +103,8 @@ PLAIN_RUNS = ((5.0, 1.0, 4.0), (0.05, 10.0, 2.0), (10.0, 3.0, 0.0))  # deg, Hz, 
 def against_plain_c(repeats: int) -> Iterator[Row]:
     """`simulate` against a plain C program of the same cascade, in turns; each allocates its history.
 
-    The program has its reference and its load worked out before.
+    The program has its reference and its load worked out before; `simulate` works its own out, so that a
+    second row is given where the program does too.
     """
     design = load_design("ilr33-amber")
     peer, ticks = PlainServo(design), round(DURATION_S / design.controller.period_s)
@@ -108,17 +113,36 @@ def against_plain_c(repeats: int) -> Iterator[Row]:
         reference = design.total_ratio * command.values(design.controller.period_s, ticks)
         moment = np.full(ticks, load_Nm)
         ours = partial(simulate, design, command, DURATION_S, load)
-        theirs = partial(peer.run, reference, moment)
-        pairs = [(best_of(ours, repeats), best_of(theirs, repeats)) for _ in range(3)]
-        here, there = np.array(pairs).min(axis=0)
-        yield Row(
-            group=GROUP,
-            name=f"time over that of a plain C program, {size_deg:g} deg {frequency_hz:g} Hz {load_Nm:g} N m",
-            measured=float(here / there),
-            unit="x",
-            target=1.2,
-            note=f"{1e9 * here / ticks:.1f} ns a tick, C {1e9 * there / ticks:.1f}",
-        )
+        given = partial(peer.run, reference, moment)
+        worked_out = partial(_with_command, peer, design, command, moment)
+        turns = [[best_of(work, repeats) for work in (ours, given, worked_out)] for _ in range(3)]
+        here, *there = np.array(turns).min(axis=0)
+        run = f"{size_deg:g} deg {frequency_hz:g} Hz {load_Nm:g} N m"
+        for peers, time_s in zip(("", " with its command"), there, strict=True):
+            yield Row(
+                group=GROUP,
+                name=f"time over that of a plain C program{peers}, {run}",
+                measured=float(here / time_s),
+                unit="x",
+                target=1.2,
+                note=f"{1e9 * here / ticks:.1f} ns a tick, C {1e9 * time_s / ticks:.1f}",
+            )
+
+
+def _with_command(peer: PlainServo, design: Design, command: commands.Command, load_Nm: Floats) -> object:
+    """The plain program, and the sine of its command at every tick before it."""
+    values = command.values(design.controller.period_s, load_Nm.size)
+    return peer.run(design.total_ratio * values, load_Nm)
+
+
+def other_plants(best_s: float, repeats: int) -> Iterator[Row]:
+    """A tick of a drive with the smooth law of friction or a spring, over that of the baseline."""
+    for name in ("ilr33-amber-tanh", "ilr33-amber-compliant", "joint", "ballscrew", "fin"):
+        row = sawtooth(load_design(name)).values[0]
+        tick_s = seconds_of(row, repeats) / row[at.TICKS]
+        note = f"{1e9 * tick_s:.1f} ns a tick"
+        text = f"time a tick of {name} over the baseline's"
+        yield Row(group=GROUP, name=text, measured=tick_s / best_s, unit="x", target=2.0, note=note)
 
 
 def against_control(best: float) -> Row:
@@ -172,8 +196,7 @@ def two_mass_with_play(best: float, quick: bool) -> Row:
     rows["load"] = 4.0
     rows.sine("command", np.radians(5.0), 1.0)
     row = rows.values[0]
-    history = np.zeros((8 + at.ELASTIC_COLUMNS, int(row[at.TICKS])))
-    flags, out, shared = np.zeros(history.shape[1], np.uint16), np.zeros(at.OUT_SIZE), np.zeros(2)
+    (history, flags), out, shared = room(row), np.zeros(at.OUT_SIZE), np.zeros(2)
     taken = best_of(lambda: call(row, np.zeros(1), history, flags, out, shared), 2 if quick else 8)
     return Row(
         group=GROUP,

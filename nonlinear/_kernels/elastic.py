@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
+from actuator_lti.compiled.kernel import kernel, seldom
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
 from nonlinear._kernels.elastic_energy import add_energies
@@ -115,6 +115,7 @@ def put_state(p, s, i, w, W, d, turned):  # type: ignore[no-untyped-def]
     put_output(p, s)
 
 
+@seldom
 @kernel
 def walk(p, s, whole):  # type: ignore[no-untyped-def]
     """Advance with every event located."""

@@ -1,4 +1,8 @@
-"""Forms of the loop for rigid drives of three plain loops: the parts that they lack cost nothing."""
+"""Forms of the loop: the parts that a drive lacks cost nothing.
+
+Two for any drive that is run without instruments, energies or a law of its own, rigid and elastic; the others
+for drives of three plain loops.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +10,32 @@ from actuator_lti.compiled.form import Form
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.probes import PROBE_I, PROBE_U, PROBE_W, PROBE_Y
 
+_UNSEEN = (at.PROBING, PROBE_U, PROBE_I, PROBE_W, PROBE_Y, at.WITH_ENERGY, at.OWN_STAGE, at.OWN_MEASURES)
 _ABSENT = (
-    at.RARE_LOAD, at.RARE_SENSE, at.RARE_COMMAND, at.RARE_SPEED, at.RARE_VELOCITY, at.RARE_CURRENT,
-    at.PROBING, PROBE_U, PROBE_I, PROBE_W, PROBE_Y, at.OVERLOAD, at.SUPPLY, at.WITH_ENERGY, at.WINDOW,
-    at.WITH_EXTREMES, at.STEP_TARGET, at.ELASTIC_DRIVE, at.NOTING, at.OWN_STAGE, at.OWN_MEASURES,
+    *_UNSEEN, at.RARE_LOAD, at.RARE_SENSE, at.RARE_COMMAND, at.RARE_SPEED, at.RARE_VELOCITY, at.RARE_CURRENT,
+    at.OVERLOAD, at.SUPPLY, at.WINDOW, at.WITH_EXTREMES, at.STEP_TARGET,
 )  # fmt: skip
 _PRESENT = (at.HAS_POSITION, at.HAS_VELOCITY, at.HAS_CURRENT)
-_FRICTION = {
-    "dry": {at.LAW: 0.0, at.LOOK: 0.0},
-    "tanh": {at.LAW: 1.0, at.LOOK: 1.0},
+_PLANTS = {
+    "dry": {at.LAW: 0.0, at.LOOK: 0.0, at.ELASTIC_DRIVE: 0.0, at.NOTING: 0.0},
+    "tanh": {at.LAW: 1.0, at.LOOK: 1.0, at.ELASTIC_DRIVE: 0.0, at.NOTING: 0.0, at.TANH_LEVEL: -1.0},
+    "elastic": {at.LAW: 0.0, at.LOOK: 1.0, at.ELASTIC_DRIVE: 1.0, at.NOTING: 1.0},
 }
 
 
 def forms() -> tuple[Form, ...]:
-    """For each law of friction, with a delay of less than one tick and of one to two."""
+    """For each kind of plant; those of plain loops with a delay of less than one tick and of one to two.
+
+    The last that fits is taken.
+    """
+    unseen = dict.fromkeys(_UNSEEN, 0.0)
     plain = dict.fromkeys(_ABSENT, 0.0) | dict.fromkeys(_PRESENT, 1.0)
-    return tuple(
-        Form("run_block", f"{name}_{line}", "p", plain | law | {at.DELAY_LINE: float(line)})
-        for name, law in _FRICTION.items()
-        for line in (2, 3)
+    wide = {"rigid": {at.ELASTIC_DRIVE: 0.0}, "two_sided": {at.ELASTIC_DRIVE: 1.0}}
+    return (
+        *(Form("run_block", name, "p", unseen | known) for name, known in wide.items()),
+        *(
+            Form("run_block", f"{name}_{line}", "p", plain | plant | {at.DELAY_LINE: float(line)})
+            for name, plant in _PLANTS.items()
+            for line in (2, 3)
+        ),
     )

@@ -107,7 +107,6 @@ def quick(p, s, part, u):  # type: ignore[no-untyped-def]
     return quick_stick(p, s, part, u)
 
 
-@seldom
 @kernel
 def closely(p, s, part, u, events):  # type: ignore[no-untyped-def]
     """One segment by the general way; the events of this tick so far, -1 where there are too many."""

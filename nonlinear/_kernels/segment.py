@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
+from actuator_lti.compiled.kernel import kernel, seldom
 from nonlinear._kernels import layout
 from nonlinear._kernels.energy import energy_slip, energy_stick, energy_whole
 from nonlinear._kernels.landing import NEVER_LEFT, NONE_IN_SEGMENT, first_landing
@@ -93,6 +93,7 @@ def slip_part(p, s, part, left, u, Tb, Tc, i, w, th, d):  # type: ignore[no-unty
     return span, i, w, th, min(t, 0.0)
 
 
+@seldom
 @kernel
 def segment(p, s, part, u, events):  # type: ignore[no-untyped-def]
     """Advance current, speed, angle and direction of the state row over one segment with all its events.

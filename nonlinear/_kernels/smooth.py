@@ -44,9 +44,13 @@ def phi_columns(p, t, h, work, at):  # type: ignore[no-untyped-def]
 
 @kernel
 def prepare_tanh(p, s):  # type: ignore[no-untyped-def]
-    """Fill the coefficients of every level for both segments."""
+    """Fill the coefficients of every level for both segments, and what chooses among them."""
+    p[layout.TANH_RATE] = STEP_FACTOR * math.sqrt(math.sqrt(p[layout.TANH_TOLERANCE]))
     for part in range(2):
         h = p[layout.LENGTH + part]
+        if p[layout.SOURCE] <= 0.0:
+            share = 1.0 - math.exp(-h * p[layout.RESISTANCE] / p[layout.INDUCTANCE])
+            p[layout.TANH_SHARE + part] = share
         for level in range(layout.LEVELS):
             if h > 0.0:
                 which = part * layout.LEVELS + level
@@ -160,21 +164,19 @@ def tanh_torque(p, w, Tcp, Tcm):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def level_for(p, i, w, u, Tb, Tcp, Tcm, h):  # type: ignore[no-untyped-def]
-    """Number of halvings of h that the tolerance asks for at this state."""
+def level_for(p, part, i, u, Tb, Tc, n0):  # type: ignore[no-untyped-def]
+    """Number of halvings of a segment that the tolerance asks for under the friction torque n0."""
     if p[layout.TANH_LEVEL] >= 0.0:
         return int(p[layout.TANH_LEVEL])
     J, ws = p[layout.INERTIA], p[layout.SMOOTHING]
-    drive = p[layout.TORQUE_CONSTANT] * i + p[layout.SOURCE_GAIN] * u + Tb + tanh_torque(p, w, Tcp, Tcm)
-    Tc = max(Tcp, Tcm)
+    drive = p[layout.TORQUE_CONSTANT] * i + p[layout.SOURCE_GAIN] * u + Tb + n0
     rate = (Tc / J + abs(drive) / J) / ws
     rate += abs(p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) / J
     if p[layout.SOURCE] <= 0.0:
         # the drive changes within the step as fast as the current does
         jump = p[layout.TORQUE_CONSTANT] * abs(u / p[layout.RESISTANCE] - i)
-        share = 1.0 - math.exp(-h * p[layout.RESISTANCE] / p[layout.INDUCTANCE])
-        rate += jump * share / (J * ws)
-    wanted = rate * h / (STEP_FACTOR * math.sqrt(math.sqrt(p[layout.TANH_TOLERANCE])))
+        rate += jump * p[layout.TANH_SHARE + part] / (J * ws)
+    wanted = rate * p[layout.LENGTH + part] / p[layout.TANH_RATE]
     level = 0
     while wanted > 1.0 and level < layout.LEVELS - 1:
         wanted *= 0.5
@@ -183,9 +185,8 @@ def level_for(p, i, w, u, Tb, Tcp, Tcm, h):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm):  # type: ignore[no-untyped-def]
-    """One ETD4RK step: state after it, and the friction torque at its beginning, middle and end."""
-    n0 = tanh_torque(p, w, Tcp, Tcm)
+def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm, n0):  # type: ignore[no-untyped-def]
+    """One ETD4RK step from the friction torque n0: state after it, and the torque at its middle and end."""
     ih, wh, thh = slip_step(p, o + HALF, i, w, th, u, Tb)
     ia, wa, tha = ih + p[o + STAGE] * n0, wh + p[o + STAGE + 1] * n0, thh + p[o + STAGE + 2] * n0
     na = tanh_torque(p, wa, Tcp, Tcm)
@@ -198,7 +199,6 @@ def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm):  # type: ignore[no-untyped-def]
         i1 + p[o + WEIGHT_1] * n0 + p[o + WEIGHT_2] * nab + p[o + WEIGHT_3] * nc,
         w1 + p[o + WEIGHT_1 + 1] * n0 + p[o + WEIGHT_2 + 1] * nab + p[o + WEIGHT_3 + 1] * nc,
         th1 + p[o + WEIGHT_1 + 2] * n0 + p[o + WEIGHT_2 + 2] * nab + p[o + WEIGHT_3 + 2] * nc,
-        n0,
         0.5 * nab,
         nc,
     )
@@ -238,19 +238,20 @@ def tanh_segment(p, s, part, u):  # type: ignore[no-untyped-def]
     allowed = p[layout.TANH_TOLERANCE] * p[layout.SMOOTHING]
     kink = bend / p[layout.INERTIA] * whole / steps / allowed if p[layout.TANH_LEVEL] < 0.0 else 0.0
     while done < steps:
-        level = level_for(p, i, w, u, Tb, Tcp, Tcm, whole)
+        n0 = tanh_torque(p, w, Tcp, Tcm)
+        level = level_for(p, part, i, u, Tb, max(Tcp, Tcm), n0)
         unit = steps >> level
         while (done & (unit - 1)) != 0:
             unit >>= 1
             level += 1
         o = layout.TANH + (first + level) * layout.LEVEL
-        i1, w1, th1, n0, nm, nc = etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm)
+        i1, w1, th1, nm, nc = etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm, n0)
         # unequal friction has a bend at w = 0: a step across it is halved until the bend does not matter
         while kink * abs(w1 - w) * unit > 1.0 and w1 * w < 0.0 and unit > 1:
             unit >>= 1
             level += 1
             o = layout.TANH + (first + level) * layout.LEVEL
-            i1, w1, th1, n0, nm, nc = etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm)
+            i1, w1, th1, nm, nc = etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm, n0)
         if p[layout.WITH_ENERGY] > 0.0:
             form = layout.TANH_FORMS + (first + level) * layout.TANH_FORM
             energy_step(p, s, form, th1 - th, i, w, u, Tb, n0, nm, nc)

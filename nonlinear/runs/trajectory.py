@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -176,6 +177,8 @@ class Trajectory:
         output, A, V).
     ratio : float
         Motor over output.
+    row_period_s : float
+        From one row to the next.
     limit_flags : ndarray of uint16
         Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest, 32
         limit in front of the torque filters, 64 overload protection, 128 profile of the command.
@@ -204,7 +207,7 @@ class Trajectory:
     design_name: str
     axis: Axis
     period_s: float
-    time_s: Floats
+    row_period_s: float
     reference_rad: Floats
     output_angle_rad: Floats
     motor_angle_rad: Floats
@@ -230,6 +233,12 @@ class Trajectory:
     stage: Stage = "position"
     ratio: float = 1.0
     running: Running | None = field(default=None, repr=False, compare=False)
+
+    @cached_property
+    def time_s(self) -> Floats:
+        """Time of each row."""
+        rows: Floats = np.arange(self.limit_flags.size, dtype=np.float64)
+        return rows * self.row_period_s
 
     @property
     def followed(self) -> Floats:

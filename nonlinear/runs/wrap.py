@@ -36,7 +36,7 @@ def wrap(
         design_name=design.name,
         axis=design.axis,
         period_s=period,
-        time_s=np.arange(history.shape[1]) * (period * row[at.RECORD_EVERY]),
+        row_period_s=float(period * row[at.RECORD_EVERY]),
         **{name: history[k] for k, name in enumerate(at.SIGNALS[: at.BASE_SIGNALS])},
         motor_angle_rad=history[at.HISTORY_ANGLE],
         limit_flags=flags,
