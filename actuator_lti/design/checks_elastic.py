@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from actuator_lti.design.mistakes import Refusal
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Coupling, Design
 from actuator_lti.files.reading import shown
 
 
@@ -33,6 +33,7 @@ def check_elastic(design: Design) -> Iterator[Refusal]:
     if design.load_side_inertia_kgm2 <= 0.0:
         allowed = "allowed with an inertia behind it; load.inertia, or that of a gear behind it, is missing"
         yield "coupling.stiffness", f"{coupling.stiffness_Nm_rad:g}", allowed
+    yield from _bends(coupling)
     if design.friction.law == "tanh":
         yield "friction.law", '"tanh"', 'allowed with a coupling: "coulomb"'
     names, locking = [gear.name for gear in design.gears], design.load.locking_gear
@@ -51,6 +52,21 @@ def check_elastic(design: Design) -> Iterator[Refusal]:
     elif coefficient < least * (1 - 1e-12):
         allowed = f"a self-locking stage with less than 1/N gives energy; allowed: at least {least:g}"
         yield "friction.load_coefficient", f"{coefficient:g}", allowed
+
+
+def _bends(coupling: Coupling) -> Iterator[Refusal]:
+    """Torques and stiffnesses of a spring that bends: each with its other, in order."""
+    bends = [(coupling.torque_1_Nm, coupling.stiffness_2_Nm_rad)]
+    bends.append((coupling.torque_2_Nm, coupling.stiffness_3_Nm_rad))
+    for number, (torque, stiffness) in enumerate(bends, 1):
+        key, beside = f"coupling.torque_{number}", f"coupling.stiffness_{number + 1}"
+        if (torque is None) != (stiffness is None):
+            given, missing = (key, beside) if stiffness is None else (beside, key)
+            yield given, f"{torque or stiffness:g}", f"allowed with {missing} beside it"
+    first, second = bends[0][0], bends[1][0]
+    if second is not None and (first is None or first >= second):
+        allowed = "above coupling.torque_1" if first is not None else "with coupling.torque_1"
+        yield "coupling.torque_2", f"{second:g}", f"allowed: {allowed}"
 
 
 def elastic_warnings(design: Design) -> Iterator[str]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from actuator_lti.design.field import choice, degrees, not_negative, positive, quantity, text
 from actuator_lti.design.over_angle import OverAngle, Wave
+from actuator_lti.drive.choice import where
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -123,11 +124,24 @@ class Coupling:
     """The elastic coupling between the motor's side and the load's side (model.md section 6).
 
     Stiffness k, damping c and play (total, 2 b) are those at its own shaft, which is the output shaft of the
-    gear ``after`` (``None``: of the last gear, or of the motor where there are no gears).
+    gear ``after`` (``None``: of the last gear, or of the motor where there are no gears).  The stiffness may
+    bend as data sheets of strain wave gears state it: K1 up to the torque T1, K2 up to T2, K3 beyond.
     """
 
     stiffness_Nm_rad: Annotated[float, positive(
-        "stiffness", "{torque}/{angle}", "k", "stiffness at the coupling's own shaft", example="400 N*m/rad")]
+        "stiffness", "{torque}/{angle}", "k",
+        "stiffness at the coupling's own shaft; of a strain wave gear K1, up to torque_1",
+        example="400 N*m/rad")]
+    torque_1_Nm: Annotated[float | None, positive(
+        "torque_1", "{torque}", "T1", "torque at which the stiffness becomes stiffness_2",
+        example="14 N*m")] = None
+    stiffness_2_Nm_rad: Annotated[float | None, positive(
+        "stiffness_2", "{torque}/{angle}", "K2", "stiffness beyond torque_1", example="25000 N*m/rad")] = None
+    torque_2_Nm: Annotated[float | None, positive(
+        "torque_2", "{torque}", "T2", "torque at which the stiffness becomes stiffness_3",
+        example="48 N*m")] = None
+    stiffness_3_Nm_rad: Annotated[float | None, positive(
+        "stiffness_3", "{torque}/{angle}", "K3", "stiffness beyond torque_2", example="29000 N*m/rad")] = None
     damping_Nms_rad: Annotated[float, not_negative(
         "damping", "{torque}*s/{angle}", "c", "damping at the coupling's own shaft",
         example="0.02 N*m*s/rad")] = 0.0
@@ -135,6 +149,43 @@ class Coupling:
         "play", "{angle}", "2b", "total play (backlash) at its own shaft", example="2 mrad")] = 0.0
     after: Annotated[str | None, text(
         "name of the gear whose output shaft it is on; default the last gear")] = None
+
+    @property
+    def pieces(self) -> tuple[tuple[Any, Any, Any], ...]:
+        """Torque and twist without play from which on each piece of the spring holds, and its stiffness."""
+        made = [(0.0, 0.0, self.stiffness_Nm_rad)]
+        bends = (self.torque_1_Nm, self.stiffness_2_Nm_rad), (self.torque_2_Nm, self.stiffness_3_Nm_rad)
+        for torque, stiffness in bends:
+            if torque is not None and stiffness is not None:
+                before, twist, k = made[-1]
+                made.append((torque, twist + (torque - before) / k, stiffness))
+        return tuple(made)
+
+    def stretch_rad(self, torque_Nm: Any) -> Any:
+        """Twist without play that carries a torque at its own shaft, with the sign of the torque.
+
+        Examples
+        --------
+        >>> strain_wave = Coupling(stiffness_Nm_rad=10.0, torque_1_Nm=2.0, stiffness_2_Nm_rad=20.0)
+        >>> strain_wave.stretch_rad(-6.0), strain_wave.stiffness_at(0.25)
+        (-0.4, 20.0)
+        """
+        size, result = abs(torque_Nm), abs(torque_Nm) / self.stiffness_Nm_rad
+        for torque, twist, k in self.pieces[1:]:
+            result = where(size > torque, twist + (size - torque) / k, result)
+        return where(torque_Nm < 0.0, -result, result)
+
+    def twist_rad(self, torque_Nm: Any) -> Any:
+        """The same with the half play; in the middle of it where there is no torque."""
+        side = where(torque_Nm > 0.0, 0.5, where(torque_Nm < 0.0, -0.5, 0.0))
+        return self.stretch_rad(torque_Nm) + side * self.play_rad
+
+    def stiffness_at(self, twist_rad: Any) -> Any:
+        """Stiffness of the piece that holds at a twist."""
+        result: Any = self.stiffness_Nm_rad
+        for _, twist, k in self.pieces[1:]:
+            result = where(abs(twist_rad) - 0.5 * self.play_rad > twist, k, result)
+        return result
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,7 +43,8 @@ class Operating:
     angle_rad : float
         Output angle at which torques that bend with the angle are made linear.
     twist_rad : float
-        Twist of the coupling there, at its own shaft: the motor stands at N angle + N_c twist.
+        Twist of the coupling there, at its own shaft: the motor stands at N angle + N_c twist. A spring that
+        bends has the stiffness of this twist; without one, of that under ``load_Nm``.
     torques_held : bool
         Whether torques that depend on the angle are taken as they stand, without their slopes.
     """

@@ -100,7 +100,8 @@ def lost_motion_rad(design: Design) -> Any:
     motor held, between the middles of its width at +-`LOST_MOTION_SHARE` of the largest load moment.
 
     On either branch the spring carries the moment less or more the load's dry friction.  At m > C0_l that is
-    2 (b + m/k)/N_r; below it the play lies within the width.  Without a load moment: the play.
+    2 (b + m/k)/N_r, of one stiffness; below it the play lies within the width.  Without a load moment: the
+    play.
     """
     coupling, friction = design.coupling, design.load.friction
     if coupling is None:
@@ -108,7 +109,7 @@ def lost_motion_rad(design: Design) -> Any:
     dry = 0.0 if friction is None else friction.dry_torque_Nm
     m = LOST_MOTION_SHARE * design.load.moment_max_Nm / design.ratio_behind_coupling
     behind_dry = where(m > dry, 1.0, where(m < dry, 0.0, 0.5))  # share of the play that the width leaves
-    twist = 2.0 * m / coupling.stiffness_Nm_rad + behind_dry * coupling.play_rad
+    twist = coupling.stretch_rad(m + dry) + coupling.stretch_rad(m - dry) + behind_dry * coupling.play_rad
     return where(m == 0.0, coupling.play_rad, twist) / design.ratio_behind_coupling
 
 

@@ -128,7 +128,10 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
     """The linear drive of the same fundamentals."""
     coupling, behind = design.coupling, design.load.friction or LoadFriction()
     assert coupling is not None
-    n = dead_zone(0.5 * coupling.play_rad / A)
+    half, (_, _, k), n = 0.5 * coupling.play_rad, coupling.pieces[0], dead_zone(0.5 * coupling.play_rad / A)
+    stiffness = n * k
+    for _, twist, beyond in coupling.pieces[1:]:  # each bend is a dead zone of its own
+        stiffness, k = stiffness + (beyond - k) * dead_zone((half + twist) / A), beyond
     own = replace(design.friction, load_coefficient=0.0)
     slope = own.viscous_Nms_rad
     if friction:
@@ -138,7 +141,7 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
     return replace(
         design,
         coupling=Coupling(
-            stiffness_Nm_rad=n * coupling.stiffness_Nm_rad,
+            stiffness_Nm_rad=stiffness,
             damping_Nms_rad=n * coupling.damping_Nms_rad,
             after=coupling.after,
         ),

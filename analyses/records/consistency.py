@@ -192,7 +192,7 @@ def _twist_share(design: Design, record: Record) -> float:
     slope = np.gradient(np.gradient(_smooth(record, own), record.time_s), record.time_s)
     moment += design.load.inertia_kgm2 * float(np.sqrt(np.mean(_inner(slope) ** 2)))
     behind = design.ratio_behind_coupling
-    twist = 0.5 * design.coupling.play_rad + moment / behind / design.coupling.stiffness_Nm_rad
+    twist = 0.5 * design.coupling.play_rad + design.coupling.stretch_rad(moment / behind)
     return twist / behind / max(float(np.std(own)), 1e-300)
 
 

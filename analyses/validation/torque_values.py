@@ -175,7 +175,9 @@ def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: flo
     if design.coupling is not None:
         W, coupling = abs(speed) / N_c, design.coupling
         stretch = float(np.spacing(max(abs(motion.twist_rad), Ts * W)))
-        behind = coupling.stiffness_Nm_rad * stretch + coupling.damping_Nms_rad * float(np.spacing(W))
+        behind = coupling.stiffness_at(motion.twist_rad) * stretch + coupling.damping_Nms_rad * float(
+            np.spacing(W)
+        )
         behind = ULPS * (behind + design.load_side_inertia_kgm2 * float(np.spacing(W)) / Ts)
         floor += behind / N_c
     found = wanted.torque_Nm - J * (drive.value("SPEED") - speed) / Ts
@@ -199,8 +201,7 @@ def _at_rest(model: Design, load: float) -> tuple[float, float, float, float]:
     if model.coupling is not None:
         behind = model.load.friction
         T_s = -moment / model.ratio_behind_coupling + (behind.offset_torque_Nm if behind else 0.0)
-        twist = T_s / model.coupling.stiffness_Nm_rad
-        twist += copysign(0.5 * model.coupling.play_rad, T_s) if T_s else 0.0
+        twist = model.coupling.twist_rad(T_s)
         pushed, moment = passed * T_s / model.ratio_to_coupling, T_s * model.ratio_behind_coupling
     held = [float(dry_torque(model, moment, side)) * friction.breakaway_ratio for side in (1, -1)]
     return twist, pushed + friction.offset_torque_Nm, held[0], held[1]
@@ -244,7 +245,7 @@ def _spring_rounding(model: Design, twist_rad: float) -> float:
     if model.coupling is None:
         return 0.0
     share = 1.0 / model.ratio_to_coupling + model.friction.load_coefficient * model.ratio_behind_coupling
-    return ULPS * model.coupling.stiffness_Nm_rad * float(np.spacing(abs(twist_rad))) * share
+    return ULPS * model.coupling.stiffness_at(twist_rad) * float(np.spacing(abs(twist_rad))) * share
 
 
 WAYS = {1: "forward", -1: "backward"}

@@ -12,7 +12,7 @@ import numpy as np
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
-from nonlinear._kernels.elastic_modes import contact_side, map_place
+from nonlinear._kernels.elastic_modes import contact_side, map_place, spring_of
 from nonlinear._kernels.elastic_series import series_state
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
@@ -42,13 +42,13 @@ def add_powers(p, s, weight, i, w, W, d):  # type: ignore[no-untyped-def]
     rate = w / p[layout.RATIO_TO_COUPLING] - W
     torque = 0.0
     if side != 0.0:
-        torque = p[layout.STIFFNESS] * (d - side * p[layout.HALF_PLAY]) + p[layout.COUPLING_DAMPING] * rate
+        k, rest = spring_of(p, s, side)
+        torque = k * (d - rest) + p[layout.COUPLING_DAMPING] * rate
         s[e + layout.ENERGY_DAMPING] += weight * p[layout.COUPLING_DAMPING] * rate * rate
     parted = 0.5 * s[at.ES_CONTACT]
     if abs(parted) == 1.0:
-        s[e + layout.ENERGY_PARTING] -= (
-            weight * p[layout.STIFFNESS] * (d - parted * p[layout.HALF_PLAY]) * rate
-        )
+        k, rest = spring_of(p, s, parted)
+        s[e + layout.ENERGY_PARTING] -= weight * k * (d - rest) * rate
     add_motor_friction(p, s, weight, w, torque)
     s[e + layout.ENERGY_LOAD_DRY] += weight * p[layout.LOAD_DRY] * s[at.ES_LOAD] * W
     s[e + layout.ENERGY_LOAD_VISCOUS] += weight * p[layout.LOAD_VISCOUS] * W * W

@@ -10,7 +10,7 @@ from __future__ import annotations
 from nonlinear._kernels import layout
 
 MAX_TERMS = 18  # of the Taylor series over one short interval
-MAX_GUARDS = 6
+MAX_GUARDS = 8
 MAX_STEPS = 200_000  # short intervals in one held segment, beyond which the run is given up
 
 # --- derived parameters ---------------------------------------------------------------------------
@@ -26,8 +26,11 @@ MAX_STEPS = 200_000  # short intervals in one held segment, beyond which the run
     EL_MODE_SIZE,
     EL_SEGMENTS,  # number of segments of the motor's friction for w > 0
     EL_SEGMENTS_REVERSE,
-) = range(layout.ELASTIC, layout.ELASTIC + 11)
-EL_MAP = EL_SEGMENTS_REVERSE + 1  # segments of w > 0, then of w < 0
+    EL_SPRINGS,  # number of pieces of the spring: 1 to 3
+) = range(layout.ELASTIC, layout.ELASTIC + 12)
+SPRING_STIFFNESS, SPRING_HALF, SPRING_TWIST, SPRING_SIZE = range(4)  # T = k (delta - half) beyond a twist
+EL_SPRING = EL_SPRINGS + 1  # pieces of the spring
+EL_MAP = EL_SPRING + 3 * SPRING_SIZE  # segments of w > 0, then of w < 0
 MAP_SPEED, MAP_LEVEL, MAP_SLOPE, MAP_SEGMENT = 0, 1, 2, 3  # begins at; T = level + slope |w|
 MAP_SIDE = layout.MAX_POINTS * MAP_SEGMENT
 EL_MODES = EL_MAP + 2 * MAP_SIDE  # first mode
@@ -64,14 +67,15 @@ ES_LOAD_ANGLE: layout.Continuous = layout.ELASTIC_STATE + 2  # phi
 ES_SEGMENT: layout.Flag = layout.ELASTIC_STATE + 3  # of the friction map
 ES_LOAD: layout.Flag = layout.ELASTIC_STATE + 4  # direction of slip of the load: 1, -1, 0
 ES_CONTACT: layout.Flag = layout.ELASTIC_STATE + 5  # GAP, 1 or -1 in contact, 2 or -2 parted, |delta| > b
-ES_HAPPENED: layout.Flag = layout.ELASTIC_STATE + 6  # events of the last held segment
+ES_BEND: layout.Flag = layout.ELASTIC_STATE + 6  # piece of the spring, with the sign of the twist: 0, 1, 2
+ES_HAPPENED: layout.Flag = layout.ELASTIC_STATE + 7  # events of the last held segment
 # what follows from the mode, kept until it changes
-ES_MODE: layout.Flag = layout.ELASTIC_STATE + 7  # place of the mode in p
-ES_MOTOR_TORQUE: layout.Flag = layout.ELASTIC_STATE + 8  # constant torque on the motor
-ES_MOTOR_DRY: layout.Flag = layout.ELASTIC_STATE + 9  # torque on the motor per |M_ext|
-ES_LOAD_TORQUE: layout.Flag = layout.ELASTIC_STATE + 10  # constant torque on the load
-ES_GUARDS: layout.Flag = layout.ELASTIC_STATE + 11  # number of guards
-ES_GUARD: layout.Flag = layout.ELASTIC_STATE + 12
+ES_MODE: layout.Flag = layout.ELASTIC_STATE + 8  # place of the mode in p
+ES_MOTOR_TORQUE: layout.Flag = layout.ELASTIC_STATE + 9  # constant torque on the motor
+ES_MOTOR_DRY: layout.Flag = layout.ELASTIC_STATE + 10  # torque on the motor per |M_ext|
+ES_LOAD_TORQUE: layout.Flag = layout.ELASTIC_STATE + 11  # constant torque on the load
+ES_GUARDS: layout.Flag = layout.ELASTIC_STATE + 12  # number of guards
+ES_GUARD: layout.Flag = layout.ELASTIC_STATE + 13
 # one guard: an affine function of state and inputs that stays positive in this mode
 (G_I, G_W, G_V, G_D, G_ONE, G_U, G_M, G_ABS_M, G_EXTRA, G_CURVE, G_EVENT, GUARD_SIZE) = range(12)
 # work space: the held inputs, then the Taylor coefficients of (i, w, W, delta) and of one guard
@@ -93,6 +97,8 @@ GAP = 0.0
     PART,
     REJOIN,
     INSIDE,
+    BEND_PLUS,
+    BEND_MINUS,
     MOTOR_UP,
     MOTOR_DOWN,
     MOTOR_LOWER,
@@ -100,4 +106,4 @@ GAP = 0.0
     LOAD_UP,
     LOAD_DOWN,
     LOAD_LANDS,
-) = range(14)
+) = range(16)

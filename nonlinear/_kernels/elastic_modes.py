@@ -22,11 +22,20 @@ def contact_side(s):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def spring_of(p, s, side):  # type: ignore[no-untyped-def]
+    """Stiffness of the piece that holds, and where its line passes zero: T_s = k (delta - rest)."""
+    bend = s[at.ES_BEND]
+    place = at.EL_SPRING + int(abs(bend)) * at.SPRING_SIZE
+    sign = side if bend == 0.0 else (1.0 if bend > 0.0 else -1.0)
+    return p[place + at.SPRING_STIFFNESS], sign * p[place + at.SPRING_HALF]
+
+
+@kernel
 def spring_expression(p, s, side):  # type: ignore[no-untyped-def]
-    """side T_s as if in contact: k (side delta - b) + side c delta'."""
+    """side T_s as if in contact: side (k (delta - rest) + c delta')."""
     rate = s[layout.S_SPEED] / p[layout.RATIO_TO_COUPLING] - s[at.ES_LOAD_SPEED]
-    stretch = side * s[at.ES_TWIST] - p[layout.HALF_PLAY]
-    return p[layout.STIFFNESS] * stretch + side * p[layout.COUPLING_DAMPING] * rate
+    k, rest = spring_of(p, s, side)
+    return side * (k * (s[at.ES_TWIST] - rest)) + side * p[layout.COUPLING_DAMPING] * rate
 
 
 @kernel
@@ -52,9 +61,9 @@ def mode_number(p, s):  # type: ignore[no-untyped-def]
     if s[layout.S_DIRECTION] < 0.0:
         motor = 1 + int(p[at.EL_SEGMENTS]) + int(s[at.ES_SEGMENT])
     side = contact_side(s)
-    contact = 0 if side == 0.0 else (1 if side > 0.0 else 2)
+    contact = 0 if side == 0.0 else (1 if side > 0.0 else 2) + 2 * int(abs(s[at.ES_BEND]))
     load = 1 if s[at.ES_LOAD] != 0.0 else 0
-    return 6 * motor + 2 * contact + load
+    return (2 + 4 * int(p[at.EL_SPRINGS])) * motor + 2 * contact + load
 
 
 @kernel
@@ -63,7 +72,8 @@ def enter_mode(p, s):  # type: ignore[no-untyped-def]
     mode = at.EL_MODES + mode_number(p, s) * int(p[at.EL_MODE_SIZE])
     s[at.ES_MODE] = float(mode)
     side, direction, load = contact_side(s), s[layout.S_DIRECTION], s[at.ES_LOAD]
-    preload = side * p[layout.STIFFNESS] * p[layout.HALF_PLAY]
+    k, rest = spring_of(p, s, side)
+    preload = abs(side) * k * rest
     share = p[at.EL_REACTION] + direction * side * p[at.EL_LOAD_COEFFICIENT]
     level = p[map_place(p, s) + at.MAP_LEVEL]
     s[at.ES_MOTOR_TORQUE] = share * preload - p[layout.OFFSET] - direction * level
@@ -93,36 +103,53 @@ def new_guard(s, event):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def twist_guard(p, s, sign, side, event):  # type: ignore[no-untyped-def]
-    """sign (side delta - b) > 0."""
+def twist_guard(s, sign, side, twist, event):  # type: ignore[no-untyped-def]
+    """sign (side delta - twist) > 0."""
     g = new_guard(s, event)
-    s[g + at.G_D], s[g + at.G_ONE] = sign * side, -sign * p[layout.HALF_PLAY]
+    s[g + at.G_D], s[g + at.G_ONE] = sign * side, -sign * twist
 
 
 @kernel
 def spring_guard(p, s, sign, side, event):  # type: ignore[no-untyped-def]
-    """sign (k (side delta - b) + side c delta') > 0."""
+    """sign side (k (delta - rest) + c delta') > 0."""
     g = new_guard(s, event)
-    k, c = p[layout.STIFFNESS], p[layout.COUPLING_DAMPING]
+    k, rest = spring_of(p, s, side)
+    c = p[layout.COUPLING_DAMPING]
     s[g + at.G_W], s[g + at.G_V] = sign * side * c / p[layout.RATIO_TO_COUPLING], -sign * side * c
-    s[g + at.G_D], s[g + at.G_ONE] = sign * side * k, -sign * k * p[layout.HALF_PLAY]
+    s[g + at.G_D], s[g + at.G_ONE] = sign * side * k, -sign * side * k * rest
+
+
+@kernel
+def bend_guards(p, s):  # type: ignore[no-untyped-def]
+    """The twist stays on its piece of the spring, on either side; with play zero lies in the gap."""
+    last, bend = int(p[at.EL_SPRINGS]) - 1, int(s[at.ES_BEND])
+    code, one_sided = s[at.ES_CONTACT], p[layout.HALF_PLAY] > 0.0
+    ends = at.EL_SPRING + at.SPRING_TWIST
+    if bend < last and (bend < 0 or code > 0.0 or not one_sided):
+        twist = p[ends + (bend + 1) * at.SPRING_SIZE] if bend >= 0 else -p[ends - bend * at.SPRING_SIZE]
+        twist_guard(s, -1.0, 1.0, twist, at.BEND_PLUS)
+    if bend > -last and (bend > 0 or code < 0.0 or not one_sided):
+        twist = p[ends + bend * at.SPRING_SIZE] if bend > 0 else -p[ends + (1 - bend) * at.SPRING_SIZE]
+        twist_guard(s, 1.0, 1.0, twist, at.BEND_MINUS)
 
 
 @kernel
 def contact_guards(p, s):  # type: ignore[no-untyped-def]
     """Guards of contact, of the gap, and of the time between parting and the gap."""
-    code = s[at.ES_CONTACT]
+    code, half = s[at.ES_CONTACT], p[layout.HALF_PLAY]
     if code == at.GAP:
-        twist_guard(p, s, -1.0, 1.0, at.MEET_PLUS)
-        twist_guard(p, s, -1.0, -1.0, at.MEET_MINUS)
-    elif abs(code) == 2.0:
+        twist_guard(s, -1.0, 1.0, half, at.MEET_PLUS)
+        twist_guard(s, -1.0, -1.0, half, at.MEET_MINUS)
+        return
+    bend_guards(p, s)
+    if abs(code) == 2.0:
         spring_guard(p, s, -1.0, 0.5 * code, at.REJOIN)
-        twist_guard(p, s, 1.0, 0.5 * code, at.INSIDE)
-    elif p[layout.HALF_PLAY] == 0.0:
+        twist_guard(s, 1.0, 0.5 * code, half, at.INSIDE)
+    elif half == 0.0:
         if p[at.EL_LOAD_COEFFICIENT] > 0.0:
             spring_guard(p, s, 1.0, code, at.FLIP)
     elif p[layout.COUPLING_DAMPING] == 0.0:
-        twist_guard(p, s, 1.0, code, at.PART)
+        twist_guard(s, 1.0, code, half, at.PART)
     else:
         spring_guard(p, s, 1.0, code, at.PART)
 
@@ -153,9 +180,9 @@ def motor_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
     side = contact_side(s)
     torque = ratio * CM * side + sign * p[at.EL_REACTION]  # factor of T_s
     s[g + at.G_V] = -torque * abs(side) * p[layout.COUPLING_DAMPING]
-    s[g + at.G_D] = torque * abs(side) * p[layout.STIFFNESS]
-    preload = side * p[layout.STIFFNESS] * p[layout.HALF_PLAY]
-    s[g + at.G_ONE] = ratio * level + sign * p[layout.OFFSET] - torque * preload
+    k, rest = spring_of(p, s, side)
+    s[g + at.G_D] = torque * abs(side) * k
+    s[g + at.G_ONE] = ratio * level + sign * p[layout.OFFSET] - torque * abs(side) * k * rest
     if p[layout.SOURCE] > 0.0:
         s[g + at.G_U] = -sign * p[layout.SOURCE_GAIN]
     else:
@@ -182,10 +209,11 @@ def load_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
     """ratio_l C0_l - sign (T_s + M_ext/N_r - offset_l) > 0, with W = 0 in T_s."""
     g = new_guard(s, event)
     side = contact_side(s)
-    k, c = abs(side) * p[layout.STIFFNESS], abs(side) * p[layout.COUPLING_DAMPING]
+    k, rest = spring_of(p, s, side)
+    k, c = abs(side) * k, abs(side) * p[layout.COUPLING_DAMPING]
     s[g + at.G_W], s[g + at.G_D] = -sign * c / p[layout.RATIO_TO_COUPLING], -sign * k
     level = p[layout.LOAD_BREAKAWAY] * p[layout.LOAD_DRY]
-    s[g + at.G_ONE] = level + sign * (p[layout.LOAD_OFFSET] + side * k * p[layout.HALF_PLAY])
+    s[g + at.G_ONE] = level + sign * (p[layout.LOAD_OFFSET] + k * rest)
     s[g + at.G_M] = -sign / p[at.EL_RATIO_BEHIND]
 
 
@@ -283,8 +311,11 @@ def find_mode(p, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def start_contact(p, s):  # type: ignore[no-untyped-def]
-    """Contact as the state says."""
-    s[at.ES_CONTACT] = at.GAP
+    """Piece of the spring and contact as the state says."""
+    s[at.ES_BEND], s[at.ES_CONTACT] = 0.0, at.GAP
+    for j in range(1, int(p[at.EL_SPRINGS])):
+        if abs(s[at.ES_TWIST]) > p[at.EL_SPRING + j * at.SPRING_SIZE + at.SPRING_TWIST]:
+            s[at.ES_BEND] = float(j) if s[at.ES_TWIST] > 0.0 else -float(j)
     if p[layout.HALF_PLAY] == 0.0:
         negative = p[at.EL_LOAD_COEFFICIENT] > 0.0 and spring_expression(p, s, 1.0) < 0.0
         s[at.ES_CONTACT] = -1.0 if negative else 1.0
@@ -307,9 +338,11 @@ def put_output(p, s):  # type: ignore[no-untyped-def]
 
 @kernel
 def change_contact(p, s, event):  # type: ignore[no-untyped-def]
-    """The coupling meets, parts, or its torque changes sign."""
+    """The coupling meets, parts, its torque changes sign, or its spring bends."""
     code = s[at.ES_CONTACT]
-    if event == at.FLIP:
+    if event == at.BEND_PLUS or event == at.BEND_MINUS:
+        s[at.ES_BEND] += 1.0 if event == at.BEND_PLUS else -1.0
+    elif event == at.FLIP:
         s[at.ES_CONTACT] = -code
     elif event == at.PART:
         s[at.ES_CONTACT] = at.GAP if p[layout.COUPLING_DAMPING] == 0.0 else 2.0 * code
@@ -346,7 +379,7 @@ def land_load(p, s):  # type: ignore[no-untyped-def]
 @kernel
 def change_mode(p, s, event):  # type: ignore[no-untyped-def]
     """What an event does to the discrete state; only the speed that stops is set, to exactly 0."""
-    if event <= at.INSIDE:
+    if event <= at.BEND_MINUS:
         change_contact(p, s, event)
     elif event == at.MOTOR_UP or event == at.MOTOR_DOWN:
         s[layout.S_DIRECTION] = 1.0 if event == at.MOTOR_UP else -1.0

@@ -23,7 +23,6 @@ from nonlinear._kernels.elastic_steps import (
 
 SHORT = 0.5  # norm of A times the shortest interval
 MOST_LEVELS = 30
-SIDES = (0.0, 1.0, -1.0)  # gap, contact on either side
 LARGEST_POWER = 700.0  # of e in double precision
 
 
@@ -67,6 +66,7 @@ def put_shares(p):  # type: ignore[no-untyped-def]
     p[at.EL_REACTION] = back / p[layout.RATIO_TO_COUPLING]
     p[at.EL_BACK] = back / p[layout.RATIO] if rigid else 0.0
     p[at.EL_LOAD_COEFFICIENT] = p[layout.LOAD_COEFFICIENT] * (1.0 if rigid else behind)
+    put_springs(p)
     for side in range(2):
         put_segments(p, side)
     forward, reverse = at.EL_MAP, at.EL_MAP + at.MAP_SIDE
@@ -75,6 +75,22 @@ def put_shares(p):  # type: ignore[no-untyped-def]
     dry = abs(p[forward + at.MAP_LEVEL]) + abs(p[reverse + at.MAP_LEVEL]) + p[at.EL_LOAD_COEFFICIENT]
     p[at.EL_SMOOTH] = 1.0 if one and same and dry == 0.0 else 0.0
     p[at.EL_LOAD_SMOOTH] = 1.0 if p[layout.LOAD_DRY] == 0.0 else 0.0
+
+
+@kernel
+def put_springs(p):  # type: ignore[no-untyped-def]
+    """The pieces of the spring: stiffness, twist at which its line passes zero, twist at which it begins."""
+    k, torque, begins, place = p[layout.STIFFNESS], 0.0, p[layout.HALF_PLAY], at.EL_SPRING
+    p[place + at.SPRING_STIFFNESS], p[place + at.SPRING_HALF], p[place + at.SPRING_TWIST] = k, begins, begins
+    p[at.EL_SPRINGS] = 1.0
+    for j in range(2):
+        bend = p[layout.BEND_TORQUE + 2 * j]
+        if bend > torque:
+            begins, torque, k = begins + (bend - torque) / k, bend, p[layout.BEND_STIFFNESS + 2 * j]
+            place += at.SPRING_SIZE
+            p[place + at.SPRING_STIFFNESS], p[place + at.SPRING_HALF] = k, begins - bend / k
+            p[place + at.SPRING_TWIST] = begins
+            p[at.EL_SPRINGS] += 1.0
 
 
 @kernel
@@ -100,8 +116,11 @@ def put_segments(p, side):  # type: ignore[no-untyped-def]
 
 @kernel
 def mode_count(p):  # type: ignore[no-untyped-def]
-    """Number of modes: motor at rest or on a segment of either side, three contacts, load at rest or not."""
-    return 6 * (1 + int(p[at.EL_SEGMENTS]) + int(p[at.EL_SEGMENTS_REVERSE]))
+    """Number of modes: motor at rest or on a segment of either side, gap or contact on either side with a
+    piece of the spring, load at rest or not.
+    """
+    motors = 1 + int(p[at.EL_SEGMENTS]) + int(p[at.EL_SEGMENTS_REVERSE])
+    return (2 + 4 * int(p[at.EL_SPRINGS])) * motors
 
 
 @kernel
@@ -120,20 +139,24 @@ def put_mode(p, number, m):  # type: ignore[no-untyped-def]
     """Coefficients and weights of a mode at ``p[m]``, numbered as in `elastic_modes.mode_number`."""
     for j in range(at.MODE_CHORD):
         p[m + j] = 0.0
-    motor = int(number / 6)
-    contact = int((number - 6 * motor) / 2)
-    slips = number - 6 * motor - 2 * contact > 0
+    each = 2 + 4 * int(p[at.EL_SPRINGS])
+    motor = int(number / each)
+    contact = int((number - each * motor) / 2)
+    slips = number - each * motor - 2 * contact > 0
+    piece = int((contact - 1) / 2) if contact > 0 else 0
+    side = 0.0 if contact == 0 else float(3 + 4 * piece - 2 * contact)
     direction, slope = motor_of(p, motor)
     # T_s acts on the motor with 1/N_c and, through friction, with CM' sgn(w T_s)
-    share = p[at.EL_REACTION] + direction * SIDES[contact] * p[at.EL_LOAD_COEFFICIENT]
-    k = p[layout.STIFFNESS] if contact > 0 else 0.0
+    share = p[at.EL_REACTION] + direction * side * p[at.EL_LOAD_COEFFICIENT]
+    spring = p[at.EL_SPRING + piece * at.SPRING_SIZE + at.SPRING_STIFFNESS]
+    k = spring if contact > 0 else 0.0
     c = p[layout.COUPLING_DAMPING] if contact > 0 else 0.0
     put_electrical(p, m, direction)
     if direction != 0.0:
         put_motor(p, m, slope, share, k, c)
     if p[layout.RIGID] == 0.0:
         put_load_side(p, m, direction != 0.0, slips, share, k, c)
-    put_weights(p, m)
+    put_weights(p, m, spring)
 
 
 @kernel
@@ -172,7 +195,7 @@ def put_load_side(p, m, motor_slips, load_slips, share, k, c):  # type: ignore[n
 
 
 @kernel
-def put_weights(p, m):  # type: ignore[no-untyped-def]
+def put_weights(p, m, k):  # type: ignore[no-untyped-def]
     """Square roots of L, J_m, J_l, k: in these units a passive plant does not grow.
 
     A state that acts on no other (the twist in the gap, the absent current) weighs nothing.
@@ -182,7 +205,7 @@ def put_weights(p, m):  # type: ignore[no-untyped-def]
     p[weight + 1] = math.sqrt(p[layout.MOTOR_INERTIA])
     p[weight + 2] = math.sqrt(p[layout.LOAD_INERTIA])
     free = p[m + at.A_WD] == 0.0 and p[m + at.A_VD] == 0.0
-    p[weight + 3] = 0.0 if free else math.sqrt(p[layout.STIFFNESS])
+    p[weight + 3] = 0.0 if free else math.sqrt(k)
 
 
 @kernel

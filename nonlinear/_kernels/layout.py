@@ -140,6 +140,10 @@ from actuator_lti.drive import signals
     STIFFNESS,  # k
     COUPLING_DAMPING,  # c
     HALF_PLAY,  # b
+    BEND_TORQUE,  # T1 at which the spring bends, and its stiffness K2 beyond; 0: it does not
+    BEND_STIFFNESS,
+    BEND_TORQUE_2,  # T2 and K3
+    BEND_STIFFNESS_2,
     LOAD_DRY,  # C0_l
     LOAD_VISCOUS,  # Cv_l
     LOAD_BREAKAWAY,
@@ -161,7 +165,7 @@ from actuator_lti.drive import signals
     TORQUE_ORDER,
     TORQUE_PHASE,
     COMMAND,  # first of SIGNAL_SIZE numbers
-) = range(142)
+) = range(146)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
 # --- a signal: kind and parameters -----------------------------------------------------------------
@@ -382,7 +386,7 @@ S_SPEED_CHAIN: Continuous = S_COMMAND_CHAIN + 2
 S_TORQUE_CHAIN: Continuous = S_SPEED_CHAIN + 2 * MAX_SECTIONS
 S_PROBE_PLACES: Counter = S_TORQUE_CHAIN + 2 * MAX_SECTIONS  # next place in each probe's ring
 ELASTIC_STATE = S_PROBE_PLACES + 4
-ELASTIC_STATE_SIZE = 179
+ELASTIC_STATE_SIZE = 202
 S_QUEUE: Continuous = (
     ELASTIC_STATE + ELASTIC_STATE_SIZE
 )  # delay line, oldest first; then angles, average, states of a law of one's own, rings

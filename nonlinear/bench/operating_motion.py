@@ -77,7 +77,7 @@ class OperatingMotion:
     def operating(self, design: Design) -> Operating:
         """Where the linear loops have to be taken to be those of this motion."""
         if design.coupling is not None and self.friction_on:
-            return Operating(point="driving", speed_rad_s=self.speed_rad_s)
+            return Operating(point="driving", speed_rad_s=self.speed_rad_s, twist_rad=self.twist_rad)
         angle = self.output_rad(design)
         return Operating(speed_rad_s=self.speed_rad_s, angle_rad=angle, twist_rad=self.twist_rad)
 
@@ -161,7 +161,7 @@ def standing(design: Design) -> OperatingMotion:
         return OperatingMotion(0.0, 0.0, 0.0, False, holding_moment_Nm(design), extra_Nm=torque)
     press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
     coupling_Nm = press / design.ratio_behind_coupling
-    twist = coupling_Nm / coupling.stiffness_Nm_rad + 0.5 * coupling.play_rad
+    twist = coupling.twist_rad(coupling_Nm)
     passed = 1.0 if load.path == "back-drivable" else 0.0
     torque += passed * coupling_Nm / design.ratio_to_coupling
     moment = holding_moment_Nm(design, -twist / design.ratio_behind_coupling) - press
@@ -288,8 +288,7 @@ def operating_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0
     else:
         coupling_Nm = _behind(design.load.friction, speed_rad_s / design.ratio_to_coupling)
         coupling_Nm -= moment / design.ratio_behind_coupling
-        half = 0.5 * design.coupling.play_rad * (1.0 if coupling_Nm > 0.0 else -1.0)
-        twist = coupling_Nm / design.coupling.stiffness_Nm_rad + half
+        twist = design.coupling.twist_rad(coupling_Nm)
         torque = passed * coupling_Nm / design.ratio_to_coupling
         torque += sense * friction.load_coefficient * design.ratio_behind_coupling * abs(coupling_Nm)
     torque += sense * _own(friction, abs(speed_rad_s), int(sense)) + friction.offset_torque_Nm

@@ -23,7 +23,7 @@ _COUNTED = {at.S_TICK, at.S_STATUS, at.S_AVERAGE_PLACE, at.S_EVENTS, at.S_MAX_EV
 _BEHIND = (
     *range(at.S_CURRENT, at.S_NOISE),
     *range(at.S_COMMAND_CHAIN, at.S_PROBE_PLACES),
-    *range(elastic_layout.ES_LOAD_SPEED, elastic_layout.ES_CONTACT + 1),
+    *range(elastic_layout.ES_LOAD_SPEED, elastic_layout.ES_BEND + 1),
 )
 
 

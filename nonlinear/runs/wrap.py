@@ -130,7 +130,13 @@ def kinetic_energy(row: Floats, out: Floats) -> float:
 
 
 def spring_energy(row: Floats, twist_rad: float) -> float:
-    """k max(0, |delta| - b)^2 / 2."""
+    """Work that the spring has taken up at a twist; of one stiffness k max(0, |delta| - b)^2 / 2."""
     if not row[at.ELASTIC_DRIVE] or row[at.RIGID]:
         return 0.0
-    return float(0.5 * row[at.STIFFNESS] * max(0.0, abs(twist_rad) - row[at.HALF_PLAY]) ** 2)
+    left, torque, k, work = max(0.0, abs(twist_rad) - row[at.HALF_PLAY]), 0.0, row[at.STIFFNESS], 0.0
+    for bend, beyond in row[at.BEND_TORQUE : at.BEND_STIFFNESS_2 + 1].reshape(2, 2):
+        here = (bend - torque) / k
+        if bend <= torque or left <= here:
+            break
+        left, work, torque, k = left - here, work + 0.5 * (bend + torque) * here, bend, beyond
+    return float(work + torque * left + 0.5 * k * left**2)

@@ -20,7 +20,7 @@ Places = npt.NDArray[np.intp]
 DRIFT, CHECKED, EVEN = 64, 16, 1e-4  # periods of a window, of a look ahead; how alike two changes are
 STILL, ROUNDING = 2.0**-30, 2.0**-42  # of the largest value: a change in a window that counts; rounding
 MOST_LEAPS = int(1.0 / STILL)  # windows until what changes by `STILL` in each has changed by its own size
-_MODES = (at.S_DIRECTION, ES.ES_SEGMENT, ES.ES_LOAD, ES.ES_CONTACT)  # they follow from the rest
+_MODES = (at.S_DIRECTION, ES.ES_SEGMENT, ES.ES_LOAD, ES.ES_CONTACT, ES.ES_BEND)  # they follow from the rest
 _ANGLES = (at.S_ANGLE, at.S_OUTPUT)
 
 

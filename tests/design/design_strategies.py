@@ -87,6 +87,14 @@ _FILTERS: list[dict[str, Any]] = [
 ]
 
 
+def _bends(torque: str, angle: str) -> st.SearchStrategy[dict[str, Any]]:
+    """A spring of one piece, of two, of three."""
+    keys = ("torque_1", "stiffness_2", "torque_2", "stiffness_3")
+    values = (f"2 {torque}", f"40 {torque}/{angle}", f"5.5 {torque}", f"70 {torque}/{angle}")
+    pieces = [dict(zip(keys, (*values[:n], *[None] * (4 - n)), strict=True)) for n in (0, 2, 4)]
+    return st.sampled_from(pieces)
+
+
 @st.composite
 def design_trees(draw: st.DrawFn) -> dict[str, Any]:
     """A tree of a design file that must be accepted."""
@@ -129,7 +137,8 @@ def design_trees(draw: st.DrawFn) -> dict[str, Any]:
         "load": {"moment_damping": f"1e-12 {torque}*s/{angle}", "gear_error": None,
                  "locking_gear": None}, "friction": {},
         "encoder": {"bandwidth": None, **tracking}, "validation": {},
-        "coupling": {"after": None}, "output_encoder": {}, "instruments": {"jitter": "20 us"},
+        "coupling": {"after": None, **draw(_bends(torque, angle))}, "output_encoder": {},
+        "instruments": {"jitter": "20 us"},
     }  # fmt: skip
     if "position" in control:
         given["command"] = {"jerk": None, "acceleration": None, "rate": "1 urad/s"}

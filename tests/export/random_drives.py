@@ -129,6 +129,10 @@ def random_elastic_drive(rng: Rng) -> Design:
     friction = replace(design.friction, law="coulomb")
     if kind > 1:
         friction = replace(friction, points=_map(rng, friction.dry_torque_Nm))
+    for number in range(int(rng.integers(3))):
+        bend = {f"torque_{number + 1}_Nm": scaled(rng, 0.3 * 10.0**number)}
+        bend[f"stiffness_{number + 2}_Nm_rad"] = coupling.stiffness_Nm_rad * scaled(rng, 1.5)
+        coupling = replace(coupling, **bend)
     return replace(
         design,
         friction=friction,

@@ -56,6 +56,14 @@ def everything() -> Design:
     return replace(base, controller=controller, encoder=encoder, command=command, load=load)
 
 
+def bent() -> Design:
+    """A spring of three pieces, on whose second the load lies."""
+    base = drive_e()
+    k = base.coupling.stiffness_Nm_rad
+    bends = {"torque_1_Nm": 1.0, "stiffness_2_Nm_rad": 2 * k, "torque_2_Nm": 4.0, "stiffness_3_Nm_rad": 3 * k}
+    return replace(base, coupling=replace(base.coupling, **bends))
+
+
 DRIVES = {
     "cascade": amber(2, 10, delay_s=1.5e-4),
     "difference": amber(encoder=Encoder(speed="difference", difference_samples=3, filter_time_s=2e-4)),
@@ -68,6 +76,7 @@ DRIVES = {
     "torque drive": replace(drive_d(), controller=replace(drive_d().controller, velocity=None)),
     "everything": everything(),
     "friction map": replace(amber(), friction=replace(amber().friction, points=MAP)),
+    "bent spring": bent(),
 }
 
 
@@ -100,9 +109,10 @@ def test_stacked_blocks_are_the_single_ones(name: str) -> None:
     values = scattered(design, count)
     ticks = design.controller.computing_delay_s / design.controller.period_s
     values["control.computing_delay"] = ticks * values["control.period"]
-    many = wire(stacked(design, values), Operating())
+    at = Operating(load_Nm=2.0)
+    many = wire(stacked(design, values), at)
     for k in range(count):
-        alone = wire(stacked(design, {path: float(array[k]) for path, array in values.items()}), Operating())
+        alone = wire(stacked(design, {path: float(array[k]) for path, array in values.items()}), at)
         for stage in many.stages:
             blocks = [fundamental(stage_blocks(each, stage)) for each in (many, alone)]
             same(blocks, k)

@@ -180,10 +180,14 @@ def random_drive(seed: int) -> tuple[Design, np.ndarray, np.ndarray, float]:
         "offset_torque_Nm": N * torque * rng.uniform(-0.1, 0.1),
     }
     Ts = power_of_ten(rng, -4.3, -2.3)
+    bent, bends = np.random.default_rng([seed, 1]), {}  # of its own, so that the rest stays as it is
+    for number in range(int(bent.integers(3))):
+        bends[f"torque_{number + 1}_Nm"] = N * torque * power_of_ten(bent, number - 2.0, number - 1.0)
+        bends[f"stiffness_{number + 2}_Nm_rad"] = k * power_of_ten(bent, -0.4, 0.6)
     design = two_mass(
         Ts, source=bool(source), path="self-locking" if locking else "back-drivable", friction=friction,
         ratio=N, behind=gears, J_l=J_l * N_r**2, load_friction=load_friction,
-        coupling={"stiffness_Nm_rad": k, "damping_Nms_rad": damping, "play_rad": play},
+        coupling={"stiffness_Nm_rad": k, "damping_Nms_rad": damping, "play_rad": play, **bends},
     )  # fmt: skip
     voltages = np.repeat(rng.normal(size=8) * (torque if source else 4.0), 3)
     return design, voltages, 0.3 * N * N_r * torque * rng.normal(size=24), float(rng.choice([0.0, 0.4])) * Ts

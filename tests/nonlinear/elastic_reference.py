@@ -65,7 +65,17 @@ class Reference:
     def spring(self, x: np.ndarray, side: int) -> float:
         """Side T_s as the page writes it for contact."""
         delta, rate = x[3] / self.Nc - x[4], x[1] / self.Nc - x[2]
-        return side * (self.k * (delta - side * self.b) + self.c * rate)
+        return side * (self.stretched(delta - side * self.b) + self.c * rate)
+
+    def stretched(self, z: float) -> float:
+        """Torque of the spring alone: k z, or the data sheet's points (0, 0), (T1/K1, T1) ... and beyond."""
+        c = self.design.coupling
+        knots = [(0.0, 0.0, self.k)]
+        for T, K in ((c.torque_1_Nm, c.stiffness_2_Nm_rad), (c.torque_2_Nm, c.stiffness_3_Nm_rad)):
+            if T is not None:
+                knots.append((knots[-1][0] + (T - knots[-1][1]) / knots[-1][2], T, K))
+        z0, T0, K0 = next(knot for knot in reversed(knots) if abs(z) >= knot[0])
+        return float(np.copysign(T0 + K0 * (abs(z) - z0), z))
 
     def torque(self, x: np.ndarray, mode: Mode) -> float:
         return mode.contact * self.spring(x, mode.contact) if mode.contact else 0.0

@@ -110,6 +110,42 @@ def test_load_swings_behind_a_self_locking_stage() -> None:
     assert np.abs(run.states[:, 3]).max() < 1e-18
 
 
+def quarter(x: float, bends: list[tuple[float, float, float]]) -> list[tuple[float, ...]]:
+    """Free swing of the reduced inertia from rest at a twist to zero, by piece: (t, w, centre, size, phase).
+
+    On a piece T = T0 + k (x - x0) the twist is centre + amplitude cos(w (t - t0) + phase).
+    """
+    t, v, made = 0.0, 0.0, []
+    for x0, T0, k in reversed([piece for piece in bends if piece[0] < x]):
+        w, centre = np.sqrt(k / REDUCED), x0 - T0 / k
+        amplitude, phase = np.hypot(x - centre, v / w), np.arctan2(-v / w, x - centre)
+        made.append((t, w, centre, amplitude, phase))
+        ends = np.arccos((x0 - centre) / amplitude)
+        t, v, x = t + (ends - phase) / w, -amplitude * w * np.sin(ends), x0
+    return [*made, (t, 0.0, 0.0, 0.0, 0.0)]
+
+
+def test_free_swing_on_a_spring_of_three_pieces() -> None:
+    """K1 to T1, K2 to T2, K3 beyond, as data sheets of strain wave gears have it."""
+    T1, K2, T2, K3 = 3.0, 500.0, 8.0, 900.0
+    bends = {"torque_1_Nm": T1, "stiffness_2_Nm_rad": K2, "torque_2_Nm": T2, "stiffness_3_Nm_rad": K3}
+    design = two_mass(1e-3, source=True, coupling=IDEAL | {"play_rad": 0.0} | bends)
+    start = 0.06
+    run = run_plant(design, np.zeros(200), start=(0.0, 0.0, 0.0, start * N, 0.0))
+    x1, x2 = T1 / K, T1 / K + (T2 - T1) / K2
+    pieces = quarter(start, [(0.0, 0.0, K), (x1, T1, K2), (x2, T2, K3)])
+    assert len(pieces) == 4
+    period, wanted = 4.0 * pieces[-1][0], []
+    for t in np.arange(201) * 1e-3:
+        turn = np.mod(t, period) / period
+        near = min(turn, 1.0 - turn)  # even about every extreme, odd about every zero
+        sign, near = (1.0, near) if near <= 0.25 else (-1.0, 0.5 - near)
+        t0, w, centre, amplitude, phase = next(p for p in reversed(pieces[:-1]) if near * period >= p[0])
+        wanted.append(sign * (centre + amplitude * np.cos(w * (near * period - t0) + phase)))
+    twist = run.states[:, 3] / N - run.states[:, 4]
+    np.testing.assert_allclose(twist, wanted, atol=1e-13)
+
+
 def rms_difference(first: np.ndarray, second: np.ndarray) -> float:
     return float(np.sqrt(np.mean((first - second) ** 2)))
 
@@ -173,8 +209,18 @@ def stored(design: Design, x: np.ndarray) -> float:
     i, w, W, th, phi = x
     coupling, L = design.coupling, design.motor.inductance_H or 0.0
     stretch = max(0.0, abs(th / design.ratio_to_coupling - phi) - coupling.play_rad / 2)
+    bends = (
+        (coupling.torque_1_Nm, coupling.stiffness_2_Nm_rad),
+        (coupling.torque_2_Nm, coupling.stiffness_3_Nm_rad),
+    )
+    spring, T, k = 0.0, 0.0, coupling.stiffness_Nm_rad
+    for bend, beyond in bends:
+        if bend is not None and T + k * stretch > bend:
+            spring += 0.5 * (bend * bend - T * T) / k
+            stretch, T, k = stretch - (bend - T) / k, bend, beyond
+    spring += T * stretch + 0.5 * k * stretch * stretch
     kinetic = design.motor_side_inertia_kgm2 * w * w + design.load_side_inertia_kgm2 * W * W
-    return 0.5 * (L * i * i + kinetic + coupling.stiffness_Nm_rad * stretch * stretch)
+    return 0.5 * (L * i * i + kinetic) + spring
 
 
 @pytest.mark.parametrize("seed", range(60))

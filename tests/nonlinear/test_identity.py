@@ -109,6 +109,14 @@ class Point:
     moment_Nm: float
     play_rad: float = 0.02
     load_coefficient: float = 0.02
+    bends: tuple[tuple[float, float], ...] = ()  # torques at which the spring bends, stiffnesses beyond
+
+    def twist(self, torque: float, k: float) -> tuple[float, float]:
+        """Twist under a torque, and the stiffness there."""
+        size, before, twist = abs(torque), 0.0, 0.5 * self.play_rad * abs(self.side)
+        for bend, beyond in self.bends:
+            twist, before, k = twist + (bend - before) / k, bend, beyond
+        return np.copysign(twist + (size - before) / k, torque), k
 
 
 POINTS = [
@@ -116,24 +124,27 @@ POINTS = [
     Point("driven", -1.0, 2.0),
     Point("gap", 0.0, LOAD_DRY + 0.01, 1e3),
     Point("sliding", 1.0, LOAD_DRY, 0.0, 0.0),  # a spring without play: its torque passes zero
+    Point("driven", -1.0, 2.0, bends=((0.1, 300.0),)),
+    Point("driving", 1.0, -1.0, 0.0, bends=((0.1, 350.0), (0.3, 260.0))),
 ]
 
 
-def cruise(design: Design, point: Point) -> tuple[State, dict[str, float]]:
-    """State of steady motion for the running and for the linear drive."""
+def cruise(design: Design, point: Point) -> tuple[State, dict[str, float], float, float]:
+    """State of steady motion for running and linear drive; its twist, and that of the line there."""
     motor, coupling, N, w = design.motor, design.coupling, design.ratio_to_coupling, SPRUNG_SPEED
     torque = (LOAD_DRY + 1e-3 * w / N - point.moment_Nm) * abs(point.side)
     share = 1 / N + point.side * design.friction.load_coefficient
     i = (DRY + 1e-4 * w + share * torque) / motor.torque_constant_Nm_A
     u = motor.resistance_ohm * i + 0.05 * w
-    th, twist = -w / design.controller.position_loop.gain, torque / coupling.stiffness_Nm_rad
+    th, (bent, k) = -w / design.controller.position_loop.gain, point.twist(torque, coupling.stiffness_Nm_rad)
+    twist = torque / k
     state = State(
         motor_angle_rad=th, motor_speed_rad_s=w, current_A=i, current_integral_V=u, velocity_integral=i,
         speed_command_rad_s=w, current_command_A=i, voltage_V=u,
-        output_angle_rad=th / N - twist - point.side * coupling.play_rad / 2,
+        output_angle_rad=th / N - bent,
     )  # fmt: skip
     linear = {"i": i, "w": w, "th": th, "W": w / N, "twist": twist, "velocity.I": i, "current.I": u}
-    return state, linear | {"hold_w_ref": w, "hold_i_ref": i, "u1": u, "u2": u}
+    return state, linear | {"hold_w_ref": w, "hold_i_ref": i, "u1": u, "u2": u}, bent, twist
 
 
 @every_rate
@@ -141,24 +152,31 @@ def cruise(design: Design, point: Point) -> tuple[State, dict[str, float]]:
 @pytest.mark.parametrize("point", POINTS, ids=lambda point: point.name)
 def test_behind_a_coupling_between_its_events(point: Point, delay: float, rates: tuple[int, int]) -> None:
     design = timed(drive_f(), delay, rates)
+    names = ("torque_1_Nm", "stiffness_2_Nm_rad"), ("torque_2_Nm", "stiffness_3_Nm_rad")
+    bends = {
+        key: value
+        for keys, pair in zip(names, point.bends, strict=False)
+        for key, value in zip(keys, pair, strict=True)
+    }
     design = replace(
         design,
         friction=Friction(dry_torque_Nm=DRY, viscous_Nms_rad=1e-4, load_coefficient=point.load_coefficient),
         load=replace(design.load, friction=LoadFriction(dry_torque_Nm=LOAD_DRY, viscous_Nms_rad=1e-3)),
-        coupling=replace(design.coupling, play_rad=point.play_rad),
+        coupling=replace(design.coupling, play_rad=point.play_rad, **bends),
     )
-    initial, known = cruise(design, point)
+    initial, known, bent, twist = cruise(design, point)
     bias = commands.ramp(SPRUNG_SPEED / design.total_ratio)
     duration = TICKS * design.controller.period_s
     run = simulate(design, commands.sine(0.03, 7.0), duration, point.moment_Nm, bias=bias, initial=initial)
     assert run.events == 0
-    if point.play_rad == 0.0:
+    if point.play_rad == 0.0 and not point.bends:
         assert np.ptp(np.sign(run.coupling_torque_Nm)) == 2.0
     else:
         assert (point.side * run.coupling_torque_Nm > 0.0).all() or point.side == 0.0
-    linear = linear_run(design, run, known, -DRY, point.moment_Nm - LOAD_DRY, operating_point=point.name)
+    at = {"operating_point": point.name, "twist_rad": bent}
+    linear = linear_run(design, run, known, -DRY, point.moment_Nm - LOAD_DRY, **at)
     assert set(linear) == {*SIGNALS, "phi"}
-    assert_identical(run, linear, 5.0, off=point.side * point.play_rad / 2)
+    assert_identical(run, linear, 5.0, off=bent - twist)
 
 
 def linear_drive(case: int) -> Design:

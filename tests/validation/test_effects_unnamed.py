@@ -9,6 +9,7 @@ from actuator_lti import load_design
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
 from analyses.validation import CHECKS, validate
+from analyses.validation.design_values import design_value_rows
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import small_signal
 
@@ -52,3 +53,15 @@ def test_cogging_in_front_of_a_coupling_with_play() -> None:
     assert plain.coupling.play_rad > 0.0
     assert result.tally.met == result.tally.total > 100
     assert result.passed
+
+
+def test_every_number_of_a_spring_that_bends_is_confronted() -> None:
+    """K1 to T1, K2 to T2, K3 beyond, as the data sheet of a strain wave gear of size 25 has them."""
+    keys = {"coupling.torque_1": 14.0, "coupling.stiffness_2": 3.5e4, "coupling.torque_2": 48.0,
+            "coupling.stiffness_3": 4.1e4}  # fmt: skip
+    design = load_design("joint").with_values(keys)
+    assert {row.verdict for row in design_value_rows(design)} == {Verdict.MET}
+    for key, value in {**keys, "coupling.stiffness": 2.2e4}.items():
+        for drive, model in ((1.0, 1.01), (1.01, 1.0)):
+            one, other = (design.with_values({key: factor * value}) for factor in (drive, model))
+            assert Verdict.NOT_MET in {row.verdict for row in design_value_rows(one, other)}, key
