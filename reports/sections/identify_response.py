@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analyses.estimation.parameters import parameter
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -15,6 +16,7 @@ from reports.sections.record_tables import finding_table, input_table
 
 if TYPE_CHECKING:
     from analyses.identification.frequency_bench import FrequencyResult
+    from analyses.identification.measured_response import ResponseResult
 
 
 def section(result: FrequencyResult) -> Section:
@@ -37,6 +39,37 @@ def section(result: FrequencyResult) -> Section:
         words += f", play {2e3 * result.play.half_rad:.3g} mrad"
     return judged(
         "frequency-identification", "Two-mass drive", result, blocks, result=f"{words}.", intro=intro
+    )
+
+
+SEEN = {"L": "open loop", "T": "closed loop L/(1+L)", "S": "sensitivity", "closed": "command to output"}
+
+
+def of_loop(result: ResponseResult) -> Section:
+    """Make the section of a design that was fitted to a measured response of one of its loops."""
+    fit, measured = result.fit, result.measured
+    noise = "no deviations were measured: errors are those of the residual"
+    if fit.misfit is not None:
+        noise = f"misfit {fit.misfit:.2f} (1: the measured deviations explain the residual)"
+    intro = (
+        f"{measured.name}: {len(measured.frequency_hz)} frequencies from {measured.frequency_hz[0]:.4g} to "
+        f"{measured.frequency_hz[-1]:.4g} Hz, {SEEN[result.of]} of {result.loop}; least squares of the exact "
+        f"sampled loop, {noise}."
+    )
+    blocks: list[Block] = [parameter_table("Identified values", fit)]
+    for label, of in (("magnitude", np.abs), ("phase, deg", lambda z: np.degrees(np.angle(z)))):
+        chart = Chart(width=style.WIDE, height=280.0)
+        panel = chart.panel()
+        panel.x.log, panel.y.log = True, label == "magnitude"
+        panel.points(measured.frequency_hz, of(measured.response), "measured", colour=style.BLUE)
+        panel.curve(measured.frequency_hz, of(result.modelled), "identified design", **style.series(1))
+        panel.x.label, panel.y.label = "frequency, Hz", label
+        what = label.partition(",")[0].capitalize()
+        words = f"{what} of the {SEEN[result.of]} of {result.loop}, measured and fitted"
+        blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
+    found = "; ".join(f"{parameter(name).key} {value_words(fit, name)}" for name in fit.names)
+    return judged(
+        "response-identification", "Measured response", result, blocks, result=f"{found}.", intro=intro
     )
 
 
