@@ -146,7 +146,8 @@ def _model(
     def response(tried: Design) -> ComplexArray:
         system = _seen(tried, name, of)
         value = np.asarray(system(np.exp(2j * np.pi * measured.frequency_hz * system.dt))).ravel()
-        return value / (1.0 + value) if of == "T" else 1.0 / (1.0 + value) if of == "S" else value
+        over = {"T": value, "S": np.ones_like(value)}.get(of)
+        return np.asarray(value if over is None else over / (1.0 + value), dtype=np.complex128)
 
     return response
 

@@ -1,22 +1,20 @@
-"""The identification of a two-mass drive: parameters, resonances, play, and the response with its fit."""
+"""Identifications by a frequency response: of a two-mass drive by its lines, of a design by a loop's."""
 
 from __future__ import annotations
-
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analyses.estimation.parameters import parameter
+from analyses.identification.frequency import response
+from analyses.identification.frequency_bench import FrequencyResult
+from analyses.identification.measured_response import ResponseResult
+from analyses.identification.two_mass import NAMES, angle_responses
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section
 from reports.sections.identified import judged, parameter_table, value_words
 from reports.sections.record_tables import finding_table, input_table
-
-if TYPE_CHECKING:
-    from analyses.identification.frequency_bench import FrequencyResult
-    from analyses.identification.measured_response import ResponseResult
 
 
 def section(result: FrequencyResult) -> Section:
@@ -59,11 +57,9 @@ def of_loop(result: ResponseResult) -> Section:
     blocks: list[Block] = [parameter_table("Identified values", fit)]
     for label, of in (("magnitude", np.abs), ("phase, deg", lambda z: np.degrees(np.angle(z)))):
         chart = Chart(width=style.WIDE, height=280.0)
-        panel = chart.panel()
-        panel.x.log, panel.y.log = True, label == "magnitude"
+        panel = chart.panel("frequency, Hz", label, "xy" if label == "magnitude" else "x")
         panel.points(measured.frequency_hz, of(measured.response), "measured", colour=style.BLUE)
         panel.curve(measured.frequency_hz, of(result.modelled), "identified design", **style.series(1))
-        panel.x.label, panel.y.label = "frequency, Hz", label
         what = label.partition(",")[0].capitalize()
         words = f"{what} of the {SEEN[result.of]} of {result.loop}, measured and fitted"
         blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
@@ -75,9 +71,6 @@ def of_loop(result: ResponseResult) -> Section:
 
 def response_figures(result: FrequencyResult) -> list[Block]:
     """Motor angle (and load angle) over motor torque: measured lines and the model."""
-    from analyses.identification.frequency import response
-    from analyses.identification.two_mass import NAMES, angle_responses
-
     lines, fit = result.lines, result.fit
     own = {name: fit[name] for name in NAMES}
     model = angle_responses(lines.omega_rad_s, own, fit.reduction, fit.reaction)
@@ -88,11 +81,9 @@ def response_figures(result: FrequencyResult) -> list[Block]:
             continue
         measured, _ = response(lines, signal, lines.names[0])
         chart = Chart(width=style.WIDE, height=320.0)
-        panel = chart.panel()
-        panel.x.log = panel.y.log = True
+        panel = chart.panel("frequency, Hz", f"{label} over torque, rad/(N m)", "xy")
         panel.points(hertz, np.abs(measured), "measured", colour=style.BLUE)
         panel.curve(hertz, np.abs(model[k]), "two-mass model", **style.series(1))
-        panel.x.label, panel.y.label = "frequency, Hz", f"{label} over torque, rad/(N m)"
         caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
         alt = f"Magnitude of {label} over motor torque against frequency, measured and fitted"
         figures.append(doc.figure("response", chart, caption=caption, alt=alt))
