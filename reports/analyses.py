@@ -286,7 +286,7 @@ ANALYSES = (
         Identify a drive from bench records, and write the result as a design with
         tolerances.
 
-        Four ways to call it:
+        Five ways to call it:
 
         identify campaign.toml --out result: C0, Cv and CM from the steady parts
         of many runs. A bad run is set aside and named, the others go on.
@@ -299,6 +299,9 @@ ANALYSES = (
 
         identify --frequency-response chirp.csv --play reversal.csv --design my.toml:
         inertias, stiffness, damping and play of a two-mass drive.
+
+        identify --response loop.csv --of T --design my.toml: inertias, stiffness,
+        damping and delay from a measured frequency response of any loop.
 
         identify --plan my.toml --within 2 --out result: motions that make the
         intervals as small as asked; with records after it, what to measure next.

@@ -45,8 +45,10 @@ class Solution:
     condition: float
 
 
-def told_apart(w: FloatArray, names: Sequence[str]) -> tuple[tuple[int, ...], tuple[NotTold, ...]]:
-    """Which columns can be told apart, the first named having the right of way.
+def told_apart(
+    w: FloatArray, names: Sequence[str], *, least: float = LEAST_OWN_SHARE
+) -> tuple[tuple[int, ...], tuple[NotTold, ...]]:
+    """Which columns can be told apart (a share above ``least`` their own), the first named first.
 
     Examples
     --------
@@ -67,7 +69,7 @@ def told_apart(w: FloatArray, names: Sequence[str]) -> tuple[tuple[int, ...], tu
         unit = w[:, k] / size
         rest = unit - sum((b * float(b @ unit) for b in basis), np.zeros(len(unit)))
         own = float(np.linalg.norm(rest))
-        if own < LEAST_OWN_SHARE:
+        if own < least:
             sizes = np.linalg.norm(w[:, kept], axis=0)
             share = np.linalg.lstsq(w[:, kept] / sizes, unit, rcond=None)[0]
             chosen = np.flatnonzero(np.abs(share) > 0.2 * np.abs(share).max())

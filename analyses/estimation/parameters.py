@@ -49,6 +49,7 @@ PARAMETERS = {
     "back_emf": Parameter("Back-EMF constant kE (kM follows)", "V s/rad", "motor.back_emf_constant"),
     "inductance": Parameter("Inductance L", "H", "motor.inductance"),
     "voltage_offset": Parameter("Offset of the voltage", "V"),
+    "delay": Parameter("Computing delay", "s", "control.computing_delay"),
     "C0": Parameter("C0, static", "mN m", "friction.dry_torque", scale=1e3),
     "Cv": Parameter("Cv, viscous", "µN m s/rad", "friction.viscous", scale=1e6),
     "CM": Parameter("CM, load", "mN m/(N m)", "friction.load_coefficient", scale=1e3),

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 Friction = Literal["symmetric", "per-direction", "map"]
 Criterion = Literal["margins", "D"]
+Of = Literal["L", "T", "S", "closed"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +81,21 @@ class Asked(Settings):
         list[Path] | None,
         Option(words="A record the fit does not see; repeatable.", metavar="RECORD"),
     ] = None
+    response: Annotated[
+        bool,
+        Option(words="FILE is a measured frequency response of a loop: inertias, stiffness, damping, delay."),
+    ] = False
+    loop: Annotated[
+        str | None,
+        Option(words="With --response: which stage or break point; the outermost stage.", metavar="NAME"),
+    ] = None
+    response_of: Annotated[
+        Of,
+        Option(
+            words="With --response: L (open loop), T = L/(1+L), S = 1/(1+L), closed (from the command).",
+            flag="of",
+        ),
+    ] = "L"
     frequency_response: Annotated[
         bool, Option(words="Of one record with a periodic excitation: a compliant two-mass drive.")
     ] = False
@@ -128,6 +144,10 @@ class Asked(Settings):
                 raise InputError(f"--{option} {value:g}; allowed: {allowed}")
         if self.frequency_response and len(self.files) != 1:
             raise InputError("--frequency-response takes one record (and --play RECORD for the play)")
+        if self.response and len(self.files) != 1:
+            raise InputError("--response takes one file; allowed: CSV or .mat of a frequency response")
+        if not self.response and (self.loop is not None or self.response_of != "L"):
+            raise InputError("--loop and --of go with --response")
         if self.is_campaign and (self.validate or self.refine):
             raise InputError("--validate and --refine go with records, not with a campaign")
 
@@ -135,7 +155,7 @@ class Asked(Settings):
     def is_campaign(self) -> bool:
         """Whether a single TOML file is given that lists runs, and is no record file."""
         first = self.files[0]
-        alone = len(self.files) == 1 and not (self.frequency_response or self.plan)
+        alone = len(self.files) == 1 and not (self.frequency_response or self.plan or self.response)
         if not alone or first.suffix.lower() != ".toml":
             return False
         from analyses.toml_tables import read_toml
@@ -147,9 +167,11 @@ class Asked(Settings):
         """The design where none is named: the campaign's, looked for beside its file too, or emps."""
         if chosen.get("plan"):
             return str(chosen["files"][0])
-        asked = cls(files=chosen["files"], frequency_response=chosen["frequency_response"])
+        if chosen.get("frequency_response") or chosen.get("response"):
+            return "ilr33-amber"
+        asked = cls(files=chosen["files"])
         if not asked.is_campaign:
-            return "ilr33-amber" if asked.frequency_response else "emps"
+            return "emps"
         from analyses.records.campaign_file import load_campaign
 
         design = load_campaign(asked.files[0]).design

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.fields import field_of
@@ -17,7 +18,7 @@ from analyses.estimation.least_squares import correlated_covariance
 
 STEP = 1e-3
 TOLERANCE = 1e-6
-ITERATIONS = 12
+ITERATIONS = 24
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +37,82 @@ class OutputErrorResult(Fit):
     at_bound: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, kw_only=True)
+class Moved:
+    """Values (SI) with which an output fits best, its slopes over them, shape (n, p), and what is left."""
+
+    values: FloatArray
+    slopes: FloatArray
+    rest: FloatArray
+    first: FloatArray
+    iterations: int
+    at_bound: tuple[str, ...]
+
+
+def fit_output(
+    design: Design,
+    paths: tuple[str, ...],
+    output_of: Callable[[Design], FloatArray],
+    measured: FloatArray,
+    progress: Callable[[int, int], None] | None = None,
+) -> Moved:
+    """The values of some keys, within what each allows, with which an output of a design fits best.
+
+    Least squares by a dogleg in a box (scipy), from the design's own values; the derivative is by central
+    differences of 0.1 % of each value.
+
+    Raises
+    ------
+    InputError
+        For outputs of different shape, or a starting value of zero without a scale.
+    NumericalError
+        If the output does not depend on a parameter.
+    """
+    start = np.array([parameter_value(design, path) for path in paths])
+    scale = np.array([_scale(design, path, value) for path, value in zip(paths, start, strict=True)])
+    fields = [field_of(path) for path in paths]
+    ends = np.array([(-np.inf, np.inf) if field is None else (field.low, field.high) for field in fields]).T
+    count, most = 0, ITERATIONS * (2 * len(paths) + 1)
+
+    def values_at(moved: FloatArray) -> FloatArray:
+        return np.asarray(np.clip(start + scale * (moved - 1.0), *ends))
+
+    def residual(moved: FloatArray) -> FloatArray:
+        nonlocal count
+        values = dict(zip(paths, values_at(moved).tolist(), strict=True))
+        output = output_of(with_values(design, values, check=False))
+        if output.shape != measured.shape:
+            raise InputError(f"output and measurement have the shapes {output.shape} and {measured.shape}")
+        count += 1
+        if progress is not None:
+            progress(min(count, most), most)
+        return np.asarray(measured - output)
+
+    begin = np.ones(len(paths))
+    first = residual(begin)
+    found = least_squares(
+        residual,
+        begin,
+        jac="3-point",
+        bounds=1.0 + (ends - start) / scale,
+        method="dogbox",
+        diff_step=STEP,
+        xtol=TOLERANCE,
+        max_nfev=ITERATIONS,
+    )
+    dead = np.flatnonzero(np.linalg.norm(found.jac, axis=0) <= 1e-12 * np.linalg.norm(found.fun))
+    if len(dead):
+        raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
+    return Moved(
+        values=values_at(found.x),
+        slopes=found.jac / scale,
+        rest=found.fun,
+        first=first,
+        iterations=int(found.njev),
+        at_bound=tuple(path for path, side in zip(paths, found.active_mask, strict=True) if side),
+    )
+
+
 def refine_by_output_error(
     design: Design,
     paths: tuple[str, ...],
@@ -45,15 +122,12 @@ def refine_by_output_error(
     ends: Sequence[int] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> OutputErrorResult:
-    """Refine parameters so that the simulated output fits the measured one in the least-squares sense.
-
-    Gauss-Newton with halved steps, starting from the design's own values (an inverse-model estimate). The
-    derivative is by central differences of 0.1 % of each value.
+    """Refine parameters so that the simulated output fits the measured one, as `fit_output`.
 
     Parameters
     ----------
     design : Design
-        Holds the starting values.
+        Holds the starting values (an inverse-model estimate).
     paths : tuple of str
         Dotted keys to refine.
     simulate_output : callable
@@ -61,103 +135,35 @@ def refine_by_output_error(
     measured : array, shape (n,)
     ends : sequence of int, optional
         Where each record ends in it.
-
-    Raises
-    ------
-    InputError
-        For outputs of different shape, or where all starting values are zero (then there is no scale).
-    NumericalError
-        If the output does not depend on a parameter.
     """
-    start = np.array([parameter_value(design, path) for path in paths])
-    scale = np.array([_scale(design, path, value) for path, value in zip(paths, start, strict=True)])
-
-    def values_at(moved: FloatArray) -> dict[str, float]:
-        result = start + scale * (moved - 1.0)
-        return {path: _allowed(path, float(v)) for path, v in zip(paths, result, strict=True)}
-
-    def within(moved: FloatArray) -> FloatArray:
-        return 1.0 + (np.array(list(values_at(moved).values())) - start) / scale
-
-    def residual(moved: FloatArray) -> FloatArray:
-        output = simulate_output(with_values(design, values_at(moved), check=False))
-        if output.shape != measured.shape:
-            raise InputError(f"output and measurement have the shapes {output.shape} and {measured.shape}")
-        return np.asarray(measured - output)
-
-    p, rest, jac, iterations, first = _gauss_newton(residual, within, paths, progress)
-    covariance = correlated_covariance(jac, rest, ends) * np.outer(scale, scale)
-    values = values_at(p)
+    found = fit_output(design, paths, simulate_output, measured, progress)
     norm = float(np.linalg.norm(measured))
+    values = dict(zip(paths, found.values.tolist(), strict=True))
     return OutputErrorResult(
         names=paths,
-        values=np.array(list(values.values())),
-        covariance=covariance,
-        error_before=float(np.linalg.norm(first)) / norm,
-        error_after=float(np.linalg.norm(rest)) / norm,
-        iterations=iterations,
+        values=found.values,
+        covariance=correlated_covariance(found.slopes, found.rest, ends),
+        error_before=float(np.linalg.norm(found.first)) / norm,
+        error_after=float(np.linalg.norm(found.rest)) / norm,
+        iterations=found.iterations,
         design=with_values(design, values, check=False),
-        at_bound=tuple(path for path, value in values.items() if _allowed(path, value, 1e-9) != value),
+        at_bound=found.at_bound,
     )
-
-
-def _gauss_newton(
-    residual: Callable[[FloatArray], FloatArray],
-    within: Callable[[FloatArray], FloatArray],
-    paths: tuple[str, ...],
-    progress: Callable[[int, int], None] | None,
-) -> tuple[FloatArray, FloatArray, FloatArray, int, FloatArray]:
-    p = np.ones(len(paths))
-    rest = first = residual(p)
-    jac = np.zeros((len(rest), len(p)))
-    iteration = 0
-    for iteration in range(1, ITERATIONS + 1):
-        for k in range(len(p)):
-            h = np.zeros(len(p))
-            h[k] = STEP
-            jac[:, k] = (residual(p + h) - residual(p - h)) / (2.0 * STEP)
-        dead = np.flatnonzero(np.linalg.norm(jac, axis=0) <= 1e-12 * np.linalg.norm(rest))
-        if len(dead):
-            raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
-        change = np.asarray(-np.linalg.lstsq(jac, rest, rcond=None)[0])
-        p, rest, moved = _halved_step(residual, within, p, rest, change)
-        if progress is not None:
-            progress(iteration, ITERATIONS)
-        if not moved or np.max(np.abs(change)) < TOLERANCE:
-            break
-    return p, rest, jac, iteration, first
-
-
-def _halved_step(
-    residual: Callable[[FloatArray], FloatArray],
-    within: Callable[[FloatArray], FloatArray],
-    p: FloatArray,
-    rest: FloatArray,
-    change: FloatArray,
-) -> tuple[FloatArray, FloatArray, bool]:
-    """The longest of the full, half, quarter ... steps, within bounds, that makes the residual smaller."""
-    for _ in range(8):
-        tried = residual(within(p + change))
-        if np.linalg.norm(tried) < np.linalg.norm(rest):
-            return within(p + change), tried, True
-        change = 0.5 * change
-    return p, rest, False
 
 
 def _scale(design: Design, path: str, start: float) -> float:
     """What a parameter is measured by: its start, or where that is zero a part of a like one."""
     if start != 0.0:
         return abs(start)
+    period, friction = design.controller.period_s, design.friction
+    stiffness = 0.0 if design.coupling is None else design.coupling.stiffness_Nm_rad
     like = {
-        "friction.offset_torque": 0.1 * design.friction.dry_torque_Nm,
-        "friction.dry_torque": 0.01 * abs(design.friction.offset_torque_Nm),
+        "friction.offset_torque": 0.1 * friction.dry_torque_Nm,
+        "friction.dry_torque": 0.01 * abs(friction.offset_torque_Nm),
+        "friction.viscous": 0.1 * design.inertia_kgm2,
+        "coupling.damping": stiffness * period,
+        "control.computing_delay": period,
     }.get(path, 0.0)
     if like == 0.0:
-        raise InputError(f"{path} = 0: a refinement by simulation needs a start that is not zero")
+        raise InputError(f"{path} = 0: a fit needs a start that is not zero")
     return like
-
-
-def _allowed(path: str, value: float, off: float = 0.0) -> float:
-    """A tried value, kept within what its key allows (and ``off`` its ends)."""
-    field = field_of(path)
-    return value if field is None else min(max(value, field.low + off), field.high - off)

@@ -15,6 +15,7 @@ from analyses.identification.campaign import CampaignResult, campaign_items, ide
 from analyses.identification.campaign_design import CampaignSuggestion, suggest_runs
 from analyses.identification.contributions import Contribution, contributions
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
+from analyses.identification.measured_response import ResponseResult, identify_response
 from analyses.identification.plan import Plan, plan_motions
 from analyses.identification.resimulation import steady_current_error
 from analyses.identification.surface_fit import NAMES
@@ -39,7 +40,7 @@ class CampaignAnswer(Identified):
 
 def identify(
     design: Design, asked: Asked, *, progress: Progress | None = None
-) -> BenchResult | CampaignAnswer | FrequencyResult | Plan:
+) -> BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan:
     """Identify a drive from its records, and hold the design that comes of it against them.
 
     Raises
@@ -49,7 +50,15 @@ def identify(
     """
     if asked.plan:
         return _planned(design, asked, progress)
-    of = _of_campaign if asked.is_campaign else _of_response if asked.frequency_response else _of_records
+    of = (
+        _of_response
+        if asked.response
+        else _of_campaign
+        if asked.is_campaign
+        else _of_sweep
+        if asked.frequency_response
+        else _of_records
+    )
     return replace(of(design, asked, progress), accepted=asked.accept)
 
 
@@ -71,11 +80,23 @@ def _planned(design: Design, asked: Asked, progress: Progress | None) -> Plan:
     return plan_motions(design, within=within, noise=noise, measured=measured, progress=progress)
 
 
-def _of_response(design: Design, asked: Asked, _: Progress | None) -> FrequencyResult:
+def _of_sweep(design: Design, asked: Asked, _: Progress | None) -> FrequencyResult:
     play = None if asked.play is None else open_record(asked.play)
     fixed = fixed_values(design, asked.fix)
     record = open_record(asked.files[0])
     return identify_frequency(design, record, play_record=play, period_s=asked.period_s, fixed=fixed)
+
+
+def _of_response(design: Design, asked: Asked, progress: Progress | None) -> ResponseResult:
+    return identify_response(
+        design,
+        asked.files[0],
+        loop=asked.loop,
+        of=asked.response_of,
+        fixed=fixed_values(design, asked.fix),
+        limit=asked.residual_limit / 100.0,
+        progress=progress,
+    )
 
 
 def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> CampaignAnswer:

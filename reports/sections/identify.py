@@ -7,6 +7,7 @@ from pathlib import Path
 from actuator_lti.files.atomic import write_text
 from analyses.identification.bench import BenchResult
 from analyses.identification.frequency_bench import FrequencyResult
+from analyses.identification.measured_response import ResponseResult
 from analyses.identification.plan import Plan
 from analyses.identification.run import CampaignAnswer
 from analyses.identification.verdict import Identified
@@ -14,7 +15,7 @@ from reports.document_schema import Section
 from reports.sections import identify_campaign, identify_plan, identify_records, identify_response
 
 
-def section(result: BenchResult | CampaignAnswer | FrequencyResult | Plan) -> Section:
+def section(result: BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan) -> Section:
     """Make the section."""
     if isinstance(result, Plan):
         return identify_plan.section(result)
@@ -22,6 +23,8 @@ def section(result: BenchResult | CampaignAnswer | FrequencyResult | Plan) -> Se
         return identify_records.section(result)
     if isinstance(result, FrequencyResult):
         return identify_response.section(result)
+    if isinstance(result, ResponseResult):
+        return identify_response.of_loop(result)
     return identify_campaign.section(result)
 
 

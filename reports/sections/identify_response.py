@@ -1,11 +1,13 @@
-"""The identification of a two-mass drive: parameters, resonances, play, and the response with its fit."""
+"""Identifications by a frequency response: of a two-mass drive by its lines, of a design by a loop's."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from analyses.estimation.parameters import parameter
 from analyses.identification.frequency import response
 from analyses.identification.frequency_bench import FrequencyResult
+from analyses.identification.measured_response import ResponseResult
 from analyses.identification.two_mass import NAMES, angle_responses
 from reports import document as doc
 from reports.charts import style
@@ -35,6 +37,35 @@ def section(result: FrequencyResult) -> Section:
         words += f", play {2e3 * result.play.half_rad:.3g} mrad"
     return judged(
         "frequency-identification", "Two-mass drive", result, blocks, result=f"{words}.", intro=intro
+    )
+
+
+SEEN = {"L": "open loop", "T": "closed loop L/(1+L)", "S": "sensitivity", "closed": "command to output"}
+
+
+def of_loop(result: ResponseResult) -> Section:
+    """Make the section of a design that was fitted to a measured response of one of its loops."""
+    fit, measured = result.fit, result.measured
+    noise = "no deviations were measured: errors are those of the residual"
+    if fit.misfit is not None:
+        noise = f"misfit {fit.misfit:.2f} (1: the measured deviations explain the residual)"
+    intro = (
+        f"{measured.name}: {len(measured.frequency_hz)} frequencies from {measured.frequency_hz[0]:.4g} to "
+        f"{measured.frequency_hz[-1]:.4g} Hz, {SEEN[result.of]} of {result.loop}; least squares of the exact "
+        f"sampled loop, {noise}."
+    )
+    blocks: list[Block] = [parameter_table("Identified values", fit)]
+    for label, of in (("magnitude", np.abs), ("phase, deg", lambda z: np.degrees(np.angle(z)))):
+        chart = Chart(width=style.WIDE, height=280.0)
+        panel = chart.panel("frequency, Hz", label, "xy" if label == "magnitude" else "x")
+        panel.points(measured.frequency_hz, of(measured.response), "measured", colour=style.BLUE)
+        panel.curve(measured.frequency_hz, of(result.modelled), "identified design", **style.series(1))
+        what = label.partition(",")[0].capitalize()
+        words = f"{what} of the {SEEN[result.of]} of {result.loop}, measured and fitted"
+        blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
+    found = "; ".join(f"{parameter(name).key} {value_words(fit, name)}" for name in fit.names)
+    return judged(
+        "response-identification", "Measured response", result, blocks, result=f"{found}.", intro=intro
     )
 
 

@@ -1,0 +1,241 @@
+"""Inertias, stiffness, damping and delay of a design from a measured frequency response of a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from actuator_lti.design import parameter_value, paths_of, read_design_text, write_design
+from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.wiring import wire
+from actuator_lti.errors import InputError
+from actuator_lti.files.response import RecordedResponse, read_response
+from actuator_lti.loops import sampled
+from analyses.estimation.arrays import ComplexArray, FloatArray
+from analyses.estimation.fit import Fit, Fixed
+from analyses.estimation.least_squares import told_apart
+from analyses.identification.asked import Of
+from analyses.identification.output_error import Moved, fit_output
+from analyses.identification.to_design import design_with_fit, with_fixed
+from analyses.identification.verdict import Identified, Item, simulated_item
+
+KEYS = (
+    "motor.rotor_inertia",
+    "load.inertia",
+    "coupling.stiffness",
+    "coupling.damping",
+    "friction.viscous",
+    "control.computing_delay",
+)
+LEVEL = 1e-3
+"""Probability with which noise of the stated size alone fails a response."""
+RESOLVED = 1e-5
+"""Share of a slope that is its own, by differences of 0.1 %: below it two values do the same."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResponseFit(Fit):
+    """Values by key with which a loop's response is the measured one.
+
+    ``misfit`` is the root of the mean squared residual over its deviation, None where none was measured.
+    Errors are widened by a misfit above 1; without deviations they are those of the residual.
+    """
+
+    misfit: float | None
+    at_bound: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResponseResult(Identified):
+    """What a measured response told of a design, and the response of the design that comes of it."""
+
+    measured: RecordedResponse = field(repr=False)
+    modelled: ComplexArray = field(repr=False)
+    loop: str
+    of: Of
+    fit: ResponseFit
+
+
+def identify_response(
+    design: Design,
+    source: Path | str | Any,
+    *,
+    loop: str | None = None,
+    of: Of = "L",
+    fixed: Mapping[str, float] | None = None,
+    limit: float = 0.2,
+    progress: Callable[[int, int], None] | None = None,
+) -> ResponseResult:
+    """Fit a design to a measured frequency response of one of its loops.
+
+    Parameters
+    ----------
+    design : Design
+        Its loops, sampled and exact, are the model; other values than those of `KEYS` are kept. What the
+        response does not determine (a standard error above the value itself) is kept too, and said.
+    source : path or control.FrequencyResponseData
+        See `actuator_lti.files.response.read_response`.
+    loop : str, optional
+        A stage (``"position"``) or a break point (``"w_ref"``); the outermost stage by default.
+    of : {"L", "T", "S", "closed"}
+        Open loop, L/(1 + L), 1/(1 + L), or from the command to the output with all that is fed forward.
+    fixed : mapping, optional
+        Keys held at a value.
+    limit : float
+        Largest relative error of the design's response, root mean square over the frequencies.
+
+    Raises
+    ------
+    InputError
+        If the response cannot be read, the design has no such loop, or nothing is determined.
+    """
+    measured = read_response(source)
+    start = with_fixed(design, dict(fixed or {}))
+    model = _model(start, loop, of, measured)
+    known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
+    size = np.abs(measured.response) * (measured.deviation / np.sqrt(2.0) if known else 1.0)
+
+    def parts(tried: Design) -> FloatArray:
+        return _parts(model(tried) / size)
+
+    held = {key: Fixed(value=value, reason="fixed as asked") for key, value in (fixed or {}).items()}
+    names = tuple(key for key in KEYS if key in paths_of(start) and key not in held)
+    fit, rest = _determined(start, names, parts, _parts(measured.response / size), known, progress)
+    fit = replace(fit, fixed={**held, **fit.fixed})
+    made = design_with_fit(start, fit, f"frequency response {measured.name}")
+    text = write_design(made)
+    modelled = model(read_design_text(text))
+    error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
+    return ResponseResult(
+        design=made,
+        text=text,
+        items=(
+            *_noise_items(fit, rest),
+            simulated_item(measured.name, error, limit, "its response, rms over the frequencies"),
+            *(_bound_item(key) for key in fit.at_bound),
+        ),
+        measured=measured,
+        modelled=modelled,
+        loop=loop or design.controller.outermost,
+        of=of,
+        fit=fit,
+    )
+
+
+def _model(
+    design: Design, loop: str | None, of: Of, measured: RecordedResponse
+) -> Callable[[Design], ComplexArray]:
+    """The response of a design's loop at the measured frequencies."""
+    wired = wire(design, Operating())
+    name = loop or wired.outermost
+    if name not in (*wired.stages, *wired.points):
+        allowed = ", ".join((*wired.stages, *wired.points))
+        raise InputError(f'--loop "{name}": allowed: {allowed}', where=design.name)
+    top = 0.5 / _seen(design, name, of).dt
+    if not measured.frequency_hz[-1] < top:
+        raise InputError(
+            f"{measured.frequency_hz[-1]:g} Hz: the loop is sampled; allowed: below {top:g} Hz", measured.name
+        )
+
+    def response(tried: Design) -> ComplexArray:
+        system = _seen(tried, name, of)
+        value = np.asarray(system(np.exp(2j * np.pi * measured.frequency_hz * system.dt))).ravel()
+        over = {"T": value, "S": np.ones_like(value)}.get(of)
+        return np.asarray(value if over is None else over / (1.0 + value), dtype=np.complex128)
+
+    return response
+
+
+def _seen(design: Design, name: str, of: Of) -> Any:
+    wired = wire(design, Operating())
+    if of == "closed":
+        return sampled.reference_to_output(wired)
+    make = sampled.stage_loop if name in wired.stages else sampled.point_loop
+    return make(wired, name).open_loop
+
+
+def _parts(values: ComplexArray) -> FloatArray:
+    return np.concatenate([values.real, values.imag])
+
+
+def _determined(
+    start: Design,
+    names: tuple[str, ...],
+    parts: Callable[[Design], FloatArray],
+    measured: FloatArray,
+    known: bool,
+    progress: Callable[[int, int], None] | None,
+) -> tuple[ResponseFit, FloatArray]:
+    """The fit of what is determined, and its residual; of the others the one told worst goes first."""
+    left: dict[str, str] = {}
+    while names:
+        found = fit_output(start, names, parts, measured, progress)
+        kept, like = told_apart(found.slopes, names, least=RESOLVED)
+        if like:
+            left |= {one.name: str(one) for one in like}
+            names = tuple(names[k] for k in kept)
+            continue
+        covariance, misfit = _covariance(found, known)
+        share = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(found.values), 1e-300)
+        worst = int(np.argmax(share))
+        if share[worst] <= 1.0:
+            return _fit(start, names, found, covariance, misfit, left), found.rest
+        left[names[worst]] = "its standard error is larger than the value"
+        names = tuple(name for name in names if name != names[worst])
+    raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)
+
+
+def _fit(
+    start: Design,
+    names: tuple[str, ...],
+    found: Moved,
+    covariance: FloatArray,
+    misfit: float | None,
+    left: Mapping[str, str],
+) -> ResponseFit:
+    fixed = {
+        key: Fixed(
+            value=parameter_value(start, key), reason=f"{why}: not determined, the design's value kept"
+        )
+        for key, why in left.items()
+    }
+    return ResponseFit(
+        names=names,
+        values=found.values,
+        covariance=covariance,
+        fixed=fixed,
+        misfit=misfit,
+        at_bound=found.at_bound,
+    )
+
+
+def _covariance(found: Moved, known: bool) -> tuple[FloatArray, float | None]:
+    """Of the values, by residuals of unit deviation or by their own scatter; and the misfit."""
+    size = np.linalg.norm(found.slopes, axis=0)
+    unit = found.slopes / size
+    variance = float(found.rest @ found.rest) / max(len(found.rest) - len(size), 1)
+    scale = max(variance, 1.0) if known else variance
+    inverse = np.linalg.inv(unit.T @ unit) / np.outer(size, size)
+    return np.asarray(scale * inverse), float(np.sqrt(variance)) if known else None
+
+
+def _noise_items(fit: ResponseFit, rest: FloatArray) -> list[Item]:
+    """Whether noise of the stated deviation explains what is left."""
+    if fit.misfit is None:
+        return []
+    level = float(chi2.sf(float(rest @ rest), len(rest) - len(fit.names)))
+    label = f"The measured deviations explain what is left (misfit {fit.misfit:.3g})"
+    reason = f"by chance with a probability of {level:.1g}: another drive, or at another operating point"
+    passed = level > LEVEL
+    return [Item(id="misfit", label=label, passed=passed, reason="" if passed else reason)]
+
+
+def _bound_item(key: str) -> Item:
+    reason = "it ended at the least or largest value of its key: the response wants another"
+    return Item(id=f"bound-{key}", label=f"{key} is within what its key allows", passed=False, reason=reason)

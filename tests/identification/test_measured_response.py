@@ -1,0 +1,164 @@
+"""A design fitted to measured responses: the truth is the exact sampled loop from matrix exponentials."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from actuator_lti.design import load_design, parameter_value
+from analyses.identification.measured_response import ResponseResult, identify_response
+from tests.identification.bench_records import Command
+
+TICK, GAIN, N = 1e-3, 0.8, 50.0
+TRUTH = {
+    "motor.rotor_inertia": 2e-5,
+    "load.inertia": 0.04,
+    "coupling.stiffness": 900.0,
+    "coupling.damping": 0.9,
+    "friction.viscous": 4e-4,
+    "control.computing_delay": 0.6e-3,
+}
+COUPLED = """
+[design]
+name = "two-mass"
+revision = "1"
+[motor]
+source_gain = "1 N*m/V"
+rotor_inertia = "{J} kg*m^2"
+[[gear]]
+name = "gear"
+ratio = 50
+[coupling]
+stiffness = "{k} N*m/rad"
+damping = "{c} N*m*s/rad"
+[load]
+path = "back-drivable"
+inertia = "{Jl} kg*m^2"
+[friction]
+viscous = "{C} N*m*s/rad"
+[encoder]
+speed = "ideal"
+[limits]
+voltage = "10 V"
+[control]
+period = "1 ms"
+computing_delay = "{d} s"
+[control.position]
+gain = "0.8 V/rad"
+"""
+
+
+def _design(folder: Path, off: dict[str, float]) -> Path:
+    J, Jl, k, c, C, d = (value * off.get(key, 1.0) for key, value in TRUTH.items())
+    (folder / "start.toml").write_text(COUPLED.format(J=J, Jl=Jl, k=k, c=c, C=C, d=d))
+    return folder / "start.toml"
+
+
+def open_loop(hertz: np.ndarray) -> np.ndarray:
+    """P control of the motor angle, held over a tick and late by a part of it (Astrom, Wittenmark, 3.2)."""
+    J, Jl, k, c, C, d = TRUTH.values()
+    spring = np.array([k / N, c / N, -k, -c])  # of motor angle and speed, load angle and speed
+    a = np.zeros((4, 4))
+    a[0, 1] = a[2, 3] = 1.0
+    a[1] = (-spring / N - C * np.eye(4)[1]) / J
+    a[3] = spring / Jl
+    b = np.array([0.0, 1.0 / J, 0.0, 0.0])
+
+    def held(span: float) -> tuple[np.ndarray, np.ndarray]:
+        whole = expm(np.block([[a, b[:, None]], [np.zeros((1, 5))]]) * span)
+        return whole[:4, :4], whole[:4, 4]
+
+    whole, _ = held(TICK)
+    rest, new = held(TICK - d)
+    old = rest @ held(d)[1]
+    z = np.exp(2j * np.pi * hertz * TICK)
+    return np.array([GAIN * np.linalg.solve(s * np.eye(4) - whole, new + old / s)[0] for s in z])
+
+
+HERTZ = np.geomspace(0.5, 400.0, 60)
+OFF = dict(zip(TRUTH, (1.15, 0.85, 1.1, 0.7, 1.3, 0.8), strict=True))
+
+
+def _seen(of: str) -> np.ndarray:
+    loop = open_loop(HERTZ)
+    return {"L": loop, "T": loop / (1.0 + loop), "S": 1.0 / (1.0 + loop)}[of]
+
+
+def _measured(folder: Path, of: str, deviation: float, seed: int, *, stated: bool = True) -> Path:
+    noise = np.random.default_rng(seed).standard_normal((2, len(HERTZ))) / np.sqrt(2.0)
+    value = _seen(of) * (1.0 + deviation * (noise[0] + 1j * noise[1]))
+    columns = {"frequency_hz": HERTZ, "real": value.real, "imag": value.imag}
+    if stated:
+        columns["deviation"] = np.full(len(HERTZ), deviation)
+    path = folder / "response.csv"
+    table = np.column_stack(list(columns.values()))
+    np.savetxt(path, table, delimiter=",", header=",".join(columns), comments="")
+    return path
+
+
+def _found(folder: Path, *measured: object, **options: object) -> ResponseResult:
+    file = _measured(folder, *measured, stated=bool(options.pop("stated", True)))  # type: ignore[arg-type]
+    return identify_response(load_design(_design(folder, OFF)), file, of=measured[0], **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("of", ["L", "T", "S"])
+def test_a_response_without_noise_gives_the_truth(of: str, tmp_path) -> None:
+    result = _found(tmp_path, of, 1e-7, 0, stated=False)
+    for key, value in TRUTH.items():
+        assert result.fit[key] == pytest.approx(value, rel=1e-4), key
+        assert parameter_value(result.design, key) == pytest.approx(result.fit[key], rel=1e-6)
+    assert result.passed
+
+
+def test_intervals_hold_what_they_say(tmp_path) -> None:
+    """Errors over their standard errors: mean square 1 within 3 sigma of chi-square, misfit as well."""
+    results = [_found(tmp_path, of, 0.01, seed) for seed, of in enumerate("LLLTTS")]
+    shares = [(one.fit[key] - TRUTH[key]) / one.fit.std(key) for one in results for key in one.fit.names]
+    assert len(shares) == 6 * len(TRUTH)
+    assert abs(np.mean(np.square(shares)) - 1.0) < 3.0 * np.sqrt(2.0 / len(shares))
+    assert [one.fit.misfit for one in results] == pytest.approx([1.0] * 6, abs=3.0 * np.sqrt(0.5 / 114))
+    assert all(one.passed for one in results)
+
+
+def test_what_a_response_does_not_determine_is_kept_and_said(tmp_path) -> None:
+    """A rigid drive: two inertias on one shaft; far too much noise: the small values drown."""
+    rigid = COUPLED.replace('[coupling]\nstiffness = "{k} N*m/rad"\ndamping = "{c} N*m*s/rad"\n', "")
+    design = tmp_path / "rigid.toml"
+    design.write_text(rigid.format(J=2e-5, Jl=0.04, C=4e-4, d=6e-4))
+    file = _measured(tmp_path, "L", 0.01, 0)
+    hertz, total = HERTZ[HERTZ < 4.0], 2e-5 + 0.04 / N**2
+    rows = [f"{f},{v.real},{v.imag},0.01" for f, v in zip(hertz, open_loop(hertz), strict=True)]
+    file.write_text("f_hz,re,im,deviation\n" + "\n".join(rows))
+    fit = identify_response(load_design(design), file).fit
+    assert "motor.rotor_inertia" in fit.fixed or "load.inertia" in fit.fixed
+    inertia = fit["motor.rotor_inertia"] + fit["load.inertia"] / N**2
+    assert inertia == pytest.approx(total, rel=0.02)
+    assert all("not determined, the design's value kept" in one.reason for one in fit.fixed.values())
+
+
+def test_another_drive_than_the_model_fails(tmp_path, command: Command) -> None:
+    """A stiffness that is held at half: no other values make up for it, and the page says so."""
+    file, design = _measured(tmp_path, "L", 0.01, 3), _design(tmp_path, OFF)
+    words = ("identify", "--response", file, "--design", design, "--json", "--out", tmp_path / "o")
+    assert command(*words).status == 0
+    status, out, _ = command(*words, "--fix", "coupling.stiffness=450")
+    result = json.loads(out)
+    assert status == 1
+    assert result["fit"]["misfit"] > 5.0
+    assert next(item["passed"] for item in result["items"]) is False
+
+
+@pytest.mark.parametrize(
+    ("more", "reason"),
+    [
+        (("--loop", "speed"), 'speed": allowed: position'),
+        (("--of", "X"), "'L', 'T', 'S', 'closed'"),
+        (("--fix", "motor.resistance=1"), "motor.resistance"),
+    ],
+)
+def test_what_cannot_be_is_refused(more: tuple[str, ...], reason: str, tmp_path, command: Command) -> None:
+    file, design = _measured(tmp_path, "L", 0.01, 0), _design(tmp_path, {})
+    status, _, err = command("identify", "--response", file, "--design", design, *more)
+    assert (status, reason in err) == (2, True), err
