@@ -52,31 +52,31 @@ export const beside = (label, name, { period }) => {
   return curves;
 };
 const CURVES = [["bode", 0, ""], ["bode", 1, ""], ["nyquist", 0, ""], ["sensitivity", 0, "S "], ["sensitivity", 0, "T "], ["step", 0, ""]];
-export const without = (label) => { for (const [figure, panel, of] of CURVES) tell(figure, "chart:redraw", { panel, curve: of + label, x: [], y: [] }); };
+export const without = (label) => { for (const [figure, panel, of] of CURVES) tell(figure, "redraw", { panel, curve: of + label, x: [], y: [] }); };
 export const thinned = (count, most = 700) => Math.max(1, Math.ceil(count / most));
 export const draw = (label, { curves, step, period }, name) => {
   const { hertz } = kept[name], keep = curves && near(curves);
   if (curves) {
-    tell("bode", "chart:redraw", { panel: 0, curve: label, x: hertz, y: curves.gain });
-    tell("bode", "chart:redraw", { panel: 1, curve: label, x: hertz, y: curves.phase });
+    tell("bode", "redraw", { panel: 0, curve: label, x: hertz, y: curves.gain });
+    tell("bode", "redraw", { panel: 1, curve: label, x: hertz, y: curves.phase });
     const cut = (list) => list.map((value, k) => (keep[k] ? value : NaN));
-    tell("nyquist", "chart:redraw", { panel: 0, curve: label, x: cut(curves.re), y: cut(curves.im), parameter: hertz });
-    tell("sensitivity", "chart:redraw", { panel: 0, curve: "S " + label, x: hertz, y: curves.s });
-    tell("sensitivity", "chart:redraw", { panel: 0, curve: "T " + label, x: hertz, y: curves.t });
+    tell("nyquist", "redraw", { panel: 0, curve: label, x: cut(curves.re), y: cut(curves.im), parameter: hertz });
+    tell("sensitivity", "redraw", { panel: 0, curve: "S " + label, x: hertz, y: curves.s });
+    tell("sensitivity", "redraw", { panel: 0, curve: "T " + label, x: hertz, y: curves.t });
   }
   if (!step) return;
   const T = period * 1e3, stride = thinned(step.length);
   const at = step.map((_, k) => k).filter((k) => k % stride === 0);
-  tell("step", "chart:redraw", { panel: 0, curve: label, x: at.map((k) => k * T), y: at.map((k) => step[k]) });
+  tell("step", "redraw", { panel: 0, curve: label, x: at.map((k) => k * T), y: at.map((k) => step[k]) });
 };
 export const range = (list, low, high) => [Math.max(low, Math.min(...list.filter(Number.isFinite))), Math.min(high, Math.max(...list.filter(Number.isFinite)))];
 export const frame = (name) => {
   const part = kept[name], ends = [part.hertz[0], part.hertz[part.hertz.length - 1]], { gain, phase, s, t } = part.curves;
   const [low, high] = range(gain, -90, 90), [lag, lead] = range(phase, -900, 180), [, peak] = range([...s, ...t], -60, 60);
-  tell("bode", "chart:axes", { panel: 0, x: ends, y: [Math.max(low, high - 100) - 6, high + 12] });
-  tell("bode", "chart:axes", { panel: 1, x: ends, y: [lag - 60, lead + 30] });
-  tell("sensitivity", "chart:axes", { panel: 0, x: ends, y: [-45, Math.max(peak, 3) + 9] });
+  tell("bode", "axes", { panel: 0, x: ends, y: [Math.max(low, high - 100) - 6, high + 12] });
+  tell("bode", "axes", { panel: 1, x: ends, y: [lag - 60, lead + 30] });
+  tell("sensitivity", "axes", { panel: 0, x: ends, y: [-45, Math.max(peak, 3) + 9] });
   const end = part.count * desk.before.loops[name].period * 1e3;
-  tell("step", "chart:axes", { panel: 0, x: [0, end], y: [-0.1, Math.max(1.5, Math.max(...(part.step || [1])) + 0.2)] });
-  tell("step", "chart:redraw", { panel: 0, curve: "command", x: [0, end], y: [1, 1] });
+  tell("step", "axes", { panel: 0, x: [0, end], y: [-0.1, Math.max(1.5, Math.max(...(part.step || [1])) + 0.2)] });
+  tell("step", "redraw", { panel: 0, curve: "command", x: [0, end], y: [1, 1] });
 };
