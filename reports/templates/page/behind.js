@@ -19,7 +19,7 @@ const nextPiece = () => {
 export const fillBehind = () => {
   clearTimeout(waits);
   root.dataset.behind = "waits";
-  pieces = [...(desk.late ? [runLate] : []), ...timedPieces(desk.now), ...periodicPieces(desk.before), ...(desk.now === desk.before ? [] : periodicPieces(desk.now)), table, sideBySide, ...mapPieces(desk.now)];
+  pieces = [...(desk.late ? [runLate] : []), ...timed(desk.now), ...[...new Set([desk.before, desk.now])].flatMap(periodic), table, sideBySide, ...mapPieces(desk.now)];
   waits = setTimeout(nextPiece, QUIET);
 };
 const runLate = () => { // taken when it runs: what waits may be listed anew before
@@ -65,8 +65,8 @@ const left = (found, of, waits, stage, timed) => Object.keys(found[of]).filter((
   found[of][name] = figures(stage(name), timed);
   if (timed) state();
 });
-const timedPieces = (found) => left(found, "loops", ({ waits }) => waits, stageOf, 1);
-const periodicPieces = (found) => left(found, "points", ({ n }) => n === BEHIND, (name) => data.points[name], 0);
+const timed = (found) => left(found, "loops", ({ waits }) => waits, stageOf, 1);
+const periodic = (found) => left(found, "points", ({ n }) => n === BEHIND, (name) => data.points[name], 0);
 // the map is computed only where somebody may see it
 export const watchMap = () => {
   new IntersectionObserver(([entry]) => {

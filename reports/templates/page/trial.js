@@ -60,45 +60,42 @@ const measure = () => { // how long the run takes: that of a step, as designed, 
 /** @type {() => [number, string]} */
 export const unitOf = () => (trial.span < 2 ? [1e3, "ms"] : [1, "s"]);
 const traceOf = (part, name) => (name === "output" ? part.y.map((value) => value * scaleOf() / factor) : part[name]);
-const rangeOf = (lists) => lists.reduce(([low, high], list) => list.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [low, high]), [0, 0]);
-const draw = (label, part, panel, values) => {
-  const [unit] = unitOf(), stride = thinned(values.length, 700), at = [];
-  for (let k = 0; k < values.length; k += stride) at.push(k);
-  tell("run", "redraw", { panel, curve: label, x: at.map((k) => k * part.T * unit), y: at.map((k) => values[k]) });
+const rangeOf = (lists, within = [-Infinity, Infinity]) => { // 0 is always in it
+  const ends = [0, 0];
+  for (const list of lists) for (const value of list) { ends[0] = Math.min(ends[0], value); ends[1] = Math.max(ends[1], value); }
+  return ends.map((end) => Math.min(Math.max(end, within[0]), within[1]));
+};
+const draw = (curve, part, panel, values) => {
+  const stride = thinned(values.length), at = Array.from({ length: Math.ceil(values.length / stride) }, (_, k) => k * stride);
+  tell("run", "redraw", { panel, curve, x: at.map((k) => k * part.T * unitOf()[0]), y: at.map((k) => values[k]) });
 };
 // where a limit acts is shaded in the panel of what it limits, where the motor sticks in that of the speed
 const PLACES = { w_ref: "speed", i_ref: "current", i: "current", u: "voltage" };
 const shade = (part, ends) => {
-  const [unit] = unitOf(), gap = Math.ceil(part.flags.length / 400), cells = TRACES.map(() => []);
-  const acting = [...data.limiters, ["stick", data.places.stick, "motor sticks", "w_ref"]];
-  for (const [name, bit, words, signal] of acting) {
-    const panel = Math.max(TRACES.indexOf(PLACES[signal]), name === "profile" ? 0 : 1);
-    for (const [from, to] of spansOf(part.flags, bit, gap)) cells[name === "profile" ? 0 : panel].push({
-      x: [from * part.T * unit, to * part.T * unit], y: ends[name === "profile" ? 0 : panel], colour: name === "stick" ? "muted" : data.map?.colours[name] ?? "c5", words,
-    });
-  }
-  cells.forEach((list, panel) => tell("run", "cells", { panel, cells: list }));
+  const over = part.T * unitOf()[0], gap = Math.ceil(part.flags.length / 400);
+  const acting = [...data.limiters, ["stick", data.places.stick, "motor sticks", "w_ref"]].map(([name, bit, words, signal]) => ({
+    bit, words, colour: name === "stick" ? "muted" : data.map?.colours[name] ?? "c5", panel: name === "profile" ? 0 : Math.max(TRACES.indexOf(PLACES[signal]), 1),
+  }));
+  ends.forEach((y, panel) => tell("run", "cells", { panel, cells: acting.filter((one) => one.panel === panel).flatMap(({ bit, words, colour }) => spansOf(part.flags, bit, gap).map((span) => ({ x: span.map((at) => at * over), y, colour, words }))) }));
 };
 export const drawRuns = (part) => {
   const { designed } = trial;
   if (!part.y?.length || !designed.y?.length) return;
   trial.span = Math.max(trial.length, part.y.length * part.T, designed.y.length * designed.T);
   const [unit, words] = unitOf(), command = commandLine();
+  const dots = desk.record ? [desk.record.time.map((t) => t * unit), desk.record.angle.map((value) => value / factor)] : [[], []];
   const ends = TRACES.map((name, panel) => {
-    const known = traceOf(designed, name), own = traceOf(part, name), first = panel === 0;
-    const [low, high] = rangeOf([known, ...(first ? [command[1], ...(desk.record ? [desk.record.angle.map((value) => value / factor)] : [])] : [])]), span = high - low || 1;
-    const [least, most] = rangeOf([[low, high], own]).map((value) => Math.min(Math.max(value, low - GROWTH * span), high + GROWTH * span));
-    const room = 0.08 * (most - least || 1), y = [least - room, most + room];
+    const known = traceOf(designed, name), own = traceOf(part, name), [low, high] = rangeOf([known, ...(panel ? [] : [command[1], dots[1]])]), span = high - low || 1;
+    const [least, most] = rangeOf([[low, high], own], [low - GROWTH * span, high + GROWTH * span]), room = 0.08 * (most - least || 1), y = [least - room, most + room];
     tell("run", "axes", { panel, x: [0, trial.span * unit], y, words: panel === TRACES.length - 1 ? words : undefined });
     draw("as designed", designed, panel, known);
     draw("as changed", part, panel, own);
     return y;
   });
-  tell("run", "redraw", { panel: 0, curve: "command", x: command[0], y: command[1] });
-  const dots = desk.record ? [desk.record.time.map((t) => t * unit), desk.record.angle.map((value) => value / factor)] : [[], []];
-  tell("run", "redraw", { panel: 0, curve: "measured record", x: dots[0], y: dots[1] });
+  for (const [curve, [x, y]] of [["command", command], ["measured record", dots]]) tell("run", "redraw", { panel: 0, curve, x, y });
   shade(part, ends);
-  find(".hands-run").dataset.last = JSON.stringify(Object.fromEntries([["ticks", part.y.length], ["before", part.before], ...TRACES.map((name) => [name, traceOf(part, name)[part.y.length - 1]])]));
+  const last = part.y.length - 1;
+  find(".hands-run").dataset.last = JSON.stringify({ ticks: last + 1, before: part.before, ...Object.fromEntries(TRACES.map((name) => [name, traceOf(part, name)[last]])) });
 };
 const commandLine = () => {
   const [unit] = unitOf(), rec = desk.record;
