@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from reports.nightly.changes import Change, Columns, Comparison, cause_of
 from reports.nightly.code_version import commits_between
 from reports.nightly.history import History
 from reports.nightly.records import Baseline, Result, Run
 from reports.nightly.tolerance import Tolerances
-from reports.nightly.trend import WINDOW, flaps, may_flap
+from reports.nightly.trend import WINDOW, flaps
 
 SHOWN_CHANGES = 100
 _CODE = Path(__file__).resolve().parents[2]
@@ -83,8 +81,9 @@ class Between:
         if not shown or len(past) < 4:
             return changes
         values = self.history.matrix(past[-WINDOW:], [c.figure for c in shown])
-        maybe = may_flap(values, np.array([c.tolerance for c in shown]))
-        to_and_fro = {c.figure for j, c in enumerate(shown) if maybe[j] and flaps(values[:, j], c.tolerance)}
+        to_and_fro = {
+            c.figure for c, column in zip(shown, values.T, strict=True) if flaps(column, c.tolerance)
+        }
         return tuple(replace(c, flapping=True) if c.figure in to_and_fro else c for c in changes)
 
     def _commits(self, old: Run, new: Run) -> tuple[tuple[str, str], ...]:

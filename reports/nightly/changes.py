@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -64,13 +65,18 @@ class Columns:
 
     def __init__(self, figures: Sequence[Figure], tolerances: Tolerances) -> None:
         self.figures = tuple(figures)
-        pairs = [tolerances.pair(figure) for figure in figures]
-        self.absolute, self.relative = np.array(pairs).reshape(-1, 2).T
-        self.better = np.array([figure.better for figure in figures])
-        self.verdict = np.array([figure.kind == "verdict" for figure in figures], dtype=bool)
         self.names = [figure.name for figure in figures]
-        self.order = np.empty(len(figures), dtype=int)
-        self.order[np.argsort(np.array(self.names), kind="stable")] = np.arange(len(figures))
+        pairs = [tolerances.pair(figure) for figure in figures]
+        self._absolute, self._relative = np.array(pairs).reshape(-1, 2).T
+
+    def allowed(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """How far each figure may move between values, shape (..., figures); NaN where there is none."""
+        return np.maximum(self._absolute, self._relative * np.fmax(np.abs(before), np.abs(after)))
+
+    def moved(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Which figures moved beyond their tolerance, appeared or vanished, shape (..., figures)."""
+        there = np.isfinite(before) | np.isfinite(after)
+        return there & ~(np.abs(after - before) <= self.allowed(before, after))
 
     def compare(self, before: np.ndarray, after: np.ndarray) -> tuple[Change, ...]:
         """List every figure that moved beyond its tolerance, appeared or vanished; the worst first.
@@ -80,30 +86,34 @@ class Columns:
         before, after : ndarray, shape (figures,)
             NaN where a result has no such value.
         """
-        old, new = np.isfinite(before), np.isfinite(after)
-        size = np.fmax(np.abs(before), np.abs(after))
-        tolerance = np.where(self.verdict, 0.5, np.maximum(self.absolute, self.relative * size))
-        delta = after - before
-        moved = np.flatnonzero((old | new) & ~(np.abs(delta) <= tolerance))
-        larger = np.where(np.abs(self.better) == 2, np.abs(after) - np.abs(before), delta)
-        worse = np.where(old & new, larger * self.better < 0.0, False)
-        worse = np.where(self.verdict, (after == 0.0) | (~new & (before == 1.0)), worse)
-        known = self.verdict | (old & new & (self.better != 0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            far = np.nan_to_num(np.abs(delta) / tolerance, nan=np.inf, posinf=np.inf)
-        keys = (self.order[moved], -far[moved], ~self.verdict[moved], ~(worse & known)[moved])
-        rows = (before.tolist(), after.tolist(), tolerance.tolist(), worse.tolist(), known.tolist())
-        return tuple(self._change(k, *rows) for k in moved[np.lexsort(keys)].tolist())
+        moved, allowed = np.flatnonzero(self.moved(before, after)), self.allowed(before, after)
+        changes = [_change(self.figures[k], *map(float, (before[k], after[k], allowed[k]))) for k in moved]
+        return tuple(sorted(changes, key=_order))
 
-    def _change(
-        self, k: int, before: list[float], after: list[float], tolerance: list[float], worse: list[bool],
-        known: list[bool],
-    ) -> Change:  # fmt: skip
-        figure, old, new = self.figures[k], before[k], after[k]
-        return Change(
-            figure=figure.name, unit=figure.unit, kind=figure.kind, before=None if old != old else old,
-            after=None if new != new else new, tolerance=tolerance[k], worse=worse[k] if known[k] else None,
-        )  # fmt: skip
+
+def _change(figure: Figure, before: float, after: float, tolerance: float) -> Change:
+    old, new = (value if math.isfinite(value) else None for value in (before, after))
+    return Change(
+        figure=figure.name, unit=figure.unit, kind=figure.kind, before=old, after=new, tolerance=tolerance,
+        worse=_worse(figure, old, new),
+    )  # fmt: skip
+
+
+def _worse(figure: Figure, old: float | None, new: float | None) -> bool | None:
+    """Whether a change is for the worse; None where no direction is known."""
+    if figure.kind == "verdict":
+        return new == 0.0 or (new is None and old == 1.0)
+    if old is None or new is None or not figure.better:
+        return None
+    larger = abs(new) - abs(old) if abs(figure.better) == 2 else new - old
+    return larger * figure.better < 0.0
+
+
+def _order(change: Change) -> tuple[bool, bool, float, str]:
+    """What got worse first, then verdicts, then what moved by most of its tolerances."""
+    known = change.delta is not None and change.tolerance > 0.0
+    far = abs(change.delta or 0.0) / change.tolerance if known else math.inf
+    return not change.worse, change.kind != "verdict", -far, change.figure
 
 
 def cause_of(

@@ -9,11 +9,11 @@ import numpy as np
 from markupsafe import Markup
 
 from actuator_lti.files.tree import Tree
+from reports.nightly.changes import Columns
 from reports.nightly.charts import line_chart
 from reports.nightly.figures import Figure, Verdict, first_number
 from reports.nightly.history import History
 from reports.nightly.records import Result
-from reports.nightly.tolerance import Tolerances
 from reports.nightly.trend import LOOK_BACK, ChangePoint, change_points, flaps
 from reports.nightly.view import DesignView, Overview
 
@@ -35,46 +35,46 @@ def course_of(night: Overview, design: DesignView, history: History, past: Seque
 
     Requirements are always charted; margins and other figures with a better side only where they moved.
     """
-    good = [r for r in past if r.home is not None]
+    good = [i for i, result in enumerate(past) if result.home is not None]
     if not good:
         return Course()
-    figures = list(history.figures(good[-1]).values())
-    values = history.matrix(past, [figure.name for figure in figures])
-    writer = _Writer(night, design, past)
-    writer.course.moved = _moved(past, values, figures, night.tolerances)
-    for column in sorted(range(len(figures)), key=lambda j: figures[j].kind != "requirement"):
-        figure = figures[column]
-        if figure.kind in ("requirement", "check") or (figure.better and figure.kind == "figure"):
-            writer.add(figure, values[:, column])
-    return writer.course
+    figures = list(history.figures(past[good[-1]]).values())
+    columns = Columns(figures, night.tolerances)
+    values = history.matrix(past, columns.names)
+    moved = columns.moved(values[good[:-1]], values[good[1:]]).sum(axis=1).tolist()
+    course = Course(moved={past[i].run: count for i, count in zip(good[1:], moved, strict=True)})
+    size = np.max(np.abs(np.nan_to_num(values)), axis=0)
+    allowed = columns.allowed(size, size).tolist()
+    of = _Design(design, past, {run.id: run.started for run in night.runs})
+    for k in sorted(range(len(figures)), key=lambda k: figures[k].kind != "requirement"):
+        shown = figures[k].kind in ("requirement", "check") or (
+            figures[k].better and figures[k].kind == "figure"
+        )
+        if shown and np.isfinite(values[:, k]).any():
+            of.add(course, figures[k], values[:, k], allowed[k])
+    return course
 
 
-class _Writer:
-    def __init__(self, night: Overview, design: DesignView, past: Sequence[Result]) -> None:
-        started = {r.id: r.started for r in night.runs}
-        self.course = Course()
-        self.past = past
-        self.tolerances: Tolerances = night.tolerances
-        self.nights = [started[r.run] for r in past]
+class _Design:
+    """A design whose figures are charted."""
+
+    def __init__(self, design: DesignView, past: Sequence[Result], started: Mapping[int, str]) -> None:
+        self.past, self.nights = past, [started[result.run] for result in past]
         self.verdicts: Mapping[str, Verdict] = {f"{v.id}: value": v for v in design.verdicts}
 
-    def add(self, figure: Figure, values: np.ndarray) -> None:
+    def add(self, course: Course, figure: Figure, values: np.ndarray, tolerance: float) -> None:
         """Chart a figure, or count it among the steady ones."""
-        finite = values[np.isfinite(values)]
-        if not len(finite):
-            return
-        tolerance = self.tolerances.of(figure, float(np.max(np.abs(finite))))
         points, to_and_fro = _recent(values, tolerance), flaps(values, tolerance)
-        charts, moved = self.course.charts, bool(points) or to_and_fro
-        if figure.kind != "requirement" and (not moved or len(charts) >= MAX_CHARTS):
-            self.course.steady.append(figure)
+        moved = bool(points) or to_and_fro
+        if figure.kind != "requirement" and (not moved or len(course.charts) >= MAX_CHARTS):
+            course.steady.append(figure)
             return
         for point in points:
-            self.course.marks.setdefault(self.past[point.index].run, []).append((figure, point))
+            course.marks.setdefault(self.past[point.index].run, []).append((figure, point))
         verdict = self.verdicts.get(figure.name)
         title, limit = (verdict.label, first_number(verdict.limit)) if verdict else (figure.name, None)
-        drawn = line_chart(title, figure.unit, self.nights, values, points, limit, f"t{len(charts)}")
-        charts.append(
+        drawn = line_chart(title, figure.unit, self.nights, values, points, limit, f"t{len(course.charts)}")
+        course.charts.append(
             {
                 "title": title,
                 "id": verdict.id if verdict else "",
@@ -90,17 +90,4 @@ def _recent(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ...]:
     """Find the changes of level of the last nights."""
     start = max(len(values) - LOOK_BACK, 0)
     result = change_points(values[start:], tolerance)
-    return tuple(replace(point, index=start + point.index) for point in result) if start else result
-
-
-def _moved(
-    past: Sequence[Result], values: np.ndarray, figures: Sequence[Figure], tolerances: Tolerances
-) -> dict[int, int]:
-    """How many figures moved beyond their tolerance in each night, against the last night with a result."""
-    rows = [i for i, r in enumerate(past) if r.home is not None]
-    if len(rows) < 2:
-        return {}
-    size = np.max(np.abs(np.nan_to_num(values)), axis=0)
-    limits = np.array([tolerances.of(f, float(s)) for f, s in zip(figures, size, strict=True)])
-    steps = np.abs(np.diff(values[rows], axis=0)) > limits
-    return {past[row].run: int(count) for row, count in zip(rows[1:], steps.sum(axis=1), strict=True)}
+    return tuple(replace(point, index=start + point.index) for point in result)

@@ -35,11 +35,6 @@ class Tolerances:
 
     rules: tuple[Rule, ...] = ()
 
-    def of(self, figure: Figure, size: float) -> float:
-        """Tolerance of a figure whose larger value has this size."""
-        absolute, relative = self.pair(figure)
-        return max(absolute, relative * abs(size))
-
     def pair(self, figure: Figure) -> tuple[float, float]:
         """Absolute and relative tolerance of a figure; the larger one counts."""
         if figure.kind == "verdict":

@@ -95,24 +95,6 @@ def flaps(values: np.ndarray, tolerance: float) -> bool:
     return int(np.count_nonzero(returns)) >= RETURNS
 
 
-def may_flap(values: np.ndarray, tolerances: np.ndarray) -> np.ndarray:
-    """Tell which figures can go to and fro at all: at least two pairs of nights, not neighbours, agree.
-
-    Parameters
-    ----------
-    values : ndarray, shape (nights, figures)
-        NaN where there is none.
-    tolerances : ndarray, shape (figures,)
-
-    Examples
-    --------
-    >>> may_flap(np.array([[1.0, 1.0], [2.0, 2.0], [1.0, 3.0], [2.0, 4.0]]), np.array([0.1, 0.1]))
-    array([ True, False])
-    """
-    first, second = np.triu_indices(len(values), 2)
-    return np.asarray((np.abs(values[first] - values[second]) <= tolerances).sum(axis=0) >= RETURNS)
-
-
 def missing_nights(starts: Sequence[str]) -> tuple[tuple[int, int], ...]:
     """Nights without a run: ``(index of the run before the gap, how many are missing)``.
 

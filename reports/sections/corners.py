@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
+from analyses.corners import Corner, Corners
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section
 from reports.sections.margins import shown
 from reports.sections.names import figure_column, loop_words
-
-if TYPE_CHECKING:
-    from analyses.corners import Corner, Corners
 
 PER_LOOP = [QUANTITIES[name] for name in (*CORNERED, "bandwidth")]
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
+from analyses.monte_carlo import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
+from analyses.specification.verdicts import RequirementVerdict
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -18,10 +20,6 @@ from reports.sections.margins import finite
 from reports.sections.names import unit_words
 from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
-
-if TYPE_CHECKING:
-    from analyses.monte_carlo import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
-    from analyses.specification.verdicts import RequirementVerdict
 
 _SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
 
@@ -107,8 +105,8 @@ def _verdict(result: MonteCarloResult, odds: Odds) -> VerdictItem:
 
 def _not_sampled(one: RequirementVerdict) -> VerdictItem:
     return doc.verdict(
-        f"tolerance/{one.id}", f"{label(one)}: met within the tolerances", value=None, limit=None, unit="",
-        distance=None, passed=None, reason=one.reason, waiver=one.waiver.words if one.waiver else "",
+        f"tolerance/{one.id}", f"{label(one)}: met within the tolerances", passed=None, reason=one.reason,
+        waiver=one.waiver.words if one.waiver else "",
     )  # fmt: skip
 
 
@@ -214,15 +212,13 @@ def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: Colum
     worst = finite(case.value) if case is not None and alone else None
     for name, value, colour, dash in (("nominal", nominal, style.INK, 0), ("worst", worst, style.ORANGE, 1)):
         if value is not None:
-            panel.x.see([value])
-            panel.rule_x(value, label=name, colour=colour, dash=dash, width=1.7)
+            panel.rule_x(value, label=name, seen=True, colour=colour, dash=dash, width=1.7)
     known = [*edges, *style.known((nominal, worst))]
     low, high = min(known), max(known)
     width, unit = max(high - low, 1e-3 * max(abs(high), 1e-9)), unit_words(column.unit)
     for name, value in (("minimum", odds.minimum), ("maximum", odds.maximum)):
         if value is not None and low - 2 * width <= value <= high + 2 * width:
-            panel.x.see([value])
-            panel.rule_x(value, label="limit", colour=style.RED, dash=2, width=1.7)
+            panel.rule_x(value, label="limit", seen=True, colour=style.RED, dash=2, width=1.7)
         elif value is not None:
             panel.note(f"{name} {value:g} {unit}: off scale", corner="top left", colour=style.MUTED)
     panel.x.label, panel.y.label, panel.x.grid = unit, "samples", False

@@ -206,6 +206,40 @@ def test_a_worker_that_joins_late_proves_itself_first(bare) -> None:
     assert 0 < len(got) < 1000
 
 
+def test_a_worker_that_is_lost_over_its_proof_is_no_refusal(bare) -> None:
+    import distributed
+
+    address, _, worker = bare
+    worker()
+    got: dict[int, int] = {}
+    with distributed.Client(address) as client:
+
+        class Losing:
+            def __getattr__(self, name: str) -> object:
+                return getattr(client, name)
+
+            def run(self, *asked: object, **how: object) -> dict[str, object]:
+                return {**client.run(*asked, **how), "tcp://lost": OSError("closed")}
+
+        clusters.submit(Losing(), engine._applied, doubled, [1, 2], got.__setitem__)
+    assert got == {1: 2, 2: 4}
+
+
+def deadly(number: int) -> int:
+    os._exit(number)
+
+
+def test_a_part_that_kills_its_workers_is_one_line(monkeypatch) -> None:
+    import dask
+
+    monkeypatch.setattr(clusters, "_RETRIES", 0)
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        pytest.raises(NumericalError, match="workers keep dying over one part"),
+    ):
+        Engine(workers=1).map(deadly, [3], lambda *_: None)
+
+
 def slowly(number: int) -> int:
     time.sleep(0.1)
     return number
@@ -364,33 +398,3 @@ def test_a_lost_worker_s_jobs_are_done_again(cluster, tmp_path) -> None:
     night = run_night(study(*jobs), tmp_path / "site", Fakes(**remote), code=CODE, progress=kill_one)
     assert killed
     assert {d.result.status for d in night.designs} == {"pass"}
-
-
-def test_a_lost_worker_s_designs_of_a_comparison_are_done_again(cluster, tmp_path) -> None:
-    """One of two workers dies while designs are computed; what is found is what one process finds."""
-    import distributed
-
-    from analyses.comparison.variants import compare
-    from analyses.studies.study import load_study
-
-    running, remote = cluster
-    (tmp_path / "study.toml").write_text(
-        '[study]\nbase = "ctms-motor-position"\n[[sweep]]\nparameter = "control.position.gain"\n'
-        'values = ["9 V/rad", "12 V/rad", "15 V/rad", "18 V/rad", "21 V/rad"]\n'
-    )
-    plan = load_study(tmp_path / "study.toml")
-    with distributed.Client(running) as client:
-        workers = list(client.run(os.getpid).values())
-    killed = []
-
-    def kill_one(done: int, total: int) -> None:
-        if done >= 2 and not killed:
-            killed.append(workers[0])
-            os.kill(workers[0], signal.SIGKILL)
-
-    result = compare(plan, engine=Engine(**remote), folder=tmp_path / "designs", progress=kill_one)
-    assert killed
-    assert not result.refused
-    assert len(result.all) == len(list((tmp_path / "designs").rglob("*.json"))) == 6
-    here = compare(plan)
-    assert [one.figures for one in result.all] == [one.figures for one in here.all]

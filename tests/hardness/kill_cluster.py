@@ -1,0 +1,211 @@
+"""Kills clients, workers and schedulers of cluster studies at random moments; looks at what comes of them.
+
+``python kill_cluster.py FOLDER KILLS SEED``: a scheduler and two workers are processes of this machine. Each
+round starts a study, or goes on with it, and kills one of them with SIGKILL. A study that has ended is held
+against one that nobody disturbed: its result, and every file that it keeps. Prints one line of JSON.
+"""
+
+import contextlib
+import hashlib
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import distributed  # noqa: F401 - here, not in every child
+import pyarrow.parquet  # noqa: F401
+
+from actuator_lti import NumericalError, load_design
+from analyses.comparison.variants import compare
+from analyses.monte_carlo import MonteCarloSettings, monte_carlo, run
+from analyses.studies.engine import Engine
+from analyses.studies.study import load_study
+
+LOST = 3  # the scheduler, said in one line
+SEEDS = 6  # studies that differ
+VICTIMS = ("client", "client", "worker", "worker", "scheduler")
+ENDS = {"client": (0, -signal.SIGKILL), "worker": (0,), "scheduler": (0, LOST)}
+SWEEP = """[study]
+base = "ctms-motor-position"
+[[sweep]]
+parameter = "control.position.gain"
+from = "9 V/rad"
+to = "%d V/rad"
+points = 8
+"""
+
+
+def kept(folder: Path, seed: int, engine: Engine) -> object:
+    """A study of which every sample is kept."""
+    asked = MonteCarloSettings(samples=1000, seed=seed, chunk=25, worst_cases=False)
+    made = monte_carlo(load_design("ilr33-amber"), folder, asked, engine=engine)
+    return made.odds, made.columns, made.nominal, made.drivers
+
+
+def reduced(folder: Path, seed: int, engine: Engine) -> object:
+    """A study whose samples are reduced on the workers."""
+    run.KEPT, run.BLOCK, run.NOTED_S = 999, 50, 0.05
+    return kept(folder, seed, engine)
+
+
+def compared(folder: Path, seed: int, engine: Engine) -> object:
+    """A comparison of variants."""
+    plan = folder.with_suffix(".toml")
+    plan.write_text(SWEEP % (15 + seed))
+    found = compare(load_study(plan), engine=engine, folder=folder)
+    return [(one.figures, one.verdicts, one.differences) for one in found.all]
+
+
+STUDIES: tuple[Callable[[Path, int, Engine], object], ...] = (kept, reduced, compared)
+
+
+class Cluster:
+    """A scheduler and two workers, each a process that can be killed and started again."""
+
+    def __init__(self, folder: Path) -> None:
+        self.file, self.log = folder / "scheduler.json", (folder / "cluster.log").open("ab")
+        self.scheduler = self.workers = None
+
+    def start(self) -> None:
+        """Start what is not there."""
+        if self.scheduler is None:
+            self.end()
+            self.file.unlink(missing_ok=True)
+            self.scheduler, self.workers = self._process("dask_scheduler", "--port", "0"), []
+            while not self._address():
+                time.sleep(0.02)
+        while len(self.workers) < 2:
+            self.workers.append(self._process("dask_worker", "--no-nanny", "--nthreads", "1"))
+
+    @property
+    def address(self) -> str:
+        """Where the scheduler listens."""
+        return self._address()
+
+    def _address(self) -> str:
+        with contextlib.suppress(FileNotFoundError, json.JSONDecodeError):
+            return json.loads(self.file.read_text())["address"]
+        return ""
+
+    def _process(self, kind: str, *words: str) -> subprocess.Popen[bytes]:
+        common = ("--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(self.file))
+        command = [sys.executable, "-m", f"distributed.cli.{kind}", *common, *words]
+        return subprocess.Popen(command, stdout=self.log, stderr=self.log)
+
+    def kill(self, victim: str, draw: random.Random) -> None:
+        """Kill the scheduler, or one of the workers."""
+        if victim == "scheduler":
+            process, self.scheduler = self.scheduler, None
+        else:
+            process = self.workers.pop(draw.randrange(len(self.workers)))
+        process.kill()
+        process.wait()
+
+    def end(self) -> None:
+        """Kill all that are there."""
+        for process in (self.scheduler, *(self.workers or ())):
+            if process is not None:
+                process.kill()
+                process.wait()
+        self.scheduler = self.workers = None
+
+
+def child(number: int, folder: Path, engine: Engine) -> int:
+    """A study in a process of its own, what it finds beside its folder; the process's number."""
+    process = os.fork()
+    if process == 0:
+        status = 1
+        try:
+            found = repr(STUDIES[number % len(STUDIES)](folder, number // len(STUDIES), engine))
+            folder.with_suffix(".found").write_text(found.replace(str(folder), ""))
+            status = 0
+        except NumericalError as error:
+            told = "the same command goes on" in str(error) and "\n" not in str(error)
+            status = LOST if told else 1
+        except BaseException:  # noqa: BLE001 - told, and seen by its status
+            traceback.print_exc()
+        finally:
+            os._exit(status)
+    return process
+
+
+def contents(folder: Path) -> dict[str, str]:
+    """Every file of a study by the hash of what it holds, and what was found."""
+    files = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+    # a note of a reduced study says in which order its parts ended; ".part": killed while it was written
+    made = {
+        name: path
+        for name, path in files.items()
+        if not name.startswith("reduced-") and path.suffix != ".part"
+    }
+    told = {"found": folder.with_suffix(".found")}
+    return {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in {**made, **told}.items()}
+
+
+def ended(process: int, most_s: float = 240.0) -> int:
+    """How a process ended: its status, or minus the signal."""
+    end = time.monotonic() + most_s
+    while True:
+        number, status = os.waitpid(process, os.WNOHANG)
+        if number:
+            return os.waitstatus_to_exitcode(status)
+        if time.monotonic() > end:
+            os.kill(process, signal.SIGKILL)
+            os.waitpid(process, 0)
+            raise TimeoutError("a study that never ends")
+        time.sleep(0.01)
+
+
+def undisturbed(number: int, top: Path, cluster: Cluster) -> tuple[Path, float]:
+    """The study as it is when nobody is killed, made once; and how long it took."""
+    plain, timed = top / f"plain-{number % SEEDS}", top / f"plain-{number % SEEDS}.s"
+    if not timed.exists():
+        begin = time.monotonic()
+        assert ended(child(number % SEEDS, plain, Engine(scheduler=cluster.address))) == 0
+        timed.write_text(str(time.monotonic() - begin))
+    return plain, float(timed.read_text())
+
+
+def one_study(number: int, top: Path, cluster: Cluster, draw: random.Random) -> Iterator[str]:
+    """Disturb one study until it has ended; whom each kill met while the study ran."""
+    cluster.start()
+    (plain, usual_s), folder, status = undisturbed(number, top, cluster), top / f"study-{number}", None
+    while status != 0:
+        cluster.start()
+        process = child(number % SEEDS, folder, Engine(scheduler=cluster.address))
+        time.sleep(draw.uniform(0.0, usual_s))
+        victim = draw.choice(VICTIMS)
+        if os.waitpid(process, os.WNOHANG) != (0, 0):
+            break
+        if victim == "client":
+            os.kill(process, signal.SIGKILL)
+        else:
+            cluster.kill(victim, draw)
+        yield victim
+        status = ended(process)
+        assert status in ENDS[victim], (victim, status)
+    assert contents(folder) == contents(plain), number
+
+
+def main(top: Path, kills: int, seed: int) -> dict[str, object]:
+    """Disturb one study after the other until there were enough kills."""
+    draw, met, number = random.Random(seed), Counter[str](), 0
+    cluster = Cluster(top)
+    try:
+        while met.total() < kills:
+            met.update(one_study(number, top, cluster, draw))
+            number += 1
+    finally:
+        cluster.end()
+    return {"studies": number, "killed": met}
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))) + "\n")
