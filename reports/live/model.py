@@ -173,26 +173,17 @@ def _figures(design: Design) -> list[Figure]:
 
 def _step(design: Design) -> StepData:
     """Give the command of the step (a tenth of the largest), and what it is a step of."""
-    outermost, linear_axis = design.controller.outermost, design.axis == "linear"
-    if outermost == "position":
-        size, unit = 0.1 * design.validation.full_deflection_rad, "mm" if linear_axis else "deg"
-        return {
-            "size": size,
-            "unit": unit,
-            "factor": 1e-3 if linear_axis else math.pi / 180.0,
-            "of": "output",
-        }
-    if outermost == "velocity":
-        speed = design.limits.speed_rad_s
-        size = 0.1 * (speed if math.isfinite(speed) else 100.0) / design.total_ratio
-        return {"size": size, "unit": "m/s" if linear_axis else "rad/s", "factor": 1.0, "of": "speed"}
-    peak = design.limits.peak_current_A
-    return {
-        "size": 0.1 * (peak if math.isfinite(peak) else 10.0),
-        "unit": "A",
-        "factor": 1.0,
-        "of": "current",
-    }
+    stage, linear_axis, limits = design.controller.outermost, design.axis == "linear", design.limits
+    if stage == "position":
+        unit, factor = ("mm", 1e-3) if linear_axis else ("deg", math.pi / 180.0)
+        size = 0.1 * design.validation.full_deflection_rad
+        return {"size": size, "unit": unit, "factor": factor, "of": "output"}
+    known, most = (limits.speed_rad_s, 100.0) if stage == "velocity" else (limits.peak_current_A, 10.0)
+    size = 0.1 * (known if math.isfinite(known) else most)
+    if stage == "velocity":
+        unit = "m/s" if linear_axis else "rad/s"
+        return {"size": size / design.total_ratio, "unit": unit, "factor": 1.0, "of": "speed"}
+    return {"size": size, "unit": "A", "factor": 1.0, "of": "current"}
 
 
 def _map(design: Design) -> MapData | None:

@@ -8,7 +8,6 @@ import { table } from "./table.js";
 import { sideBySide } from "./variants.js";
 import { html } from "./words.js";
 
-// what takes too long for a moving slider: once nothing has moved for a moment, one piece at a time
 const QUIET = 150, SLICE = 12; // ms
 let pieces = [], waits = 0, inView = false;
 const nextPiece = () => {
@@ -20,7 +19,7 @@ const nextPiece = () => {
 export const fillBehind = () => {
   clearTimeout(waits);
   root.dataset.behind = "waits";
-  pieces = [...(desk.late ? [runLate] : []), ...timedPieces(desk.now), ...periodicPieces(desk.before), ...(desk.now === desk.before ? [] : periodicPieces(desk.now)), table, sideBySide, ...mapPieces(desk.now)];
+  pieces = [...(desk.late ? [runLate] : []), ...timed(desk.now), ...[...new Set([desk.before, desk.now])].flatMap(periodic), table, sideBySide, ...mapPieces(desk.now)];
   waits = setTimeout(nextPiece, QUIET);
 };
 const runLate = () => { // taken when it runs: what waits may be listed anew before
@@ -53,26 +52,21 @@ const drawMap = (cells) => {
   if (!border.map) return;
   const edges = (list, k) => { const half = Math.sqrt(list[1] / list[0]); return [list[k] / half, list[k] * half]; };
   const { hertz, amplitude } = border.map;
-  tell("border", "chart:cells", { panel: 0, cells: cells.filter(({ cause }) => cause !== "none").map(({ j, k, cause }) => ({
+  tell("border", "cells", { panel: 0, cells: cells.filter(({ cause }) => cause !== "none").map(({ j, k, cause }) => ({
     x: edges(hertz, k), y: edges(amplitude, j).map((value) => value / data.step.factor), colour: data.map.colours[cause], words: data.map.words[cause],
   })) });
-  const seen = [...new Set(cells.map(({ cause }) => cause))], line = find(".map-keys");
-  line.replaceChildren(...(seen.length ? [html("span", "", "Sine from rest, simulated: ")] : []), ...seen.map((cause) => {
-    const item = html("span", "map-key", data.map.words[cause]);
-    if (cause !== "none") { const box = html("i"); box.style.background = `var(--${data.map.colours[cause]})`; item.prepend(box); }
-    return item;
-  }));
+  const seen = [...new Set(cells.map(({ cause }) => cause))], box = (cause) => (cause === "none" ? [] : [html("i", { style: `background:var(--${data.map.colours[cause]})` })]);
+  find(".map-keys").replaceChildren(...(seen.length ? ["Sine from rest, simulated: "] : []), ...seen.map((cause) => html("span", "map-key", ...box(cause), data.map.words[cause])));
   root.dataset.cells = JSON.stringify(cells.map(({ cause, ticks, tone, amplitude }) => [cause, ticks, tone.hertz, tone.count, amplitude]));
 };
-const timedPieces = (found) => data.loops.filter((name) => found.loops[name].waits).map((name) => () => {
+// figures of the loops, or of the break points, that were left
+const left = (found, of, waits, stage, timed) => Object.keys(found[of]).filter((name) => waits(found[of][name])).map((name) => () => {
   view(x.p_at(), found.row.length).set(found.row);
-  found.loops[name] = figures(stageOf(name), 1);
-  state();
+  found[of][name] = figures(stage(name), timed);
+  if (timed) state();
 });
-const periodicPieces = (found) => Object.keys(data.points).filter((name) => found.points[name].n === BEHIND).map((name) => () => {
-  view(x.p_at(), found.row.length).set(found.row);
-  found.points[name] = figures(data.points[name], 0);
-});
+const timed = (found) => left(found, "loops", ({ waits }) => waits, stageOf, 1);
+const periodic = (found) => left(found, "points", ({ n }) => n === BEHIND, (name) => data.points[name], 0);
 // the map is computed only where somebody may see it
 export const watchMap = () => {
   new IntersectionObserver(([entry]) => {

@@ -9,10 +9,10 @@ import { trial } from "./trial.js";
 export const border = { grid: [], map: null };
 export const drawBorder = (label, part) => {
   if (!part) return;
-  tell("border", "chart:redraw", { panel: 0, curve: `lowest, ${label}`, x: border.grid, y: part.lowest });
+  tell("border", "redraw", { panel: 0, curve: `lowest, ${label}`, x: border.grid, y: part.lowest });
   if (label === "as changed") for (const name of data.borders) {
     const own = part.each.find(([known]) => known === name);
-    tell("border", "chart:redraw", { panel: 0, curve: name, x: own ? border.grid : [], y: own ? own[1] : [] });
+    tell("border", "redraw", { panel: 0, curve: name, x: own ? border.grid : [], y: own ? own[1] : [] });
   }
 };
 export const borderStart = () => {
@@ -25,6 +25,6 @@ export const borderStart = () => {
   if (data.map && Number.isFinite(band[PLACE.bandwidth])) border.map = gridOf(Math.max(low, band[PLACE.bandwidth] / 25), Math.min(band[PLACE.bandwidth] * 8, 0.8 * top), data.map.full);
   const [, high] = range([...part.lowest.slice(0, 1), trial.size / data.step.factor], 0, 1e30), [bottom] = range(part.lowest, 0, 1e30);
   const ends = border.map ? border.map.amplitude.map((value) => value / data.step.factor) : [bottom];
-  tell("border", "chart:axes", { panel: 0, x: [border.grid[0], border.grid[90]], y: [Math.max(Math.min(bottom, ends[0]) / 4, high / 1e7), Math.max(high * 8, ends[ends.length - 1] * 2)] });
+  tell("border", "axes", { panel: 0, x: [border.grid[0], border.grid[90]], y: [Math.max(Math.min(bottom, ends[0]) / 4, high / 1e7), Math.max(high * 8, ends[ends.length - 1] * 2)] });
   drawBorder("as designed", part);
 };

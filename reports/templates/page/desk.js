@@ -7,7 +7,7 @@ export const data = holder && JSON.parse(holder.textContent);
 /** @type {(selector: string) => any} */
 export const find = (selector) => root.querySelector(selector);
 export const chart = (name) => find(`[data-chart="${name}"] .chart`);
-export const tell = (name, type, detail) => chart(name).dispatchEvent(new CustomEvent(type, { detail }));
+export const tell = (name, what, detail) => chart(name).dispatchEvent(new CustomEvent(`chart:${what}`, { detail }));
 export const outer = data.loops[data.loops.length - 1];
 export const PLACE = Object.fromEntries(data.quantities.map((name, k) => [name, k]));
 export const STABLE = data.quantities.length;

@@ -1,7 +1,7 @@
 // Hands on the curves: the loop's gain on Bode and Nyquist, the corner of a PI, the filters; marks of the margins.
 import { PLACE, STABLE, desk, tell } from "./desk.js";
 import { commit, keys, past, preview } from "./history.js";
-import { judged } from "./requirements.js";
+import { unmet } from "./requirements.js";
 import { digits } from "./words.js";
 
 const find = (path) => keys.findIndex((key) => key.path === path);
@@ -24,8 +24,8 @@ export const stepGain = (by) => {
   done();
 };
 export const holdCurves = () => {
-  tell("bode", "chart:hold", { panel: 0, curve: "as changed", words: "drag up or down: gain of the loop", moved: (from, to) => decibels(to.y - from.y), done });
-  tell("nyquist", "chart:hold", { panel: 0, curve: "as changed", across: true, words: "drag out or in: gain of the loop",
+  tell("bode", "hold", { panel: 0, curve: "as changed", words: "drag up or down: gain of the loop", moved: (from, to) => decibels(to.y - from.y), done });
+  tell("nyquist", "hold", { panel: 0, curve: "as changed", across: true, words: "drag out or in: gain of the loop",
     moved: (from, to) => factor(gainOf(), Math.hypot(to.x, to.y) / Math.hypot(from.x, from.y)), done });
 };
 
@@ -41,21 +41,24 @@ export const crossings = (hertz, curve, level, other) => {
   return found;
 };
 const nearest = (found, value) => found.reduce((best, one) => (best === null || Math.abs(one[1] - value) < Math.abs(best[1] - value) ? one : best), null);
-const colourOf = (quantity) => (judged(desk.now).some(({ item, met }) => item.loop === desk.shown && item.quantity === quantity && met === false) ? "fail" : "pass");
 const turned = (phase) => -180 + 360 * Math.round((phase + 180) / 360);
 
 // the quoted margins on the curves as changed: found on the curves where the figures say how large they are
 export const marginMarks = (hertz, { gain, phase }) => {
-  const own = desk.now.loops[desk.shown].figures, top = [], bottom = [];
+  const own = desk.now.loops[desk.shown].figures, top = [], bottom = [], bad = unmet(desk.now);
+  const mark = (list, name, words, unit, x, y, to) => {
+    const value = own[PLACE[name]];
+    if (Number.isFinite(value)) list.push({ x, y, to, colour: bad(desk.shown, name) ? "fail" : "pass", words: `${words} ${digits(value, 3)} ${unit} at ${digits(x, 3)} Hz` });
+  };
   if (own[STABLE] === 1) {
     const level = Math.round((Math.min(...phase) + 180) / 360);
     const across = [...Array(1 - Math.min(level, 0)).keys()].flatMap((turn) => crossings(hertz, phase, -180 - 360 * turn, gain));
     const gm = nearest(across, -own[PLACE.gain_margin]), pm = nearest(crossings(hertz, gain, 0, phase).map(([f, at]) => [f, at - turned(at), at]), own[PLACE.phase_margin]);
-    if (gm && Number.isFinite(own[PLACE.gain_margin])) top.push({ x: gm[0], y: gm[1], to: 0, colour: colourOf("gain_margin"), words: `gain margin ${digits(own[PLACE.gain_margin], 3)} dB at ${digits(gm[0], 3)} Hz` });
-    if (pm && Number.isFinite(own[PLACE.phase_margin])) bottom.push({ x: pm[0], y: pm[2], to: turned(pm[2]), colour: colourOf("phase_margin"), words: `phase margin ${digits(own[PLACE.phase_margin], 3)} deg at ${digits(pm[0], 3)} Hz` });
+    if (gm) mark(top, "gain_margin", "gain margin", "dB", gm[0], gm[1], 0);
+    if (pm) mark(bottom, "phase_margin", "phase margin", "deg", pm[0], pm[2], turned(pm[2]));
   }
-  tell("bode", "chart:marks", { panel: 0, marks: [...top, ...handles(hertz, gain)] });
-  tell("bode", "chart:marks", { panel: 1, marks: bottom });
+  tell("bode", "marks", { panel: 0, marks: [...top, ...handles(hertz, gain)] });
+  tell("bode", "marks", { panel: 1, marks: bottom });
 };
 
 // handles on the magnitude: the corner of the loop's PI, and each filter of the velocity loop

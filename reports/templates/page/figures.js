@@ -1,6 +1,6 @@
 // Every figure of the page is made to live, and a row of a table that names a crossing shows it there.
 import { Chart, closest } from "./chart.js";
-import { all, html, unfold } from "./words.js";
+import { all, button, unfold } from "./words.js";
 
 const charts = all(".chart").map((root) => new Chart(root));
 // one cursor through all figures of a loop
@@ -18,20 +18,15 @@ for (const row of all("tr[data-loop][data-hz]")) {
   if (!own.length) continue;
   let kept = false;
   const show = () => own.forEach((c) => c.mark(+row.dataset.hz));
-  const hide = () => { if (!kept) own.forEach((c) => c.hide()); };
-  const button = html("button", "find", "show");
-  button.type = "button";
-  button.setAttribute("aria-label", "Show this crossing in the figures");
-  row.querySelector("th").append(" ", button);
-  row.addEventListener("pointerenter", () => { kept = false; show(); });
-  row.addEventListener("pointerleave", hide);
-  button.addEventListener("focus", show);
-  button.addEventListener("click", () => {
+  const find = button("show", () => {
     kept = true;
     const main = own.find((c) => c.root.closest("section[id^=loop]")) || own[0];
     unfold(main.root);
     main.root.scrollIntoView({ block: "center", behavior: "auto" });
     show();
-  });
+  }, { className: "find", ariaLabel: "Show this crossing in the figures", onfocus: show });
+  row.querySelector("th").append(" ", find);
+  row.addEventListener("pointerenter", () => { kept = false; show(); });
+  row.addEventListener("pointerleave", () => { if (!kept) own.forEach((c) => c.hide()); });
 }
 if (charts.length) document.documentElement.classList.add("live");

@@ -4,16 +4,14 @@ import { inUnit, keys, past, start } from "./history.js";
 import { unified } from "./diff.js";
 import { give } from "./words.js";
 
+// places of the text that change, in order, and what stands there then
+const edits = () => data.patches.map(([from, to, lead, tail], k) => {
+  const key = keys[k], value = inUnit(key, past.values[k]);
+  return { from, to, moved: past.values[k] !== start[k], text: lead + (key.unit ? `"${value} ${key.unit}"` : String(Number.isInteger(value) && !key.whole ? value.toFixed(1) : value)) + tail };
+}).filter(({ moved }) => moved).sort((a, b) => a.from - b.from || a.to - b.to);
 export const changedText = () => {
-  const places = data.patches.map((patch, k) => [patch, k]).filter(([, k]) => past.values[k] !== start[k]).sort((a, b) => a[0][0] - b[0][0] || a[0][1] - b[0][1]);
-  let text = "", at = 0;
-  const letters = [...data.text];
-  for (const [[from, to, lead, tail], k] of places) {
-    const key = keys[k], value = inUnit(key, past.values[k]);
-    text += letters.slice(at, from).join("") + lead + (key.unit ? `"${value} ${key.unit}"` : String(Number.isInteger(value) && !key.whole ? value.toFixed(1) : value)) + tail;
-    at = to;
-  }
-  return text + letters.slice(at).join("");
+  const letters = [...data.text], made = edits();
+  return made.map(({ from, text }, k) => letters.slice(made[k - 1]?.to ?? 0, from).join("") + text).join("") + letters.slice(made.at(-1)?.to ?? 0).join("");
 };
 const named = (tail) => `${data.name.replace(/[^\w.-]/g, "_") || "design"}${tail}`;
 export const save = () => give(named("-changed.toml"), changedText());
@@ -26,8 +24,8 @@ export const sheet = (text) => {
   area.select();
 };
 export const copy = () => {
-  const area = find(".sheet textarea");
+  const area = find(".sheet textarea"), old = () => document.execCommand("copy");
   area.select();
-  if (navigator.clipboard) navigator.clipboard.writeText(area.value).catch(() => document.execCommand("copy"));
-  else document.execCommand("copy");
+  if (navigator.clipboard) navigator.clipboard.writeText(area.value).catch(old);
+  else old();
 };

@@ -1,65 +1,58 @@
 // What can be taken hold of in a figure: a curve, or a handle on it; and marks that are drawn anew with the curves.
 import { make } from "./words.js";
 
-// values on the axes of a panel where the pointer is, inside its frame or not
-const valuesAt = (panel, back, event) => {
-  const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(back);
-  const [px, py] = panel.back(point.x, point.y);
-  return { x: panel.x.value(px), y: panel.y.value(py), shift: event.shiftKey };
-};
-
-// moved(from, to) is told at every move, done() at the end
+// moved(from, to) is told at every move, in values of the axes, inside the frame or not; done() at the end
 const listenTo = (panel, node, { moved, done }) => {
   // the page above may grow while something is moved: the screen is measured once
   let from = null, back = null;
-  node.addEventListener("pointerdown", (event) => {
-    if (event.button) return;
-    event.stopPropagation();
-    event.preventDefault();
-    node.setPointerCapture(event.pointerId);
-    back = node.ownerSVGElement.getScreenCTM().inverse();
-    from = valuesAt(panel, back, event);
-  });
-  node.addEventListener("pointermove", (event) => {
-    if (!from) return;
-    event.stopPropagation();
-    moved(from, valuesAt(panel, back, event));
-  });
-  for (const name of ["pointerup", "pointercancel"]) node.addEventListener(name, (event) => {
-    if (!from) return;
-    event.stopPropagation();
+  const values = (event) => {
+    const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(back), [px, py] = panel.back(point.x, point.y);
+    return { x: panel.x.value(px), y: panel.y.value(py), shift: event.shiftKey };
+  };
+  const release = () => {
     from = null;
     done();
+  };
+  const does = {
+    pointerdown: (event) => {
+      event.preventDefault();
+      node.setPointerCapture(event.pointerId);
+      back = node.ownerSVGElement.getScreenCTM().inverse();
+      from = values(event);
+    },
+    pointermove: (event) => moved(from, values(event)), pointerup: release, pointercancel: release,
+  };
+  for (const name in does) node.addEventListener(name, (event) => {
+    if (name === "pointerdown" ? event.button : !from) return;
+    event.stopPropagation();
+    does[name](event);
   });
   node.addEventListener("dblclick", (event) => event.stopPropagation());
 };
 
 // a curve that is dragged: {panel, curve (its label), words, across, moved, done}
-export const holdCurve = (chart, { panel, curve, words, across, moved, done }) => {
-  const p = chart.panels[panel], key = Object.keys(chart.labels).find((k) => chart.labels[k] === curve);
-  const known = p.curves.find((one) => one.key === key);
+export const holdCurve = ({ panel, curve, words, across, moved, done }, chart) => {
+  const p = chart.panels[panel], key = chart.keyOf(curve), known = p.curves.find((one) => one.key === key);
   if (!known) return;
-  const node = make("path", { class: `grab ${across ? "both" : "up"}`, d: known.node.getAttribute("d") }, p.world);
-  make("title", {}, node).textContent = words;
-  known.grab = node;
-  listenTo(p, node, { moved, done });
+  known.grab = make("path", { class: `grab ${across ? "both" : "up"}`, d: known.node.getAttribute("d") }, p.world);
+  make("title", {}, known.grab).textContent = words;
+  listenTo(p, known.grab, { moved, done });
 };
 
 // marks of a panel: [{x, y, to (the other end of a stem along y), colour, words, name, moved, done}]; one with moved is a handle
-export const putMarks = (chart, { panel, marks }) => {
+export const putMarks = ({ panel, marks }, chart) => {
   const p = chart.panels[panel];
   p.live ??= make("g", { class: "live-marks" }, p.group);
-  p.again = () => putMarks(chart, { panel, marks });
+  p.again = () => putMarks({ panel, marks }, chart);
   const before = [...p.live.children], known = new Map(before.map((node) => [node.dataset.name, node]));
   const made = marks.flatMap((mark) => nodesOf(p, mark, mark.name && known.get(mark.name)));
   for (const node of before) if (!made.includes(node)) node.remove();
   p.live.append(...made.filter((node) => !before.includes(node))); // one that is held stays where it is
 };
 const nodesOf = (panel, mark, known) => {
-  const [x, y] = panel.place(panel.x.px(mark.x), panel.y.px(mark.y));
-  const [, end] = panel.place(0, panel.y.px(mark.to ?? mark.y));
+  const [x, y] = panel.place([panel.x.px(mark.x), panel.y.px(mark.y)]), end = panel.y.seen(panel.y.px(mark.to ?? mark.y));
   if (![x, y, end].every(Number.isFinite) || !panel.holds(x, y)) return [];
-  const inside = Math.min(Math.max(end, panel.top), panel.bottom), made = [];
+  const inside = Math.min(Math.max(end, panel.y.first), panel.y.last), made = [];
   if (mark.to !== undefined) made.push(make("path", { class: "stem", d: `M${x.toFixed(2)} ${y.toFixed(2)}V${inside.toFixed(2)}`, style: `stroke:var(--${mark.colour})` }));
   const dot = known ?? make("circle", mark.moved ? { class: "grab handle", r: 6.5, "data-name": mark.name } : { class: "point", r: 3.4 });
   dot.setAttribute("cx", x.toFixed(2));
@@ -67,6 +60,6 @@ const nodesOf = (panel, mark, known) => {
   dot.style.fill = `var(--${mark.colour})`;
   if (!dot.firstChild) make("title", {}, dot);
   dot.firstChild.textContent = mark.words;
-  if (mark.moved && !known) requestAnimationFrame(() => listenTo(panel, dot, mark));
+  if (mark.moved && !known) listenTo(panel, dot, mark);
   return [...made, dot];
 };

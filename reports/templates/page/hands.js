@@ -15,7 +15,7 @@ import { makePanel, show } from "./sliders.js";
 import { table } from "./table.js";
 import { drawRuns, playSine, runKeys, runStart, tried } from "./trial.js";
 import { drawPins, sideBySide } from "./variants.js";
-import { all, html } from "./words.js";
+import { all, button } from "./words.js";
 
 let lastGood = start.slice();
 const drawLoop = (name) => {
@@ -63,7 +63,7 @@ const update = () => {
 };
 const choose = (name) => {
   desk.shown = name;
-  for (const button of all(".tabs button", root)) button.setAttribute("aria-pressed", String(button.dataset.loop === name));
+  for (const tab of all(".tabs button", root)) tab.ariaPressed = String(tab.dataset.loop === name);
   compute(start);
   designed(name);
   frame(name);
@@ -80,13 +80,7 @@ const begin = () => {
   if (!desk.before) throw new Error("the design as written is refused");
   const followed = data.loops.filter((name) => desk.before.loops[name].figures);
   if (!followed.includes(desk.shown)) desk.shown = followed[followed.length - 1];
-  for (const name of followed) {
-    const button = html("button", "", LOOP_NAMES[name]);
-    button.type = "button";
-    button.dataset.loop = name;
-    button.addEventListener("click", () => choose(name));
-    find(".tabs").append(button);
-  }
+  find(".tabs").append(...followed.map((name) => button(LOOP_NAMES[name], () => choose(name), { dataset: { loop: name } })));
   watchMap();
   holdCurves();
   chart("bode").addEventListener("keydown", (/** @type {any} */ event) => {
@@ -107,22 +101,23 @@ const begin = () => {
     copy, close: () => { find(".sheet").hidden = true; },
   };
   root.addEventListener("click", (/** @type {any} */ event) => {
-    const button = event.target.closest("[data-do]");
-    if (button) acts[button.dataset.do](button.dataset.letter);
+    const { do: act, letter } = event.target.closest("[data-do]")?.dataset ?? {};
+    if (act) acts[act](letter);
   });
   root.addEventListener("keydown", (/** @type {any} */ event) => {
     if (!(event.ctrlKey || event.metaKey) || event.target.matches("textarea, .field")) return;
-    if (event.key === "z" && !event.shiftKey) acts.undo();
-    else if (event.key === "y" || (event.key === "z" && event.shiftKey)) acts.redo();
-    else return;
+    const does = { z: acts.undo, Z: acts.redo, y: acts.redo }[event.key];
+    if (!does) return;
+    does();
     event.preventDefault();
   });
   find('input[type="file"]').addEventListener("change", (event) => { if (event.target.files[0]) take(event.target.files[0]); });
   addEventListener("dragover", (event) => { if ([...event.dataTransfer.types].includes("Files")) event.preventDefault(); });
   addEventListener("drop", (event) => {
-    if (!event.dataTransfer.files.length) return;
+    const [file] = event.dataTransfer.files;
+    if (!file) return;
     event.preventDefault();
-    take(event.dataTransfer.files[0]);
+    take(file);
   });
   addEventListener("hashchange", fromFragment);
   fromFragment();

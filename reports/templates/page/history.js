@@ -38,7 +38,8 @@ const set = (changed) => {
   commit();
 };
 export const reset = () => set({ values: start });
-export const free = () => ["A", "B", "C"].find((letter) => !past.pins[letter]);
+export const LETTERS = ["A", "B", "C"];
+export const free = () => LETTERS.find((letter) => !past.pins[letter]);
 export const pin = () => set({ pins: { ...past.pins, [free()]: past.values } });
 export const unpin = (letter) => set({ pins: Object.fromEntries(Object.entries(past.pins).filter(([each]) => each !== letter)) });
 export const restore = (letter) => set({ values: past.pins[letter] });

@@ -5,13 +5,14 @@ const MARGIN = 10, KEY = 16, DENSE = 2; // DENSE: points of the PNG for one of t
 // pictures side by side and the legend below, with the colours of now in place of their names
 export const svgOf = (chart) => {
   const colours = getComputedStyle(document.documentElement);
+  const put = (node, attributes) => { for (const name in attributes) node.setAttribute(name, attributes[name]); };
   const ink = colours.getPropertyValue("--ink").trim(), whole = make("svg", { "font-family": "sans-serif" });
   let x = MARGIN, high = 0;
   for (const { svg } of chart.pictures) {
     const { width, height } = svg.viewBox.baseVal, copy = svg.cloneNode(true);
     for (const node of copy.querySelectorAll(".over, .grab, [data-off]")) node.remove();
     for (const name of ["class", "style", "aria-label", "role"]) copy.removeAttribute(name);
-    for (const [name, value] of Object.entries({ x, y: MARGIN, width, height })) copy.setAttribute(name, value);
+    put(copy, { x, y: MARGIN, width, height });
     whole.append(copy);
     x += width + MARGIN;
     high = Math.max(high, height);
@@ -21,14 +22,14 @@ export const svgOf = (chart) => {
     const wide = 34 + 6.2 * item.textContent.length;
     if (at > MARGIN && at + wide > x) { at = MARGIN; y += KEY; }
     const swatch = item.querySelector("svg").cloneNode(true);
-    for (const [name, value] of Object.entries({ x: at, y: y - 10, width: 26, height: 12 })) swatch.setAttribute(name, value);
+    put(swatch, { x: at, y: y - 10, width: 26, height: 12 });
     swatch.removeAttribute("class");
     make("text", { x: at + 31, y, "font-size": 10.5, fill: ink }, whole).textContent = item.textContent;
     whole.append(swatch);
     at += wide;
   }
   const height = y + MARGIN;
-  for (const [name, value] of Object.entries({ viewBox: `0 0 ${x} ${height}`, width: x, height })) whole.setAttribute(name, value);
+  put(whole, { viewBox: `0 0 ${x} ${height}`, width: x, height });
   whole.prepend(make("rect", { width: x, height, fill: colours.getPropertyValue("--paper").trim() }));
   const text = new XMLSerializer().serializeToString(whole);
   return text.replace(/var\(--([\w-]+)(?:,[^()]*)?\)/g, (_, name) => colours.getPropertyValue(`--${name}`).trim()).replace(/ class="(?!world)[^"]*"/g, "");

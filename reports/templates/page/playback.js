@@ -1,7 +1,7 @@
 // Playback of a run: motor, shaft or spring, and load, drawn as they stand at a time.
 import { chart, data, find, tell } from "./desk.js";
 import { unitOf } from "./trial.js";
-import { digits, html, make } from "./words.js";
+import { button, digits, html, make } from "./words.js";
 
 const LASTS = 4000, TURN = 60, SHIFT = 42; // ms of a playback; degrees, and widths, at which the farthest place is drawn
 const elastic = [...data.keys, ...data.fixed].some(({ path }) => path === "coupling.stiffness"), linear = data.axis === "linear";
@@ -28,14 +28,14 @@ const draw = () => {
   on.motor.style.strokeDasharray = sticks ? "4 3" : "";
   on.range.value = 1000 * share;
   const said = `${digits(k * part.T * unit, 3)} ${words}: output ${digits(part.output[k] / length, 3)} ${angle}`;
-  on.range.setAttribute("aria-valuetext", said);
+  on.range.ariaValueText = said;
   on.words.textContent = [said, ...(sticks ? ["motor sticks"] : []), ...acting.map(([, , limit]) => limit)].join(", ");
 };
 const end = () => (part?.output?.length ? (part.output.length - 1) * part.T * unitOf()[0] : 0);
 const seek = (to) => {
   share = to;
   draw();
-  if (end()) tell("run", "chart:cursor", { x: share * end() });
+  if (end()) tell("run", "cursor", { x: share * end() });
 };
 const step = (now) => {
   if (!last) return;
@@ -58,16 +58,13 @@ export const follow = (made) => {
   draw();
 };
 export const playStart = () => {
-  const keys = html("p", "play-keys"), svg = make("svg", { viewBox: "0 0 370 120", role: "img", "aria-label": "The drive at a time of the run: motor, shaft, load" });
+  const svg = make("svg", { viewBox: "0 0 370 120", role: "img", "aria-label": "The drive at a time of the run: motor, shaft, load" });
   const add = (name, attributes) => make(name, { class: "body", ...attributes }, svg);
-  on.play = html("button", "", "Play");
-  on.play.type = "button";
-  on.play.addEventListener("click", () => {
+  on.play = button("Play", () => {
     if (share === 1) share = 0;
     going(last ? 0 : performance.now());
   });
-  on.range = Object.assign(html("input"), { type: "range", min: 0, max: 1000, step: 1, ariaLabel: "Time of the run" });
-  on.range.addEventListener("input", () => { going(0); seek(on.range.value / 1000); });
+  on.range = html("input", { type: "range", min: 0, max: 1000, step: 1, ariaLabel: "Time of the run", oninput: () => { going(0); seek(on.range.value / 1000); } });
   on.words = html("span", "note");
   on.scale = html("p", "note");
   on.motor = add("circle", { cx: 70, cy: 60, r: 36 });
@@ -76,8 +73,7 @@ export const playStart = () => {
   if (linear) add("path", { d: "M200 92H366" });
   on.load = add("path", { d: linear ? "M258 34H318V92H258Z" : "M300 96A36 36 0 1 1 300.1 96ZM288 60L300 4L312 60Z" });
   [["motor", 70], [elastic ? "spring" : "shaft", 185], ["load", 300]].forEach(([words, x]) => { make("text", { x, y: 114, "text-anchor": "middle" }, svg).textContent = String(words); });
-  keys.append(on.play, on.range, on.words);
-  find(".playback").append(svg, keys, on.scale);
+  find(".playback").append(svg, html("p", "play-keys", on.play, on.range, on.words), on.scale);
   // pointed at in the run's figure, the drive stands as it stood then
   chart("run").addEventListener("chart:at", (/** @type {any} */ { detail }) => {
     if (detail.x === undefined || last || !end()) return;

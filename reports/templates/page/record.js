@@ -5,7 +5,7 @@ import { LOOP_NAMES, data, desk, find, tell } from "./desk.js";
 import { start } from "./history.js";
 import { compute, respond } from "./module.js";
 import { residual, runStart, trial } from "./trial.js";
-import { digits, html } from "./words.js";
+import { button, choice, digits, html } from "./words.js";
 
 const linear = data.axis === "linear", LARGEST = 5e7; // bytes
 const measured = MEASURED[{ output: linear ? "length" : "angle", speed: linear ? "velocity" : "rate", current: "current" }[data.step.of]];
@@ -24,50 +24,40 @@ export const forget = (kind) => {
   delete boxes[kind];
   lay[kind](null);
 };
-const show = (name, table, choice) => {
-  const box = html("div", "dropped"), said = html("span", "told"), off = html("button", "", "Remove");
+const show = (name, table, chosen) => {
+  const { kind } = chosen, plain = (list) => list.map((each) => [each, each]);
   const again = () => {
-    const { kind } = choice;
     try {
-      lay[kind](kind === "record" ? recordOf(name, table, choice, measured) : responseOf(name, table, choice, choice.of));
+      lay[kind](kind === "record" ? recordOf(name, table, chosen, measured) : responseOf(name, table, chosen, chosen.of));
     } catch (error) {
       lay[kind](null);
       say(kind, `${name}: ${error.message}.`);
     }
     desk.follow();
   };
-  const pick = (words, options, value, change) => {
-    const label = html("label", "", words + " "), list = html("select", "field");
-    for (const [each, told] of options) list.append(Object.assign(html("option", "", told), { value: each, selected: String(each) === String(value) }));
-    list.setAttribute("aria-label", words);
-    list.addEventListener("change", () => change(list.value));
-    label.append(list);
-    return label;
-  };
-  const other = (kind) => { forget(choice.kind); show(name, table, guess(table, measured, kind)); };
-  box.append(pick(name, [["record", "record in time"], ["response", "frequency response"]], choice.kind, other));
-  if (choice.kind === "response") box.append(pick("of", [["L", "open loop L"], ["T", "closed loop T"], ["S", "sensitivity S"]], "L", (of) => { choice.of = of; again(); }));
-  for (const [role, { words, units, free }] of Object.entries(rolesOf(choice.kind, measured))) {
-    const listed = [...(free || choice.columns[role] < 0 ? [[-1, free ? "none" : "choose"]] : []), ...table.head.map((word, k) => [k, word])];
-    box.append(pick(words, listed, choice.columns[role], (k) => { choice.columns[role] = Number(k); again(); }));
-    if (Object.keys(units).length > 1) box.append(pick(`${words} in`, Object.keys(units).map((unit) => [unit, unit]), choice.units[role], (unit) => { choice.units[role] = unit; again(); }));
+  const pick = (words, options, of, part, /** @type {(value: string) => any} */ read = String) => choice(words, options, of[part], (value) => { of[part] = read(value); again(); });
+  const box = html("div", "dropped", choice(name, [["record", "record in time"], ["response", "frequency response"]], kind, (other) => { forget(kind); show(name, table, guess(table, measured, other)); }));
+  if (kind === "response") box.append(pick("of", [["L", "open loop L"], ["T", "closed loop T"], ["S", "sensitivity S"]], chosen, "of"));
+  for (const [role, { words, units, free }] of Object.entries(rolesOf(kind, measured))) {
+    const none = free || chosen.columns[role] < 0 ? [[-1, free ? "none" : "choose"]] : [];
+    box.append(pick(words, [...none, ...table.head.map((word, k) => [k, word])], chosen.columns, role, Number));
+    if (Object.keys(units).length > 1) box.append(pick(`${words} in`, plain(Object.keys(units)), chosen.units, role));
   }
-  off.type = "button";
-  off.addEventListener("click", () => { forget(choice.kind); desk.follow(); });
-  box.append(off, " ", said);
-  boxes[choice.kind]?.remove();
-  boxes[choice.kind] = box;
+  box.append(button("Remove", () => { forget(kind); desk.follow(); }), " ", html("span", "told"));
+  boxes[kind]?.remove();
+  boxes[kind] = box;
   find(".record").append(box);
   again();
 };
 export const take = async (file) => {
+  const wrong = find(".record > .wrong");
   try {
     if (file.size > LARGEST) throw new Error("larger than 50 MB");
     const table = tableOf(await file.text());
-    find(".record > .wrong").textContent = "";
+    wrong.textContent = "";
     show(file.name, table, guess(table, measured));
   } catch (error) {
-    find(".record > .wrong").textContent = `${file.name}: ${error.message}.`;
+    wrong.textContent = `${file.name}: ${error.message}.`;
   }
 };
 
@@ -76,15 +66,15 @@ const leftOut = ({ left }) => (left ? ` ${left} rows without numbers left out.` 
 export const overRun = (part) => {
   const { record } = desk;
   const [now, was] = [part, trial.designed].map((made) => record && made.y?.length && residual(made));
-  tell("run", "chart:redraw", { panel: 0, curve: "residual", x: now ? now.x : [], y: now ? now.y : [] });
+  tell("run", "redraw", { panel: 0, curve: "residual", x: now ? now.x : [], y: now ? now.y : [] });
   if (!now || !was) return;
   const words = ({ rms, fit }) => `${digits(100 * rms, 3)} % rms of the largest command, fit ${digits(fit, 4)} %`;
   say("record", `${record.name}: ${record.time.length} samples.${leftOut(record)} Residual of the model as changed: ${words(now)}; as designed: ${words(was)}.`);
 };
 // a response over the loop that is shown, whose model the module has just computed, and the difference to it
 export const overLoop = () => {
-  const { response, shown } = desk, hertz = response ? response.hertz : [], { re, im, weight } = response ?? { re: [], im: [], weight: [] };
-  const put = (figure, panel, curve, y, x = hertz) => tell(figure, "chart:redraw", { panel, curve, x, y, parameter: hertz });
+  const { response, shown } = desk, { hertz, re, im, weight } = response ?? { hertz: [], re: [], im: [], weight: [] };
+  const put = (figure, panel, curve, y, x = hertz) => tell(figure, "redraw", { panel, curve, x, y, parameter: hertz });
   const top = 0.5 / desk.now.loops[shown].period, below = hertz.filter((f) => f < top).length;
   const model = below ? respond(shown, hertz.slice(0, below)) : null;
   const ratio = model ? model.re.map((a, k) => { // measured over model, as decibels and degrees
@@ -99,11 +89,12 @@ export const overLoop = () => {
   find('[data-chart="difference"]').hidden = !model;
   if (!response) return;
   if (!model) { say("response", `${response.name}: no frequency below half that of the sampling of the ${LOOP_NAMES[shown].toLowerCase()}, ${digits(top, 4)} Hz.`); return; }
-  const ends = [0, 1].map((n) => Math.max(...ratio.map((each) => Math.abs(each[n])), 1e-3)), sum = weight.slice(0, below).reduce((all, share) => all + share, 0);
-  ends.forEach((most, n) => {
-    tell("difference", "chart:axes", { panel: n, x: [hertz[0], Math.max(hertz[below - 1], 1.01 * hertz[0])], y: [-1.1 * most, 1.1 * most] });
-    put("difference", n, "measured over model", ratio.map((each) => each[n]), hertz.slice(0, below));
+  const sum = weight.slice(0, below).reduce((all, share) => all + share, 0);
+  const told = ["dB", "deg"].map((unit, n) => {
+    const list = ratio.map((each) => each[n]), sizes = list.map(Math.abs), most = Math.max(...sizes, 1e-3);
+    tell("difference", "axes", { panel: n, x: [hertz[0], Math.max(hertz[below - 1], 1.01 * hertz[0])], y: [-1.1 * most, 1.1 * most] });
+    put("difference", n, "measured over model", list, hertz.slice(0, below));
+    return `${digits(Math.sqrt(list.reduce((all, value, k) => all + weight[k] * value ** 2, 0) / sum), 3)} ${unit} rms, at most ${digits(most, 3)} at ${digits(hertz[sizes.indexOf(most)] ?? NaN, 3)} Hz`;
   });
-  const told = ends.map((most, n) => `${digits(Math.sqrt(ratio.reduce((all, each, k) => all + weight[k] * each[n] ** 2, 0) / sum), 3)} ${["dB", "deg"][n]} rms, at most ${digits(most, 3)} at ${digits(hertz[ratio.findIndex((each) => Math.abs(each[n]) === most)] ?? NaN, 3)} Hz`);
   say("response", `${response.name}: ${hertz.length} points on the ${LOOP_NAMES[shown].toLowerCase()}.${leftOut(response)} Measured over model as changed${response.known ? ", weighted by coherence" : ""}: ${told.join("; ")}.${below < hertz.length ? ` ${hertz.length - below} above half the sampling frequency are not compared.` : ""}`);
 };

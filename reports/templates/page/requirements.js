@@ -13,6 +13,11 @@ export const judged = (found) => data.requirements.map((item, k) => {
   if (item.absolute) value = Math.abs(value);
   return { item, value, met: Number.isNaN(value) ? null : value >= (item.minimum ?? -Infinity) && value <= (item.maximum ?? Infinity) };
 });
+// whether a figure of a loop is beyond what is asked for
+export const unmet = (found) => {
+  const beyond = new Set(judged(found).filter(({ met }) => met === false).map(({ item }) => `${item.loop} ${item.quantity}`));
+  return (loop, quantity) => beyond.has(`${loop} ${quantity}`);
+};
 export const calm = (value, unit) => (["dB", "deg", "%"].includes(unit) && Math.abs(value) < 1 ? Math.round(value * 1e4) / 1e4 : value); // no -3e-5 dB
 
 const NAMED = 3; // of what is not met, in the line at the top
@@ -26,33 +31,27 @@ export const state = () => {
   if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
   const met = all.filter((one) => one.met).length, count = (many, word) => (many ? `, ${many} ${word}` : "");
   const designed = changes().length ? ` (as designed: ${old.length} not met)` : "";
-  const named = [...fails, ...open].slice(0, NAMED).map(({ item }) => [item.words, placed(item).toLowerCase()].join(" ").trim()), more = fails.length + open.length - named.length;
+  const named = [...fails, ...open].slice(0, NAMED).map(({ item }) => [item.words, item.loop ? placed(item).toLowerCase() : placed(item)].join(" ").trim()), more = fails.length + open.length - named.length;
   if (total) words.push(`${met} of ${total} requirements met${count(fails.length, "not met")}${count(open.length, "not proven")}${designed}${named.length ? `: ${named.join(", ")}${more ? ` and ${more} more` : ""}` : ""}.`);
   else if (!data.apart.length) words.push("The design states no requirements.");
   if (data.apart.length) words.push(`${data.apart.length} found by a simulation of its own ${data.apart.length === 1 ? "does" : "do"} not follow: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
   if (refused) words.push(refused);
   line.className = `state ${refused || unstable.length || fails.length ? "fail" : unknown.length || open.length ? "warn" : total ? "pass" : "info"}`;
-  line.textContent = words.filter(Boolean).join(" ");
+  line.textContent = words.join(" ");
   line.dataset.failing = fails.length;
   demands(all, was);
 };
 const placed = (item) => (item.loop ? LOOP_NAMES[item.loop] : item.load ? `at ${minus(String(item.load))} ${data.axis === "linear" ? "N" : "N m"}` : "");
 const demands = (all, was) => {
-  const box = find("table.demands");
+  const box = find("table.demands"), right = (words, bad) => html("td", bad ? "right bad" : "right", words);
   box.closest("details").hidden = !all.length;
   const limit = ({ minimum, maximum }) => [minimum !== null ? `≥ ${minus(String(minimum))}` : "", maximum !== null ? `≤ ${minus(String(maximum))}` : ""].filter(Boolean).join(", ");
-  const rest = all.map(({ item, value, met, words }, k) => {
-    const row = html("tr"), th = heading(item.words[0].toUpperCase() + item.words.slice(1), "left", "row"), last = html("td", "left");
+  const found = ({ item, value, words }) => words || `${digits(calm(value, item.unit), 4)} ${item.unit}`;
+  const rows = all.map((one, k) => {
+    const { item, value, met } = one, th = heading(item.words[0].toUpperCase() + item.words.slice(1), "left", "row");
     th.title = item.id;
-    const found = (one) => one.words || `${digits(calm(one.value, one.item.unit), 4)} ${one.item.unit}`;
-    const cellNow = html("td", met === false ? "right bad" : "right", found({ item, value, words }));
-    row.dataset.id = item.id;
-    row.dataset.loop = item.loop || "";
-    row.dataset.value = value;
-    row.dataset.met = met;
-    last.append(html("span", `mark ${met === null ? "warn" : met ? "pass" : "fail"}`, met === null ? "not proven" : met ? "met" : was[k].met === false ? "not met" : "now not met"));
-    row.append(th, html("td", "left", placed(item)), html("td", "right", `${limit(item)} ${item.unit}`), html("td", "right", found(was[k])), cellNow, last);
-    return row;
+    const verdict = html("span", `mark ${met === null ? "warn" : met ? "pass" : "fail"}`, met === null ? "not proven" : met ? "met" : was[k].met === false ? "not met" : "now not met");
+    return html("tr", { dataset: { id: item.id, loop: item.loop || "", value, met } }, th, html("td", "left", placed(item)), right(`${limit(item)} ${item.unit}`), right(found(was[k])), right(found(one), met === false), html("td", "left", verdict));
   });
-  fill(box, [...["Requirement", "Where"].map((words) => heading(words)), ...["Limit", "As designed", "As changed"].map((words) => heading(words, "right")), heading("Verdict")], rest);
+  fill(box, [...["Requirement", "Where"].map((words) => heading(words)), ...["Limit", "As designed", "As changed"].map((words) => heading(words, "right")), heading("Verdict")], rows);
 };

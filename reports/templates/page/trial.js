@@ -5,7 +5,7 @@ import { thinned } from "./curves.js";
 import { PLACE, STABLE, data, desk, find, outer, tell } from "./desk.js";
 import { start } from "./history.js";
 import { compute, run, view, x } from "./module.js";
-import { digits, html } from "./words.js";
+import { choice, digits, html, labelled, typed } from "./words.js";
 
 const { size: usual, unit: unitIn, factor } = data.step;
 /** @type {any} */
@@ -60,45 +60,42 @@ const measure = () => { // how long the run takes: that of a step, as designed, 
 /** @type {() => [number, string]} */
 export const unitOf = () => (trial.span < 2 ? [1e3, "ms"] : [1, "s"]);
 const traceOf = (part, name) => (name === "output" ? part.y.map((value) => value * scaleOf() / factor) : part[name]);
-const rangeOf = (lists) => lists.reduce(([low, high], list) => list.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [low, high]), [0, 0]);
-const draw = (label, part, panel, values) => {
-  const [unit] = unitOf(), stride = thinned(values.length, 700), at = [];
-  for (let k = 0; k < values.length; k += stride) at.push(k);
-  tell("run", "chart:redraw", { panel, curve: label, x: at.map((k) => k * part.T * unit), y: at.map((k) => values[k]) });
+const rangeOf = (lists, within = [-Infinity, Infinity]) => { // 0 is always in it
+  const ends = [0, 0];
+  for (const list of lists) for (const value of list) { ends[0] = Math.min(ends[0], value); ends[1] = Math.max(ends[1], value); }
+  return ends.map((end) => Math.min(Math.max(end, within[0]), within[1]));
+};
+const draw = (curve, part, panel, values) => {
+  const stride = thinned(values.length), at = Array.from({ length: Math.ceil(values.length / stride) }, (_, k) => k * stride);
+  tell("run", "redraw", { panel, curve, x: at.map((k) => k * part.T * unitOf()[0]), y: at.map((k) => values[k]) });
 };
 // where a limit acts is shaded in the panel of what it limits, where the motor sticks in that of the speed
 const PLACES = { w_ref: "speed", i_ref: "current", i: "current", u: "voltage" };
 const shade = (part, ends) => {
-  const [unit] = unitOf(), gap = Math.ceil(part.flags.length / 400), cells = TRACES.map(() => []);
-  const acting = [...data.limiters, ["stick", data.places.stick, "motor sticks", "w_ref"]];
-  for (const [name, bit, words, signal] of acting) {
-    const panel = Math.max(TRACES.indexOf(PLACES[signal]), name === "profile" ? 0 : 1);
-    for (const [from, to] of spansOf(part.flags, bit, gap)) cells[name === "profile" ? 0 : panel].push({
-      x: [from * part.T * unit, to * part.T * unit], y: ends[name === "profile" ? 0 : panel], colour: name === "stick" ? "muted" : data.map?.colours[name] ?? "c5", words,
-    });
-  }
-  cells.forEach((list, panel) => tell("run", "chart:cells", { panel, cells: list }));
+  const over = part.T * unitOf()[0], gap = Math.ceil(part.flags.length / 400);
+  const acting = [...data.limiters, ["stick", data.places.stick, "motor sticks", "w_ref"]].map(([name, bit, words, signal]) => ({
+    bit, words, colour: name === "stick" ? "muted" : data.map?.colours[name] ?? "c5", panel: name === "profile" ? 0 : Math.max(TRACES.indexOf(PLACES[signal]), 1),
+  }));
+  ends.forEach((y, panel) => tell("run", "cells", { panel, cells: acting.filter((one) => one.panel === panel).flatMap(({ bit, words, colour }) => spansOf(part.flags, bit, gap).map((span) => ({ x: span.map((at) => at * over), y, colour, words }))) }));
 };
 export const drawRuns = (part) => {
   const { designed } = trial;
   if (!part.y?.length || !designed.y?.length) return;
   trial.span = Math.max(trial.length, part.y.length * part.T, designed.y.length * designed.T);
   const [unit, words] = unitOf(), command = commandLine();
+  const dots = desk.record ? [desk.record.time.map((t) => t * unit), desk.record.angle.map((value) => value / factor)] : [[], []];
   const ends = TRACES.map((name, panel) => {
-    const known = traceOf(designed, name), own = traceOf(part, name), first = panel === 0;
-    const [low, high] = rangeOf([known, ...(first ? [command[1], ...(desk.record ? [desk.record.angle.map((value) => value / factor)] : [])] : [])]), span = high - low || 1;
-    const [least, most] = rangeOf([[low, high], own]).map((value) => Math.min(Math.max(value, low - GROWTH * span), high + GROWTH * span));
-    const room = 0.08 * (most - least || 1), y = [least - room, most + room];
-    tell("run", "chart:axes", { panel, x: [0, trial.span * unit], y, words: panel === TRACES.length - 1 ? words : undefined });
+    const known = traceOf(designed, name), own = traceOf(part, name), [low, high] = rangeOf([known, ...(panel ? [] : [command[1], dots[1]])]), span = high - low || 1;
+    const [least, most] = rangeOf([[low, high], own], [low - GROWTH * span, high + GROWTH * span]), room = 0.08 * (most - least || 1), y = [least - room, most + room];
+    tell("run", "axes", { panel, x: [0, trial.span * unit], y, words: panel === TRACES.length - 1 ? words : undefined });
     draw("as designed", designed, panel, known);
     draw("as changed", part, panel, own);
     return y;
   });
-  tell("run", "chart:redraw", { panel: 0, curve: "command", x: command[0], y: command[1] });
-  const dots = desk.record ? [desk.record.time.map((t) => t * unit), desk.record.angle.map((value) => value / factor)] : [[], []];
-  tell("run", "chart:redraw", { panel: 0, curve: "measured record", x: dots[0], y: dots[1] });
+  for (const [curve, [x, y]] of [["command", command], ["measured record", dots]]) tell("run", "redraw", { panel: 0, curve, x, y });
   shade(part, ends);
-  find(".hands-run").dataset.last = JSON.stringify(Object.fromEntries([["ticks", part.y.length], ["before", part.before], ...TRACES.map((name) => [name, traceOf(part, name)[part.y.length - 1]])]));
+  const last = part.y.length - 1;
+  find(".hands-run").dataset.last = JSON.stringify({ ticks: last + 1, before: part.before, ...Object.fromEntries(TRACES.map((name) => [name, traceOf(part, name)[last]])) });
 };
 const commandLine = () => {
   const [unit] = unitOf(), rec = desk.record;
@@ -122,12 +119,22 @@ const again = () => {
   runStart();
   desk.follow();
 };
-const fields = {};
+// what a run is asked for: key of the trial, words, SI over its unit, values that are allowed in words and as a check
+const ASKED = [
+  ["size", `Size, ${unitIn}:`, factor, "a number that is not 0", (value) => value !== 0],
+  ["hertz", "Frequency, Hz:", 1, "a number above 0", (value) => value > 0],
+  ["rate", `Rate, ${unitIn}/s:`, factor, "a number above 0", (value) => value > 0],
+  ...(data.step.of === "output" ? [["moment", data.axis === "linear" ? "Load, N:" : "Load, N m:", 1, "a number", () => true]] : []),
+  ...(data.step.of !== "current" ? [["moving", `Moving, ${data.step.of === "output" ? `${unitIn}/s` : unitIn}:`, factor, "a number", () => true]] : []),
+  ["chosen", "Duration, s:", 1, "a number above 0", (value) => value >= 0],
+];
+const OF = { hertz: ["sine"], rate: ["ramp", "back"] }; // kinds of command that need it
+const shown = [];
 const show = () => {
   find(".run-kind").value = trial.kind;
-  for (const [name, { label, field, read }] of Object.entries(fields)) {
-    label.hidden = (name === "hertz" && trial.kind !== "sine") || (name === "rate" && !["ramp", "back"].includes(trial.kind));
-    field.value = trial[name] || ["moment", "moving"].includes(name) ? digits(read(trial[name]), 4).replace("−", "-") : "";
+  for (const { name, over, label, field } of shown) {
+    label.hidden = OF[name] && !OF[name].includes(trial.kind);
+    field.value = trial[name] || ["moment", "moving"].includes(name) ? digits(trial[name] / over, 4).replace("−", "-") : "";
   }
 };
 // the sine of a place on the map of limits
@@ -137,40 +144,24 @@ export const playSine = (hertz, amplitude) => {
   again();
 };
 export const runKeys = () => {
-  const box = find(".run-keys"), choice = html("label", "", "Command: "), kinds = html("select", "run-kind field");
-  for (const kind in KINDS) {
-    const one = html("option", "", KINDS[kind]);
-    one.value = kind;
-    kinds.append(one);
-  }
-  kinds.addEventListener("change", () => { trial.kind = kinds.value; show(); again(); });
-  choice.append(kinds);
-  box.append(choice);
+  const kinds = choice("Command:", Object.entries(KINDS), trial.kind, (kind) => { trial.kind = kind; show(); again(); });
+  kinds.lastChild.classList.add("run-kind");
+  find(".run-keys").append(kinds);
   trial.rate = Math.abs(trial.size) * 5;
   const band = desk.before.loops[outer].figures?.[PLACE.bandwidth];
   if (band > 0 && Number.isFinite(band)) trial.hertz = Number((band / 3).toPrecision(2));
-  const make = (name, words, over, fits) => {
-    const label = html("label", "", words + " "), field = html("input", "field"), wrong = html("span", "wrong");
-    field.type = "text";
-    field.inputMode = "decimal";
+  for (const [name, words, over, allowed, fits] of ASKED) {
+    const field = html("input", { className: "field", type: "text", inputMode: "decimal" }), wrong = html("span", "wrong"), label = labelled(words, field, " ", wrong);
     field.addEventListener("change", () => {
-      const typed = field.value.trim() === "" && name === "chosen" ? 0 : Number(field.value.trim() === "" ? NaN : field.value.replace(",", ".").replace("−", "-"));
-      const good = Number.isFinite(typed) && fits(typed);
-      wrong.textContent = good ? "" : `"${field.value}": a number${fits(-1) ? fits(0) ? "" : " that is not 0" : " above 0"}`;
-      field.setAttribute("aria-invalid", String(!good));
+      const value = name === "chosen" && field.value.trim() === "" ? 0 : typed(field.value), good = Number.isFinite(value) && fits(value);
+      wrong.textContent = good ? "" : `"${field.value}": ${allowed}`;
+      field.ariaInvalid = String(!good);
       if (!good) return;
-      trial[name] = typed * over;
+      trial[name] = value * over;
       again();
     });
-    label.append(field, " ", wrong);
-    box.append(label);
-    fields[name] = { label, field, read: (value) => value / over };
-  };
-  make("size", `Size, ${unitIn}:`, factor, (value) => value !== 0);
-  make("hertz", "Frequency, Hz:", 1, (value) => value > 0);
-  make("rate", `Rate, ${unitIn}/s:`, factor, (value) => value > 0);
-  if (data.step.of === "output") make("moment", data.axis === "linear" ? "Load, N:" : "Load, N m:", 1, () => true);
-  if (data.step.of !== "current") make("moving", `Moving, ${data.step.of === "output" ? `${unitIn}/s` : unitIn}:`, factor, () => true);
-  make("chosen", "Duration, s:", 1, (value) => value >= 0);
+    find(".run-keys").append(label);
+    shown.push({ name, over, label, field });
+  }
   show();
 };

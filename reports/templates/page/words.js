@@ -2,40 +2,49 @@
 /** @type {(selector: string, of?: ParentNode) => any[]} */
 export const all = (selector, of = document) => [...of.querySelectorAll(selector)];
 
-/** @type {(name: string, className?: string, text?: string) => any} */
-export const html = (name, className, text) => {
-  const made = document.createElement(name);
-  if (className) made.className = className;
-  if (text !== undefined) made.textContent = text;
+// an element: its properties, or its class, and what is in it
+/** @type {(name: string, own?: string | Record<string, any>, ...inside: any[]) => any} */
+export const html = (name, own = {}, ...inside) => {
+  const made = document.createElement(name), { dataset, ...rest } = typeof own === "string" ? { className: own } : own;
+  Object.assign(made, rest);
+  Object.assign(made.dataset, dataset);
+  made.append(...inside);
   return made;
 };
-export const heading = (words, side = "left", scope = "col") => Object.assign(html("th", side, words), { scope });
-// fills a table anew: its headings, its rows
-export const fill = (box, headings, rows) => {
-  const head = html("thead"), top = html("tr"), body = html("tbody");
-  top.append(...headings);
-  head.append(top);
-  body.append(...rows);
-  box.replaceChildren(box.querySelector("caption"), head, body);
+/** @type {(words: string, run?: () => void, own?: Record<string, any>) => any} */
+export const button = (words, run, own) => html("button", { type: "button", onclick: run ?? null, ...own }, words);
+// a field or a list with its words before it
+export const labelled = (words, ...inside) => html("label", {}, words + " ", ...inside);
+// a list to choose from: [value, words]
+export const choice = (words, options, value, change) => {
+  const list = html("select", { className: "field", ariaLabel: words }, ...options.map(([each, told]) => html("option", { value: each, selected: String(each) === String(value) }, told)));
+  list.addEventListener("change", () => change(list.value));
+  return labelled(words, list);
 };
+// what is typed as a number; NaN where it is none
+export const typed = (text) => (text.trim() === "" ? NaN : Number(text.replace(",", ".").replace("−", "-")));
+export const heading = (words, side = "left", scope = "col") => html("th", { className: side, scope }, words);
+// fills a table anew: its headings, its rows
+export const fill = (box, headings, rows) => box.replaceChildren(box.querySelector("caption"), html("thead", {}, html("tr", {}, ...headings)), html("tbody", {}, ...rows));
 // opens every fold that holds an element
 export const unfold = (target) => {
   for (let node = target; node; node = node.parentElement) if (node.tagName === "DETAILS") node.open = true;
 };
 export const minus = (text) => text.replace(/-/g, "−");
 export const raised = (power) => minus(String(power)).replace(/[−\d]/g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["−0123456789".indexOf(c)]);
+const powerOf = (value) => Math.floor(Math.log10(Math.abs(value)));
 export const show = (value, digits = 4) => {
+  const size = powerOf(value);
   if (value === 0) return "0";
-  const size = Math.floor(Math.log10(Math.abs(value)));
   if (size >= -4 && size < 6) return minus(value.toFixed(Math.max(digits - 1 - Math.max(size, -4), 0)));
   return minus((value / 10 ** size).toFixed(2)) + "×10" + raised(size);
 };
-export const reading = (value, unit) => (unit === "dB" || unit === "deg" || unit === "°" ? minus(value.toFixed(2)) : show(value));
+export const reading = (value, unit) => (["dB", "deg", "°"].includes(unit) ? minus(value.toFixed(2)) : show(value));
 export const digits = (value, count) => {
+  const size = powerOf(value);
   if (value === Infinity) return "unlimited";
   if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
-  const size = Math.floor(Math.log10(Math.abs(value)));
   if (size < -4 || size > 6) return minus(value.toExponential(Math.max(count - 1, 0)));
   return minus(value.toFixed(Math.min(Math.max(count - 1 - size, 0), 12)));
 };
@@ -49,9 +58,7 @@ export const make = (name, attributes, parent) => {
 };
 // a file that is saved from the page
 export const give = (name, content, type = "text/plain") => {
-  const link = html("a"), address = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
-  link.href = address;
-  link.download = name;
-  link.click();
+  const address = URL.createObjectURL(content instanceof Blob ? content : new Blob([content], { type }));
+  html("a", { href: address, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(address), 1000);
 };
