@@ -341,10 +341,6 @@ ANALYSES = (
         column = "cmd", unit = "deg" }.
 
         Try: actuator-lti correlate emps DATA_EMPS.mat
-
-        With --predict the records are steps of a motor on a voltage (ODrive
-        recorder): gain and time constant are fitted to them and predict the speed
-        over a chirp.
         """,
     ),
     Analysis(

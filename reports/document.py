@@ -242,21 +242,23 @@ def verdict(
     id: str,
     label: str,
     *,
-    value: float | None,
-    limit: float | None,
-    unit: str,
-    distance: float | None,
     passed: bool | None,
+    value: float | None = None,
+    limit: float | None = None,
+    unit: str = "",
+    distance: float | None = None,
     source: str = "",
     reason: str = "",
     comparison: str = "",
     waiver: str = "",
 ) -> VerdictItem:
-    """Make one item of `verdicts`; ``distance`` is positive on the good side.
+    """Make one item of `verdicts`; ``distance`` is positive on the good side, by itself where that is known.
 
     ``passed`` is ``None`` where there was nothing to compare: not proven. ``comparison`` is the good side of
     the limit, ``">="`` or ``"<="``; it is kept as it is printed. ``waiver``: see `actuator_lti` ``Waiver``.
     """
+    if distance is None and value is not None and limit is not None and comparison in COMPARISONS:
+        distance = value - limit if comparison == ">=" else limit - value
     item: VerdictItem = plain(
         {
             "id": id,

@@ -182,7 +182,7 @@ _LIST = (
              "rms current of the duty", "duty_current_A", -1, source="analysis"),
     Quantity("winding_temperature", "degC", "analysis", "winding under [duty], in the long run",
              "winding temperature of the duty", "winding_degC", -1, source="analysis"),
-    Quantity("limit_cycle", "deg", "analysis", "largest swing, peak, that a step ends in; 0 at rest",
+    Quantity("limit_cycle", "deg", "analysis", "largest swing, peak, that a step ends in; judges rest",
              "swing after a step", "limit_cycle_rad", -1, "m", size=0.01, source="analysis"),
     Quantity("corner_gain_margin", "dB", "analysis", "smallest hot, cold, at the worst tolerances",
              "gain margin at the corners", "", 1, size=6.0, source="analysis", cornered="gain_margin"),

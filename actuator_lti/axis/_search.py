@@ -14,7 +14,7 @@ from actuator_lti.compiled.kernel import kernel
 from ._factors import FACTOR, MOST, SLACK, bounded, evaluated, halved, one_way, root, slot
 
 DONE, FULL, TOO_NEAR = range(3)  # status
-INTERVALS, GAINS, REALS, FAR, TURNS, RATE, WHERE, FOUND = range(8)  # places in ``found``
+INTERVALS, GAINS, REALS, FAR, TURNS, RATE, WHERE, LEAVING, FOUND = range(9)  # places in ``found``
 KNOWN = 7  # numbers of an interval: w, gain and phase at its beginning, then their least, then their most
 CIRCLE, GAIN_LEVEL, PHASE_LEVEL = -1, 0, 1  # what is looked for
 DEEPEST = 110
@@ -41,11 +41,10 @@ def _clear(kind, level, listed_to, slack, low, bounds):
 
 
 @kernel
-def _first_turns(m, parts, from_zero):
-    """Half turns below the phase at the beginning; at zero frequency it leaves the real axis one way."""
-    phase, rate = parts[4 * m + 1], parts[4 * m + 3]
-    if from_zero and abs(math.sin(phase)) < ON_AXIS:
-        phase += math.copysign(2.0 * ON_AXIS, rate)
+def _turns_before(phase, found):
+    """Half turns below a phase; one that hardly leaves the real axis of zero frequency has left it."""
+    if found[LEAVING] > 0.0 and abs(math.sin(phase)) < ON_AXIS:
+        phase += math.copysign(2.0 * ON_AXIS, found[RATE])
     return half_turns(phase)
 
 
@@ -64,11 +63,13 @@ def _levels(m, factors, kind, level, parts, right, room, gains, found):
 
 
 @kernel
-def _turned(m, factors, listed_to, from_zero, parts, right, bounds, room, reals, found):
+def _turned(m, factors, listed_to, parts, right, bounds, room, reals, found):
     """Keep every place of the interval at which the phase passes an odd multiple of pi, or count them."""
     low = parts[4 * m + 4]
-    first = _first_turns(m, parts, from_zero and found[INTERVALS] == 0.0)
-    step = half_turns(parts[right + 4 * m + 1]) - first
+    first = _turns_before(parts[4 * m + 1], found)
+    step = _turns_before(parts[right + 4 * m + 1], found) - first
+    if abs(math.sin(parts[right + 4 * m + 1])) >= ON_AXIS:
+        found[LEAVING] = 0.0
     if step == 0.0:
         return DONE
     if low >= listed_to or bounds[MOST] < -FAR_LOG:
@@ -114,6 +115,7 @@ def search(
     size = slot(m)
     evaluated(m, factors, edges[0], parts, 0)
     found[RATE] = parts[4 * m + 3]
+    found[LEAVING] = 1.0 if edges[0] == 0.0 else 0.0
     for n in range(1, count):
         if edges[n] == edges[n - 1]:
             continue
@@ -135,10 +137,7 @@ def search(
             one = level if kind != CIRCLE else 0.0
             status = _levels(m, factors, max(kind, 0), one, parts, right, room, gains, found)
             if kind == CIRCLE and status == DONE:
-                status = _turned(
-                    m, factors, listed_to, edges[0] == 0.0, parts, right, bounds, room, reals,
-                    found,
-                )  # fmt: skip
+                status = _turned(m, factors, listed_to, parts, right, bounds, room, reals, found)
             if status != DONE:
                 return status
             _kept(m, parts, right, bounds, known, found)

@@ -24,7 +24,7 @@ from ._figures import (
     resonance,
 )
 from ._linalg import balance, hessenberg
-from ._response import CAPACITY, DEEPEST, GAIN, PHASE, closed_loop, response_at, scan
+from ._response import CAPACITY, DEEPEST, GAIN, PHASE, response_at, scan
 from ._step import step_figures
 
 TOP = math.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated apart
@@ -33,6 +33,7 @@ POINTS = 600  # angles to start from
 SMOOTH = 0.05
 NO_GAIN = 1e-6  # of the peak of |T|: less at DC (120 dB) is the rounding of a response that is zero there
 LOG_10 = 2.302585092994046
+NO_PIVOT = 1e-30  # far below the rounding of any entry that balancing leaves
 
 
 @kernel
@@ -92,59 +93,90 @@ def _grid(n, poles, points):
 
 
 @kernel
-def _pivoted(n, k, system, right):
-    """Exchange rows so that the largest pivot stands in row k; 0 where there is none."""
+def _pivoted(n, k, system, first, right):
+    """Exchange rows so that the largest pivot stands in row k; one of zero counts as rounding."""
     best = k
     for i in range(k + 1, n):
-        if abs(system[i * n + k]) > abs(system[best * n + k]):
+        if abs(system[first + i * n + k]) > abs(system[first + best * n + k]):
             best = i
-    if system[best * n + k] == 0.0:
-        return 0
     kept = right[k]
     right[k] = right[best]
     right[best] = kept
     for j in range(k, n):
-        kept = system[k * n + j]
-        system[k * n + j] = system[best * n + j]
-        system[best * n + j] = kept
-    return 1
+        kept = system[first + k * n + j]
+        system[first + k * n + j] = system[first + best * n + j]
+        system[first + best * n + j] = kept
+    if system[first + k * n + k] == 0.0:
+        system[first + k * n + k] = NO_PIVOT
 
 
 @kernel
-def _closed_dc(n, h, b, c, closed, system, right):
-    """T at DC: c (I - A + closed b c)^-1 b (h is A - I); nan where that is singular."""
+def _solved(n, system, transposed, right):
+    """Solve the system at the start of a row, or its transpose, behind it; ``right`` becomes the solution."""
+    first = n * n
     for i in range(n):
-        right[i] = b[i]
         for j in range(n):
-            system[i * n + j] = -h[i * n + j] + closed * b[i] * c[j]
+            system[first + i * n + j] = system[j * n + i] if transposed else system[i * n + j]
     for k in range(n):
-        there = _pivoted(n, k, system, right)
-        if there == 0:
-            return math.nan
+        _pivoted(n, k, system, first, right)
         for i in range(k + 1, n):
-            factor = system[i * n + k] / system[k * n + k]
+            factor = system[first + i * n + k] / system[first + k * n + k]
             right[i] -= factor * right[k]
             for j in range(k, n):
-                system[i * n + j] -= factor * system[k * n + j]
-    total = 0.0
+                system[first + i * n + j] -= factor * system[first + k * n + j]
     i = n - 1
     while i >= 0:
         for j in range(i + 1, n):
-            right[i] -= system[i * n + j] * right[j]
-        right[i] /= system[i * n + i]
-        total += c[i] * right[i]
+            right[i] -= system[first + i * n + j] * right[j]
+        right[i] /= system[first + i * n + i]
         i -= 1
+
+
+@kernel
+def _null_vector(n, system, transposed, vector):
+    """What the system, all but singular, takes to nothing; its largest element is one."""
+    for i in range(n):
+        vector[i] = 1.0
+    for _round in range(2):
+        _solved(n, system, transposed, vector)
+        largest = 0.0
+        for i in range(n):
+            largest = max(largest, abs(vector[i]))
+        for i in range(n):
+            vector[i] /= largest
+
+
+@kernel
+def _closed_dc(n, a, b, c, closed, poles, system, left, right):
+    """T at DC: c (I - A + closed b c)^-1 b, without the modes at DC that it does not show.
+
+    Each is moved away by v w' of its right and left eigenvectors. A is as it is, not yet of Hessenberg form,
+    which keeps 16 digits of A but not of slow poles, the differences of A and the identity.
+    """
+    for i in range(n):
+        for j in range(n):
+            system[i * n + j] = closed * b[i] * c[j] - a[i * n + j]
+        system[i * n + i] = 1.0 - a[i * n + i] + closed * b[i] * c[i]
+    for k in range(n):
+        if math.hypot(poles[2 * n + k] - 1.0, poles[3 * n + k]) <= HIDDEN:
+            _null_vector(n, system, False, right)
+            _null_vector(n, system, True, left)
+            for i in range(n):
+                for j in range(n):
+                    system[i * n + j] += right[i] * left[j]
+    for i in range(n):
+        right[i] = b[i]
+    _solved(n, system, False, right)
+    total = 0.0
+    for i in range(n):
+        total += c[i] * right[i]
     return total
 
 
 @kernel
-def _closed_figures(count, n, a, b, c, lead, poles, dc, row, xs, rs, ss, work, state, exchanged):
+def _closed_figures(count, n, a, b, c, lead, dc, row, xs, rs, ss, work, state, exchanged):
     """DC gain, resonance and bandwidths of a closed loop whose response is scanned."""
     row[DC_GAIN] = dc
-    for i in range(n):
-        if math.hypot(poles[2 * n + i] - 1.0, poles[3 * n + i]) <= HIDDEN:
-            real, _imaginary = closed_loop(rs[0], rs[1], xs[0], math.nan if math.isnan(lead) else 0.0)
-            row[DC_GAIN] = real
     row[FINAL] = row[DC_GAIN]
     resonance(count, xs, rs, ss, lead, row, n, a, b, c, work, state, exchanged)
     if abs(row[DC_GAIN]) < NO_GAIN * row[PEAK_T]:  # speed against a spring: nothing to measure a fall from
@@ -185,6 +217,7 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
     figures are written. The other rows lend their space: see `many_loops`.
     """
     balance(n, a, b, c)
+    dc = _closed_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, poles, work, exchanged, state)
     hessenberg(n, a, b, c, state)
     for i in range(n):
         a[i * n + i] -= 1.0
@@ -192,8 +225,7 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
     count = scan(n, a, b, c, points, kept, SMOOTH, stack, xs, rs, ss, work, state, exchanged)
     row[RADIUS] = _radius(n, poles)
     row[STABLE] = 1.0 if row[RADIUS] < 1.0 else 0.0
-    dc = _closed_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, work, state)
-    _closed_figures(count, n, a, b, c, lead, poles, dc, row, xs, rs, ss, work, state, exchanged)
+    _closed_figures(count, n, a, b, c, lead, dc, row, xs, rs, ss, work, state, exchanged)
     if not math.isnan(lead):
         _open_figures(count, n, a, b, c, row, xs, rs, ss, work, state, exchanged)
     if time_figures:

@@ -2,7 +2,8 @@
 
 A reader of its own because the usual one can crash the interpreter on a damaged file. Source of the layout:
 MathWorks, "MAT-File Format" (R2019b), chapter 1. Texts and cells of texts are read as lists of names, numeric
-fields of a structure as ``name.field``; all else (sparse, complex, objects) is passed over and named.
+fields of a structure as ``name.field``; all else (sparse, objects) is passed over and named. So are complex
+arrays, which stand beside the real ones for whoever asks for them.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ class MatContent:
     arrays: dict[str, FloatArray] = field(default_factory=dict)
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
     passed_over: list[str] = field(default_factory=list)
+    complexes: dict[str, NDArray[np.complex128]] = field(default_factory=dict)
 
 
 def read_mat5(data: bytes) -> MatContent:
@@ -88,9 +90,11 @@ def _take(kind: int, body: bytes, place: int, order: str, content: MatContent) -
     if special is not None:
         special(name, parts, order, content)
         return
-    if (flags & 0xFF) not in NUMERIC_CLASSES or (flags >> 8) & COMPLEX_FLAG or len(parts) < 4:
+    is_complex = bool((flags >> 8) & COMPLEX_FLAG)
+    if is_complex or (flags & 0xFF) not in NUMERIC_CLASSES or len(parts) < 4:
         content.passed_over.append(name)
-        return
+        if not is_complex or len(parts) < 5:
+            return
     shape = _numbers(parts[1][0], parts[1][1], order)
     values = _numbers(parts[3][0], parts[3][1], order)
     if shape is None or values is None or not 0 < len(shape) <= MAX_DIMENSIONS:
@@ -101,7 +105,13 @@ def _take(kind: int, body: bytes, place: int, order: str, content: MatContent) -
         count *= n
     if min(dimensions) < 0 or count != len(values):
         raise InputError(f'array "{name}" at byte {place}: {len(values)} numbers for the shape {dimensions}')
-    content.arrays[name] = values.reshape(dimensions, order="F")
+    if is_complex:
+        imaginary = _numbers(parts[4][0], parts[4][1], order)
+        if imaginary is None or len(imaginary) != count:
+            raise InputError(f'array "{name}" at byte {place}: no imaginary part for the shape {dimensions}')
+        content.complexes[name] = (values + 1j * imaginary).reshape(dimensions, order="F")
+    else:
+        content.arrays[name] = values.reshape(dimensions, order="F")
 
 
 Parts = list[tuple[int, bytes, int]]
@@ -159,6 +169,7 @@ def _take_structure(name: str, parts: Parts, order: str, content: MatContent) ->
         inner = MatContent()
         _take(kind, body, place, order, inner)
         content.arrays |= {f"{name}.{field_name}": values for values in inner.arrays.values()}
+        content.complexes |= {f"{name}.{field_name}": values for values in inner.complexes.values()}
 
 
 def _class_of(body: bytes, order: str) -> int:

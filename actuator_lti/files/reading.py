@@ -188,7 +188,7 @@ def _hint(text: str, error: Exception) -> str:
     if text.lstrip()[:1] in "{[" and text.lstrip()[:2] not in ("[[",) and ":" in line:
         return "; this looks like JSON, TOML is wanted"
     if re.match(r"[^=\[#]*[,;\t][^=\[#]*$", lines[0]):
-        return "; this looks like a table of numbers, TOML is wanted"
+        return "; this looks like a table of numbers, TOML is wanted: a record, and no design?"
     if result := _COMMA.match(line):
         return f"; use a decimal point: {result[1]} = {result[2].replace(',', '.')}"
     if result := _UNQUOTED.match(line):

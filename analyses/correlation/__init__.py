@@ -8,14 +8,13 @@ if TYPE_CHECKING:
     from analyses.correlation.asked import Asked
     from analyses.correlation.closed_loop import CorrelationResult, correlate_record
     from analyses.correlation.compare import SignalComparison, compare_signals
-    from analyses.correlation.run import Correlation, Prediction, correlate
+    from analyses.correlation.run import Correlation, correlate
     from analyses.correlation.summary import SignalSummary, summarise, worst_of
 
 __all__ = [
     "Asked",
     "Correlation",
     "CorrelationResult",
-    "Prediction",
     "SignalComparison",
     "SignalSummary",
     "compare_signals",
@@ -29,7 +28,7 @@ _ROOMS = {
     "asked": ("Asked",),
     "closed_loop": ("CorrelationResult", "correlate_record"),
     "compare": ("SignalComparison", "compare_signals"),
-    "run": ("Correlation", "Prediction", "correlate"),
+    "run": ("Correlation", "correlate"),
     "summary": ("SignalSummary", "summarise", "worst_of"),
 }
 __getattr__, __dir__ = on_first_use(

@@ -12,7 +12,7 @@ from analyses.request import Option
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """Records, and what drives the model; with ``predict`` a motor is fitted to them and meets a chirp."""
+    """Records, and what drives the model."""
 
     records: Annotated[
         list[Path],
@@ -29,10 +29,6 @@ class Asked:
     error_limit: Annotated[
         float | None,
         Option(words="Error, of the motion about its mean, above which a signal fails.", metavar="PERCENT"),
-    ] = None
-    predict: Annotated[
-        Path | None,
-        Option(words="Fit a motor to the RECORDs (voltage steps), predict this chirp.", metavar="CHIRP"),
     ] = None
 
     def __post_init__(self) -> None:

@@ -115,6 +115,7 @@ def correlate_record(
         If the record holds no command, or nothing to compare.
     """
     record = prepared(record)
+    design = record.drive(design)
     notes = list(record.notes)
     findings = check_record(design, record)
     measured = measured_signals(design, record, derive_velocity, notes)

@@ -80,6 +80,7 @@ def command_of(design: Design, record: Record, signal: str | None = None) -> Dri
     InputError
         For a signal that is no command of this drive, or that the record does not hold.
     """
+    design = record.drive(design)
     names = command_names(design)
     if signal is not None:
         allowed = names | {"voltage": "voltage"}

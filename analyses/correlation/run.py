@@ -1,4 +1,4 @@
-"""Every record against the model, or a chirp predicted from steps."""
+"""Every record against the model."""
 
 from __future__ import annotations
 
@@ -7,11 +7,9 @@ from dataclasses import dataclass
 
 from actuator_lti.design.model import Design
 from analyses.correlation.asked import Asked
-from analyses.correlation.chirp import ChirpPrediction, predict_chirp
 from analyses.correlation.closed_loop import CorrelationResult, correlate_record
 from analyses.correlation.summary import SignalSummary, agrees, summarise, worst_of
-from analyses.correlation.voltage_motor import VoltageMotor, fit_step
-from analyses.records import open_record
+from analyses.records import open_records
 from analyses.records.record import named_apart
 
 
@@ -44,23 +42,11 @@ class Correlation:
         return agrees(self.records, self.limit)
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """A motor fitted to steps, and what it says of a chirp."""
-
-    motor: VoltageMotor
-    chirp: ChirpPrediction
-    record: str
-
-
 def correlate(
     design: Design, asked: Asked, *, progress: Callable[[int, int], None] | None = None
-) -> Correlation | Prediction:
+) -> Correlation:
     """Run the model with each record's own command, load and supply, and compare."""
-    records = [open_record(path) for path in asked.records]
-    if asked.predict is not None:
-        motor = fit_step(records)
-        return Prediction(motor, predict_chirp(motor, open_record(asked.predict)), asked.predict.name)
+    records = [record for path in asked.records for record in open_records(path)]
     results = [
         correlate_record(design, record, command=asked.command, progress=progress)
         for record in named_apart(records)

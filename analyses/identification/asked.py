@@ -140,7 +140,7 @@ class Asked(Settings):
             return False
         from analyses.toml_tables import read_toml
 
-        return "file" not in read_toml(first)
+        return not {"file", "record"} & set(read_toml(first))
 
     @classmethod
     def design_of(cls, chosen: Mapping[str, Any]) -> str:

@@ -120,6 +120,7 @@ def identify_bench(
     items = (*_fit_items(findings, size, model, limit), *sampled, *filter(None, lags))
     try:
         values = joint_values(start, model, inertia_to=settings.inertia_to)
+        _refuse_settings(used, values.names)
         made = design_with_fit(with_structure(start, model), values, source)
     except InputError as error:
         reasons = "; ".join(item.reason for item in items if item.passed is False)
@@ -145,6 +146,14 @@ def identify_bench(
         laws=laws,
         electrical=electrical,
     )
+
+
+def _refuse_settings(records: Sequence[Record], looked_for: Sequence[str]) -> None:
+    """Refuse a record's own setting of what is found from all of them."""
+    for record in records:
+        for key in record.settings.keys() & set(looked_for):
+            told = f"settings.{key}: is found from all records; allowed: any other key, or --fix {key}=VALUE"
+            raise InputError(told, where=record.name)
 
 
 def _fitted(

@@ -92,7 +92,7 @@ def _rows(design: Design, record: Record, late_s: float) -> FloatArray:
             raise InputError(f"no {name}: voltage, current and motion are needed", record.name)
     recipe = recipe_for(record)
     period = period_of(record)
-    motion, _ = motion_of(design, record, recipe)
+    motion, _ = motion_of(record.drive(design), record, recipe)
     b, a = butter(recipe.filter_order, 2.0 * recipe.cutoff_hz * period)
     current, voltage = (np.asarray(filtfilt(b, a, record[name])) for name in ("current", "voltage"))
     voltage = np.interp(record.time_s - late_s, record.time_s, voltage)

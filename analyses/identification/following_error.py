@@ -28,6 +28,7 @@ def following_item(design: Design, record: Record, simulated: Record) -> Item | 
     Item or None
         None where the drive has no such loops, or the two are too unlike to be compared.
     """
+    design = record.drive(design)
     control = design.controller
     if control.position is None or control.velocity is None:
         return None

@@ -16,6 +16,7 @@ from analyses.identification.joint_model import (
     JointModel,
     Recipe,
     base_columns,
+    default_value,
     linear_basis,
 )
 from analyses.identification.load_side import TwoSides, two_sides
@@ -90,7 +91,7 @@ def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool
     InputError
         If the record holds no drive signal that the design makes a torque of.
     """
-    motor, signals = design.effective_motor, record.signals
+    motor, signals = record.drive(design).effective_motor, record.signals
     constant, gain, ohm = motor.torque_constant_Nm_A, motor.source_gain_Nm_V, motor.resistance_ohm
     if "force" in signals and design.axis == "linear":
         return record["force"], "force", "recorded force", False
@@ -181,6 +182,8 @@ def record_rows(
 ) -> Rows:
     """Make the rows of one record.
 
+    What the record's own settings add (an inertia at the output) is taken off the drive torque.
+
     Parameters
     ----------
     gravity : bool
@@ -190,7 +193,8 @@ def record_rows(
     moment : array, optional
         That moment after decimation, as found so far, for the load's share of the friction.
     """
-    record = prepared(record)
+    record, shared = prepared(record), design
+    design = record.drive(shared)
     lasts = len(record) * period_of(record)
     if lasts < SHORTEST_S and not is_benchmark(record):
         told = f"lasts {lasts:.3g} s in {len(record)} rows: {SHORTEST_S:g} s and more are needed"
@@ -246,6 +250,8 @@ def record_rows(
         names += ["gravity_sin", "gravity_cos"]
         share = -1.0 / design.total_ratio if free else 0.0
         w = np.column_stack([w, share * sine, share * cosine])
+    if record.settings:  # the values looked for are those of the shared design
+        y = y - w @ [default_value(design, name) - default_value(shared, name) for name in names]
     return Rows(
         record=record.name,
         names=tuple(names),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
@@ -19,8 +20,8 @@ from analyses.identification.resimulation import steady_current_error
 from analyses.identification.surface_fit import NAMES
 from analyses.identification.to_design import design_with_fit, with_fixed
 from analyses.identification.verdict import Identified
-from analyses.records import import_campaign, load_campaign, open_record
-from analyses.records.record import named_apart
+from analyses.records import import_campaign, load_campaign, open_record, open_records
+from analyses.records.record import Record, named_apart
 
 Progress = Callable[[int, int], None]
 
@@ -52,14 +53,18 @@ def identify(
     return replace(of(design, asked, progress), accepted=asked.accept)
 
 
+def _opened(paths: Sequence[Path], taken: Sequence[str] = ()) -> list[Record]:
+    return named_apart([record for path in paths for record in open_records(path)], taken)
+
+
 def _of_records(design: Design, asked: Asked, progress: Progress | None) -> BenchResult:
-    records = named_apart([open_record(path) for path in asked.files])
-    unseen = named_apart([open_record(path) for path in asked.validate or ()], [r.name for r in records])
+    records = _opened(asked.files)
+    unseen = _opened(asked.validate or (), [record.name for record in records])
     return identify_bench(design, records, validation=unseen, settings=asked, progress=progress)
 
 
 def _planned(design: Design, asked: Asked, progress: Progress | None) -> Plan:
-    records = named_apart([open_record(path) for path in asked.files[1:]])
+    records = _opened(asked.files[1:])
     measured = identify_bench(design, records, settings=asked).model if records else None
     noise = asked.noise if asked.noise is not None else design.instruments.current_noise_A
     within = asked.within / 100.0

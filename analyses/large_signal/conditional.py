@@ -26,6 +26,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import stage_gain
 from actuator_lti.errors import TooManyTicks
 from analyses.large_signal.settling_ticks import full_range
+from analyses.motion.settling import accepted_rad
 from nonlinear import LIMITERS, Rows
 from nonlinear.bench.loop_setup import points_of
 from nonlinear.bench.on_the_bench import quiet
@@ -310,6 +311,8 @@ def _bisected(design: Design, settle_ticks: int, longer: int) -> tuple[float | N
 def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 1) -> npt.NDArray[np.bool_]:
     """Which steps from rest settle: the error left is small, or still falls, or the drive has come to rest.
 
+    Small is a share of the step, what friction holds up, and the swing that a requirement accepts.
+
     An error larger than the step itself does not count as falling: an irregular swing against a limit has a
     smaller window now and then.
 
@@ -332,7 +335,7 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
     for last in (0, 1):
         low, high = result.span("output_angle_rad", last)
         errors.append(np.maximum(np.abs(high - sizes_rad), np.abs(low - sizes_rad)))
-    near = errors[0] <= np.maximum(CONVERGED * sizes_rad, _standing(design))
+    near = errors[0] <= np.maximum(CONVERGED * sizes_rad, _standing(design) + accepted_rad(design))
     low, high = result.span("output_angle_rad")
     rests = high - low <= RESTING * sizes_rad
     limited = _limited(result)

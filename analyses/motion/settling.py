@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import degrees, inf, radians
 
+from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.model import Design
+from actuator_lti.design.checks import CHECKS
+from actuator_lti.design.model import Design, Requirement, Waiver
 from nonlinear.rows import Rows
 from nonlinear.settling.rest import Rest, judge
 
@@ -40,6 +43,12 @@ class Settling:
         """Half the span of the output or of the motor at the output's side, whichever is larger."""
         return max(self.rest.amplitude, self.rest.motor_amplitude)
 
+    @property
+    def limit_cycle_rad(self) -> float | None:
+        """The swing that it ends in: 0 at rest, inf where it diverges, ``None`` where it still moves."""
+        known = {"at rest": 0.0, "diverging": inf, "still moving": None}
+        return known.get(self.rest.verdict, self.swing_rad)
+
 
 def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
     """Step and wait; the command is of the position loop.
@@ -67,21 +76,63 @@ def settlings_of(design: Design) -> tuple[Settling, ...]:
 
 
 def noticed(design: Design, settlings: Iterable[Settling]) -> Settling | None:
-    """The largest motion of the drive as it is that does not come to rest; None: it rests."""
+    """The largest motion of the drive as it is that does not come to rest; None: it rests.
+
+    One that fails comes first, then one that is not known, then one that a requirement accepts.
+    """
     least = NOTICED * design.validation.full_deflection_rad
-    return largest_swing(one for one in settlings if one.swing_rad >= least)
-
-
-def verdict_of(swing: Settling | None) -> Verdict:
-    """Whether a drive comes to rest; what still moves at the end of the work is not proven."""
-    return Verdict.of(True if swing is None else None if swing.rest.verdict == "still moving" else False)
+    hunting = [one for one in settlings if one.hunting and one.swing_rad >= least]
+    order = (Verdict.MET, Verdict.NOT_PROVEN, Verdict.NOT_MET)
+    return max(hunting, key=lambda one: (order.index(verdict_of(design, one)), one.swing_rad), default=None)
 
 
 def largest_swing(settlings: Iterable[Settling]) -> Settling | None:
     """The one of those that do not come to rest that moves most, known ends first; None: all do."""
     hunting = (one for one in settlings if one.hunting)
-    known = ("limit cycle", "diverging")
-    return max(hunting, key=lambda one: (one.rest.verdict in known, one.swing_rad), default=None)
+    return max(hunting, key=lambda one: (one.limit_cycle_rad is not None, one.swing_rad), default=None)
+
+
+def accepted(design: Design) -> Requirement | None:
+    """The tightest requirement on the swing after a step: where there is one, rest is judged by it."""
+    asked = [one for one in design.requirements if one.quantity == "limit_cycle" and one.maximum is not None]
+    return min(asked, key=lambda one: one.maximum or 0.0, default=None)
+
+
+def accepted_rad(design: Design) -> float:
+    """The swing that is accepted (m on a linear axis); 0 where rest itself is asked."""
+    asked = accepted(design)
+    most = 0.0 if asked is None or asked.maximum is None else asked.maximum
+    return most if design.axis == "linear" else radians(most)
+
+
+def verdict_of(design: Design, swing: Settling | None) -> Verdict:
+    """Whether a drive comes to rest, or swings no more than its requirement accepts.
+
+    What still moves at the end of the work is not proven.
+    """
+    size = 0.0 if swing is None else QUANTITIES["limit_cycle"].read(swing, design.axis)
+    asked = accepted(design)
+    return Verdict.of(None if size is None else size <= ((asked.maximum if asked else None) or 0.0))
+
+
+def waiver_of_rest(design: Design) -> Waiver | None:
+    """What lets go a rest that is not proven: a waiver of the check, or of the requirement that it is."""
+    asked = accepted(design)
+    return design.waiver_of(f"{CHECKS}-rest") or (design.waiver_of(asked.id) if asked else None)
+
+
+def judged_by(design: Design) -> str:
+    """Say which swing is accepted and by what; empty where rest itself is asked."""
+    asked = accepted(design)
+    return "" if asked is None else f"at most ±{asked.maximum:g} {asked.unit} by requirement {asked.id}"
+
+
+def ending_of(design: Design, swing: Settling) -> str:
+    """Say after which step a drive does not come to rest, and what it does then."""
+    scale, unit, load = (1e3, "mm", "N") if design.axis == "linear" else (degrees(1.0), "deg", "N m")
+    under = f" under {swing.load_Nm:g} {load}" if swing.load_Nm else ""
+    step = f"after a step of {scale * swing.amplitude_rad:.3g} {unit}{under}"
+    return f"{step}: {words(swing.rest, scale, unit)}"
 
 
 def words(rest: Rest, factor: float, unit: str) -> str:

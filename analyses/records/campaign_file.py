@@ -49,6 +49,10 @@ from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.toml_tables import Table, key_of, read_toml
 
+RECORDS = (
+    'CSV, JSON, Parquet or MATLAB, or a TOML with file = "log.csv" or [[record]]'
+    "; correlate takes the design first, identify behind --design"
+)
 Method = Literal["correlation", "event", "given"]
 
 
@@ -121,6 +125,7 @@ def load_campaign(path: str | Path) -> Campaign:
     """
     path = Path(path)
     root = Table(read_toml(path), "", str(path))
+    refuse_design(root)
     root.only(("campaign", "drive", "sensor", "join", "instruments", "run"))
     head = root.table("campaign")
     campaign = head.read(
@@ -136,6 +141,12 @@ def load_campaign(path: str | Path) -> Campaign:
     campaign = campaign if "name" in head else replace(campaign, name=shown_path(path.stem))
     _check(campaign)
     return campaign
+
+
+def refuse_design(root: Table) -> None:
+    """Refuse a design where records are wanted."""
+    if {"motor", "design"} & set(root):
+        raise InputError(f"a design, and no record; allowed: {RECORDS}", where=root.origin)
 
 
 def _check(campaign: Campaign) -> None:

@@ -13,6 +13,7 @@ from analyses.records.campaign_file import Campaign, RunEntry
 from analyses.records.clocks import ClockJoin, join_records
 from analyses.records.csv_stream import MAX_ROWS, read_csv_record
 from analyses.records.inputs import InputUse, account
+from analyses.records.json_reader import read_json_record
 from analyses.records.mat_reader import read_mat_record
 from analyses.records.parquet_reader import read_parquet_record
 from analyses.records.record import InputColumn, Record, RowCounts
@@ -140,6 +141,8 @@ def read_record(path: Path, spec: RecordSpec, max_rows: int = MAX_ROWS) -> Recor
         return read_mat_record(path, spec)
     if path.suffix.lower() in (".parquet", ".pq"):
         return read_parquet_record(path, spec)
+    if path.suffix.lower() == ".json":
+        return read_json_record(path, spec)
     return read_csv_record(path, spec, max_rows=max_rows)
 
 

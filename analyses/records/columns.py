@@ -51,9 +51,7 @@ def find_columns(header: tuple[str, ...] | None, text: bytes, spec: RecordSpec, 
 
     Without column names the first row of ``text`` tells how many columns there are.
     """
-    wanted: list[str | int] = [] if spec.time.column is None else [spec.time.column]
-    wanted += [signal.column for signal in spec.signals]
-    positions = tuple(_position(column, header, origin) for column in wanted)
+    positions = tuple(_position(column, header, origin) for column in spec.columns(header or ()))
     names = tuple(header[p] if header and p < len(header) else str(p + 1) for p in positions)
     separator = separator_of(spec.format).encode(spec.format.encoding)
     count = len(header) if header else text.partition(b"\n")[0].count(separator) + 1

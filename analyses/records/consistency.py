@@ -55,6 +55,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
         _supply,
         _load,
     )
+    design = record.drive(design)
     return tuple(result for check in checks if (result := check(design, record)) is not None)
 
 

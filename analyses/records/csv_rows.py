@@ -6,6 +6,7 @@ import math
 import re
 from copy import deepcopy
 from dataclasses import dataclass, field, fields
+from datetime import UTC, datetime
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from analyses.records.record import RowCounts
 from analyses.records.spec import MISSING_TEXTS, CsvFormat, Policy
 
 _RUN_OF_BLANKS = re.compile(rb"[ \t]+")
+STAMP = re.compile(rb"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?")
+"""A time stamp of ISO 8601: to the second, its fraction, its zone."""
 
 
 @dataclass
@@ -31,6 +34,7 @@ class Account:
     dropped: dict[str, int] = field(default_factory=dict)
     first_dropped: dict[str, str] = field(default_factory=dict)
     columns: tuple[str, ...] = ()
+    first_stamp: datetime | None = None
 
     def drop(self, reason: str, where: str, count: int = 1) -> None:
         """Count rows that are left out, and where the first of them was."""
@@ -60,8 +64,10 @@ class Block:
     lines: IntArray
 
 
-def clean(data: bytes, layout: CsvFormat) -> bytes:
-    """Line ends to newline, row ends cut off, runs of blanks to one tab."""
+def clean(data: bytes, layout: CsvFormat, account: Account) -> bytes:
+    """Line ends to newline, row ends cut off, runs of blanks to one tab, time stamps to seconds."""
+    if layout.stamps:
+        data = STAMP.sub(lambda stamp: _seconds(stamp, layout, account), data)
     if b"\r" in data:
         data = data.replace(b"\r\n", b"\n")
     if layout.separator == "whitespace":
@@ -70,6 +76,18 @@ def clean(data: bytes, layout: CsvFormat) -> bytes:
         end = layout.row_end.encode(layout.encoding)
         data = data.replace(end + b"\n", b"\n").removesuffix(end)
     return data
+
+
+def _seconds(stamp: re.Match[bytes], layout: CsvFormat, account: Account) -> bytes:
+    """Seconds from the first stamp's whole second, all digits of the fraction kept; UTC without a zone."""
+    try:
+        read = datetime.fromisoformat((stamp[1] + (stamp[3] or b"")).decode())
+    except ValueError:
+        return stamp[0]
+    read = read if read.tzinfo else read.replace(tzinfo=UTC)
+    account.first_stamp = account.first_stamp or read
+    whole = (read - account.first_stamp).total_seconds()
+    return f"{whole:.0f}{layout.decimal}{(stamp[2] or b'0').decode()}".encode()
 
 
 def separator_of(layout: CsvFormat) -> str:

@@ -88,7 +88,7 @@ def _blocks(path: Path, spec: RecordSpec, account: Account, digest: hashlib._Has
                 digest.update(data)
             line = account.lines + 1
             account.lines += data.count(b"\n") + (not data.endswith(b"\n"))
-            text = clean(data, layout)
+            text = clean(data, layout, account)
             if columns is None:
                 header, text, line = read_header(text, line, layout, account, str(path))
                 if header is None and not text:

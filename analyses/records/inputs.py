@@ -76,7 +76,7 @@ def inputs_of(spec: RecordSpec, columns: Sequence[str]) -> tuple[InputColumn, ..
     result += [
         InputColumn(column=name(s.column), signal=s.name, unit=s.unit, note=s.note) for s in spec.signals
     ]
-    read = {one.column for one in result}
+    read = {name(column) for column in spec.columns(columns)}
     return (*result, *(InputColumn(column=c, note=NO_SIGNAL) for c in columns if c not in read))
 
 
@@ -96,14 +96,15 @@ def spec_of_names(
     time: str | None = None
     signals: dict[str, SignalColumn] = {}
     why: dict[str, str] = {}
+    own = {column: _own_name(column) for column in columns}
     for column in columns:
-        if is_time(column):
+        if is_time(own[column]):
             if time is None:
                 time = column
             else:
                 why[column] = f"the time is read from {time}"
             continue
-        result = _signal(column, why)
+        result = _signal(column, own[column], why)
         if result is not None and result.name in signals and _at_the_output(column, result, signals):
             before = signals[result.name].column
             why[str(before)] = f"{MEANINGS[result.name]} is read from {column}"
@@ -114,7 +115,7 @@ def spec_of_names(
             signals[result.name] = result
     if time is None or not signals:
         return None, why
-    unit = taken_apart(time).unit or "s"
+    unit = taken_apart(own[time]).unit or "s"
     read = TimeColumn(column=time, unit=unit)
     return RecordSpec(format=layout, time=read, signals=tuple(signals.values())), why
 
@@ -127,9 +128,20 @@ def _at_the_output(column: str, result: SignalColumn, signals: Mapping[str, Sign
     return taken_apart(column).base.startswith("output_") and taken_apart(before).base.startswith("motor_")
 
 
-def _signal(column: str, why: dict[str, str]) -> SignalColumn | None:
-    """The signal of one column; where there is none, the reason is noted."""
-    parts = taken_apart(column)
+def _own_name(column: str) -> str:
+    """The name of a field of a structure, where only that is known."""
+    own = column.partition(".")[2]
+    return own if not _is_known(column) and _is_known(own) else column
+
+
+def _is_known(name: str) -> bool:
+    parts = taken_apart(name)
+    return is_time(name) or (parts.unit is not None and signal_of(parts.base, parts.unit) is not None)
+
+
+def _signal(column: str, name: str, why: dict[str, str]) -> SignalColumn | None:
+    """The signal of one column by its name; where there is none, the reason is noted."""
+    parts = taken_apart(name)
     if parts.unit is None:
         known = parts.base in MEANINGS or any(signal_of(parts.base, u) for u in ("rad", "A", "V", "N*m"))
         why[column] = "has no unit in its name" if known else "no name that is known"

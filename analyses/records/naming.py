@@ -100,7 +100,7 @@ def taken_apart(column: str) -> ColumnName:
     """
     for pattern in (_BRACKETS, _IN, _SLASH):
         match = pattern.match(column.strip())
-        if match is not None and _is_unit(match["unit"]):
+        if match is not None and is_unit(match["unit"]):
             return _words(match["base"], match["unit"].strip())
     for suffix in sorted(SUFFIXES, key=len, reverse=True):
         base = column.strip().removesuffix(f"_{suffix}")
@@ -109,7 +109,8 @@ def taken_apart(column: str) -> ColumnName:
     return _words(column, None)
 
 
-def _is_unit(text: str) -> bool:
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit, as recorders spell them; a plain number is none."""
     try:
         parse_unit(_spelled(text))
     except ValueError:

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
+from typing import Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import MatContent
 from actuator_lti.files.reading import open_regular, shown_path
-from analyses.records.campaign_file import record_spec
+from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
 from analyses.records.campaign_import import read_record
+from analyses.records.csv_rows import STAMP
 from analyses.records.csv_stream import MAX_ROWS
 from analyses.records.inputs import spec_of_names
+from analyses.records.json_reader import load_json
 from analyses.records.mat_reader import columns_of, load_mat, names_in
+from analyses.records.naming import is_unit
 from analyses.records.parquet_reader import load_parquet
 from analyses.records.published import EMPS_SPEC, ODRIVE_SPEC
 from analyses.records.record import Record
@@ -32,23 +37,36 @@ UNKNOWN = (
 
 
 def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
-    """Read a record whose layout is told by a record file, or by its column names.
+    """As `open_records`, of a file that holds one record."""
+    records = open_records(path, max_rows=max_rows)
+    if len(records) != 1:
+        raise InputError(f"lists {len(records)} records; allowed here: one", where=str(path))
+    return records[0]
 
-    Known without a record file: CSV (comma, semicolon or tab; decimal point or comma), Parquet and MATLAB
-    files whose columns are named with their units, such as ``time_s``, ``reference_deg``,
-    ``Motor speed [rpm]``, ``current_A``, ``load_Nm`` (what ``simulate`` writes); a MATLAB matrix beside a
-    list of such names; the ODrive recorder's CSV; and the MATLAB file of the EMPS benchmark.
+
+def open_records(path: str | Path, *, max_rows: int = MAX_ROWS) -> list[Record]:
+    """Read the records whose layout is told by a record file, or the one of a file by its column names.
+
+    Known without a record file: CSV (comma, semicolon or tab; decimal point or comma; units in the names or
+    in a row of their own; time in seconds or as ISO 8601 stamps), JSON, Parquet and MATLAB files whose
+    columns are named with their units, such as ``time_s``, ``reference_deg``, ``Motor speed [rpm]``,
+    ``current_A``, ``load_Nm`` (what ``simulate`` writes); a MATLAB matrix beside a list of such names; the
+    ODrive recorder's CSV; and the MATLAB file of the EMPS benchmark.
 
     A record file is TOML::
 
-        file = "log.csv"                               # beside the record file
+        file = "log.csv"                               # beside the record file; or a list of files
         separator = ";"
         decimal = ","
         time = { column = "t", unit = "ms" }
         signals.reference = { column = "cmd", unit = "deg" }
         signals.current = { column = "I", unit = "mA", value = "rms" }
+        signals.voltage = { column = "u - pulses", unit = "V", offset = 0.1, scale = 2.0 }
         resample_tolerance = "2 %"                     # of the range, where steps are missing or uneven
         missing = "interpolate"                        # signals at several rates; default "drop" the row
+        settings.control.position.gain = "90 1/s"      # of the drive, other than the design's
+
+    Several records stand in ``[[record]]`` tables, each with what is its own beside what all share.
 
     Raises
     ------
@@ -59,6 +77,8 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
     suffix = path.suffix.lower()
     if suffix == ".toml":
         return _described(path, max_rows)
+    if not suffix and not path.exists():  # as designs are named
+        raise InputError(f"is no file; allowed: {RECORDS}", where=str(path))
     if path.is_file() and path.stat().st_size == 0:
         raise InputError("is empty; allowed: a line of names, then rows of numbers", where=str(path))
     spec, why = _spec_of_file(path, suffix)
@@ -66,23 +86,45 @@ def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
     inputs = tuple(
         one if one.signal else replace(one, note=why.get(one.column, one.note)) for one in record.inputs
     )
-    return replace(_with_gain(record), name=shown_path(path.name), inputs=inputs)
+    return [replace(_with_gain(record), name=shown_path(path.name), inputs=inputs)]
 
 
-def _described(path: Path, max_rows: int) -> Record:
-    data = read_toml(path)
-    if "file" not in data:
-        kind = "a design" if {"motor", "design"} & set(data) else "a TOML file"
-        raise InputError(
-            f'{kind}, and no record; allowed: CSV, Parquet or MATLAB, or a TOML with file = "log.csv"'
-            " (a design goes behind --design)",
-            where=str(path),
+def _described(path: Path, max_rows: int) -> list[Record]:
+    root = Table(read_toml(path), "", str(path))
+    refuse_design(root)
+    if not {"file", "record"} & set(root):
+        raise InputError(f"a TOML file, and no record; allowed: {RECORDS}", where=str(path))
+    shared = {key: value for key, value in root.data.items() if key != "record"}
+    result = []
+    for one in root.tables("record") if "record" in root else [Table({}, "", str(path))]:
+        signals = {**root.table("signals").data, **one.table("signals").data}
+        own = Table({**shared, **one.data, "signals": signals}, one.path, one.origin)
+        settings = {**_settings(root.table("settings")), **_settings(one.table("settings"))}
+        files = own.data.get("file")
+        names: list[Any] = files if isinstance(files, list) and files else [files]
+        if not all(isinstance(name, str) for name in names):
+            raise own.fail("file", "a text, or a list of texts, is wanted")
+        spec = record_spec(
+            {k: v for k, v in own.data.items() if k not in ("file", "settings")}, own.origin, own.path
         )
-    if not isinstance(data["file"], str):
-        raise Table(data, "", str(path)).fail("file", "a text is wanted")
-    file = path.parent / data["file"]
-    spec = record_spec({k: v for k, v in data.items() if k != "file"}, str(path), "")
-    return replace(read_record(file, spec, max_rows), name=shown_path(file.name))
+        for file in (path.parent / name for name in names):
+            record = read_record(file, spec, max_rows)
+            notes = (*record.notes, *(f"set: {key} = {value}" for key, value in settings.items()))
+            result.append(replace(record, name=shown_path(file.name), settings=settings, notes=notes))
+    return result
+
+
+def _settings(table: Table) -> dict[str, str | float]:
+    """Keys of a design by their dotted names."""
+    found: dict[str, str | float] = {}
+    for name, value in table.data.items():
+        if isinstance(value, Mapping):
+            found |= {f"{name}.{key}": one for key, one in _settings(table.table(name)).items()}
+        elif isinstance(value, str | int | float) and not isinstance(value, bool):
+            found[name] = value
+        else:
+            raise table.fail(name, "a key of the design with its value is wanted")
+    return found
 
 
 def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str]]:
@@ -91,6 +133,8 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
         return _spec_of_mat(path)
     if suffix in (".parquet", ".pq"):
         spec, why = spec_of_names(tuple(load_parquet(path)[0]))
+    elif suffix == ".json":
+        spec, why = spec_of_names(tuple(load_json(path)[0]))
     else:
         head = _head(path)
         if head.startswith("%Motor characterization data"):
@@ -142,15 +186,38 @@ def _head(path: Path) -> str:
 
 
 def _columns_of_csv(head: str) -> tuple[tuple[str, ...], CsvFormat]:
-    """Column names, separator and decimal mark from the first lines of a file."""
-    lines = [line for line in (row.strip("\r\n") for row in head.split("\n")) if line.strip()]
-    lines = [line for line in lines if not line.lstrip().startswith("#")]
-    header = lines[0] if lines else ""
+    """Column names, separator and decimal mark from the first lines of a file.
+
+    Units in a row of their own below the names, and seconds of time stamps, are put behind the names.
+    """
+    lines = [(k, line.strip("\r\n")) for k, line in enumerate(head.split("\n"), 1)]
+    lines = [(k, line) for k, line in lines if line.strip() and not line.lstrip().startswith("#")]
+    at, header = lines[0] if lines else (0, "")
     separator = max(";\t,", key=lambda mark: (header.count(mark), mark == ","))
-    comma = separator != "," and any(_DECIMAL_COMMA.search(line) for line in lines[1:50])
+    comma = separator != "," and any(_DECIMAL_COMMA.search(line) for _, line in lines[1:50])
+    columns = _cells(header, separator)
+    rows = [(k, _cells(line, separator)) for k, line in lines[1:3]]
+    units = _units_row(rows[0][1]) if rows else ()
+    if units:
+        at, _ = rows.pop(0)
+    stamps = [STAMP.fullmatch(cell.encode()) is not None for cell in rows[0][1]] if rows else []
+    told = [unit or ("s" if stamp else "") for unit, stamp in zip_longest(units, stamps, fillvalue="")]
+    names = tuple(f"{name} [{unit}]" if unit else name for name, unit in zip_longest(columns, told))
+    layout = CsvFormat(separator=separator, decimal="," if comma else ".", stamps=any(stamps))
+    if names == columns or len(told) != len(columns):
+        return columns, layout
+    return names, replace(layout, names=names, skip_lines=at)
+
+
+def _cells(line: str, separator: str) -> tuple[str, ...]:
     try:
-        cells = next(csv.reader([header], delimiter=separator), [])
+        return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=separator), []))
     except csv.Error:
-        cells = []
-    columns = tuple(cell.strip() for cell in cells)
-    return columns, CsvFormat(separator=separator, decimal="," if comma else ".")
+        return ()
+
+
+def _units_row(cells: Sequence[str]) -> tuple[str, ...]:
+    """The units of a row that holds nothing else, empty where a cell is; none where it is no such row."""
+    units = tuple(cell.strip("[]()- ") for cell in cells)
+    known = all(not unit or is_unit(unit) for unit in units)
+    return units if known and any(unit.strip("1") for unit in units) else ()

@@ -52,4 +52,8 @@ def load_parquet(path: Path) -> tuple[Mapping[str, FloatArray], str]:
         if pa.types.is_integer(field.type) or pa.types.is_floating(field.type):
             column = table.column(field.name).cast(pa.float64(), safe=False)
             result[field.name] = np.asarray(column.to_numpy(), dtype=np.float64)
+        elif pa.types.is_timestamp(field.type):
+            stamps = table.column(field.name).cast(pa.timestamp("ns")).to_numpy()
+            since = (stamps - stamps[:1]) / np.timedelta64(1, "ns")
+            result[f"{field.name} [s]"] = 1e-9 * np.asarray(since, dtype=np.float64)
     return result, hashlib.sha256(data).hexdigest()

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import BoolArray, FloatArray
 
@@ -62,7 +64,8 @@ class Record:
     ``time_s`` increases strictly and may be irregular; ``signals`` hold arrays of the same length in SI,
     ``units`` their SI units. ``averaged`` tells how many rows of the file were averaged into one where the
     file was too long to be held (1: none). ``inputs`` accounts for every column of the file.
-    ``left_out`` marks rows that no fit is to use.
+    ``left_out`` marks rows that no fit is to use. ``settings`` are keys of a design, with their values, that
+    were other than the design's while this record was taken.
     """
 
     name: str
@@ -77,6 +80,22 @@ class Record:
     inputs: tuple[InputColumn, ...] = ()
     resample_tolerance: float = RESAMPLE_TOLERANCE
     left_out: BoolArray | None = field(default=None, repr=False)
+    settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+
+    def drive(self, design: Design) -> Design:
+        """The design as it was set for this record.
+
+        Raises
+        ------
+        InputError
+            For a setting that is no key of the design, or that contradicts its others.
+        """
+        if not self.settings:
+            return design
+        try:
+            return design.with_values(self.settings)
+        except InputError as error:
+            raise InputError(f"settings: {error.message}", where=self.name) from None
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -45,6 +47,8 @@ class CsvFormat:
         Of the header only; the numbers are plain ASCII.
     matrix : str
         Of a MATLAB file: the matrix whose columns are ``names`` (or named by a list of texts in the file).
+    stamps : bool
+        Whether the time is written as ISO 8601 time stamps; they are read as seconds from the first one.
     """
 
     separator: str = ","
@@ -56,6 +60,7 @@ class CsvFormat:
     skip_lines: int = 0
     encoding: str = "utf-8"
     matrix: str = ""
+    stamps: bool = False
 
     def __post_init__(self) -> None:
         if self.separator != "whitespace" and (len(self.separator) != 1 or self.separator in "\r\n\"'"):
@@ -109,7 +114,8 @@ class TimeColumn:
 class SignalColumn:
     """One signal: its name in the analyses, its column (name, or number from 1), its unit.
 
-    The value in SI is ``(raw + offset) * scale`` converted from ``unit``. The model has the equivalent DC
+    The value in SI is ``(raw + offset) * scale`` converted from ``unit``. A column ``"u - pulses"`` that the
+    file does not have is the difference (or sum) of those it has. The model has the equivalent DC
     motor: of an AC motor ``value`` tells whether a line current or a voltage was written as ``rms`` or
     ``peak``, and ``between = "phase"`` that a voltage is that of a phase to the star point.
     """
@@ -121,6 +127,20 @@ class SignalColumn:
     offset: float = 0.0
     value: Literal["dc", "rms", "peak"] = "dc"
     between: Literal["line-line", "phase"] = "line-line"
+
+    def terms(self, there: Collection[str]) -> tuple[tuple[float, str | int], ...]:
+        """Sign and column of each part of a sum of columns, where the file has no such column itself.
+
+        Examples
+        --------
+        >>> SignalColumn(name="voltage", column="u - pulses + 3rd").terms({"u", "pulses", "3rd"})
+        ((1.0, 'u'), (-1.0, 'pulses'), (1.0, '3rd'))
+        """
+        parts = [] if isinstance(self.column, int) else re.split(r"\s+([+-])\s+", self.column)
+        if len(parts) < 3 or self.column in there:
+            return ((1.0, self.column),)
+        signs = [1.0, *(1.0 if sign == "+" else -1.0 for sign in parts[1::2])]
+        return tuple(zip(signs, parts[::2], strict=True))
 
     @property
     def note(self) -> str:
@@ -160,3 +180,8 @@ class RecordSpec:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise InputError(f"signals.{twice[0]}: given twice")
+
+    def columns(self, there: Collection[str]) -> tuple[str | int, ...]:
+        """The columns to be read of a file that has those: the time's first, then those of each signal."""
+        time = () if self.time.column is None else (self.time.column,)
+        return (*time, *(column for one in self.signals for _, column in one.terms(there)))

@@ -36,9 +36,7 @@ def record_of_columns(
     InputError
         Names the file, the column and the reason.
     """
-    columns = [] if spec.time.column is None else [spec.time.column]
-    columns += [signal.column for signal in spec.signals]
-    names = [_name(column, tuple(vectors), path) for column in columns]
+    names = [_name(column, tuple(vectors), path) for column in spec.columns(vectors)]
     table = _table([_vector(vectors, column, path) for column in names], names, path)
     account = Account(rows_in=len(table), columns=tuple(vectors))
     block = Block(values=table, lines=np.arange(1, len(table) + 1))
@@ -56,7 +54,12 @@ def in_si(spec: RecordSpec, account: Account, origin: str) -> Callable[[Block], 
     def convert(block: Block) -> FloatArray:
         time, values = axis.apply(block)
         account.rows_out += len(time)
-        return np.column_stack([time, *(own(values[:, k]) for k, own in enumerate(converters))])
+        sums, first = [], 0
+        for signal, own in zip(spec.signals, converters, strict=True):
+            signs = [sign for sign, _ in signal.terms(account.columns)]
+            sums.append(own(values[:, first : first + len(signs)] @ signs))
+            first += len(signs)
+        return np.column_stack([time, *sums])
 
     return convert
 

@@ -13,6 +13,7 @@ from analyses.corners import Corners, corners
 from analyses.duty import Duty, duty
 from analyses.failures import Failures, failures
 from analyses.limit_cycles import LimitCycles, limit_cycles
+from analyses.motion.settling import ending_of
 
 
 @dataclass(frozen=True)
@@ -68,10 +69,16 @@ class AskedFigures:
         return None if heat is None else heat.final_degC
 
     @property
-    def limit_cycle_rad(self) -> float:
-        """Largest swing that a step of the drive as it is ends in; 0: it rests."""
+    def limit_cycle_rad(self) -> float | None:
+        """Largest swing that a step of the drive as it is ends in; 0: it rests; ``None``: not known."""
         swing = self._cycles.hunting
-        return 0.0 if swing is None else inf if swing.rest.verdict == "diverging" else swing.swing_rad
+        return 0.0 if swing is None else swing.limit_cycle_rad
+
+    @property
+    def limit_cycle_said(self) -> str:
+        """After which step that is; empty where every one ends at rest."""
+        swing = self._cycles.hunting
+        return "" if swing is None else ending_of(self.design, swing)
 
     def at_corners(self, quantity: Quantity) -> float:
         """The worst of a figure over loops and corners; -inf (or inf) where one is not stable."""
@@ -92,4 +99,5 @@ def asked_figure(figures: AskedFigures, name: str) -> tuple[float | None, str]:
         value = quantity.read(figures, figures.design.axis)
     except InputError as error:
         return None, error.message
-    return value, "" if value is not None else "the design does not state what this needs"
+    said = "" if value is not None else "the design does not state what this needs"
+    return value, figures.limit_cycle_said if name == "limit_cycle" else said

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import degrees
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.verdict import Tally, Verdict
@@ -15,7 +14,7 @@ from analyses.large_signal.by_amplitude import AmplitudeMargin
 from analyses.large_signal.conditional import Conditional
 from analyses.limit_cycles.counts import Counts
 from analyses.linear.loop_figures import LoopFigures
-from analyses.motion.settling import Settling, noticed, words
+from analyses.motion.settling import Settling, ending_of, judged_by, noticed, verdict_of, waiver_of_rest
 from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.in_time import MarginShown, StepShown
 from analyses.validation.row import Row
@@ -105,17 +104,27 @@ class Validation:
         return noticed(self.design, self.settlings)
 
     @property
+    def rest(self) -> Verdict:
+        """Whether it comes to rest, or swings no more than its requirement accepts."""
+        return verdict_of(self.design, self.hunting)
+
+    @property
+    def rest_words(self) -> str:
+        """What is said of a drive that does not come to rest and does not fail by it; empty otherwise."""
+        swing = self.hunting
+        if swing is None or self.rest is Verdict.NOT_MET:
+            return ""
+        if self.rest is Verdict.NOT_PROVEN:
+            return f"not known whether the drive comes to rest {ending_of(self.design, swing)}"
+        return f"{ending_of(self.design, swing)}; accepted: {judged_by(self.design)}"
+
+    @property
     def failures(self) -> tuple[str, ...]:
         """What the drive does that it must not, beside rows that are not met; a sentence each."""
         found = [f"the {name} loop is {self.figures[name].margins.verdict}" for name in self.unstable]
         swing = self.hunting
-        if swing is not None and swing.rest.verdict != "still moving":
-            scale, unit = (1e3, "mm") if self.design.axis == "linear" else (degrees(1.0), "deg")
-            load = f" under {swing.load_Nm:g} N{'' if self.design.axis == 'linear' else ' m'}" * bool(
-                swing.load_Nm
-            )
-            step = f"a step of {scale * swing.amplitude_rad:.3g} {unit}{load}"
-            found.append(f"the drive does not come to rest after {step}: {words(swing.rest, scale, unit)}")
+        if swing is not None and self.rest is Verdict.NOT_MET:
+            found.append(f"the drive does not come to rest {ending_of(self.design, swing)}")
         if self.conditional is not None and self.conditional.diverges:
             ending = {"keeps oscillating": "oscillate", "is held by a limit": "stop short"}
             does = ending.get(self.conditional.ending, "diverge")
@@ -128,8 +137,9 @@ class Validation:
         """``not met`` where a row is, or the drive fails by itself; then ``not proven``; else ``met``."""
         if self.not_met or self.failures:
             return Verdict.NOT_MET
-        doubts = {**{f"stable-{name}": True for name in self.undecided}, "rest": self.hunting is not None}
-        if not self.rows or any(there and not self.waived(what) for what, there in doubts.items()):
+        doubts = [not self.waived(f"stable-{name}") for name in self.undecided]
+        doubts.append(self.rest is Verdict.NOT_PROVEN and waiver_of_rest(self.design) is None)
+        if not self.rows or any(doubts):
             return Verdict.NOT_PROVEN
         return self.tally.verdict
 
@@ -143,9 +153,7 @@ class Validation:
         """The verdict in words: rows counted, and what the drive does that it must not."""
         said = [self.tally.words("predictions"), *self.failures]
         said += [f"stability of the {name} loop not known" for name in self.undecided]
-        if self.hunting is not None and self.hunting.rest.verdict == "still moving":
-            said.append(f"a step was still moving after {self.hunting.rest.after_s:.3g} s")
-        return "; ".join(said)
+        return "; ".join(filter(None, (*said, self.rest_words)))
 
     def __str__(self) -> str:
         return f"{self.design.name}: {self.words}"

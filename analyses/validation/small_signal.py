@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from math import degrees, pi
 from typing import TYPE_CHECKING
 
@@ -90,11 +89,8 @@ class Place:
         return max(WITHIN, SURE * self.tangent.stated_error)
 
     def within_at(self, angle: float) -> float:
-        """The same of the response at an angle a sample: a faint or a sharp part is known less well.
-
-        At 0 and pi from beside it: there a mode at rest may stand.
-        """
-        z = np.exp(1j * np.array([abs(angle - GRID[0]) if _is_real(angle) else angle]))
+        """The same of the response at an angle a sample: a faint or a sharp part is known less well."""
+        z = np.array([np.exp(1j * angle)])
         size = float(np.abs(self.tangent.closed(z))[0])
         return max(WITHIN, SURE * float(self.tangent.error_at(z)[0]) / max(size, 1e-300))
 
@@ -179,21 +175,13 @@ def _poles(place: Place) -> Row:
     return replace(row, predicted=None, found=None, error=worst)
 
 
-def _pole_equation(t: Tangent, gain: complex, point: complex) -> complex:
-    """Zero where the tangent has a closed-loop pole at a point (over one base period) at a gain."""
-    whole = t.lifted(point)
-    return complex(np.linalg.det(np.eye(len(whole)) + (gain - 1.0) * whole))
-
-
 def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | None:
     """Gain and angle of the closed-loop pole on the circle nearest to those given: its size by secants."""
-    if _is_real(angle):
-        return _real_crossing(t, gain, 1.0 if angle < 1.0 else -1.0), angle
     point = complex(np.exp(1j * angle))
     before = log_gain = float(np.log(gain))
     last = 0.0
     for k in range(NEWTON_STEPS):
-        point = nearest_pole(t.at_gain(float(np.exp(log_gain))), point)
+        point, _ = _pole(t, float(np.exp(log_gain)), point)
         if point == 0.0:
             return None
         size = float(np.log(np.abs(point)))
@@ -208,38 +196,11 @@ def _crossing(t: Tangent, gain: float, angle: float) -> tuple[float, float] | No
     return float(np.exp(log_gain)), abs(float(np.angle(point)))
 
 
-def _is_real(angle: float) -> bool:
-    """Whether an angle is that of z = 1 or -1."""
-    return min(angle, abs(angle - pi)) < 1e-12
-
-
-def _real_crossing(t: Tangent, gain: float, end: float) -> float:
-    """The gain at which a pole crosses at z = 1 or -1, from beside it: there a mode at rest may stand.
-
-    What is real is even in the angle: from a tenth of a radian by tens, where two successive agree best.
-    """
-    found = []
-    for decade in range(1, 13):
-        values = np.linalg.eigvals(t.lifted(end * np.exp(1j * 10.0**-decade)))
-        values = values[values != 0.0]
-        nearest = values[int(np.argmin(np.abs(1.0 - 1.0 / values - gain)))]
-        found.append(1.0 - 1.0 / float(nearest.real))
-    return found[int(np.argmin(np.abs(np.diff(found)))) + 1]
-
-
-def pole_near(equation: Callable[[complex], complex], point: complex) -> complex:
-    """The zero of an equation of poles nearest to a point, by Newton's method."""
-    for _ in range(NEWTON_STEPS):
-        step = 1e-7 * abs(point)
-        value = equation(point)
-        slope = (equation(point + step) - value) / step
-        if slope == 0.0 or not np.isfinite(slope):
-            break
-        move = value / slope
-        point -= move
-        if abs(move) < 1e-9 * abs(point):  # the slope is good to 1e-7: the next move would be below rounding
-            break
-    return complex(point)
+def _pole(t: Tangent, gain: float, point: complex) -> tuple[complex, float]:
+    """The pole at a gain nearest to a point, and its stated error."""
+    poles, errors = t.poles_at(gain)
+    k = int(np.argmin(np.abs(poles - point)))
+    return complex(poles[k]), float(errors[k])
 
 
 def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int | None) -> Row:
@@ -247,17 +208,18 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
 
     ``outward``: 1 where the pole leaves the circle with rising gain, -1 with falling; None: not said.
     """
-    t = place.tangent
-    within, scale = place.within_at(angle / t.B.shape[1]), ratio * _lever(ratio)
+    t, scale = place.tangent, ratio * _lever(ratio)
     found = _crossing(t, ratio, angle)
     if found is None:
-        return place.judged(name, ratio, None, within, scale, "1", "no closed-loop pole crosses there")
+        return place.judged(name, ratio, None, place.within, scale, "1", "no closed-loop pole crosses there")
     gain, turned = found
-    start = np.exp(1j * turned) * (1.0 - ROUNDING)  # not on a mode at rest
-    sides = [
-        abs(pole_near(partial(_pole_equation, t, ratio * x), start)) - 1.0
-        for x in (1.0 - BESIDE, 1.0 + BESIDE)
-    ]
+    beside = [_pole(t, ratio * x, np.exp(1j * turned)) for x in (1.0 - BESIDE, 1.0 + BESIDE)]
+    sides = [abs(pole) - 1.0 for pole, _ in beside]
+    slope = abs(sides[1] - sides[0]) / (2.0 * BESIDE)  # over the relative gain
+    blur = max(error for _, error in beside) / max(slope, 1e-300) * ratio / scale
+    within = max(WITHIN, SURE * blur)
+    if turned > 0.0:  # of the response there, else a mode at rest is in it: the tighter bound of the two
+        within = min(within, place.within_at(turned / t.B.shape[1]))
     hertz = turned / (2.0 * pi * t.period_s)
     words = f"{hertz:.6g} Hz; pole beside the circle by {sides[0]:+.1e}, {sides[1]:+.1e}"
     row = place.judged(name, ratio, gain, within, scale, "1", words)

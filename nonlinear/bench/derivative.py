@@ -30,7 +30,7 @@ import numpy.typing as npt
 from actuator_lti.design.loader import as_design
 from nonlinear.bench.differences import Differences
 from nonlinear.bench.injection import Watched
-from nonlinear.bench.lifted import Complexes, Floats, even, lifted, response, sensitivities
+from nonlinear.bench.lifted import Complexes, Floats, even, lifted, response, sensitivities, without_rest
 from nonlinear.bench.loop_setup import LoopSetup, loop_setup
 
 if TYPE_CHECKING:
@@ -114,9 +114,31 @@ class Tangent:
 
     def at_gain(self, gain: float) -> Floats:
         """A with the loop gain at the place multiplied: v = (gain - 1) times what comes back."""
+        return np.asarray(self.A - self.B @ self._factor(gain) @ self.C)
+
+    def _factor(self, gain: float) -> Floats:
         more = gain - 1.0
-        back = np.linalg.solve(np.eye(len(self.D)) + more * self.D, self.C)
-        return np.asarray(self.A - more * self.B @ back)
+        return np.asarray(more * np.linalg.inv(np.eye(len(self.D)) + more * self.D))
+
+    @cached_property
+    def _at_rest(self) -> int:
+        """Modes at rest that it has, whatever the gain."""
+        n = len(self.A)
+        return n - len(without_rest(self.A, self.entry_errors[:n, :n], n)[0])
+
+    def poles_at(self, gain: float) -> tuple[Complexes, Floats]:
+        """Poles at a gain at the place, but those at rest; the error of each, by those of the entries."""
+        from scipy.linalg import eig
+
+        n, factor = len(self.A), self._factor(gain)
+        back = np.hstack([np.eye(n), -self.B @ factor])
+        seen = np.vstack([np.eye(n), -factor @ self.C])
+        errors = np.abs(back) @ self.entry_errors @ np.abs(seen)
+        A, errors = without_rest(self.at_gain(gain), errors, self._at_rest)
+        values, left, right = eig(A, left=True)
+        sharp = np.abs(np.sum(left.conj() * right, axis=0))
+        felt = np.einsum("ik,ij,jk->k", np.abs(left), errors, np.abs(right))
+        return values, felt / np.maximum(sharp, np.finfo(float).tiny)
 
     def __str__(self) -> str:
         return (

@@ -1,16 +1,17 @@
 """Central differences of the compiled tick over one base period, all numbers of the state at once.
 
-Which numbers take part, a kick at the place shows: those that it moves.  A first estimate, by steps as large
-as no event forbids, says how far a large sine at the place moves each number.  From far above that motion on
-steps fall by tens, until a smaller one agrees no better.  Each column is taken where successive steps agree
-best, by what their difference does to the response: larger steps bend, smaller ones are lost in rounding.
-Steps over many periods of a torque that repeats agree too, on nothing: they lie beyond steps that do not, and
-are not looked at.  The sum of these differences is the stated error.
+Which numbers take part, a kick at the place shows: those that it moves.  The tick is affine but for events,
+which are seen, and for what bends, of which the design says over how far: a moment over its angle, the tanh
+law beside its flat part.  So the steps begin far above the kick's own motion, or where what bends is moved by
+`BENT` of that, and fall by tens while a smaller one agrees better: larger ones bend, smaller ones are lost in
+rounding.  Each column is taken where two successive steps agree best, by what their difference does to the
+response.  The sum of these differences is the stated error.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -23,11 +24,11 @@ from nonlinear.bench.lifted import GRID, Floats, sensitivities, sized
 from nonlinear.bench.loop_setup import LoopSetup
 
 Parts = tuple[Floats, Floats, Floats, Floats]
-DECADES, MOST_DECADES = 13, 40  # of steps; where events forbid the larger ones, or they bend
+MOST_DECADES = 40  # of steps, where events forbid the larger ones
 TENFOLD = 100.0  # what the truncation of central differences grows by with a step ten times as large
-SWAY = 1e3  # times the motion that a large sine makes: the largest step
-LEAST = float(np.sqrt(np.finfo(float).eps))  # of the number itself: the largest step is no smaller
-FAR = 1e8  # times a kick's first motion: the largest step of the first estimate
+FAR = 1e8  # times a kick's first motion: the largest step
+BENT = 1e-3  # of the way over which a torque bends, that the largest step may move it
+LEAST = 3  # steps of a column: two differences, of which the second says whether it bends
 FRESH = 4  # periods from when a number is first moved, in which its motion gives its scale
 
 
@@ -45,7 +46,7 @@ class Differences:
     """
 
     def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched | None] = (None,)) -> None:
-        self.where = f"{setup.design.name}: {place}"
+        self.setup, self.where = setup, f"{setup.design.name}: {place}"
         self.injected = Injection(setup, place, watched)
         self.drive = self.injected.rows.running()
         self.injected.prepare(self.drive.p)
@@ -76,16 +77,13 @@ class Differences:
 
         One after the other for each thing that is read.
         """
-        estimate, n = self._estimate(), self.moved.size
+        n = self.moved.size
         rows = [
             np.concatenate([np.arange(n), n + np.arange(k, self.updates * readings, readings)])
             for readings in [self.injected.readings]
             for k in range(readings)
         ]
-        felt = [self._felt(estimate[each]) for each in rows]
-        sway = SWAY * self.kick * np.max(felt[0][1], axis=0)
-        tried = self._tried(np.maximum(sway, LEAST * np.abs(self.start[self.places])), rows, felt)
-        for columns, (left, right) in zip(tried, felt, strict=True):
+        for columns, (left, right) in self._tried(rows):
             first, _ = columns.best(left, right)
             left, right = self._felt(first)  # what is felt of an error is known once the response is
             whole, off = columns.best(left, right)
@@ -152,46 +150,48 @@ class Differences:
             quiet, period = (0 if new.any() else quiet + 1), period + 1
         return moved
 
-    def _estimate(self) -> Floats:
-        """Columns by the largest step each, far beyond the kick's own motion, that ends in no event."""
-        steps, outputs = FAR * self.scale, self.updates * self.injected.readings
-        columns = np.zeros((steps.size, self.moved.size + outputs))
-        free = np.zeros(steps.size, bool)
-        for _ in range(MOST_DECADES):
-            found = self._differences(steps)[0]
-            new = ~free & np.isfinite(found).all(axis=1)
-            columns[new], free = found[new], free | new
-            if free.all():
-                return columns.T
-            steps = np.where(free, 0.0, 0.1 * steps)
-        raise self._refused(free)
+    @cached_property
+    def _bends(self) -> tuple[tuple[int, float], ...]:
+        """Numbers of the state that a torque bends over, and over how far."""
+        setup, found = self.setup, list[tuple[int, float]]()
+        design, room = setup.design, setup.bias.room_rad_s
+        elastic = self.drive.p[at.ELASTIC_DRIVE] > 0.0
+        output = (at.S_OUTPUT, 1.0) if elastic else (at.S_ANGLE, design.total_ratio)
+        for own, place, ratio in (
+            (design.motor.over_angle, at.S_ANGLE, 1.0),
+            (design.load.over_angle, *output),
+        ):
+            found += [(place, BENT * ratio / wave.order) for wave in own.waves if wave.peak_Nm]
+        if setup.bias.friction_on and np.isfinite(room):
+            found.append((at.S_SPEED, room))
+        return tuple(
+            (int(np.flatnonzero(self.moved == place)[0]), far) for place, far in found if place in self.moved
+        )
 
-    def _tried(
-        self, largest: Floats, rows: list[npt.NDArray[np.intp]], felt: list[tuple[Floats, Floats]]
-    ) -> list[_Columns]:
-        """Columns by steps that differ by tens, of the rows of each thing that is read.
+    def _tried(self, rows: list[npt.NDArray[np.intp]]) -> list[tuple[_Columns, tuple[Floats, Floats]]]:
+        """Columns by steps that fall by tens, of the rows of each thing that is read, and what is felt there.
 
-        From small steps up, each column until larger ones do not count for it; then by smaller ones, until it
-        had three without an event and the last did not bend.
+        Of each column until it had three without an event, and the last did not bend.
         """
-        tried = [self._differences(largest * 10.0 ** (1 - DECADES))]
-        done: list[list[Floats]] = [[] for _ in rows]
-        going = np.ones(largest.size, bool)
-        for decade in reversed(range(DECADES - 1)):
-            tried.insert(0, self._differences(np.where(going, largest * 10.0**-decade, 0.0)))
-            off = np.maximum(np.abs(tried[0][0] - tried[1][0]), tried[0][1])
-            for each, (left, right), below in zip(rows, felt, done, strict=True):
-                below.insert(0, _felt(off[:, each], left, right))
-            going = ~np.all([_upwards(np.stack(below))[1][-1] for below in done], axis=0)
-        for decade in range(DECADES, MOST_DECADES):
+        steps, going, tried = FAR * self.scale, np.ones(self.scale.size, bool), list[tuple[Floats, Floats]]()
+        for _ in range(MOST_DECADES):
+            tried.append(self._differences(np.where(going, steps, 0.0)))
+            steps = 0.1 * steps
+            for row, far in self._bends:
+                moved = np.abs(tried[-1][0][:, row])
+                moved[row] = np.fmax(moved[row], 1.0)  # by the step itself
+                steps = np.fmin(steps, far / np.maximum(moved, 1e-250))
+            if len(tried) < LEAST:
+                continue
             values, rounding = (np.stack(each) for each in zip(*tried, strict=True))
             columns = [_Columns(values[:, :, each], rounding[:, :, each]) for each in rows]
             going = ~columns[0].free
-            for one, (left, right) in zip(columns, felt, strict=True):
-                going = going | one.bend(left, right)
             if not going.any():
-                return columns
-            tried.append(self._differences(np.where(going, largest * 10.0**-decade, 0.0)))
+                felt = [self._felt(each.last) for each in columns]
+                for one, (left, right) in zip(columns, felt, strict=True):
+                    going = going | one.bend(left, right)
+                if not going.any():
+                    return list(zip(columns, felt, strict=True))
         raise self._refused(~going)
 
     def _refused(self, free: npt.NDArray[np.bool_]) -> NumericalError:
@@ -223,7 +223,7 @@ class Differences:
 
 
 class _Columns:
-    """All columns by steps that fall by tens, and what each differs in from that of the next smaller step."""
+    """All columns by steps that fall, and what each differs in from that of the next smaller step."""
 
     def __init__(self, values: Floats, rounding: Floats) -> None:
         self.values = values[:-1]
@@ -235,33 +235,33 @@ class _Columns:
         there = np.asarray(np.isfinite(self.off).all(axis=2))
         return np.asarray((there[:-1] & there[1:]).any(axis=0))
 
+    @property
+    def _smallest(self) -> npt.NDArray[np.intp]:
+        """The place of each column's smallest step of which the next smaller one is known."""
+        there = np.asarray(np.isfinite(self.off).all(axis=2))
+        return np.asarray(len(there) - 1 - np.argmax(there[::-1], axis=0))
+
+    @property
+    def last(self) -> Floats:
+        """Each column by its smallest step but one."""
+        return self._taken(self._smallest, self.values)
+
     def bend(self, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
         """Of which truncation still falls with the smallest step."""
-        felt = _felt(self.off[-2:], left, right)
-        return np.asarray(felt[-1] * np.sqrt(TENFOLD) < felt[-2])
+        felt, last, columns = _felt(self.off, left, right), self._smallest, np.arange(right.shape[1])
+        return np.asarray(felt[last, columns] * np.sqrt(TENFOLD) < felt[last - 1, columns])
 
     def best(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:
         """Each column by the step whose error does least to the response; and that error."""
-        felt, beyond = _upwards(_felt(self.off, left, right))
-        chosen = len(felt) - 1 - np.argmin(np.where(beyond, np.inf, felt), axis=0)
-        columns = np.arange(chosen.size)
-        return self.values[chosen, columns].T, self.off[chosen, columns].T
+        felt = _felt(self.off, left, right)
+        chosen = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
+        return self._taken(chosen, self.values), self._taken(chosen, self.off)
+
+    @staticmethod
+    def _taken(chosen: npt.NDArray[np.intp], values: Floats) -> Floats:
+        return values[chosen, np.arange(chosen.size)].T
 
 
 def _felt(off: Floats, left: Floats, right: Floats) -> Floats:
     """What the error of each column by each step does to the response."""
     return np.asarray(np.max((off @ left.T) * right.T, axis=-1))
-
-
-def _upwards(felt: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """What errors do to the response, from small steps up, and which steps lie beyond a rise.
-
-    Of a step counts what its neighbours are off by as well: a step that is lost in rounding changes nothing,
-    and agrees with the next smaller one by that.  What lies beyond a rise that truncation makes is left.
-    """
-    larger = np.nan_to_num(np.vstack([0.0 * felt[:1], felt[:-1]]), nan=0.0)
-    smaller = np.vstack([felt[1:], np.full_like(felt[:1], np.inf)])
-    felt = np.maximum(np.maximum(felt, smaller), larger)
-    felt = np.where(np.isfinite(felt), felt, np.inf)[::-1]
-    least = np.minimum.accumulate(felt, axis=0)
-    return felt, np.logical_or.accumulate(felt > TENFOLD**2 * least, axis=0)

@@ -9,6 +9,7 @@ from actuator_lti.systems.resolvent import balanced
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
+EPS = float(np.finfo(float).eps)
 GRID = np.geomspace(1e-4, 0.98, 60) * np.pi  # rad a sample: where responses are compared
 FAINT = 1e-6  # of the dominant part of a response: below that it is judged by that part
 
@@ -17,6 +18,29 @@ def even(A: Floats, B: Floats, C: Floats) -> tuple[Floats, Floats, Floats]:
     """The same system with states of like size, which what follows is meant for."""
     A, scale = balanced(A)
     return A, B / scale[:, None], C * scale
+
+
+def without_rest(A: Floats, errors: Floats, most: int) -> tuple[Floats, Floats]:
+    """A with states of like size and without modes at rest, ``most`` at the most; and errors of its entries.
+
+    One is a v with A v = v within ``errors``, those of A: an angle that nothing holds, a torque that an
+    integral and a spring hold.  Then x - v x_j, v_j = 1, obeys equations without x_j.
+    """
+    for left in range(most, -1, -1):
+        A, scale = balanced(A)
+        errors = errors / scale[:, None] * scale
+        if left == 0 or len(A) < 2:
+            break
+        own, size = np.eye(len(A)), len(A) * EPS * np.max(np.abs(A), axis=1, initial=1.0)
+        v = np.linalg.svd(A - own)[2][-1]
+        j = int(np.argmax(np.abs(v)))
+        v /= v[j]
+        if (np.abs((A - own) @ v) > errors @ np.abs(v) + size).any():
+            break
+        o = np.arange(len(v)) != j
+        errors = (errors + np.outer(np.abs(v), errors[j]))[np.ix_(o, o)]
+        A = (A - np.outer(v, A[j]))[np.ix_(o, o)]
+    return A, errors
 
 
 def lifted(A: Floats, B: Floats, C: Floats, D: Floats, points: Complexes) -> Complexes:

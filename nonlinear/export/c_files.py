@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
@@ -61,7 +62,7 @@ def spare_parameters(ours: ExportedDesign) -> int:
     return SPARE_LEVELS * modes * (1 + elastic.STEP_SIZE)
 
 
-def c_export(design: Design, *, single_precision: bool = False) -> dict[str, str]:
+def c_export(design: Design, *, single_precision: bool = False, prefix: str = "drive_") -> dict[str, str]:
     """Files of an export, by name.
 
     Parameters
@@ -69,26 +70,48 @@ def c_export(design: Design, *, single_precision: bool = False) -> dict[str, str
     design : Design
     single_precision : bool
         ``float`` in place of ``double``.
+    prefix : str
+        In front of the design's own files and symbols, so that several designs share ``drive.c`` in one
+        program.
 
     Raises
     ------
     InputError
         In single precision, for a design with noise (its random streams need 53 bits) or an elastic drive
-        train (its events are located to the rounding of double precision).
+        train (its events are located to the rounding of double precision); for a prefix that no name in C
+        begins with.
     """
+    refuse_prefix(prefix)
     if single_precision:
         _refuse_single(design)
     ours = exported(design)
     texts = {
         "drive.h": header_text(),
         "drive.c": source_text(),
-        "drive_design.h": _design_header(ours),
-        "drive_design.c": _design_source(ours),
+        f"{prefix}design.h": _design_header(ours),
+        f"{prefix}design.c": _design_source(ours),
     }
     if single_precision:
         texts = {name: single(text) for name, text in texts.items()}
-    main = template("main.c").replace("@REAL@", "float" if single_precision else "double")
-    return {**texts, "main.c": main, "README.md": readme_text(ours, single_precision)}
+    texts["main.c"] = template("main.c").replace("@REAL@", "float" if single_precision else "double")
+    texts["README.md"] = readme_text(ours, single_precision)
+    return {name: _named(text, prefix) for name, text in texts.items()}
+
+
+def refuse_prefix(prefix: str) -> None:
+    """Refuse what no name in C begins with.
+
+    Raises
+    ------
+    InputError
+        With what is allowed.
+    """
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*_", prefix):
+        raise InputError(f"prefix = {prefix!r}: allowed: letters, digits and _, a letter first, _ last")
+
+
+def _named(text: str, prefix: str) -> str:
+    return text.replace("@prefix@", prefix).replace("@PREFIX@", prefix.upper())
 
 
 def _refuse_single(design: Design) -> None:
@@ -127,24 +150,24 @@ def _design_header(ours: ExportedDesign) -> str:
     return f"""/*
  * Parameters of the design {plain(ours.design.name)}.
  */
-#ifndef DRIVE_DESIGN_H
-#define DRIVE_DESIGN_H
+#ifndef @PREFIX@DESIGN_H
+#define @PREFIX@DESIGN_H
 
 #include "drive.h"
 
-#define DRIVE_DESIGN_NAME {c_text(ours.design.name)}
-#define DRIVE_DESIGN_REVISION {c_text(ours.design.revision or "")}
-#define DRIVE_DESIGN_HASH "{design_hash(ours.design)}" /* SHA-256 of its values */
-#define DRIVE_SOURCE_HASH "{source_hash()}" /* SHA-256 of drive.h and drive.c in double precision */
-#define DRIVE_EXPORTER_VERSION "{exporter_version()}"
+#define @PREFIX@DESIGN_NAME {c_text(ours.design.name)}
+#define @PREFIX@DESIGN_REVISION {c_text(ours.design.revision or "")}
+#define @PREFIX@DESIGN_HASH "{design_hash(ours.design)}" /* SHA-256 of its values */
+#define @PREFIX@SOURCE_HASH "{source_hash()}" /* SHA-256 of drive.h and drive.c in double precision */
+#define @PREFIX@EXPORTER_VERSION "{exporter_version()}"
 
 enum {{
-    DRIVE_P_LENGTH = {ours.p_size}, /* of the row p of this design */
-    DRIVE_S_LENGTH = {ours.s_size} /* of the row s of this design */
+    @PREFIX@P_LENGTH = {ours.p_size}, /* of the row p of this design */
+    @PREFIX@S_LENGTH = {ours.s_size} /* of the row s of this design */
 }};
 
-/* Copies the parameters of the design into p, DRIVE_P_LENGTH numbers; the derived ones become 0. */
-void drive_load_design(double *p);
+/* Copies the parameters of the design into p, @PREFIX@P_LENGTH numbers; the derived ones become 0. */
+void @prefix@load_design(double *p);
 
 #endif
 """
@@ -162,13 +185,13 @@ def _design_source(ours: ExportedDesign) -> str:
  * Parameters of the design {plain(ours.design.name)}, SI, motor side.
  * {plain(ours.design.title)}
  */
-#include "drive_design.h"
+#include "@prefix@design.h"
 
 #include <math.h>
 
-void drive_load_design(double *p)
+void @prefix@load_design(double *p)
 {{
-    for (int j = 0; j < DRIVE_P_LENGTH; j += 1) {{
+    for (int j = 0; j < @PREFIX@P_LENGTH; j += 1) {{
         p[j] = 0.0;
     }}
 {body}

@@ -11,9 +11,8 @@ from actuator_lti.compiled.program import Program
 from actuator_lti.compiled.structs import struct_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_hash
-from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
-from nonlinear.export.c_files import exporter_version, plain
+from nonlinear.export.c_files import exporter_version, plain, refuse_prefix
 from nonlinear.export.controller_cut import Controller, begins, controller_of
 from nonlinear.export.controller_names import signal_words, state_words
 from nonlinear.export.controller_vectors import roundings, vectors_text
@@ -42,8 +41,7 @@ def controller_export(
     InputError
         For a prefix that no name in C begins with.
     """
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*_", prefix):
-        raise InputError(f"prefix = {prefix!r}: allowed: letters, digits and _, a letter first, _ last")
+    refuse_prefix(prefix)
     ours = controller_of(design, prefix, single_precision=single_precision)
     values = {
         "PREFIX": prefix.upper(), "prefix": prefix, "namespace": prefix.removesuffix("_"),

@@ -61,12 +61,13 @@ def _units(design: Design) -> tuple[str, str]:
 
 
 def sizes(design: Design) -> dict[str, float]:
-    """Size in use of each quantity, on the output shaft and on the motor."""
-    ratio, angle = design.total_ratio, design.validation.full_deflection_rad
-    speed = min(design.limits.speed_rad_s, no_load_speed(design), BIG)
-    voltage = supply_voltage(design)
-    current = min(design.limits.peak_current_A, design.limits.continuous_current_A, BIG)
-    kM, kV = design.motor.torque_constant_Nm_A, design.motor.source_gain_Nm_V
+    """Size in use of each quantity, on the output shaft and on the motor; ``inf`` where nothing bounds it."""
+    ratio, angle, motor = design.total_ratio, design.validation.full_deflection_rad, design.effective_motor
+    speed, voltage = min(design.limits.speed_rad_s, no_load_speed(design)), design.limits.voltage_V
+    current = min(design.limits.peak_current_A, design.limits.continuous_current_A)
+    if motor.resistance_ohm is not None:
+        current = min(current, voltage / motor.resistance_ohm)
+    kM, kV = motor.torque_constant_Nm_A, motor.source_gain_Nm_V
     return {
         "output.angle": angle,
         "output.rate": speed / ratio,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -48,6 +48,10 @@ class Axis:
         """Give the least and the largest value seen that the axis, as it is now, has a place for."""
         seen = [value for value in self.seen if value > 0.0 or not self.log]
         return [min(seen), max(seen)] if seen else []
+
+    def written(self) -> Axis:
+        """Give what a document has to hold of it."""
+        return replace(self, seen=self.shown())
 
     def span(self) -> tuple[float, float]:
         """Give both ends: those set, or the values with some room."""

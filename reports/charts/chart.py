@@ -7,7 +7,7 @@ A column is a picture of its own, so that columns stack where the screen is narr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -158,15 +158,19 @@ class Panel:
         """Draw points only."""
         return self.curve(x, y, label, **{"marker": "o", "line": False, **options})
 
-    def rule_x(self, at: float, words: str = "", label: str = "", **look: Any) -> None:
-        """Draw an upright line."""
-        self._rule(at, "x", words, label, look)
+    def rule_x(self, at: float, words: str = "", label: str = "", *, seen: bool = False, **look: Any) -> None:
+        """Draw an upright line; ``seen``: the axis reaches it."""
+        self._rule(at, "x", words, label, look, seen)
 
-    def rule_y(self, at: float, words: str = "", label: str = "", **look: Any) -> None:
-        """Draw a level."""
-        self._rule(at, "y", words, label, look)
+    def rule_y(self, at: float, words: str = "", label: str = "", *, seen: bool = False, **look: Any) -> None:
+        """Draw a level; ``seen``: the axis reaches it."""
+        self._rule(at, "y", words, label, look, seen)
 
-    def _rule(self, at: float, across: Literal["x", "y"], words: str, label: str, look: Any) -> None:
+    def _rule(
+        self, at: float, across: Literal["x", "y"], words: str, label: str, look: Any, seen: bool
+    ) -> None:
+        if seen:
+            (self.x if across == "x" else self.y).see([at])
         made = Look(**{"colour": "muted", "width": 1.0, **look})
         self.items.append(Rule(at=float(at), across=across, look=made, words=words, label=label))
 
@@ -206,6 +210,11 @@ class Column:
     title: str = ""
     shared: bool = True
 
+    def written(self) -> Column:
+        """Give what a document has to hold of it: the x axis that panels share stands in the last."""
+        bare = [replace(one, x=Axis()) for one in self.panels[:-1]] if self.shared else self.panels[:-1]
+        return replace(self, panels=bare + self.panels[-1:])
+
 
 @dataclass(kw_only=True)
 class Chart:
@@ -229,9 +238,14 @@ class Chart:
         self.columns.append(Column(panels=panels, heights=sizes, width=width, title=title, shared=shared))
         return panels
 
-    def panel(self, **options: Any) -> Panel:
-        """Add a column of one panel."""
-        return self.column(**options)[0]
+    def panel(
+        self, x: str = "", y: str = "", log: str = "", *, by_point: bool = False, **options: Any
+    ) -> Panel:
+        """Add a column of one panel: labels of its axes, and which of them are logarithmic (``"xy"``)."""
+        made = self.column(**options)[0]
+        made.x.label, made.y.label, made.by_point = x, y, by_point
+        made.x.log, made.y.log = "x" in log, "y" in log
+        return made
 
     def labels(self) -> list[tuple[str, Item]]:
         """Give every legend entry once, in the order drawn."""

@@ -67,14 +67,8 @@ def _reader() -> TypeAdapter[Chart]:
 
 def _plain(value: Any) -> Any:
     if is_dataclass(value):
-        made = {each.name: _plain(getattr(value, each.name)) for each in fields(value) if _said(value, each)}
-        if isinstance(value, Column) and value.shared:
-            made["panels"] = [{k: v for k, v in p.items() if k != "x"} for p in made["panels"][:-1]] + made[
-                "panels"
-            ][-1:]
-        if isinstance(value, Axis) and value.seen:
-            made["seen"] = _plain(value.shown())
-        return made
+        value = value.written() if isinstance(value, Axis | Column) else value
+        return {each.name: _plain(getattr(value, each.name)) for each in fields(value) if _said(value, each)}
     if isinstance(value, np.ndarray):
         return [_number(item) for item in value.tolist()]
     if isinstance(value, float):

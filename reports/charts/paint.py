@@ -1,12 +1,10 @@
-"""Colours, dashes, markers and hatches: those of Okabe and Ito, each series with a dash of its own.
+"""Colours, dashes, markers and hatches: those of Okabe and Ito.
 
 A chart names its colours; on a page they are the page's variables with the light colour as fallback, on
 paper the light colour itself.
 """
 
 from __future__ import annotations
-
-from typing import TypedDict
 
 COLOURS = {
     "ink": "#1f2933",
@@ -21,8 +19,6 @@ COLOURS = {
     "c6": "#3a8fc4",
     "c7": "#7a5c1e",
 }
-BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BROWN = SERIES = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")
-INK, MUTED = "ink", "muted"
 # lengths of dash and gap; the first is a full line
 DASHES = ("", "9 4", "3 3", "10 4 2.5 4", "1.5 2.5", "14 5", "6 2.5")
 HATCHES = ("", "//", "--", "||", "\\\\", "+", "x")
@@ -48,28 +44,6 @@ HATCH_PATHS = {
     "+": "M0 3H6M3 0V6",
     "x": "M0 0L6 6M0 6L6 0",
 }
-
-
-class Style(TypedDict, total=False):
-    """How an item of a chart is drawn: fields of `reports.charts.chart.Look` and of a curve, by name."""
-
-    colour: str
-    dash: int
-    width: float
-    opacity: float
-    marker: str
-    size: float
-    hollow: bool
-    fill: str
-    hatch: str
-    every: int
-    line: bool
-    read: bool
-
-
-def series(k: int) -> Style:
-    """Give colour and dash of the k-th series."""
-    return {"colour": SERIES[k % 7], "dash": k % 7}
 
 
 def paint(colour: str, page: bool) -> str:

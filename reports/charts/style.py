@@ -1,35 +1,31 @@
-"""What figures share: limits of an axis, ticks of phase."""
+"""What figures share: colours of series, each with a dash of its own; limits of an axis, ticks of phase."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
 from reports.charts.chart import Chart, Panel
-from reports.charts.paint import (
-    BLUE,
-    BROWN,
-    GREEN,
-    INK,
-    MUTED,
-    ORANGE,
-    PURPLE,
-    RED,
-    SERIES,
-    SKY,
-    Style,
-    series,
-)  # fmt: skip
 from reports.numbers import hertz, time_unit, to_minus
 
 SMALL, HALF, WIDE = 340.0, 430.0, 900.0
-__all__ = [
-    "BLUE", "BROWN", "GREEN", "HALF", "INK", "MUTED", "ORANGE", "PURPLE", "RED", "SERIES", "SKY", "SMALL",
-    "WIDE", "Chart", "Panel", "Style", "bound", "frequency", "hertz", "known", "phase_axis", "series",
-    "time_axis", "time_unit", "to_minus",
-]  # fmt: skip
+BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BROWN = SERIES = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")
+INK, MUTED = "ink", "muted"
+__all__ = ["Chart", "Panel", "hertz", "time_unit", "to_minus"]  # besides what stands here
+Style = dict[str, Any]  # how an item is drawn: fields of `reports.charts.chart.Look` and of a curve, by name
+
+
+def series(k: int) -> Style:
+    """Give colour and dash of the k-th series."""
+    return {"colour": SERIES[k % 7], "dash": k % 7}
+
+
+def marked(k: int, size: float = 6.0) -> Style:
+    """Give colour and marker of the k-th series."""
+    return {"colour": SERIES[k % 7], "marker": "os^Dv<>"[k % 7], "size": size}
 
 
 def known(values: Iterable[float | None]) -> list[float]:
@@ -62,9 +58,20 @@ def phase_axis(
     bound(panel, values, span=span, top_room=room)
     low, high = panel.y.span()
     step = next((s for s in (15.0, 45.0, 90.0, 180.0, 360.0, 720.0) if (high - low) / s <= 7), 1440.0)
-    first = math.ceil(low / step)
-    levels = [step * k for k in range(first, math.floor(high / step) + 1)]
-    panel.y.ticks = [(level, to_minus(f"{level:.0f}")) for level in levels]
+    panel.y.ticks = multiples(step, low, high)
+
+
+def multiples(step: float, low: float, high: float) -> list[tuple[float, str]]:
+    """Give a tick at every multiple of a step."""
+    levels = [step * k for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
+    return [(level, to_minus(f"{level:.0f}")) for level in levels]
+
+
+def rows(panel: Panel, names: Sequence[str]) -> None:
+    """Make y a list of names, the first on top."""
+    panel.y.ticks = [(float(k), name) for k, name in enumerate(names)]
+    panel.y.limits(-0.6, max(len(names), 1) - 0.4)
+    panel.y.reversed, panel.y.grid = True, False
 
 
 def time_axis(panel: Panel, last_s: float) -> float:

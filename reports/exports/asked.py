@@ -23,6 +23,9 @@ class AskedC:
         "drive-c"
     )
     single: Annotated[bool, Option(words="float in place of double.")] = False
+    prefix: Annotated[
+        str, Option(words="In front of the design's own files and symbols; drive_.", metavar="NAME_")
+    ] = "drive_"
     check: Annotated[bool, CHECK] = True
     force: Annotated[bool, FORCE] = False
 

@@ -49,14 +49,14 @@ def export_c(design: Design, asked: AskedC) -> Exported:
     Raises
     ------
     InputError
-        If there are such files already, or the folder cannot be written.
+        If there are such files already, the folder cannot be written, or the prefix is no name.
     """
     from nonlinear.export import c_export
     from reports.export_check import check_text
 
     folder = asked.target
     folder_for_results(folder)
-    texts = c_export(design, single_precision=asked.single)
+    texts = c_export(design, single_precision=asked.single, prefix=asked.prefix)
     _refuse_any(folder, texts, asked.force)
     check = _checked(design) if asked.check else None
     texts["README.md"] += "\n" + check_text(check, single_precision=asked.single)

@@ -71,8 +71,8 @@ def _bode() -> Chart:
 
 def _nyquist() -> Chart:
     chart = Chart(width=style.HALF, height=370.0, loop=FOLLOWED)
-    panel = chart.panel()
-    panel.equal = panel.by_point = True
+    panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
+    panel.equal = True
     panel.rule_y(0.0)
     panel.rule_x(0.0)
     angles = [2.0 * math.pi * k / 72 for k in range(73)]
@@ -83,7 +83,6 @@ def _nyquist() -> Chart:
     panel.note("−1", (-1.0, 0.0))
     panel.x.limits(-1.0 - FRAME, FRAME - 0.35)
     panel.y.limits(-FRAME, FRAME)
-    panel.x.label, panel.y.label = "real part of L", "imaginary part of L"
     return chart
 
 

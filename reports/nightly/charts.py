@@ -43,8 +43,7 @@ def line_chart(
     panel.x.ticks = ends if len(nights) > 1 else ends[1:]
     panel.y.name = f"value, {one_line(unit, 20)}" if unit else "value"
     if limit is not None:
-        panel.rule_y(limit, "limit", colour=style.RED, dash=1)
-        panel.y.see([limit])
+        panel.rule_y(limit, "limit", seen=True, colour=style.RED, dash=1)
     for point in points:
         panel.rule_x(float(days[point.index]), "▼", colour=style.ORANGE, dash=2)
     x, y = _steps(days, values, finite)

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.drive.signals import LIMITERS
+from analyses.large_signal import LargeSignals
+from analyses.large_signal.classify import CAUSES, WAVEFORMS
 from reports.charts import style
 from reports.charts.style import Chart, Panel
-
-if TYPE_CHECKING:
-    from analyses.large_signal import LargeSignals
 
 PALETTE = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.SKY, style.INK, style.MUTED)
 LINES = {name: k for k, name in enumerate(LIMITERS)}
@@ -39,19 +38,15 @@ EVERY = 2  # a glyph in every second column
 
 def chart(result: LargeSignals, scale: float, unit: str) -> Chart:
     """Draw regions, glyphs and lines."""
-    from analyses.large_signal.classify import CAUSES, WAVEFORMS
-
     made = Chart(
         width=style.WIDE, height=500.0, legend=True, legend_title="waveform; first reached, linear loop"
     )
-    panel, shown = made.panel(), result.map
+    panel, shown = made.panel("command frequency, Hz", f"command amplitude, {unit}", "xy"), result.map
     x, y = shown.frequency_hz, scale * shown.amplitude_rad
     xe, ye = _edges(x), _edges(y)
-    panel.x.log = panel.y.log = True
     panel.x.limits(xe[0], xe[-1])
     panel.y.limits(ye[0], ye[-1])
     panel.x.grid = panel.y.grid = False
-    panel.x.label, panel.y.label = "command frequency, Hz", f"command amplitude, {unit}"
     _regions(panel, CAUSES, shown.cause, xe, ye)
     _glyphs(panel, WAVEFORMS, shown.waveform, x, y)
     _lines(panel, result, scale)

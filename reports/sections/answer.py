@@ -58,6 +58,9 @@ def section(
     """
     linear = next((part.get("result", "") for part in sections if part["id"] == "limits"), "")
     result = [item for item in gathered(sections) if item.text != linear]
+    apart: dict[str, Finding] = {}  # the same seen by two margins stands once on the first screen
+    for item in result:
+        apart.setdefault(item.text.partition(";")[0], item)
     bars = _bars(items, bounds)
     glance: GlanceBlock = {
         "kind": "glance",
@@ -67,8 +70,8 @@ def section(
         "linear": linear,
         "bars": bars[:MOST_BARS],
         "more_bars": max(len(bars) - MOST_BARS, 0),
-        "findings": plain(result[:SHOWN]),
-        "more": max(len(result) - SHOWN, 0),
+        "findings": plain([*apart.values()][:SHOWN]),
+        "more": len(result) - min(len(apart), SHOWN),
     }
     status = worst_status([one.sound for one in figures.values()])
     if any(item["verdict"] == "not met" for item in items) or any(item.severity == "fail" for item in result):

@@ -72,7 +72,7 @@ def _already(item: AmplitudeMargin) -> bool:
 
 def _figure(items: Sequence[AmplitudeMargin]) -> Block:
     chart = Chart(width=style.HALF, height=300.0)
-    panel = chart.panel()
+    panel = chart.panel("initial deviation", "margin over linear margin", "y", by_point=True)
     sizes = list(dict.fromkeys(item.size for item in items))
     keys = list(dict.fromkeys((item.loop, item.kind) for item in items))
     for k, (loop, kind) in enumerate(keys):
@@ -87,11 +87,9 @@ def _figure(items: Sequence[AmplitudeMargin]) -> Block:
     panel.rule_y(1.0)
     panel.x.ticks = [(float(k), words) for k, words in enumerate(sizes)]
     panel.x.limits(-0.4, len(sizes) - 0.6)
-    panel.y.log, panel.by_point = True, True
     values = [max(item.value / item.linear, LOWEST) for item in items if item.value]
     panel.y.limits(min([*values, 1.0]) / 1.3, max([*values, 1.0]) * 1.5)
     panel.y.ticks = [(t, f"{t:g}") for t in (LOWEST, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)]
-    panel.x.label, panel.y.label = "initial deviation", "margin over linear margin"
     caption = (
         "Margins after release from rest at small, medium and large deviations, limits active; hollow and "
         "dashed: with dry friction."

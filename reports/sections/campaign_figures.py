@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from analyses.identification.campaign import CampaignResult
+from analyses.identification.surface_fit import SurfaceFit
+from analyses.records.record import Record
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block
 from reports.sections.thinning import kept_rows
-
-if TYPE_CHECKING:
-    from analyses.identification.campaign import CampaignResult
-    from analyses.identification.surface_fit import SurfaceFit
-    from analyses.records.record import Record
 
 NAMES = ("C0", "Cv", "CM")
 
@@ -25,21 +23,19 @@ NAMES = ("C0", "Cv", "CM")
 def surface_figure(fit: SurfaceFit) -> Block:
     """Runs and fitted lines over speed, a line for each load; runs that were left out are ringed."""
     chart = Chart(width=style.WIDE, height=380.0, legend=True)
-    panel = chart.panel()
+    panel = chart.panel("motor speed, rad/s", "friction torque at the motor, mN m")
     loads = np.array([p.load_Nm for p in fit.points])
     line = np.linspace(0.0, max(p.speed_rad_s for p in fit.points), 2)
     for k, centre in enumerate(_levels(loads)):
         here = [p for p in fit.points if abs(p.load_Nm - centre) <= 0.25]
         mean = float(np.mean([p.load_Nm for p in here]))
         label = f"{mean:.2g} N m"
-        look: style.Style = {"colour": style.SERIES[k % 7], "marker": "osD^v+x"[k % 7], "size": 6.0}
         panel.curve(line, 1e3 * fit.predict_Nm(line, np.full(2, mean)), label, **style.series(k))
-        panel.points(*_place(here), label, **look)
+        panel.points(*_place(here), label, **style.marked(k))
     named = {o.run for o in fit.outliers}
     for point in fit.points:
         if point.run in named:
             _ring(panel, (point.speed_rad_s, 1e3 * point.torque_Nm), point.run, 14.0)
-    panel.x.label, panel.y.label = "motor speed, rad/s", "friction torque at the motor, mN m"
     panel.y.limits(low=0.0)
     caption = "Friction torque of every run and the fitted surface, a line for each load"
     alt = "Measured friction torque against motor speed at several loads, with straight fitted lines"
@@ -73,7 +69,7 @@ def residual_figure(fit: SurfaceFit) -> Block:
         ([p.speed_rad_s for p in fit.points], "motor speed, rad/s"),
         ([p.load_Nm for p in fit.points], "load torque, N m"),
     ):
-        panel = chart.panel()
+        panel = chart.panel(label, "residual, µN m")
         panel.rule_y(0.0)
         for at, middle, width in zip(x, y, std, strict=True):
             ends = [middle - 2.0 * width, middle + 2.0 * width]
@@ -82,7 +78,6 @@ def residual_figure(fit: SurfaceFit) -> Block:
         for at, value, point in zip(x, y, fit.points, strict=True):
             if point.run in named:
                 _ring(panel, (at, float(value)), point.run, 13.0)
-        panel.x.label, panel.y.label = label, "residual, µN m"
     caption = "Residuals of the runs less the most likely shared errors, with two standard deviations"
     alt = "Residual torque of every run against speed and against load"
     return doc.figure("identification_residuals", chart, caption=caption, alt=alt)
@@ -96,8 +91,7 @@ def region_figure(fit: SurfaceFit) -> Block:
     chart = Chart(width=style.WIDE, height=300.0)
     for i, j in combinations(fit.told, 2):
         scale = 100.0 / fit.values[[i, j]]
-        panel = chart.panel()
-        panel.by_point = True
+        panel = chart.panel(f"{NAMES[i]}, % from its value", f"{NAMES[j]}, %", by_point=True)
         whole = _ellipse(fit.covariance, i, j, scale, radius)
         random = _ellipse(fit.random_covariance, i, j, scale, radius)
         panel.shape([whole], colour=style.BLUE, opacity=0.15)
@@ -108,7 +102,6 @@ def region_figure(fit: SurfaceFit) -> Block:
             panel.rule_x(sign * x, dash=2)
             panel.rule_y(sign * y, dash=2)
         panel.points([0.0], [0.0], marker="+", size=10.0, colour=style.INK, read=False)
-        panel.x.label, panel.y.label = f"{NAMES[i]}, % from its value", f"{NAMES[j]}, %"
     caption = "Joint 95 % regions of pairs of coefficients; dotted: the 95 % interval of each alone"
     alt = "Ellipses of the uncertainty of pairs of friction coefficients, with and without shared errors"
     return doc.figure("identification_region", chart, caption=caption, alt=alt)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
+from analyses.comparison.variant_figures import FigureName
+from analyses.comparison.variants import Compared, Comparison
+from analyses.specification.requirements import RequirementVerdict
 from reports import document as doc
 from reports.as_json import as_json
 from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
@@ -19,11 +21,6 @@ from reports.sections.compare_best import number
 from reports.sections.names import LOOPS
 from reports.sections.requirements import item, label, limit_words
 from reports.terminal import Brief
-
-if TYPE_CHECKING:
-    from analyses.comparison.variant_figures import FigureName
-    from analyses.comparison.variants import Compared, Comparison
-    from analyses.specification.requirements import RequirementVerdict
 
 GROUPS = {**LOOPS, "drive": "Drive", "large": "Large signals"}
 COLUMNS = 4  # variants beside the base in one table: what reads on one screen

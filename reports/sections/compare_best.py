@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from actuator_lti.asked.quantities import reserve
 from actuator_lti.asked.verdict import Verdict
-from analyses.specification.requirements import tally
+from analyses.comparison.variants import Compared, Comparison
+from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
 from reports.document_schema import Block, Section
 from reports.numbers import significant
 from reports.sections.requirements import label, limit_words
-
-if TYPE_CHECKING:
-    from analyses.comparison.variants import Compared, Comparison
-    from analyses.specification.requirements import RequirementVerdict
 
 _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 _MOST = 3

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, drive_cases
+from analyses.comparison.variants import Compared, Comparison
+from analyses.linear.responses import Curve, answer_curve, curve, frequency_grid
+from analyses.specification.sensitivity import Sensitivity
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section
 from reports.sections.names import LOOPS
-
-if TYPE_CHECKING:
-    from analyses.comparison.variants import Compared, Comparison
-    from analyses.linear.responses import Curve
-    from analyses.specification.sensitivity import Sensitivity
 
 MOST_CURVES = 7
 MOST_BARS = 10
@@ -47,8 +45,6 @@ def overlays(comparison: Comparison) -> Section:
 
 
 def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[Block]:
-    from analyses.linear.responses import answer_curve, curve, frequency_grid
-
     which = "closed loop" if closed else "open loop"
     chart = Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
     top, bottom = chart.column(1.0, 1.0)
@@ -97,14 +93,13 @@ def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[Block]:
     if not shown:
         return []
     chart = Chart(width=style.WIDE, height=410.0, title=f"{title}, step")
-    panel = chart.panel()
+    panel = chart.panel(y="response to a unit step")
     scale = style.time_axis(panel, max(float(step.time_s[-1]) for _, step in shown))
     for k, (label, step) in enumerate(shown):
         keep = np.unique(np.linspace(0, len(step.time_s) - 1, min(len(step.time_s), 240)).astype(int))
         response = np.asarray(step.response)[keep] / step.final_value
         panel.curve(np.asarray(step.time_s)[keep] * scale, response, label, **_look(k))
     panel.x.limits(0.0)
-    panel.y.label = "response to a unit step"
     caption = f"{title}, unit step: the base and its variants."
     alt = f"Step responses of the {name} loop of {len(shown)} designs."
     return [doc.figure("overlay", chart, caption=caption, alt=alt)]
@@ -168,19 +163,15 @@ def _tornado(comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], li
         max(ends) - base
     )
     chart = Chart(width=style.WIDE, height=90.0 + 27.0 * len(bars), legend=True)
-    panel = chart.panel()
+    panel = chart.panel(f"{words}, {name.unit}" if name and name.unit else words)
     low: style.Style = {"colour": style.ORANGE, "fill": "none", "hatch": "//", "width": 1.2}
     for k, bar in enumerate(bars):
         panel.bar(float(k), base, bar.low, "parameter low", **low)
         panel.bar(float(k), base, bar.high, "parameter high", colour=style.BLUE)
     panel.rule_x(base, colour=style.INK, width=1.3)
     if limit is not None and near:
-        panel.x.see([limit])
-        panel.rule_x(limit, "limit", colour=style.RED, width=1.4, dash=1)
-    panel.y.ticks = [(float(k), _bar_label(bar)) for k, bar in enumerate(bars)]
-    panel.y.limits(-0.6, max(len(bars), 1) - 0.4)
-    panel.y.reversed, panel.y.grid = True, False
-    panel.x.label = f"{words}, {name.unit}" if name and name.unit else words
+        panel.rule_x(limit, "limit", seen=True, colour=style.RED, width=1.4, dash=1)
+    style.rows(panel, [_bar_label(bar) for bar in bars])
     caption = f"{words}: each parameter alone at both its ends."
     alt = f"Tornado chart of {words}; the strongest is {bars[0].path}."
     return doc.figure("tornado", chart, caption=caption, alt=alt)

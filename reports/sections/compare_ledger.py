@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from actuator_lti.asked.verdict import Tally
+from analyses.comparison.variants import Compared, Comparison
+from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.document_schema import Block, Row, Section
 from reports.numbers import capital, significant
 from reports.sections.names import unit_words
 from reports.sections.validation import loop_name, quantity_name
-
-if TYPE_CHECKING:
-    from analyses.comparison.variants import Compared, Comparison
-    from analyses.validation.row import Row as Check
 
 Key = tuple[str, str, str]
 ROUNDING = 1e-9  # of a value

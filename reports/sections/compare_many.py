@@ -9,18 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.specification.requirements import tally
+from analyses.comparison.variants import Compared, Comparison
+from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
 from reports.document_schema import Block, VerdictItem
+from reports.nightly.text import csv_text
 from reports.sections.compare_best import failed, nearness, weakest
 from reports.sections.requirements import item
-
-if TYPE_CHECKING:
-    from analyses.comparison.variants import Compared, Comparison
-    from analyses.specification.requirements import RequirementVerdict
 
 MANY = 60  # designs beside the base that one page shows
 _MOST_ROOM = 5
@@ -94,8 +91,6 @@ def shown_words(comparison: Comparison) -> str:
 
 def table_text(comparison: Comparison) -> str:
     """A row for each design with every figure and every value of a requirement, as CSV."""
-    from reports.nightly.text import csv_text
-
     header = ["design", "met", "not_met", "not_proven", "weakest", "room_percent"]
     header += [f"{name.key} [{name.unit}]" for name in comparison.names]
     header += [f"requirement {one.id} [{one.requirement.unit}]" for one in comparison.base.verdicts]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
+from analyses.corners import Corner, Corners
 from reports import document as doc
+from reports.charts import style
+from reports.charts.style import Chart
 from reports.document_schema import Block, Row, Section
 from reports.sections.margins import shown
 from reports.sections.names import figure_column, loop_words
-
-if TYPE_CHECKING:
-    from analyses.corners import Corner, Corners
 
 PER_LOOP = [QUANTITIES[name] for name in (*CORNERED, "bandwidth")]
 
@@ -24,8 +24,11 @@ def section(result: Corners) -> Section:
         "taken together; the worst-case search of montecarlo looks inside the box as well."
     )
     words = [doc.text(f"{corner.name.capitalize()}: {corner.words}.") for corner in result.corners[1:]]
+    caption = "From nominal (line) to each corner (dot): which corner moves which margin, loop by loop."
+    alt = f"{caption} The figures stand in the table of every loop at every corner."
     blocks = [
         _summary_table(result),
+        doc.figure("corners", chart(result), caption=caption, alt=alt),
         doc.details("Every loop at every corner", [_loop_table(result), *words]),
     ]
     told: Literal["info", "warn"] = "info" if result.passed else "warn"
@@ -59,6 +62,37 @@ def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:
         if one.sound and (value := quantity.read(one.judged)) is not None
     ]
     return min(found, key=lambda each: quantity.better * each[0], default=None)
+
+
+def chart(result: Corners) -> Chart:
+    """Draw for each figure and corner a line from nominal to the corner, one a loop; and the limit."""
+    made = Chart(width=style.WIDE, height=96.0 + 38.0 * len(result.corners), legend=True)
+    nominal = result.corners[0]
+    for quantity in (QUANTITIES[name] for name in CORNERED):
+        panel = made.panel(title=quantity.words)
+        for k, (name, own) in enumerate(nominal.figures.items()):
+            start = shown(quantity, own.judged)
+            if start is not None:
+                panel.rule_x(start, colour=style.SERIES[k], dash=2)
+            for row, corner in enumerate(result.corners):
+                one = corner.figures[name]
+                value = shown(quantity, one.judged) if one.sound else None
+                at = row + 0.22 * (k - (len(nominal.figures) - 1) / 2.0)
+                look: style.Style = {"colour": style.SERIES[k], "read": False}
+                panel.curve([start, value], [at, at], width=2.4, **look)
+                if not one.sound and start is not None:
+                    panel.note("not stable", (start, at), colour=style.RED, pinned=True)
+                panel.points([value], [at], loop_words(name, one.rotor), **look | {"read": True})
+        asked = [one.requirement for one in nominal.verdicts if one.requirement.quantity == quantity.name]
+        limits = (one.minimum if quantity.better > 0 else one.maximum for one in asked)
+        for limit in {value for value in limits if value is not None}:
+            panel.x.see([limit])
+            panel.rule_x(limit, label="limit", colour=style.INK, dash=1, width=1.4)
+        panel.y.ticks = [(float(row), corner.name) for row, corner in enumerate(result.corners)]
+        panel.y.limits(-0.6, len(result.corners) - 0.4)
+        panel.y.reversed, panel.y.grid = True, False
+        panel.x.label = f"{quantity.words}, {quantity.shown[0]}"
+    return made
 
 
 def _summary_table(result: Corners) -> Block:

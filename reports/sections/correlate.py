@@ -1,16 +1,14 @@
-"""Records against the model: all together, then each; or a chirp predicted from steps."""
+"""Records against the model: all together, then each."""
 
 from __future__ import annotations
 
-from analyses.correlation.run import Correlation, Prediction
+from analyses.correlation.run import Correlation
 from reports.document_schema import Section
-from reports.sections import chirp, correlation
+from reports.sections import correlation
 
 
-def section(result: Correlation | Prediction) -> list[Section]:
+def section(result: Correlation) -> list[Section]:
     """Make the sections."""
-    if isinstance(result, Prediction):
-        return [chirp.section(result.motor, result.chirp, result.record)]
     limit = result.limit
     made = [correlation.section(one, k, error_limit=limit) for k, one in enumerate(result.records, 1)]
     if len(made) > 1:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from analyses.correlation.summary import BESIDE, agrees, moves_alike, summarise, worst_of
+from analyses.correlation.closed_loop import CorrelationResult
+from analyses.correlation.compare import SignalComparison
+from analyses.correlation.summary import BESIDE, SignalSummary, agrees, moves_alike, summarise, worst_of
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
@@ -13,11 +14,6 @@ from reports.document_schema import Block, Section, Status
 from reports.numbers import show
 from reports.sections.record_tables import finding_table, input_table
 from reports.sections.thinning import kept_rows
-
-if TYPE_CHECKING:
-    from analyses.correlation.closed_loop import CorrelationResult
-    from analyses.correlation.compare import SignalComparison
-    from analyses.correlation.summary import SignalSummary
 
 NAMES = {
     "angle": "Motor angle",

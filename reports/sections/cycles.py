@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from analyses.motion.settling import words
+from actuator_lti.asked.verdict import Verdict
+from analyses.limit_cycles import Confirmation, LimitCycles
+from analyses.motion.settling import Settling, judged_by, verdict_of, words
 from reports import document as doc
 from reports.document_schema import Block, Section
 from reports.sections.names import fine_unit, load_unit
-
-if TYPE_CHECKING:
-    from analyses.limit_cycles import Confirmation, LimitCycles
-    from analyses.motion.settling import Settling
 
 CAUSES = {
     "play": "play",
@@ -38,7 +36,7 @@ def section(result: LimitCycles) -> Section:
         )
         blocks.append(doc.text(f"No limit cycle of {causes} is predicted."))
     blocks.append(_rests(result, fine, small))
-    severity: Any = "info" if result.hunting is None else "warn"
+    severity: Any = "info" if _judged(result) is Verdict.MET else "warn"
     return doc.section(
         "cycles", "Limit cycles", blocks, result=summary(result), intro=intro, status=severity, told=severity
     )
@@ -52,8 +50,17 @@ def summary(result: LimitCycles) -> str:
     tail = f"; {seen} of {count} predicted cycles confirmed" if count else "; none is predicted"
     if swing is None:
         return f"The drive as it is comes to rest after every step{tail}."
+    does = {
+        Verdict.MET: f"comes to rest as far as is asked ({judged_by(result.design)})",
+        Verdict.NOT_MET: "does not come to rest",
+        Verdict.NOT_PROVEN: "is not known to come to rest",
+    }[_judged(result)]
     at = f"{swing.load_Nm:g} {load_unit(result.design)}"
-    return f"The drive as it is does not come to rest: {words(swing.rest, fine, small)} under {at}{tail}."
+    return f"The drive as it is {does}: {words(swing.rest, fine, small)} under {at}{tail}."
+
+
+def _judged(result: LimitCycles) -> Verdict:
+    return verdict_of(result.design, result.hunting)
 
 
 def _predicted(result: LimitCycles, fine: float, small: str) -> Block:

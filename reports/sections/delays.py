@@ -51,7 +51,8 @@ def section(budgets: Mapping[str, DelayBudget]) -> Section:
 def chart(budgets: Mapping[str, DelayBudget]) -> Chart:
     """Draw lag to the right and lead to the left of zero; what is left to 180 deg is phase margin."""
     made = Chart(width=style.WIDE, height=70.0 + 48.0 * len(budgets), legend=True)
-    panel = made.panel()
+    words = "lag at the gain crossover, deg (lead left of zero; at 180 deg no phase margin is left)"
+    panel = made.panel(words)
     parts = _parts(budgets)
     bars = [
         {words: -one.items[key] for key, words in parts.items() if abs(one.items.get(key, 0.0)) > 0.05}
@@ -62,14 +63,10 @@ def chart(budgets: Mapping[str, DelayBudget]) -> Chart:
         _bar(panel, float(row), bar, names)
     panel.rule_x(180.0, colour=style.INK, width=1.2)
     panel.rule_x(0.0, colour=style.INK)
-    panel.y.ticks = [(float(k), name) for k, name in enumerate(budgets)]
-    panel.y.limits(-0.6, len(bars) - 0.4)
-    panel.y.reversed, panel.y.grid = True, False
+    style.rows(panel, list(budgets))
     low, high = panel.x.span()
     panel.x.limits(high=max(high * 1.13, 186.0))
-    steps = range(int(low // 30), int(panel.x.span()[1] // 30) + 1)
-    panel.x.ticks = [(30.0 * k, style.to_minus(f"{30 * k}")) for k in steps]
-    panel.x.label = "lag at the gain crossover, deg (lead left of zero; at 180 deg no phase margin is left)"
+    panel.x.ticks = style.multiples(30.0, low, panel.x.span()[1])
     return made
 
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from actuator_lti.asked.verdict import Verdict
+from analyses.duty import Duty, Heating
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Row, Section
 from reports.sections.names import load_unit, output_unit
-
-if TYPE_CHECKING:
-    from analyses.duty import Duty, Heating
 
 _SHOWN = 400
 
@@ -102,21 +100,18 @@ def _row(
 
 def _figure(result: Duty) -> Block:
     chart = Chart(width=style.WIDE, height=320.0)
-    panel = chart.panel(title="One period of the motion")
+    panel = chart.panel(y="current, A", title="One period of the motion")
     every, last = max(1, len(result.time_s) // _SHOWN), float(result.time_s[-1])
     scale = style.time_axis(panel, last)
     panel.curve(result.time_s[::every] * scale, result.current_A[::every], "current", **style.series(0))
-    panel.rule_y(result.rms_A, "rms of the duty", colour=style.BLUE, dash=1)
-    panel.y.see([result.rms_A])
+    panel.rule_y(result.rms_A, "rms of the duty", seen=True, colour=style.BLUE, dash=1)
     if math.isfinite(result.continuous_A):
-        panel.y.see([result.continuous_A])
-        panel.rule_y(result.continuous_A, "continuous", colour=style.RED, dash=2)
-    panel.y.label = "current, A"
+        panel.rule_y(result.continuous_A, "continuous", seen=True, colour=style.RED, dash=2)
     panel.x.limits(0.0, last * scale)
     caption = "Motor current over one period of the motion."
     if result.heating is not None:
         caption += " Right: the winding from ambient."
-        _winding(chart.panel(title="Winding"), result.heating)
+        _winding(chart.panel(y="winding, °C", title="Winding"), result.heating)
     return doc.figure("duty", chart, caption=caption, alt=caption)
 
 
@@ -124,6 +119,4 @@ def _winding(panel: Panel, heat: Heating) -> None:
     scale = style.time_axis(panel, float(heat.time_s[-1]))
     panel.curve(heat.time_s * scale, heat.temperature_degC, "winding", **style.series(1))
     if math.isfinite(heat.limit_degC):
-        panel.y.see([heat.limit_degC])
-        panel.rule_y(heat.limit_degC, "limit", colour=style.RED, dash=1)
-    panel.y.label = "winding, °C"
+        panel.rule_y(heat.limit_degC, "limit", seen=True, colour=style.RED, dash=1)

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from analyses.motion.settling import largest_swing, words
+from analyses.failures import Failures
+from analyses.motion.settling import noticed, words
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section, Severity
 from reports.numbers import short
 from reports.sections.names import load_unit, output_unit
-
-if TYPE_CHECKING:
-    from analyses.failures import Failures
 
 NAMES = {
     "hard-over": "Hard-over of the power stage",
@@ -35,7 +33,7 @@ def section(result: Failures) -> Section:
     load, asked = load_unit(result.design), result.asked
     stop, near = f"{scale * asked.stop_rad:.4g} {unit}", f"{scale * asked.deflection_rad:.4g} {unit}"
     detected = f"{1e3 * asked.detection_s:.4g} ms"
-    swing = largest_swing(result.before)
+    swing = noticed(result.design, result.before)
     held = "has come to rest"
     if swing is not None:
         held = f"does not come to rest ({words(swing.rest, scale, unit)})"
@@ -60,7 +58,7 @@ def summary(result: Failures) -> str:
     size = short(scale * worst.at_detection_rad, 3)
     when = f"{1e3 * result.asked.detection_s:.4g} ms"
     stop = "" if worst.to_stop_s is None else f"; it reaches the stop after {1e3 * worst.to_stop_s:.3g} ms"
-    if largest_swing(result.before) is not None:
+    if noticed(result.design, result.before) is not None:
         stop += "; the drive does not come to rest before it"
     return f"{NAMES[worst.name]} moves the output most until it is detected: {size} {unit} in {when}{stop}."
 
@@ -100,8 +98,7 @@ def _figure(result: Failures, scale: float, unit: str, load: str) -> Block:
         time = case.time_s[keep] * per_s
         top.curve(time, scale * case.deflection_rad[keep], NAMES[case.name], **style.series(k))
         bottom.curve(time, case.moment_Nm[keep], NAMES[case.name], **style.series(k))
-    top.rule_y(scale * asked.stop_rad, "stop", colour=style.RED, dash=1)
-    top.y.see([scale * asked.stop_rad])
+    top.rule_y(scale * asked.stop_rad, "stop", seen=True, colour=style.RED, dash=1)
     for panel in (top, bottom):
         panel.rule_x(asked.detection_s * per_s, "detected" if panel is top else "")
     top.y.label, bottom.y.label = f"deflection, {unit}", f"moment, {load}"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from actuator_lti.design.model import Command
-from analyses.motion.settling import largest_swing
+from actuator_lti.design.model import Command, Design
+from analyses.friction_effects import FrictionEffects
+from analyses.friction_effects.cycles import LimitCycles
+from analyses.friction_effects.result import FrictionPoint
+from analyses.motion.settling import Settling, accepted_rad, judged_by, noticed, verdict_of
 from analyses.motion.settling import words as end_words
 from reports import document as doc
 from reports.charts import style
@@ -15,13 +18,6 @@ from reports.charts.style import Chart
 from reports.document_schema import Block, Section, Severity, Status, VerdictItem
 from reports.sections.names import fine_unit, load_unit
 from reports.verdict_summary import tally
-
-if TYPE_CHECKING:
-    from analyses.friction_effects import FrictionEffects
-    from analyses.friction_effects.cycles import LimitCycles
-    from analyses.friction_effects.result import FrictionPoint
-    from analyses.motion.settling import Settling
-
 
 LEFT = 1e-3  # of a step: an error that is spoken of
 
@@ -33,7 +29,7 @@ def section(result: FrictionEffects) -> Section:
         return doc.section("friction-effects", title, [], result=f"Not applicable: {result.reason}.")
     fine, small = fine_unit(result.design.axis)
     load = load_unit(result.design)
-    items = [_cycle_verdict(point, fine, small, load) for point in result.points]
+    items = [_cycle_verdict(result.design, point, fine, small, load) for point in result.points]
     blocks = [doc.verdicts(items, what="checks"), _threshold_table(result, fine, small, load)]
     figure = _figure(result, fine, small, load)
     blocks += [figure] if figure else []
@@ -50,14 +46,14 @@ def section(result: FrictionEffects) -> Section:
     )
 
 
-def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> VerdictItem:
+def _cycle_verdict(design: Design, point: FrictionPoint, fine: float, small: str, load: str) -> VerdictItem:
     """Say whether friction keeps the drive hunting, and whether that was predicted."""
-    cycles, swing = point.cycles, point.cycles.hunting
+    cycles, swing = point.cycles, noticed(design, point.cycles.settlings)
     predicted = _predicted_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
         result = f"at rest after steps of {len(cycles.settlings)} sizes"
     else:
-        result = end_words(swing.rest, fine, small)
+        result = "; ".join(filter(None, (end_words(swing.rest, fine, small), judged_by(design))))
     agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
@@ -65,10 +61,9 @@ def _cycle_verdict(point: FrictionPoint, fine: float, small: str, load: str) -> 
         f"validation-hunting-{point.load_Nm:g}",
         f"No limit cycle of friction after small steps at {point.load_Nm:g} {load}",
         value=0.0 if swing is None else fine * swing.swing_rad,
-        limit=0.0,
+        limit=fine * accepted_rad(design),
         unit=small,
-        distance=None,
-        passed=swing is None,
+        passed={"met": True, "not met": False}.get(verdict_of(design, swing)),
         comparison="<=",
         reason=f"{predicted}; simulated: {result}; {agree}",
     )
@@ -187,24 +182,21 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
     if not loops:
         return None
     chart = Chart(width=style.WIDE, height=330.0)
-    panel = chart.panel(title="Position error over a slow triangle of the command")
-    panel.by_point = True
+    title = "Position error over a slow triangle of the command"
+    panel = chart.panel(f"command, {small}", f"output less command, {small}", title=title, by_point=True)
     for k, (label, loop) in enumerate(loops):
         x, y = fine * loop.command_rad, fine * (loop.output_rad - loop.command_rad)
         panel.curve(np.append(x, x[0]), np.append(y, y[0]), label, **style.series(k))
     panel.rule_y(0.0)
-    panel.x.label, panel.y.label = f"command, {small}", f"output less command, {small}"
     if waits:
-        panel = chart.panel(title="Wait before a small step moves the output")
-        panel.x.log = panel.y.log = True
-        panel.x.label, panel.y.label = f"step, {small}", "time to first motion, ms"
+        title = "Wait before a small step moves the output"
+        panel = chart.panel(f"step, {small}", "time to first motion, ms", "xy", title=title)
     for k, (label, waiting) in enumerate(waits):
         sizes = [fine * one.amplitude_rad for one in waiting]
         seen = [None if one.simulated_s is None else 1e3 * one.simulated_s for one in waiting]
-        look: style.Style = {"colour": style.SERIES[k % 7], "marker": "os^D"[k % 4], "size": 6.0}
         predicted = [1e3 * one.predicted_s for one in waiting]
         panel.curve(sizes, predicted, f"{label}: predicted", **style.series(k))
-        panel.points(sizes, seen, f"{label}: simulated", **look)
+        panel.points(sizes, seen, f"{label}: simulated", **style.marked(k))
     caption = "Position error over a slow triangular command; without friction only the small lag remains."
     if waits:
         caption += " Right: a step below the threshold waits until the speed integrator reaches breakaway."
@@ -214,7 +206,7 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
 def _summary(result: FrictionEffects, fine: float, small: str) -> str:
     """Say what becomes of the steady-state error, as the steps show it."""
     settlings = [one for point in result.points for one in point.cycles.settlings]
-    swing = largest_swing(settlings)
+    swing = noticed(result.design, settlings)
     if swing is not None:
         return f"Friction keeps the drive from rest after a step: {end_words(swing.rest, fine, small)}."
     left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]

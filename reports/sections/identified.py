@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
+from analyses.identification.verdict import Identified, Item
 from reports import document as doc
 from reports.document_schema import Block, Row, Section, Status, VerdictItem
 from reports.numbers import show
-
-if TYPE_CHECKING:
-    from analyses.estimation.fit import Fit
-    from analyses.identification.verdict import Identified, Item
 
 
 def judged(
@@ -53,9 +50,8 @@ def _verdict(item: Item) -> VerdictItem:
     limit = None if item.limit is None else 100.0 * item.limit
     unit, comparison = "" if value is None else "%", "" if limit is None else "<="
     return doc.verdict(
-        item.id, item.label, value=value, limit=limit, unit=unit, comparison=comparison,
-        distance=None if value is None or limit is None else limit - value,
-        passed=item.passed, reason=item.reason,
+        item.id, item.label, value=value, limit=limit, unit=unit, comparison=comparison, passed=item.passed,
+        reason=item.reason,
     )  # fmt: skip
 
 

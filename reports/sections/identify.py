@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from actuator_lti.files.atomic import write_text
 from analyses.identification.bench import BenchResult
 from analyses.identification.frequency_bench import FrequencyResult
 from analyses.identification.plan import Plan
+from analyses.identification.run import CampaignAnswer
+from analyses.identification.verdict import Identified
 from reports.document_schema import Section
 from reports.sections import identify_campaign, identify_plan, identify_records, identify_response
-
-if TYPE_CHECKING:
-    from analyses.identification.run import CampaignAnswer
-    from analyses.identification.verdict import Identified
 
 
 def section(result: BenchResult | CampaignAnswer | FrequencyResult | Plan) -> Section:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analyses.identification.campaign import CampaignResult
+from analyses.identification.campaign_design import CampaignSuggestion
+from analyses.identification.richer import LawScore, RicherLaws
+from analyses.identification.run import CampaignAnswer
+from analyses.identification.surface_fit import SurfaceFit
 from reports import document as doc
 from reports.document_schema import Block, Row, Section
 from reports.sections.campaign_figures import (
@@ -19,13 +23,6 @@ from reports.sections.campaign_figures import (
 )
 from reports.sections.identified import judged, parameter_table, value_words
 from reports.sections.record_tables import input_table
-
-if TYPE_CHECKING:
-    from analyses.identification.campaign import CampaignResult
-    from analyses.identification.campaign_design import CampaignSuggestion
-    from analyses.identification.richer import LawScore, RicherLaws
-    from analyses.identification.run import CampaignAnswer
-    from analyses.identification.surface_fit import SurfaceFit
 
 
 def section(answer: CampaignAnswer) -> Section:

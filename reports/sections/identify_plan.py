@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 from analyses.estimation.parameters import parameter
+from analyses.identification.plan import Plan
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Section, Status
 from reports.sections.identified import parameter_table
 from reports.sections.thinning import kept_rows
-
-if TYPE_CHECKING:
-    from analyses.identification.plan import Plan
 
 NEXT = "What the records at hand tell is counted; these motions are what to measure next."
 
@@ -52,9 +49,8 @@ def section(plan: Plan) -> Section:
     if plan.segments:
         rows = kept_rows([plan.command])
         chart = Chart(width=style.WIDE, height=260.0)
-        panel = chart.panel()
+        panel = chart.panel("time, s", f"command at the output, {unit}")
         panel.curve(plan.time_s[rows], plan.command[rows], "command", colour=style.BLUE)
-        panel.x.label, panel.y.label = "time, s", f"command at the output, {unit}"
         caption = "Command of all motions, one after the other"
         blocks.append(doc.figure("plan", chart, caption=caption, alt=caption))
     intro = (

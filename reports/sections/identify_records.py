@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from analyses.estimation.parameters import parameter
+from analyses.identification.bench import BenchResult
+from analyses.identification.design_values import DesignValue
+from analyses.identification.joint_model import JointModel
+from analyses.identification.output_error import OutputErrorResult
 from reports import document as doc
 from reports.document_schema import Block, Section
 from reports.sections import residuals
 from reports.sections.identified import judged, parameter_table, value_words
 from reports.sections.record_tables import finding_table, input_table
-
-if TYPE_CHECKING:
-    from analyses.identification.bench import BenchResult
-    from analyses.identification.design_values import DesignValue
-    from analyses.identification.joint_model import JointModel
-    from analyses.identification.output_error import OutputErrorResult
 
 
 def section(result: BenchResult) -> Section:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from analyses.identification.frequency import response
+from analyses.identification.frequency_bench import FrequencyResult
+from analyses.identification.two_mass import NAMES, angle_responses
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section
 from reports.sections.identified import judged, parameter_table, value_words
 from reports.sections.record_tables import finding_table, input_table
-
-if TYPE_CHECKING:
-    from analyses.identification.frequency_bench import FrequencyResult
 
 
 def section(result: FrequencyResult) -> Section:
@@ -42,9 +40,6 @@ def section(result: FrequencyResult) -> Section:
 
 def response_figures(result: FrequencyResult) -> list[Block]:
     """Motor angle (and load angle) over motor torque: measured lines and the model."""
-    from analyses.identification.frequency import response
-    from analyses.identification.two_mass import NAMES, angle_responses
-
     lines, fit = result.lines, result.fit
     own = {name: fit[name] for name in NAMES}
     model = angle_responses(lines.omega_rad_s, own, fit.reduction, fit.reaction)
@@ -55,11 +50,9 @@ def response_figures(result: FrequencyResult) -> list[Block]:
             continue
         measured, _ = response(lines, signal, lines.names[0])
         chart = Chart(width=style.WIDE, height=320.0)
-        panel = chart.panel()
-        panel.x.log = panel.y.log = True
+        panel = chart.panel("frequency, Hz", f"{label} over torque, rad/(N m)", "xy")
         panel.points(hertz, np.abs(measured), "measured", colour=style.BLUE)
         panel.curve(hertz, np.abs(model[k]), "two-mass model", **style.series(1))
-        panel.x.label, panel.y.label = "frequency, Hz", f"{label} over torque, rad/(N m)"
         caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
         alt = f"Magnitude of {label} over motor torque against frequency, measured and fitted"
         figures.append(doc.figure("response", chart, caption=caption, alt=alt))

@@ -96,14 +96,13 @@ def _in_time(validation: Validation) -> Section:
 
 def _step(shown: StepShown) -> Block:
     chart = Chart(width=style.HALF, height=240.0)
-    panel = chart.panel()
+    panel = chart.panel(y="response to a unit step")
     scale = style.time_axis(panel, float(shown.time_s[-1]))
     some = slice(None, None, max(1, shown.time_s.size // 400))
     few = slice(None, None, max(1, shown.time_s.size // 40))
     panel.curve(scale * shown.time_s[some], shown.linear[some], "linear", colour=style.BLUE)
     look: style.Style = {"size": 4.5, "hollow": True, "colour": style.ORANGE}
     panel.points(scale * shown.time_s[few], shown.simulated[few], "simulated", **look)
-    panel.y.label = "response to a unit step"
     caption = (
         f"{LOOPS[shown.place]}: small step on the operating motion; largest difference {shown.row.error:.1e} "
         f"of its height, {shown.row.because.split(', of ')[-1]}."
@@ -113,13 +112,12 @@ def _step(shown: StepShown) -> Block:
 
 def _margin(shown: MarginShown) -> Block:
     chart = Chart(width=style.HALF, height=240.0)
-    panel = chart.panel()
+    panel = chart.panel(y="amplitude of the critical mode")
     scale = style.time_axis(panel, max(float(run.time_s[-1]) for run in (shown.inside, shown.outside)))
     for run, words, k in ((shown.inside, "1 % inside", 0), (shown.outside, "1 % outside", 3)):
         look = style.series(k)
         panel.curve(scale * run.time_s, run.factor ** (run.time_s / run.time_s[-1]), words, **look)
         panel.points(scale * run.time_s, run.amplitude, f"{words}, simulated", **look | {"size": 4.0})
-    panel.y.label = "amplitude of the critical mode"
     decibel = 20.0 * math.log10(shown.ratio)
     caption = (
         f"{LOOPS[shown.place]}: gain margin {decibel:.2f} dB at {shown.frequency_hz:.4g} Hz. The run inside "

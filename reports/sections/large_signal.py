@@ -3,11 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from actuator_lti.design.model import Command
+from actuator_lti.design.model import Command, Design
+from analyses.large_signal import LargeSignals
+from analyses.large_signal.bode import AmplitudeBode
+from analyses.large_signal.border import LimitShift
+from analyses.large_signal.classify import CAUSE_RULE, CAUSES, CRITERIA
+from analyses.large_signal.map import AmplitudeMap
+from analyses.large_signal.sawtooth import (
+    FAST,
+    GAIN_TOLERANCE,
+    LAG_TOLERANCE_DEG,
+    REVERSAL_DEG,
+    Sawtooth,
+    SawtoothRun,
+)
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -17,19 +30,9 @@ from reports.sections.limits import words_of
 from reports.sections.names import figure_column, load_unit, output_unit
 from reports.verdict_summary import tally
 
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.large_signal import LargeSignals
-    from analyses.large_signal.bode import AmplitudeBode
-    from analyses.large_signal.border import LimitShift
-    from analyses.large_signal.map import AmplitudeMap
-    from analyses.large_signal.sawtooth import Sawtooth, SawtoothRun
-
 
 def section(result: LargeSignals) -> Section:
     """Make the section from `analyses.large_signal.large_signals`."""
-    from analyses.large_signal.classify import CAUSE_RULE, CRITERIA
-
     design = result.design
     scale, unit = output_unit(design.axis)
     items = _sawtooth_verdicts(result.sawtooth)
@@ -101,8 +104,6 @@ def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
 
 def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
     """Judge the rate-limit formulas, where they apply."""
-    from analyses.large_signal.sawtooth import GAIN_TOLERANCE, LAG_TOLERANCE_DEG
-
     if not (sawtooth.runs and sawtooth.applicable):
         return []
     gain = max(abs(run.gain_error) for run in sawtooth.runs)
@@ -119,7 +120,6 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
             limit=scale * limit,
             unit=unit,
             comparison="<=",
-            distance=scale * (limit - error),
             passed=error <= limit,
         )
         for key, label, error, limit, scale, unit in rows
@@ -145,8 +145,6 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
 
 def _map_words(amplitude_map: AmplitudeMap) -> str:
     """Say in words what the map shows."""
-    from analyses.large_signal.classify import CAUSES
-
     shares = {name: amplitude_map.share((name,)) for name in CAUSES}
     parts = [f"{name} {share:.0%}" for name, share in shares.items() if share > 0.0]
     return "Map of amplitude and frequency; share of the points by what acts: " + ", ".join(parts)
@@ -184,7 +182,7 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
         for k, (fraction, amplitude) in enumerate(
             zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True)
         ):
-            look = {**style.series(k), "marker": "os^Dv<>"[k % 7], "size": 4.4, "every": 6}
+            look = {**style.series(k), **style.marked(k, 4.4), "every": 6}
             label = f"{100.0 * fraction:g} % ({scale * amplitude:.3g} {unit})"
             panel.curve(amplitude_bode.frequency_hz, values[k], label, **look)
     style.bound(gain, np.ravel(amplitude_bode.gain_db), span=45.0, top_room=0.12)
@@ -194,7 +192,9 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
     phase.rule_y(-90.0, dash=1)
     style.frequency(phase, amplitude_bode.frequency_hz)
     gain.y.label, phase.y.label = "gain of the fundamental, dB", "phase, deg"
-    _bandwidths(chart.panel(title="Bandwidth against amplitude"), amplitude_bode, scale, unit, full)
+    size = f"command amplitude, {unit} (dotted: full deflection)"
+    panel = chart.panel(size, "frequency, Hz", "xy", title="Bandwidth against amplitude")
+    _bandwidths(panel, amplitude_bode, scale, unit, full)
     caption = (
         "Fundamental of the output relative to the command at several amplitudes, simulated at no load with "
         "friction and limits. Right: frequencies of −3 dB and −90° against amplitude. Gaps: not steady."
@@ -208,16 +208,12 @@ def _bandwidths(panel: Panel, result: AmplitudeBode, scale: float, unit: str, fu
         (result.minus3db_hz, result.linear_minus3db_hz, "−3 dB", style.GREEN, "o", 0),
         (result.minus90deg_hz, result.linear_minus90deg_hz, "−90°", style.PURPLE, "D", 1),
     )
-    panel.x.log = panel.y.log = True
     for values, level, label, colour, marker, dash in pairs:
         sizes = scale * result.all_amplitude_rad
         panel.curve(sizes, values, label, colour=colour, marker=marker, size=5.0, dash=dash)
         if level is not None and math.isfinite(level):
-            panel.y.see([level])
-            panel.rule_y(level, f"linear {style.hertz(level)}", colour=colour, dash=2)
+            panel.rule_y(level, f"linear {style.hertz(level)}", seen=True, colour=colour, dash=2)
     panel.rule_x(full * scale, dash=2)
-    panel.x.label = f"command amplitude, {unit} (dotted: full deflection)"
-    panel.y.label = "frequency, Hz"
 
 
 def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str) -> Block:
@@ -248,8 +244,6 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: s
 
 def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[Block]:
     """Make the sawtooth, or say why there is none."""
-    from analyses.large_signal.sawtooth import FAST, REVERSAL_DEG
-
     if not sawtooth.runs:
         return [doc.text(f"Sawtooth: not applicable, {sawtooth.reason}.")]
     limit = scale * sawtooth.rate_limit_rad_s

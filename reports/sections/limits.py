@@ -40,7 +40,7 @@ def section(design: Design, border: Onset) -> Section:
 def _chart(design: Design, border: Onset, scale: float, unit: str) -> Chart:
     """Draw every limiter's line; below the lowest the linear model holds."""
     chart = Chart(width=style.WIDE, height=370.0, legend=True, legend_title="limit reached at this amplitude")
-    panel = chart.panel()
+    panel = chart.panel(y=f"command amplitude, {unit}", log="y")
     hertz = border.omega_rad_s / (2.0 * np.pi)
     lines = {name: scale * np.asarray(values) for name, values in border.each_rad.items()}
     lines = {name: values for name, values in lines.items() if np.isfinite(values).any()}
@@ -49,7 +49,6 @@ def _chart(design: Design, border: Onset, scale: float, unit: str) -> Chart:
     full = _full(design) * scale
     top = 4.0 * max([full, *lowest[there][:1]]) if there.any() else 1.0
     bottom = max(0.6 * min(lowest[there], default=0.1), top / 1e6)
-    panel.y.log, panel.y.label = True, f"command amplitude, {unit}"
     panel.y.limits(bottom, top)
     style.frequency(panel, hertz)
     if there.any():

@@ -126,8 +126,8 @@ def nyquist(
 ) -> Chart:  # fmt: skip
     """Draw the curve, its mirror image, the circle about -1 that it touches, and every crossing."""
     chart = Chart(width=style.HALF, height=430.0)
-    panel = chart.panel()
-    panel.equal = panel.by_point = True
+    panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
+    panel.equal = True
     panel.rule_y(0.0)
     panel.rule_x(0.0)
     turn = np.exp(2j * np.pi * np.arange(73) / 72)
@@ -152,15 +152,13 @@ def nyquist(
     panel.note("−1", (-1.0, 0.0))
     panel.x.limits(-1.0 - frame, frame - 0.35)
     panel.y.limits(-frame, frame)
-    panel.x.label, panel.y.label = "real part of L", "imaginary part of L"
     return chart
 
 
 def nichols(frequency_hz: np.ndarray, magnitude_db: np.ndarray, phase_deg: np.ndarray) -> Chart:
     """Draw gain over phase, and about each critical point in reach where S or T exceeds 6 dB."""
     chart = Chart(width=style.WIDE, height=360.0, legend=True)
-    panel = chart.panel()
-    panel.by_point = True
+    panel = chart.panel("phase, deg", "magnitude, dB", by_point=True)
     shown = np.abs(magnitude_db) <= NICHOLS_SPAN_DB
     phase, gain = (np.asarray(values)[shown].tolist() for values in (phase_deg, magnitude_db))
     low, high = min(phase, default=-360.0), max(phase, default=0.0)
@@ -170,11 +168,8 @@ def nichols(frequency_hz: np.ndarray, magnitude_db: np.ndarray, phase_deg: np.nd
     panel.curve(phase_deg, magnitude_db, "open loop", parameter=frequency_hz)
     panel.rule_y(0.0, colour=style.INK)
     panel.x.limits(low - 10.0, high + 10.0)
-    panel.x.ticks = [
-        (45.0 * k, style.to_minus(f"{45 * k}")) for k in range(int(low // 45), int(high // 45) + 2)
-    ]
+    panel.x.ticks = style.multiples(45.0, low - 10.0, high + 10.0)
     panel.y.limits(min([*gain, -2.0 * NICHOLS_DB]), max([*gain, 2.0 * NICHOLS_DB]))
-    panel.x.label, panel.y.label = "phase, deg", "magnitude, dB"
     return chart
 
 
@@ -201,7 +196,7 @@ def sensitivity(
 ) -> Chart:  # fmt: skip
     """Draw both magnitudes, their peaks and the limit of a requirement."""
     chart = Chart(width=style.HALF, height=225.0, loop=loop)
-    panel = chart.panel()
+    panel = chart.panel(y="magnitude, dB")
     for k, (name, values, (at, db)) in enumerate(zip("ST", (s_db, t_db), peaks, strict=True)):
         colour = (style.ORANGE, style.BLUE)[k]
         words = f"|{name}|, no peak"
@@ -212,7 +207,6 @@ def sensitivity(
             panel.points([at], [db], marker="^", colour=colour, size=7.0, read=False)
     panel.rule_y(0.0, colour=style.INK)
     style.frequency(panel, hertz)
-    panel.y.label = "magnitude, dB"
     style.bound(panel, [*s_db, *t_db], span=45.0, top_room=0.12)
     if limit_db is not None:
         low, high = panel.y.span()
@@ -227,12 +221,11 @@ Response = tuple[str, np.ndarray, np.ndarray]  # label, time in s, response
 def step(responses: Sequence[Response], figures: StepFigures, held: bool, loop: str, small: bool) -> Chart:
     """Draw the responses (``held``: as stairs) and the figures read from the first."""
     chart = Chart(width=style.SMALL if small else style.HALF, height=280.0 if small else 225.0, loop=loop)
-    panel = chart.panel()
+    panel = chart.panel(y="response to a unit step")
     last = float(responses[0][1][-1])
     scale = style.time_axis(panel, last)
     for k, (label, time, response) in enumerate(responses):
         panel.curve(time * scale, response, label, stairs=held and len(time) < 80, **style.series(k))
-    panel.y.label = "response to a unit step"
     panel.x.limits(0.0, last * scale)
     lowest = min(style.known(y for _, _, response in responses for y in response), default=0.0)
     panel.y.limits(low=min(0.0, 1.05 * lowest))
@@ -250,7 +243,9 @@ def _step_figures(panel: Panel, figures: StepFigures, drawn: Response, scale: fl
     panel.rule_y(final)
     part = np.asarray(figures.response) / final
     if (part >= 0.9).any():
-        start = float(figures.time_s[int(np.argmax(part >= 0.1))])
+        # both series are parts of the response, each thinned in its own way: the earlier is nearer
+        found = ((figures.time_s, part), (time, np.asarray(response) / final))
+        start = min(float(at[np.argmax(one >= 0.1)]) for at, one in found if (one >= 0.1).any())
         for t in (start, start + float(figures.rise_time_s)):
             if t <= last:
                 there = response[np.searchsorted(time, t * (1.0 + 1e-12), side="right") - 1]

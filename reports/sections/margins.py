@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from actuator_lti.asked.quantities import QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.bandwidth import Bandwidth
 from actuator_lti.files.tree import Tree
 from analyses.linear.held_loops import HELD, OPEN
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.loop_survey import OperatingPointFigures
+from analyses.margins import Margins
 from analyses.specification.weakest import Spread, spread
 from reports import document as doc
 from reports.document_schema import Block, Row, Section, State, Status
@@ -19,10 +20,6 @@ from reports.numbers import short, to_minus
 from reports.sections import requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words
 from reports.terminal import Brief, SideBySide
-
-if TYPE_CHECKING:
-    from actuator_lti.bandwidth import Bandwidth
-    from analyses.margins import Margins
 
 STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE_STATUS: dict[str, Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}

@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
+from analyses.monte_carlo import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
+from analyses.specification.verdicts import RequirementVerdict
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.document_schema import Block, Section, VerdictItem
-from reports.numbers import significant
+from reports.numbers import or_none
 from reports.sections.margins import finite
 from reports.sections.names import unit_words
 from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
-
-if TYPE_CHECKING:
-    from analyses.monte_carlo import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
-    from analyses.specification.verdicts import RequirementVerdict
 
 _SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
 
@@ -42,8 +40,8 @@ def section(result: MonteCarloResult) -> Section:
     blocks += [doc.remark(note) for note in result.notes]
     blocks.append(doc.facts([
         doc.fact("Samples", result.samples), doc.fact("Seed", result.seed),
-        doc.fact("Parameters that vary", ", ".join(result.paths)),
     ]))  # fmt: skip
+    blocks.append(doc.remark(f"Parameters that vary: {', '.join(result.paths)}."))
     intro = (
         f"{result.samples} designs drawn from the tolerances; sampled loops. An optimiser seeks the worst "
         "case in the whole tolerance box, as sampling alone does not find it."
@@ -107,8 +105,8 @@ def _verdict(result: MonteCarloResult, odds: Odds) -> VerdictItem:
 
 def _not_sampled(one: RequirementVerdict) -> VerdictItem:
     return doc.verdict(
-        f"tolerance/{one.id}", f"{label(one)}: met within the tolerances", value=None, limit=None, unit="",
-        distance=None, passed=None, reason=one.reason, waiver=one.waiver.words if one.waiver else "",
+        f"tolerance/{one.id}", f"{label(one)}: met within the tolerances", passed=None, reason=one.reason,
+        waiver=one.waiver.words if one.waiver else "",
     )  # fmt: skip
 
 
@@ -179,7 +177,7 @@ def _words(name: str) -> str:
 
 
 def _figures(result: MonteCarloResult) -> list[Block]:
-    """Draw the distribution behind every requirement, three a figure."""
+    """Draw the distribution behind every requirement, at most three a figure, in rows of like length."""
     shown = [
         (odds, result.columns[name])
         for odds in result.odds
@@ -188,9 +186,10 @@ def _figures(result: MonteCarloResult) -> list[Block]:
         if len(result.columns[name].counts) >= 2  # the same in every sample: nothing to draw
     ]
     blocks = []
-    for first in range(0, len(shown), 3):
-        part = shown[first : first + 3]
-        chart = Chart(width=style.WIDE * len(part) / 3.0, height=250.0, legend=True)
+    rows = -(-len(shown) // 3)
+    for row in range(rows):
+        part = shown[row * len(shown) // rows : (row + 1) * len(shown) // rows]
+        chart = Chart(width=style.WIDE, height=250.0, legend=True)
         for odds, column in part:
             _histogram(chart.panel(title=_words(column.name)), result, odds, column)
         names = ", ".join(_words(column.name) for _, column in part)
@@ -213,15 +212,13 @@ def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: Colum
     worst = finite(case.value) if case is not None and alone else None
     for name, value, colour, dash in (("nominal", nominal, style.INK, 0), ("worst", worst, style.ORANGE, 1)):
         if value is not None:
-            panel.x.see([value])
-            panel.rule_x(value, label=name, colour=colour, dash=dash, width=1.7)
+            panel.rule_x(value, label=name, seen=True, colour=colour, dash=dash, width=1.7)
     known = [*edges, *style.known((nominal, worst))]
     low, high = min(known), max(known)
     width, unit = max(high - low, 1e-3 * max(abs(high), 1e-9)), unit_words(column.unit)
     for name, value in (("minimum", odds.minimum), ("maximum", odds.maximum)):
         if value is not None and low - 2 * width <= value <= high + 2 * width:
-            panel.x.see([value])
-            panel.rule_x(value, label="limit", colour=style.RED, dash=2, width=1.7)
+            panel.rule_x(value, label="limit", seen=True, colour=style.RED, dash=2, width=1.7)
         elif value is not None:
             panel.note(f"{name} {value:g} {unit}: off scale", corner="top left", colour=style.MUTED)
     panel.x.label, panel.y.label, panel.x.grid = unit, "samples", False
@@ -230,7 +227,7 @@ def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: Colum
 def _driver_table(result: MonteCarloResult) -> Block:
     """Say of each required figure which tolerances move it most, and between which values."""
     strongest: dict[str, list[Driver]] = {}
-    for one in result.drivers:
+    for one in (each for each in result.drivers if each.swing != 0.0):
         strongest.setdefault(one.column, []).append(one)
     places = [("first", "Driven most by"), ("second", "then by"), ("third", "then by")]
     columns = [
@@ -244,11 +241,11 @@ def _driver_table(result: MonteCarloResult) -> Block:
 
 def _driver(place: int) -> Callable[[tuple[str, list[Driver]]], str]:
     def words(item: tuple[str, list[Driver]]) -> str:
-        if place >= len(item[1]) or item[1][place].swing == 0.0:
+        if place >= len(item[1]):
             return ""
         one = item[1][place]
-        ends = ["none" if value is None else significant(value, 3) for value in (one.low, one.high)]
-        return f"{one.path}: {ends[0]} to {ends[1]}"
+        told = ([or_none(value, digits) for value in (one.low, one.high)] for digits in range(3, 7))
+        return next((f"{one.path}: {low} to {high}" for low, high in told if low != high), "")
 
     return words
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from analyses.records.consistency import Finding
+from analyses.records.inputs import InputUse
 from reports import document as doc
 from reports.document_schema import Block
-
-if TYPE_CHECKING:
-    from analyses.records.consistency import Finding
-    from analyses.records.inputs import InputUse
 
 
 def input_table(caption: str, inputs: Sequence[InputUse]) -> Block:

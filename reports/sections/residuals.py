@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analyses.identification.joint_model import JointModel, RecordFit
+from analyses.identification.residuals import ResidualTest
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block
 from reports.sections.thinning import kept_rows
-
-if TYPE_CHECKING:
-    from analyses.identification.joint_model import JointModel, RecordFit
-    from analyses.identification.residuals import ResidualTest
 
 
 def blocks(model: JointModel, tests: Sequence[ResidualTest], axis: str) -> list[Block]:
@@ -65,16 +62,14 @@ def _over_time(part: RecordFit, unit: str) -> Chart:
     from scipy.signal import welch
 
     chart = Chart(width=style.WIDE, height=300.0)
-    left, right = chart.panel(), chart.panel()
+    left = chart.panel("time in the rows used, s", f"residual, {unit}")
+    right = chart.panel("frequency, Hz", f"{unit}/√Hz", "xy")
     time = part.step_s * np.flatnonzero(part.keep)
     rows = kept_rows([part.residual])
     left.rule_y(0.0)
     left.curve(time[rows], part.residual[rows], "residual", colour=style.BLUE, width=1.1)
-    left.x.label, left.y.label = "time in the rows used, s", f"residual, {unit}"
     hertz, power = welch(part.residual, 1.0 / part.step_s, nperseg=min(256, len(part.residual)))
-    right.x.log = right.y.log = True
     right.curve(hertz[1:], np.sqrt(power[1:]), "amplitude density of the residual", colour=style.BLUE)
-    right.x.label, right.y.label = "frequency, Hz", f"{unit}/√Hz"
     return chart
 
 
@@ -91,12 +86,10 @@ def _correlation(tests: Sequence[ResidualTest]) -> Chart:
 
 def _friction(part: RecordFit, unit: str, rate: str) -> Chart:
     chart = Chart(width=style.WIDE, height=320.0)
-    panel = chart.panel()
-    panel.by_point = True
+    panel = chart.panel(f"speed, {rate}", f"friction, {unit}", by_point=True)
     few = slice(None, None, max(1, len(part.speed) // 1500))
     order = np.argsort(part.speed)
     line = order[kept_rows([(part.friction - part.residual)[order]])]
     panel.points(part.speed[few], part.friction[few], "rows of the record", size=3.0, colour=style.BLUE)
     panel.curve(part.speed[line], (part.friction - part.residual)[line], "model", colour=style.ORANGE)
-    panel.x.label, panel.y.label = f"speed, {rate}", f"friction, {unit}"
     return chart

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.model import Design
+from analyses.specification import Specification
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart, Panel
@@ -15,10 +17,6 @@ from reports.findings import Finding
 from reports.numbers import short, significant
 from reports.sections.limits import words_of
 from reports.sections.names import load_unit, output_unit
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.specification import Specification
 
 ALIKE = 0.05  # relative: closed form and simulation are not told apart in the headline
 BOUND_COLOURS = {
@@ -138,8 +136,7 @@ def _planes(result: Specification) -> list[Block]:
         moves = [move for move in result.manoeuvres if move.load_Nm == load]
         title = f"{'Force' if linear else 'Torque'} and speed of the motor, load {load:g} {unit}"
         chart = Chart(width=style.WIDE, height=400.0, title=title, legend=True)
-        panel = chart.panel()
-        panel.by_point = True
+        panel = chart.panel(speed_label, torque_label, by_point=True)
         widest, top = fast * _fastest(result, moves), strong * _top(result, moves)
         panel.x.limits(-0.02 * widest, widest)
         panel.y.limits(-1.12 * top, 1.25 * top)
@@ -162,7 +159,6 @@ def _planes(result: Specification) -> list[Block]:
                 fast * each.speed_rad_s, strong * each.torque_Nm, each.name, colour=style.INK, width=1.5,
                 dash=2, marker="os^D"[k % 4], size=5.0, every=8,
             )  # fmt: skip
-        panel.x.label, panel.y.label = speed_label, torque_label
         caption = (
             f"{'Force' if linear else 'Motor torque'} over speed at {load:g} {unit}: bounds, what steady "
             "motion needs, and the paths of standard manoeuvres at full deflection. Below zero it brakes; "

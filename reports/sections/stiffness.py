@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.model import Design
+from analyses.stiffness import Stiffness, stiffness
+from analyses.stiffness.result import AGREED, READ
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section, Status
 from reports.numbers import short
 from reports.sections.names import load_unit, output_unit
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.stiffness import Stiffness
 
 STATES = {
     "powered": "powered, command held",
@@ -27,8 +26,6 @@ STATES = {
 
 def of_design(design: Design) -> Section:
     """Make the section of a report from the linear loops alone."""
-    from analyses.stiffness import stiffness
-
     return {**section(stiffness(design, simulated=False)), "status": "info"}
 
 
@@ -67,8 +64,6 @@ def _result(result: Stiffness, unit: str) -> str:
 
 def _compared(result: Stiffness) -> str:
     """What was put to the simulator, and how far it is off; or why it could not be."""
-    from analyses.stiffness.result import AGREED, READ
-
     if not result.checks:
         return f"nothing is compared: {result.unproven}" if result.unproven else ""
     most = max(check.difference for check in result.checks)

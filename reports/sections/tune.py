@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from actuator_lti.design import write_design
 from actuator_lti.files.atomic import write_text
+from analyses.specification.verdicts import RequirementVerdict
+from analyses.tuning import BindingRequirement, TuningResult
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
 from reports.document_schema import Block, Section, VerdictItem
 from reports.sections.names import output_unit, unit_words
-
-if TYPE_CHECKING:
-    from analyses.specification.verdicts import RequirementVerdict
-    from analyses.tuning import BindingRequirement, TuningResult
 
 
 def section(result: TuningResult) -> Section:
@@ -136,7 +133,7 @@ def _curve(result: TuningResult) -> Block:
     width = [q.minimum for q in wanted if q.quantity == "bandwidth" and q.loop == "position"]
     margin = [q.minimum for q in wanted if q.quantity == "phase_margin" and q.minimum is not None]
     chart = Chart(width=style.WIDE, height=350.0, title="What the position loop can trade")
-    panel = chart.panel()
+    panel = chart.panel("bandwidth of the position loop, Hz", "smallest phase margin of all loops, deg")
     x, y = [p.bandwidth_hz for p in result.trade_off], [p.phase_margin_deg for p in result.trade_off]
     panel.curve(x, y, "best smallest phase margin, worst corner", colour=style.BLUE)
     for ok, marker, colour, label in (
@@ -147,15 +144,11 @@ def _curve(result: TuningResult) -> Block:
         if chosen:
             xs, ys = zip(*chosen, strict=True)
             panel.points(xs, ys, label, marker=marker, colour=colour, size=7.0)
-    required: style.Style = {"colour": style.RED, "width": 1.2, "dash": 1}
+    required: style.Style = {"colour": style.RED, "width": 1.2, "dash": 1, "seen": True, "label": "required"}
     if width and width[0] is not None:
-        panel.x.see([width[0]])
-        panel.rule_x(width[0], label="required", **required)
+        panel.rule_x(width[0], **required)
     if margin:
-        panel.y.see([max(margin)])
-        panel.rule_y(max(margin), label="required", **required)
-    panel.x.label = "bandwidth of the position loop, Hz"
-    panel.y.label = "smallest phase margin of all loops, deg"
+        panel.rule_y(max(margin), **required)
     caption = "Position bandwidth against the phase margin that every loop keeps at its worst corner."
     alt = f"Curve of {len(result.trade_off)} points, phase margin falling with bandwidth."
     return doc.figure("trade_off", chart, caption=caption, alt=alt)

@@ -9,12 +9,22 @@ from typing import Any, cast
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.drive.signals import LIMITERS
+from analyses.motion.settling import waiver_of_rest
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
-from reports.document_schema import Block, Counts, Section, Severity, Status, VerdictItem
+from reports.document_schema import Block, Counts, Section, Severity, VerdictItem
 from reports.findings import Finding
 from reports.numbers import capital
+from reports.sections import (
+    conditional,
+    counts,
+    friction_effects,
+    from_rest,
+    in_time,
+    large_signal,
+    specification,
+)
 from reports.sections.conditional import findings_of
 from reports.sections.names import LOOPS, POINTS, QUANTITIES, unit_words
 from reports.terminal import Brief
@@ -42,8 +52,6 @@ NOISE = 1e-9  # of the value: a smaller error changes with the order in which su
 
 def section(validation: Validation) -> list[Section]:
     """Make all sections of a validation, verdicts first."""
-    from reports.sections import conditional, counts, from_rest, in_time
-
     made = [summary(validation), *in_time.sections(validation)]
     if validation.rest_sweep is not None:
         made += from_rest.sections(validation.rest_sweep, validation.design.axis)
@@ -56,8 +64,6 @@ def section(validation: Validation) -> list[Section]:
 
 def _others(validation: Validation) -> list[Section]:
     """Make the sections of large signals, friction and specification, as far as they were asked for."""
-    from reports.sections import friction_effects, large_signal, specification
-
     shown: list[tuple[Callable[[Any], Section], Any]] = [
         (large_signal.section, validation.large_signals),
         (friction_effects.section, validation.friction),
@@ -95,10 +101,9 @@ def summary(validation: Validation) -> Section:
         "then without dry friction and friction by load: its figures differ from those of sliding by that. "
         "What is large, starts from rest, or is shaken by counts is a finding of its own."
     )
-    status: Status = {"met": "pass", "not met": "fail", "not proven": "warn"}[validation.verdict]  # type: ignore[assignment]
     return doc.section(
         "validation", "Predictions against simulation", blocks, result=result(validation), intro=intro,
-        status=status, findings=findings(validation),
+        status=validation.verdict.role(), findings=findings(validation),
     )  # fmt: skip
 
 
@@ -106,7 +111,7 @@ def result(validation: Validation) -> str:
     """Say how many predictions are met, and what the drive does that it must not."""
     words = [validation.tally.words("predictions"), *validation.failures]
     words += [f"stability of the {name} loop not known" for name in validation.undecided]
-    return " ".join(f"{capital(each)}." for each in words)
+    return " ".join(f"{capital(each)}." for each in (*words, validation.rest_words) if each)
 
 
 def findings(validation: Validation) -> list[Finding]:
@@ -134,17 +139,17 @@ def verdict_items(validation: Validation) -> list[VerdictItem]:
     """One verdict a loop, break point or path, and one for each thing that the drive must not do."""
     items = [_rows_item(validation, name, rows) for name, rows in by_loop(validation.rows).items()]
     if not items:
-        items.append(_item("judged", "Predictions", 0.0, None, None, "; ".join(validation.notes)))
+        items.append(_item("judged", "Predictions", None, "; ".join(validation.notes), value=0.0))
     for k, failure in enumerate(validation.failures):
-        items.append(_item(f"drive-{k}", "Stable, and at rest where it is sent", None, None, False, failure))
+        items.append(_item(f"drive-{k}", "Stable, and at rest where it is sent", False, failure))
     items += [
-        _item(f"stable-{name}", f"{loop_name(name)}: stable", None, None, None, "not known")
+        _item(f"stable-{name}", f"{loop_name(name)}: stable", None, "not known")
         for name in validation.undecided
     ]
-    swing = validation.hunting
-    if swing is not None and swing.rest.verdict == "still moving":
-        reason = f"still moving after {swing.rest.after_s:.3g} s"
-        items.append(_item("rest", "Comes to rest after a step", None, None, None, reason))
+    if validation.rest is Verdict.NOT_PROVEN:
+        waiver = waiver_of_rest(validation.design)
+        item = _item("rest", "Comes to rest after a step", None, validation.rest_words)
+        items.append({**item, "waiver": waiver.words if waiver else ""})
     return items
 
 
@@ -158,18 +163,12 @@ def _rows_item(validation: Validation, name: str, rows: Sequence[Check]) -> Verd
     label = f"{loop_name(name)}: predictions met by the simulator"
     reason = "; ".join(words) or f"largest error {share:.1g} of what is allowed"
     waiver = f"{tally.waived} of {open_ones} waived" if tally.waived and not tally.not_proven else ""
-    item = _item(name, label, float(tally.met), float(tally.total), passed, reason)
+    item = _item(name, label, passed, reason, value=float(tally.met), limit=float(tally.total))
     return {**item, "waiver": waiver, "gathers": cast(Counts, asdict(tally))}
 
 
-def _item(
-    id: str, label: str, value: float | None, limit: float | None, passed: bool | None, reason: str
-) -> VerdictItem:
-    distance = None if value is None or limit is None else value - limit
-    return doc.verdict(
-        f"{CHECKS}-{id}", label, value=value, limit=limit, unit="", distance=distance, passed=passed,
-        reason=reason, comparison=">=",
-    )  # fmt: skip
+def _item(id: str, label: str, passed: bool | None, reason: str, **counts: Any) -> VerdictItem:
+    return doc.verdict(f"{CHECKS}-{id}", label, passed=passed, reason=reason, comparison=">=", **counts)
 
 
 def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import struct
 import subprocess
 from pathlib import Path
 
@@ -13,8 +14,10 @@ from random_drives import law_at, random_drive, random_elastic_drive
 from typer.testing import CliRunner
 
 from actuator_lti import load_design
+from actuator_lti.compiled.compiler import zig_command
 from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design
+from actuator_lti.design.shipped import shipped_designs
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear.export import controller_export
@@ -60,7 +63,7 @@ def without_library(folder: Path) -> set[str]:
 
 
 @pytest.mark.parametrize("single", [False, True])
-@pytest.mark.parametrize("name", ["ilr33-amber-multirate", "emps", "joint", "ballscrew", "fin"])
+@pytest.mark.parametrize("name", shipped_designs())
 def test_vectors_of_the_simulator_hold_and_no_library_is_called(
     name: str, single: bool, tmp_path: Path
 ) -> None:
@@ -70,6 +73,58 @@ def test_vectors_of_the_simulator_hold_and_no_library_is_called(
     assert all(difference <= bound for difference, bound in worst.values())
     moved = max(difference for difference, _ in worst.values())
     assert (moved > 0.0) if single else (moved < 1e-10)
+
+
+CHIP = """#include "controller.h"
+#include <math.h>
+float sqrtf(float x)
+{
+    float result;
+    __asm__("vsqrt.f32 %0, %1" : "=t"(result) : "t"(x));
+    return result;
+}
+float floorf(float x)
+{
+    const float whole = (float)(int)x;
+    return (whole > x) ? whole - 1.0f : whole;
+}
+static drive_controller_state state;
+volatile drive_controller_input measured;
+volatile drive_controller_output put_out;
+void _start(void)
+{
+    drive_controller_input in = measured;
+    drive_controller_output out;
+    drive_controller_start(&state, &in);
+    for (;;) {
+        in = measured;
+        drive_controller_step(&state, &in, &out);
+        put_out = out;
+    }
+}
+"""
+CORTEX_M4F = ("-target", "thumb-freestanding-eabihf", "-mcpu=cortex_m4+vfp4d16sp")
+
+
+@pytest.mark.skipif(zig_command() is None, reason="ziglang is not installed")
+@pytest.mark.parametrize("name", shipped_designs())
+def test_it_links_for_a_cortex_m4f_with_no_library_at_all(name: str, tmp_path: Path) -> None:
+    """No library of the compiler either: a ``double`` or a copied array would miss its function here."""
+    folder = written(tmp_path, load_design(name), single=True)
+    (folder / "chip.c").write_text(CHIP)
+    (folder / "math.h").write_text("float sqrtf(float);\nfloat floorf(float);\n")
+    zig, *cc = zig_command() or ()
+    plain = ("-std=c99", "-O2", "-ffp-contract=off", "-ffreestanding", "-nostdlib", "-isystem", ".")
+    gcc(folder, *cc, *CORTEX_M4F, *plain, "chip.c", "controller.c", "-o", "chip", compiler=zig)
+    data = (folder / "chip").read_bytes()
+    machine, flags = struct.unpack_from("<H", data, 18)[0], struct.unpack_from("<I", data, 36)[0]
+    assert (machine, flags & 0x400) == (40, 0x400)  # ARM, floating-point numbers in registers
+    begin, size, count = (
+        struct.unpack_from(form, data, at)[0] for form, at in (("<I", 32), ("<H", 46), ("<H", 48))
+    )
+    sections = [struct.unpack_from("<6I", data, begin + k * size) for k in range(count)]
+    code = sum(length for _, kind, flags, _, _, length in sections if kind == 1 and flags & 2)
+    assert 100 < code < 3000  # the page on hosts says so
 
 
 @pytest.mark.parametrize("seed", [1, 2, 6, 12])

@@ -9,13 +9,10 @@ from random_drives import random_drive
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import compile_files, system_compiler
 from actuator_lti.design.model import Design
+from actuator_lti.design.shipped import shipped_designs
 from nonlinear.native import LIBRARY
 from nonlinear.rows import Rows
 
-SHIPPED = (
-    "emps", "ilr33-amber", "ilr33-amber-multirate", "ilr33-amber-tanh", "ilr33-amber-compliant", "fin",
-    "joint", "ballscrew", "ctms-motor-position",
-)  # fmt: skip
 CPU = Path("/proc/cpuinfo")
 pytestmark = pytest.mark.skipif(
     system_compiler() is None or not CPU.is_file() or " fma " not in CPU.read_text(encoding="utf-8"),
@@ -52,7 +49,7 @@ def apart(design: Design, libraries: tuple[Path, Path], ticks: int = 3000) -> fl
     return float((np.abs(plain - fused).max(axis=0)[there] / np.abs(plain).max(axis=0)[there]).max())
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", shipped_designs())
 def test_shipped_designs_stay_within_rounding(name: str, libraries: tuple[Path, Path]) -> None:
     assert apart(load_design(name), libraries) < 1e-11
 

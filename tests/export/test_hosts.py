@@ -33,10 +33,11 @@ def said(folder: Path, *call: str) -> str:
 
 
 def exported(folder: Path, title: str) -> None:
-    """Runs the command of a section."""
-    words = block(title, "sh").split()
-    assert words[0] == "actuator-lti"
-    said(folder, sys.executable, "-m", "reports.cli", *words[1:])
+    """Runs the commands of a section."""
+    for line in block(title, "sh").splitlines():
+        words = line.split()
+        assert words[0] == "actuator-lti"
+        said(folder, sys.executable, "-m", "reports.cli", *words[1:])
 
 
 def python(folder: Path, text: str) -> str:
@@ -62,6 +63,17 @@ def truth() -> float:
 def test_the_host_in_c_has_the_bits_of_the_simulator(truth: float, tmp_path: Path) -> None:
     exported(tmp_path, "C")
     assert float(compiled(tmp_path, "C", "drive.c", "drive_design.c")) == truth
+
+
+@needs_compiler
+def test_two_designs_in_one_program_each_have_the_bits_of_the_simulator(tmp_path: Path) -> None:
+    title = "Several designs in one program"
+    exported(tmp_path, title)
+    files = ("worm/drive.c", "worm/worm_design.c", "soft/soft_design.c")
+    lines = compiled(tmp_path, title, "-Iworm", "-Isoft", *files).splitlines()
+    for column, (name, size) in enumerate((("ilr33-amber", 0.01), ("ilr33-amber-compliant", 0.02))):
+        run = simulate(load_design(name), commands.step(size), 0.1001, loads.constant(0.0))
+        assert [float(line.split(",")[column]) for line in lines] == run.output_angle_rad.tolist()
 
 
 @needs_compiler

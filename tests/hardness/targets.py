@@ -16,13 +16,16 @@ from command_lines import hostile, seeds
 from mutate import damaged, damaged_tree, extreme
 
 from actuator_lti.design import load_design, read_design_text, shipped_designs, with_overrides, write_design
-from actuator_lti.design.loader import design_text
+from actuator_lti.design.controller_files import import_controller_file
+from actuator_lti.design.loader import design_from_tree, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.objects import import_objects
 from actuator_lti.design.settings_file import read_settings_toml
 from actuator_lti.design.settings_xml import read_settings_xml, write_settings_xml
 from actuator_lti.design.units import parse_quantity
+from actuator_lti.design.writing import design_tree
 from actuator_lti.files.reading import decode
+from actuator_lti.files.response import read_response
 from analyses.linear.outer_loop_file import read_outer_loop
 from analyses.records import (
     CsvFormat,
@@ -110,6 +113,18 @@ AROUND = (
     b'{"num": [1.5, 2], "den": [0.1, 1.0, 3], "dt": 0, "sampling_period": 0.01, "sign": -1, "name": "a"}',
     b'{"A": [[0.9, 0.1], [0.0, 0.8]], "B": [[0], [1]], "C": [[1, 0]], "D": [[0]], "dt": 0.001}',
 )
+CONTROLLERS = (
+    b'{"axis0": {"motor": {"config": {"torque_constant": 0.04, "current_lim": 20.0}},'
+    b' "encoder": {"config": {"bandwidth": 1000.0}},'
+    b' "controller": {"config": {"pos_gain": 20.0, "vel_gain": 0.16, "vel_integrator_gain": 0.32}}}}',
+    b"<MCConfiguration><foc_current_kp>0.01</foc_current_kp><s_pid_kp>0.004</s_pid_kp><s_pid_ki>8</s_pid_ki>"
+    b"<l_current_max>60</l_current_max><si_motor_poles>14</si_motor_poles></MCConfiguration>",
+    b"[30A0sub1]\nParameterValue=369404\n[30A0sub2]\nParameterValue=466187\n[30A2sub1]\nParameterValue=0xB",
+    b'<a><CANopenObject index="30A0"><CANopenSubObject subIndex="1" actualValue="3694"/></CANopenObject></a>',
+    b"motor.torque_controller = TorqueControlType::foc_current;\n"
+    b"motor.PID_velocity.P = 0.5f;\nmotor.PID_velocity.I = 1;\n",
+)
+RESPONSE = b"f_hz,gain_db,phase_deg,coherence\n1,20,-90,0.99\n2,14,-95,0.98\n4,7.5,-102,0.9\n"
 SUMMARY = b'{"history": {"id": "x", "nights": 3, "approvals": 1}}'
 SPEC = RecordSpec(
     format=CsvFormat(),
@@ -143,6 +158,13 @@ def settings(path: Path) -> None:
 
 def settings_xml(path: Path) -> None:
     import_objects(read_settings_xml(decode(path.read_bytes(), "f"), "f"), base())
+
+
+def controller_file(path: Path) -> None:
+    tree = {key: value for key, value in design_tree(base()).items() if key not in ("requirement", "objects")}
+    if b"30A0" in path.read_bytes():  # no velocity loop inside a position loop
+        del tree["control"]["position"]
+    import_controller_file(path, design_from_tree(tree, "base"))
 
 
 def record(path: Path) -> None:
@@ -276,6 +298,8 @@ def mat_files() -> tuple[bytes, ...]:
             "i": np.arange(20.0) ** 2,
             "n": np.ones((1, 20)),
             "k": 3.5,
+            "f": np.arange(1.0, 5.0),
+            "H": np.arange(1.0, 5.0) * 1j,
         }
         savemat(stream, values, do_compression=packed)
         made.append(b"MATLAB 5.0 MAT-file".ljust(116) + stream.getvalue()[116:])  # without the date
@@ -330,6 +354,9 @@ def targets() -> tuple[Target, ...]:
         Target("extreme design", designs, design_round, fault=extreme, share=200),
         Target("settings", (SETTINGS,), settings, share=1000),
         Target("settings xml", (xml_seed(),), settings_xml, ".xml", share=1000),
+        Target("controller file", CONTROLLERS, controller_file, ".xml", share=400),
+        Target("response", (RESPONSE,), read_response, ".csv", share=800),
+        Target("response in mat", mat_files(), read_response, ".mat", share=1500),
         Target("study", (STUDY,), lambda p: read_study(str(p)), share=200),
         Target("campaign", (CAMPAIGN,), load_campaign, share=1000),
         Target("record file", (RECORD,), record, share=800),

@@ -8,8 +8,6 @@ import pytest
 from actuator_lti.design import load_design
 from actuator_lti.errors import InputError
 from analyses.correlation import CorrelationResult, compare_signals, correlate_record
-from analyses.correlation.chirp import find_chirp, predict_chirp
-from analyses.correlation.voltage_motor import fit_step
 from analyses.records import open_record
 from tests.identification.bench_records import Command, write
 
@@ -131,32 +129,3 @@ def test_an_unknown_layout_is_refused_with_advice(tmp_path) -> None:
     (tmp_path / "x.csv").write_text("a,b\n1,2\n")
     with pytest.raises(InputError, match="describe it in a record file"):
         open_record(tmp_path / "x.csv")
-
-
-def test_the_odrive_step_settles_at_its_published_speed(odrive_files: dict[str, Path]) -> None:
-    motor = fit_step([open_record(odrive_files["step1"])])
-    assert motor.steady_speeds_rad_s[0] / (2.0 * np.pi) == pytest.approx(4.52, abs=0.005)
-    assert motor.time_constant_std_s < 0.1 * motor.time_constant_s
-
-
-def test_a_motor_fitted_on_the_step_predicts_the_chirp(odrive_files: dict[str, Path]) -> None:
-    """How well: 1.9 % of the speed from 1 to 48 Hz, no band worse than 3 %."""
-    motor = fit_step([open_record(odrive_files["step1"])])
-    result = predict_chirp(motor, open_record(odrive_files["chirp1"]))
-    assert result.law.amplitude == pytest.approx(0.25, rel=2e-3)
-    assert result.law.start_hz == pytest.approx(1.0, rel=5e-3)
-    assert result.law.frequency_hz(result.law.end_s) > 45.0
-    assert result.whole.relative_error < 0.025
-    assert max(band.relative_error for _, _, band in result.bands) < 0.035
-
-
-def test_a_chirp_is_found_again_and_noise_is_not() -> None:
-    time = np.arange(0.0, 6.0, 5e-3)
-    since = np.maximum(time - 1.0, 0.0)
-    signal = 0.3 * np.sin(2.0 * np.pi * 1.5 * np.expm1(0.8 * since) / 0.8)
-    law = find_chirp(time, signal)
-    assert (law.start_hz, law.rate_per_s) == (pytest.approx(1.5, rel=1e-4), pytest.approx(0.8, rel=1e-4))
-    assert law.end_s > 5.9
-    noise = np.where(time > 1.0, np.random.default_rng(0).standard_normal(len(time)), 0.0)
-    with pytest.raises(InputError, match="no chirp"):
-        find_chirp(time, noise)

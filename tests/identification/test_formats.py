@@ -1,5 +1,7 @@
 """The formats that people have: one truth, written in many ways, reads the same."""
 
+import json
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +60,60 @@ def _structure(path: Path) -> Path:
     return path / "r.toml"
 
 
+def _structure_by_itself(path: Path) -> Path:
+    named = {"t_ms": TABLE[:, 0], "motor_angle_deg": TABLE[:, 1], "i_mA": TABLE[:, 2]}
+    savemat(path / "s.mat", {"d": named, "Ts": 1e-2})
+    return path / "s.mat"
+
+
+def _units_row(path: Path) -> Path:
+    first, *rows = _text("\t", ",").splitlines()
+    names = "\t".join(name.split(" [")[0].split(" (")[0] for name in first.split("\t"))
+    (path / "r.txt").write_text("\n".join(["# made by hand", names, "[ms]\t[deg]\t[mA]", *rows]))
+    return path / "r.txt"
+
+
+def _stamps(path: Path) -> Path:
+    """From the last second of a year in one zone on; the same instants in another zone from row 100 on."""
+    made = ["Time;Motor angle [deg];I [mA];state"]
+    for k, (t, angle, current) in enumerate(zip(TIME, TABLE[:, 1], TABLE[:, 2], strict=True)):
+        at = datetime(2024, 12, 31, 23, 59, 59, tzinfo=timezone(timedelta(hours=1)))
+        at = (at + timedelta(seconds=float(t))).astimezone(timezone(timedelta(hours=1 if k < 100 else 0)))
+        made.append(f"{at.isoformat(sep='T' if k % 2 else ' ')};{angle:.9f};{current:.9f};on")
+    (path / "r.csv").write_text("\n".join(made).replace(".", ","))
+    return path / "r.csv"
+
+
+def _parquet_stamps(path: Path) -> Path:
+    stamps = pa.array(
+        (1e9 * TIME).round().astype("int64") + 1_700_000_000_000_000_000, pa.timestamp("ns", "UTC")
+    )
+    table = pa.table([stamps, *(pa.array(TABLE[:, k]) for k in (1, 2))], names=["time", *NAMES[1:]])
+    pq.write_table(table, path / "r.parquet")
+    return path / "r.parquet"
+
+
+def _json(path: Path, *, rows: bool) -> Path:
+    tree: object = {"log": dict(zip(NAMES, TABLE.T.tolist(), strict=True)), "by": "hand"}
+    if rows:
+        tree = [dict(zip(NAMES, row, strict=True)) for row in TABLE.tolist()]
+    (path / "r.json").write_text(json.dumps(tree))
+    return path / "r.json"
+
+
+def _sum(path: Path) -> Path:
+    """A difference of two columns, with offset and scale; a column named like a sum is itself."""
+    half = np.column_stack([TABLE[:, 0], TABLE[:, 1] + 7.0, 0.5 * TABLE[:, 2] - 3.0, np.full(len(TIME), 7.0)])
+    rows = "\n".join(",".join(f"{v:.9f}" for v in row) for row in half)
+    (path / "r.csv").write_text("t,a,i - 3,seven\n" + rows + "\n")
+    (path / "r.toml").write_text(
+        'file = "r.csv"\ntime = { column = "t", unit = "ms" }\n'
+        'signals.angle = { column = "a - seven", unit = "deg" }\n'
+        'signals.current = { column = "i - 3", unit = "mA", offset = 3.0, scale = 2.0 }\n'
+    )
+    return path / "r.toml"
+
+
 def _named(path: Path) -> Path:
     savemat(path / "s.mat", {"X": TABLE})
     (path / "r.toml").write_text(
@@ -77,6 +133,13 @@ FORMATS = {
     "a matrix with a cell of names": _matrix,
     "a matrix with a character array of names": _characters,
     "a structure": _structure,
+    "a structure by itself": _structure_by_itself,
+    "a row of units": _units_row,
+    "time stamps": _stamps,
+    "Parquet with time stamps": _parquet_stamps,
+    "JSON by columns": lambda path: _json(path, rows=False),
+    "JSON by rows": lambda path: _json(path, rows=True),
+    "a difference of columns": _sum,
     "a matrix named by the record file": _named,
 }
 
@@ -187,6 +250,7 @@ def test_the_tolerance_is_an_option_of_the_record_file(tmp_path) -> None:
     [
         (lambda p: savemat(p / "r.mat", {"X": TABLE}), "layout is not known"),
         (lambda p: (p / "r.mat").write_bytes(b"MATLAB"), "too short"),
+        (lambda p: (p / "r.json").write_text("[1, 2]"), "columns by name, or a list of rows"),
         (lambda p: (p / "r.parquet").write_bytes(b"PAR1PAR1"), "is no Parquet file"),
         (lambda p: (p / "r.csv").write_text("time,current\n1,2\n"), "has no unit in its name"),
         (lambda p: (p / "r.csv").write_text("time_s,banana_A\n1,2\n"), '"banana_A": no name'),

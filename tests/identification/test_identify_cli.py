@@ -84,13 +84,6 @@ def test_the_results_become_sections_of_the_report(campaign: Path, tmp_path, com
     assert ids.count("provenance") == 1
 
 
-def test_the_chirp_on_the_command_line(odrive_files: dict[str, Path], command: Command) -> None:
-    chirp, step = str(odrive_files["chirp1"]), str(odrive_files["step1"])
-    status, out, _ = command("correlate", "emps", step, "--predict", chirp, "--json")
-    assert status == 0
-    assert json.loads(out)["chirp"]["whole"]["relative_error"] < 0.025
-
-
 def test_the_virtual_bench_writes_54_runs(tmp_path, capsys, monkeypatch) -> None:
     short = BenchPlan(duration_s=2.2)
     monkeypatch.setattr("examples.virtual_bench.campaign.BenchPlan", lambda: short)

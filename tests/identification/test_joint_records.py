@@ -8,9 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from actuator_lti.design import load_design
-from analyses.correlation.voltage_motor import fit_step
 from analyses.estimation.least_squares import between_records, correlated_covariance, solve
-from analyses.records import open_record
 from tests.identification.bench_records import Command, columns_of, motion, staircase, write
 
 
@@ -174,17 +172,6 @@ def test_records_that_differ_widen_the_errors(tmp_path, command: Command) -> Non
     assert dry["standard_error"] == pytest.approx(true.std(ddof=1) / np.sqrt(6.0), rel=0.2)
     white = json.loads(out)["model"]["white_errors"][2]
     assert white < 0.3 * dry["standard_error"]
-
-
-def test_pooled_steps_agree_with_the_scatter_of_single_ones(odrive_files: dict[str, Path]) -> None:
-    """ODrive, measured: two steps 0.35 ms apart cannot be pooled to 0.04 ms."""
-    steps = [open_record(odrive_files[name]) for name in ("step1", "step2")]
-    alone = [fit_step([step]) for step in steps]
-    together = fit_step(steps)
-    apart = abs(alone[0].time_constant_s - alone[1].time_constant_s)
-    assert together.time_constant_std_s > 0.4 * apart
-    assert min(one.time_constant_s for one in alone) < together.time_constant_s
-    assert together.time_constant_s < max(one.time_constant_s for one in alone)
 
 
 def test_correlation_over_several_records(files: dict[str, str], command: Command) -> None:

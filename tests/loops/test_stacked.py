@@ -10,6 +10,7 @@ from two_mass import drive_d, drive_e
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures, variable_paths
+from actuator_lti.batch._figures import DC_GAIN
 from actuator_lti.batch.static import drive_figures
 from actuator_lti.design import parameter_value, with_overrides, with_values
 from actuator_lti.design.access import stacked
@@ -176,6 +177,20 @@ def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
     }
     for quantity, expected in pairs.items():
         assert figures.quantity(quantity, loop)[k] == pytest.approx(expected, rel=1e-7), quantity
+
+
+@pytest.mark.parametrize("gain", [0.01, 1.0])
+@pytest.mark.parametrize("slope", [-1e3, -1.0, -1e-3])
+def test_behind_a_soft_spring_the_gain_at_zero_frequency_keeps_its_digits(slope: float, gain: float) -> None:
+    """A spring takes the speed's gain at rest away, the integral of the PI gives it back: L(0) is finite."""
+    design = pushed("ilr33-amber", slope)
+    velocity = replace(design.controller.velocity, gain=gain * design.controller.velocity.gain)
+    design = replace(design, controller=replace(design.controller, velocity=velocity))
+    figures = linear_figures(Population(design, {}, 1), time_figures=False)
+    response = assemble_loops(design).present["velocity"].open_loop
+    A, b, c = (np.asarray(part, dtype=float) for part in (response.A, response.B, response.C))
+    closed = float((c @ np.linalg.solve(np.eye(len(A)) - A + b @ c, b))[0, 0])
+    assert figures.raw[0, figures._index("velocity"), DC_GAIN] == pytest.approx(closed, rel=1e-12)
 
 
 def test_gravity_may_differ_from_design_to_design() -> None:

@@ -14,6 +14,8 @@ from actuator_lti.design.access import with_values
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import assemble_loops
 from actuator_lti.margins import stability_margins
+from actuator_lti.margins.axis_search import search
+from actuator_lti.margins.factors_on_axis import Factored
 from actuator_lti.margins.results import Agreement, StabilityMargins
 
 s = control.tf("s")
@@ -213,3 +215,18 @@ def test_the_sensitivity_of_an_unstable_loop_has_no_peak() -> None:
         else:
             assert np.isnan(peaks[k])
             assert m.sensitivity_peak_db is None
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_pairs_that_are_double_but_for_rounding_make_no_crossing_at_nyquist(seed: int) -> None:
+    """Delays of whole samples, poles at z = 0, are computed as pairs 1e-17 apart."""
+    rng = np.random.default_rng(seed)
+    real, apart = -(10.0 ** rng.uniform(-2.0, 2.0, 6)), 10.0 ** rng.uniform(-17.0, -13.0, 3)
+    weights = np.repeat([1.0, -1.0, 1.0, -1.0], [3, 3, 2, 4])
+
+    def crossings(sizes: np.ndarray) -> int:
+        near = [complex(-1.0, side * size) for size in sizes for side in (1.0, -1.0)]
+        factors = Factored(np.array([*real, *near]), weights, 0.0, phase=math.pi, slack=1e-8)
+        return search(factors, 0.0, 1e3).real_w.size
+
+    assert crossings(apart) == crossings(np.zeros(3))

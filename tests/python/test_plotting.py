@@ -12,7 +12,7 @@ from analyses.large_signal.classify import CAUSES
 from analyses.large_signal.map import amplitude_map
 from analyses.linear.loop_survey import LoopSurvey
 from nonlinear import commands, simulate
-from reports.charts import paint
+from reports.charts import paint, style
 
 
 @pytest.fixture(autouse=True)
@@ -105,7 +105,7 @@ def test_cells_keep_their_colours_when_some_are_missing() -> None:
 
 
 def test_pages_and_notebooks_have_the_same_colours() -> None:
-    assert set(COLOURS) == {paint.COLOURS[name] for name in (*paint.SERIES, "ink", "muted")}
+    assert set(COLOURS) == {paint.COLOURS[name] for name in (*style.SERIES, "ink", "muted")}
 
 
 def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:

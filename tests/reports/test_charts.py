@@ -10,12 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from actuator_lti.step import StepFigures
 from reports.charts import style
 from reports.charts.axis import Axis, linear_ticks, log_ticks
 from reports.charts.chart import Chart
 from reports.charts.labels import Room
 from reports.charts.svg import page_svg, paper_svg
-from reports.sections.loop_charts import nichols
+from reports.sections.loop_charts import nichols, step
 
 finite = st.floats(-1e9, 1e9, allow_nan=False)
 
@@ -205,3 +206,16 @@ def test_the_critical_points_are_odd_half_turns() -> None:
         -180.0,
         180.0,
     ]
+
+
+def test_the_rise_is_marked_where_it_begins_and_ends() -> None:
+    """1 - exp(-t) passes 0.1 at ln(10/9) and 0.9 at ln(10), however few of its samples the figures keep."""
+    drawn, kept = np.linspace(0.0, 6.0, 6001), np.array([0.0, 1.0, 4.0, 8.0])
+    figures = StepFigures(
+        rise_time_s=math.log(9.0), overshoot_percent=0.0, settling_time_s=math.log(50.0), final_value=1.0,
+        peak_value=1.0, peak_time_s=math.inf, period_s=None, time_s=kept, response=1.0 - np.exp(-kept),
+    )  # fmt: skip
+    panel = step([("", drawn, 1.0 - np.exp(-drawn))], figures, False, "", False).columns[0].panels[0]
+    marks = [item for item in panel.items if item.kind == "curve" and item.look.marker == "o"]
+    assert [float(mark.x[0]) for mark in marks] == pytest.approx([math.log(10 / 9), math.log(10)], abs=1e-3)
+    assert [float(mark.y[0]) for mark in marks] == pytest.approx([0.1, 0.9], abs=1e-3)

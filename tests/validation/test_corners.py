@@ -15,7 +15,7 @@ from analyses.corners import Asked, corners
 from analyses.corners.run import worst_ends
 from analyses.specification.sensitivity import population_figures
 from reports.cli.main import main
-from reports.sections.corners import section
+from reports.sections.corners import chart, section
 
 
 def test_a_hot_motor_has_more_resistance_and_less_torque() -> None:
@@ -74,6 +74,14 @@ def test_command_and_section(capsys) -> None:
     assert not told["cold"]["passed"]
     made = section(corners(load_design("emps")))
     assert made["result"].startswith("Every loop is stable")
+    fin = corners(load_design("fin"))
+    left, right = (column.panels[0] for column in chart(fin).columns)
+    limits = [
+        [item.at for item in panel.items if item.kind == "rule" and item.label] for panel in (left, right)
+    ]
+    assert limits == [[6.0], [45.0]]
+    seen = [item.words for panel in (left, right) for item in panel.items if item.kind == "note"]
+    assert seen == ["not stable"] * 2 * sum(not one.sound for c in fin.corners for one in c.figures.values())
     assert main(["corners", "fin", "--hot", "-60"]) == 2
     assert "allowed: cold below hot" in capsys.readouterr().err
 

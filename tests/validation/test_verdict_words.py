@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
-from math import exp, log
+from math import degrees, exp, log
 
 import numpy as np
 import pytest
 
 from actuator_lti import load_design
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Requirement, Waiver
 from analyses.large_signal.at_rest import RestSweep
+from analyses.limit_cycles import LimitCycles
 from analyses.motion.settling import Settling
+from analyses.specification import asked_figures
+from analyses.specification.requirements import evaluate_requirements
 from analyses.validation import CHECKS, Validation, validate
 from analyses.validation.places import Bench
 from analyses.validation.row import judged
 from nonlinear import tangent
 from nonlinear.settling.rest import Rest
+from reports import document as doc
+from reports.sections.cycles import summary as cycles_summary
 from reports.sections.from_rest import described
 from reports.sections.validation import summary
+from reports.verdict_summary import verdict_of
 
 EMPS = load_design("emps")
 
@@ -75,6 +81,54 @@ def test_a_hunting_drive_fails_by_name() -> None:
     hunts = replace(quiet, settlings=(swing,))
     assert hunts.verdict == "not met"
     assert "does not come to rest" in str(hunts)
+
+
+WAIVED = Waiver(requirement="swing", reason="known", date="2026-11-23")
+
+
+@pytest.mark.parametrize(("name", "swing_rad"), [("emps", 2e-3), ("fin", 2e-3)])
+@pytest.mark.parametrize(
+    ("ends", "allowed", "waivers", "verdict"),
+    [
+        ("limit cycle", (), (), "not met"),
+        ("limit cycle", (2.0,), (), "met"),
+        ("limit cycle", (0.9,), (), "not met"),
+        ("limit cycle", (2.0, 0.9), (), "not met"),
+        ("still moving", (2.0,), (), "not proven"),
+        ("still moving", (2.0,), (WAIVED,), "met"),
+        ("limit cycle", (0.9,), (WAIVED,), "not met"),
+        ("diverging", (2.0,), (), "not met"),
+    ],
+)
+def test_who_states_a_swing_that_is_accepted_has_rest_judged_by_it(
+    name: str, swing_rad: float, ends, allowed: tuple[float, ...], waivers: tuple[Waiver, ...], verdict: str,
+    monkeypatch,
+) -> None:  # fmt: skip
+    """Requirement, cycles, validation and friction give one verdict, whatever a step ends in."""
+    bare = load_design(name)
+    unit, scale = ("m", 1.0) if bare.axis == "linear" else ("deg", degrees(1.0))
+    asked = tuple(
+        Requirement(id="swing" + "x" * k, quantity="limit_cycle", unit=unit, maximum=part * scale * swing_rad)
+        for k, part in enumerate(allowed)
+    )
+    design = replace(bare, requirements=asked, waivers=waivers)
+    step = hunting(0.1, swing_rad, 3.0)
+    step = replace(step, rest=replace(step.rest, verdict=ends))
+    small = hunting(0.01, 1e-2 * swing_rad, 3.0)  # of less swing than any that is accepted
+    found = LimitCycles(design, (), (small, step), ())
+    monkeypatch.setattr(asked_figures, "limit_cycles", lambda _: found)
+    rows = (judged("bandwidth", "position", 1.0, 1.0, 0.1, unit="Hz"),)
+    validation = Validation(design=design, rows=rows, figures={}, settlings=found.rests)
+    assert (found.verdict, validation.verdict) == (verdict, verdict)
+    requirements = evaluate_requirements(design)
+    assert not asked or all(one.passes for one in requirements) == (verdict == "met")
+    said = [summary(validation)["result"], str(validation), cycles_summary(found)]
+    said += [one.reason for one in requirements]
+    assert all(("by requirement swing" in one) == (verdict == "met" and not waivers) for one in said[:3])
+    assert ("does not come to rest" in " ".join(said)) == (verdict == "not met")
+    made = summary(validation)
+    doc.waived([made], design)
+    assert verdict_of([made], "validation")["passed"] == (verdict == "met")
 
 
 @pytest.mark.parametrize(("part", "hunts"), [(2e-10, False), (1e-3, True)])

@@ -154,16 +154,18 @@ def _by_movement(
     unstable = int(np.count_nonzero((closed.real > 0.0) & ~near & ~exact))
     beyond = [size[size > 10.0 * max(r, s)].min(initial=math.inf) for r, s in zip(radius, size, strict=True)]
     at_dc = near & ((radius > _SHARP * size) | (size == 0.0)) & (radius <= _SHARP * np.array(beyond))
-    hidden = int(np.count_nonzero(at_dc))
-    if hidden:
+    unsure = int(np.count_nonzero(at_dc & ~exact))
+    problem, hidden = None, int(np.count_nonzero(at_dc))
+    if np.count_nonzero(near & ~exact & ~at_dc):
+        problem = f"{ULP} ulp of the entries move a closed-loop pole across the stability boundary"
+    elif unsure > 1:  # be they hidden or not
+        problem = f"{ULP} ulp of the entries decide about several modes at zero frequency"
+    elif hidden:
         shown = _values(base, closed=False)
         spread = _movements(shown, [_values(f, closed=False) for f in others])
         hidden = min(hidden, int(np.count_nonzero(np.abs(shown) <= 10.0 * spread)))
-    problem = None
-    if hidden > 1:
-        problem = f"{ULP} ulp of the entries decide about several modes at zero frequency"
-    elif np.count_nonzero(near & ~exact & ~at_dc) or np.count_nonzero(at_dc & ~exact) > hidden:
-        problem = f"{ULP} ulp of the entries move a closed-loop pole across the stability boundary"
+        if hidden > 1 or unsure > hidden:
+            problem = f"{ULP} ulp of the entries decide about a mode at zero frequency"
     if problem is not None:
         return None, 0, 0, problem
     return unstable, base.closed_at_end + int(np.count_nonzero(exact | at_dc)) - hidden, hidden, None

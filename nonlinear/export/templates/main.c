@@ -1,25 +1,25 @@
 /*
  * Example: the drive answers a small step of its command; one line a tick, in comma-separated columns.
  *
- *     cc -std=c99 -O2 -ffp-contract=off main.c drive.c drive_design.c -lm -o drive
+ *     cc -std=c99 -O2 -ffp-contract=off main.c drive.c @prefix@design.c -lm -o drive
  *     ./drive 1000 0.01
  */
 #include "drive.h"
-#include "drive_design.h"
+#include "@prefix@design.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 
 int main(int argc, char **argv)
 {
-    static @REAL@ p[DRIVE_P_LENGTH];
-    static @REAL@ s[DRIVE_S_LENGTH];
+    static @REAL@ p[@PREFIX@P_LENGTH];
+    static @REAL@ s[@PREFIX@S_LENGTH];
     static @REAL@ io[DRIVE_IO_LENGTH];
     const long ticks = (argc > 1) ? strtol(argv[1], NULL, 10) : 1000L;
     const @REAL@ command = (@REAL@)((argc > 2) ? strtod(argv[2], NULL) : 0.01);
     int status = DRIVE_OK;
 
-    drive_load_design(p);
+    @prefix@load_design(p);
     drive_prepare_sizes(p);
     drive_derive(p, s);
     drive_init(p, s);

@@ -15,6 +15,7 @@ export const judged = (found) => data.requirements.map((item, k) => {
 });
 export const calm = (value, unit) => (["dB", "deg", "%"].includes(unit) && Math.abs(value) < 1 ? Math.round(value * 1e4) / 1e4 : value); // no -3e-5 dB
 
+const NAMED = 3; // of what is not met, in the line at the top
 // the line at the top, and the table of requirements
 export const state = () => {
   const { refused } = desk, line = find(".state"), all = judged(desk.now), was = judged(desk.before), total = all.length;
@@ -25,7 +26,8 @@ export const state = () => {
   if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
   const met = all.filter((one) => one.met).length, count = (many, word) => (many ? `, ${many} ${word}` : "");
   const designed = changes().length ? ` (as designed: ${old.length} not met)` : "";
-  if (total) words.push(`${met} of ${total} requirements met${count(fails.length, "not met")}${count(open.length, "not proven")}${designed}.`);
+  const named = [...fails, ...open].slice(0, NAMED).map(({ item }) => [item.words, placed(item).toLowerCase()].join(" ").trim()), more = fails.length + open.length - named.length;
+  if (total) words.push(`${met} of ${total} requirements met${count(fails.length, "not met")}${count(open.length, "not proven")}${designed}${named.length ? `: ${named.join(", ")}${more ? ` and ${more} more` : ""}` : ""}.`);
   else if (!data.apart.length) words.push("The design states no requirements.");
   if (data.apart.length) words.push(`${data.apart.length} found by a simulation of its own ${data.apart.length === 1 ? "does" : "do"} not follow: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
   if (refused) words.push(refused);
@@ -36,9 +38,8 @@ export const state = () => {
 };
 const placed = (item) => (item.loop ? LOOP_NAMES[item.loop] : item.load ? `at ${minus(String(item.load))} ${data.axis === "linear" ? "N" : "N m"}` : "");
 const demands = (all, was) => {
-  const box = find("table.demands"), fold = box.closest("details");
-  fold.hidden = !all.length;
-  if (all.some(({ met, words }) => met !== true && words !== "…")) fold.open = true;
+  const box = find("table.demands");
+  box.closest("details").hidden = !all.length;
   const limit = ({ minimum, maximum }) => [minimum !== null ? `≥ ${minus(String(minimum))}` : "", maximum !== null ? `≤ ${minus(String(maximum))}` : ""].filter(Boolean).join(", ");
   const rest = all.map(({ item, value, met, words }, k) => {
     const row = html("tr"), th = heading(item.words[0].toUpperCase() + item.words.slice(1), "left", "row"), last = html("td", "left");

@@ -1,0 +1,108 @@
+"""Units and sizes of the model description, against figures worked out from the data sheets by hand."""
+
+import io
+import xml.etree.ElementTree as ET
+import zipfile
+from dataclasses import replace
+from math import pi, sqrt
+
+import pytest
+
+from actuator_lti import load_design
+from actuator_lti.design.model import Design
+from nonlinear.export import fmu_bytes
+
+MOTOR_SIDE = ("motor.angle", "motor.speed", "motor.torque", "motor.current", "motor.voltage")
+# full deflection, ratio, top speed of the motor, its torque, current, voltage, largest load; None: unbounded
+SIZES = {
+    "ilr33-amber": (10 * pi / 180, 66 * 36, 942.5, 5.9e-3 * 4, 4.0, 12.0, 8.0),
+    "joint": (30 * pi / 180, 100.0, 300.0, 0.12 * 6, 6.0, 48.0, 60.0),
+    # 0.5 N m per A rms, and 4.4 A rms as the DC motor's 5.4 A; a lead of 10 mm
+    "ballscrew": (0.05, 1.0, 3000 / 60 * 0.01, 0.5 / sqrt(1.5) * 5.4 * 2 * pi / 0.01, 5.4, 320.0, 800.0),
+    "emps": (0.2, 1.0, None, 35.15065 * 10, None, 10.0, None),  # a force source of 35.15 N/V
+    "ctms-motor-position": (pi / 2, 1.0, 12 / 0.0274, 0.0274 * 3, 12 / 4, 12.0, None),  # stalled: U/R
+}
+# exponents of kg, m, s, A, rad; what one rad, m, ... is in the unit that is shown
+BASE = ("kg", "m", "s", "A", "rad")
+UNITS = {
+    "rad": (0, 0, 0, 0, 1), "rad/s": (0, 0, -1, 0, 1), "m": (0, 1, 0, 0, 0), "m/s": (0, 1, -1, 0, 0),
+    "A": (0, 0, 0, 1, 0), "V": (1, 2, -3, -1, 0), "N": (1, 1, -2, 0, 0), "N*m": (1, 2, -2, 0, 0),
+    "ohm": (1, 2, -3, -2, 0), "H": (1, 2, -2, -2, 0), "kg*m^2": (1, 2, 0, 0, 0), "kg": (1, 0, 0, 0, 0),
+    "N*m/A": (1, 2, -2, -1, 0), "V*s/rad": (1, 2, -2, -1, -1), "N/A": (1, 1, -2, -1, 0), "s": (0, 0, 1, 0, 0),
+    "A*s/rad": (0, 0, 1, 1, -1), "N*m*s/rad": (1, 2, -1, 0, -1), "1/s": (0, 0, -1, 0, 0),
+}  # fmt: skip
+SHOWN = {"deg": 180 / pi, "deg/s": 180 / pi, "rpm": 30 / pi, "mm": 1000.0}
+
+
+def described(design: Design, version: int) -> ET.Element:
+    with zipfile.ZipFile(io.BytesIO(fmu_bytes(design, version, ()))) as archive:  # type: ignore[arg-type]
+        return ET.fromstring(archive.read("modelDescription.xml"))
+
+
+def variables(root: ET.Element) -> dict[str, dict[str, str]]:
+    """Attributes of each variable by its name; of FMI 2 those of its type are an element of their own."""
+    listed = root.find("ModelVariables")
+    assert listed is not None
+    return {each.attrib["name"]: each.attrib | (each[0].attrib if len(each) else {}) for each in listed}
+
+
+def speed_drive() -> Design:
+    design = load_design("ilr33-amber")
+    return replace(design, controller=replace(design.controller, position=None))
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("name", SIZES)
+def test_sizes_and_units_are_those_of_the_data_sheet(name: str, version: int) -> None:
+    known = variables(described(load_design(name), version))
+    angle, ratio, speed, torque, current, voltage, load = SIZES[name]
+    assert angle is not None
+    assert ratio is not None
+    linear = name in ("ballscrew", "emps")
+    turn, shown = ("m", "mm") if linear else ("rad", "deg")
+    rate = (f"{turn}/s", None) if linear else ("rad/s", "deg/s")
+    moment = "N" if linear else "N*m"
+    wanted = {
+        **dict(zip(MOTOR_SIDE, zip((angle * ratio, speed, torque, current, voltage),
+                                   (turn, rate[0], moment, "A", "V"),
+                                   (shown, None if linear else "rpm", None, None, None), strict=True),
+                   strict=True)),
+        "output.angle": (angle, turn, shown),
+        "output.rate": (speed and speed / ratio, *rate),
+        "command": (angle, turn, shown),
+        "hinge_moment": (load, moment, None),
+        "supply_voltage": (voltage, "V", None),
+        "control.current_command": (current, "A", None),
+        "control.speed_command": (speed, rate[0], None if linear else "rpm"),
+        "initial.angle": (None, turn, shown),
+    }  # fmt: skip
+    found = {each: (float(a["nominal"]) if "nominal" in (a := known[each]) else None, a["unit"],
+                    a.get("displayUnit")) for each in wanted}  # fmt: skip
+    for each, (size, *units) in wanted.items():
+        assert found[each][1:] == tuple(units), each
+        assert found[each][0] == (None if size is None else pytest.approx(size, rel=1e-6)), each
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_the_command_is_that_of_the_outermost_stage(version: int) -> None:
+    command = variables(described(speed_drive(), version))["command"]
+    assert (command["unit"], command["displayUnit"]) == ("rad/s", "deg/s")
+    assert float(command["nominal"]) == pytest.approx(942.5 / 2376, rel=1e-12)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_units_are_defined_by_the_base_units_of_si(version: int) -> None:
+    seen: set[str] = set()
+    for name in SIZES:
+        root = described(load_design(name), version)
+        defined = {unit.attrib["name"]: unit for unit in root.iter("Unit")}
+        used = {v["unit"] for v in variables(root).values() if "unit" in v}
+        assert used == set(defined)
+        for unit in set(defined) & set(UNITS):
+            base, *shown = defined[unit]
+            assert tuple(int(base.attrib.get(each, "0")) for each in BASE) == UNITS[unit]
+            assert float(base.attrib.get("factor", "1")) == 1.0
+            for each in shown:
+                assert float(each.attrib["factor"]) == pytest.approx(SHOWN[each.attrib["name"]], rel=1e-15)
+            seen |= {unit, *(each.attrib["name"] for each in shown)}
+    assert seen == {*UNITS, *SHOWN}
