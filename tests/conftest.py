@@ -1,6 +1,7 @@
 """The browser of all tests that look at a page; which tests are slow; a processor that is not at hand.
 
 ``OTHER_PROCESSOR=SEED``: every result of linear algebra a few ulp beside what it was (`machines.beside`).
+``RANDOM_ORDER=SEED``: files in another order, and the tests in each.
 Examples that hypothesis draws are the same in every run and are not timed; ``--hypothesis-profile=search``
 draws new ones.
 """
@@ -8,6 +9,7 @@ draws new ones.
 from __future__ import annotations
 
 import os
+import random
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,7 +35,11 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what `slow.txt` names, by file or by test."""
+    """Mark what `slow.txt` names, by file or by test; turn the order round where asked to."""
+    if seed := os.environ.get("RANDOM_ORDER"):
+        draw = random.Random(seed)
+        files = {item.path: draw.random() for item in items}
+        items.sort(key=lambda item: (files[item.path], draw.random()))
     slow = {line for line in SLOW.read_text(encoding="utf-8").splitlines() if line[:1] not in ("", "#")}
     for item in items:
         name = item.nodeid.partition("[")[0]

@@ -125,7 +125,7 @@ def test_a_recorded_command_of_many_rows(tmp_path, monkeypatch) -> None:
     tracemalloc.start()
 
 
-def test_samples_in_parquet_are_counted_before_they_are_unpacked(tmp_path) -> None:
+def test_samples_in_parquet_are_counted_before_they_are_unpacked(tmp_path, monkeypatch) -> None:
     import numpy as np
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -137,6 +137,7 @@ def test_samples_in_parquet_are_counted_before_they_are_unpacked(tmp_path) -> No
     assert path.stat().st_size < 100_000
     import pandas  # noqa: F401 - not what is measured
 
+    monkeypatch.setattr(pq.ParquetFile, "read", lambda *_: pytest.fail("unpacked"))
     tracemalloc.reset_peak()
     refused(lambda: read_table(path, ("motor.resistance",)), "--from-samples", "at most 5000000")
 

@@ -12,19 +12,19 @@ HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="kills processes that were forked")
 
 
-def killed(script: str, folder: Path, kills: int, seed: int) -> dict:
+def killed(script: str, *words: object) -> dict:
     """What a script that kills says in the end."""
     quiet = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
-    command = [sys.executable, str(HERE / script), str(folder), str(kills), str(seed)]
-    done = subprocess.run(command, capture_output=True, text=True, env=quiet, timeout=500, check=False)
+    command = [sys.executable, str(HERE / script), *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, env=quiet, timeout=800, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
     return json.loads(done.stdout)
 
 
-def test_kills_at_calls_lose_nothing(tmp_path) -> None:
-    outcome = killed("kill_at_calls.py", tmp_path / "site", 60, 18)
-    assert outcome["calls"] > 100
-    assert outcome["killed"] >= 54
+def test_a_kill_at_any_call_loses_nothing(tmp_path) -> None:
+    """Each of them once: a site or a history out of order shows between two of its calls alone."""
+    outcome = killed("kill_at_calls.py", tmp_path / "site")
+    assert outcome["killed"] == outcome["calls"] > 100
 
 
 def test_kills_of_clients_workers_and_schedulers_change_no_result(tmp_path) -> None:
