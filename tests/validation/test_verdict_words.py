@@ -127,6 +127,9 @@ def test_who_states_a_swing_that_is_accepted_has_rest_judged_by_it(
     assert all(("by requirement swing" in one) == (verdict == "met" and not waivers) for one in said[:3])
     assert ("does not come to rest" in " ".join(said)) == (verdict == "not met")
     made = summary(validation)
+    told = next(one for one in made["findings"] if "step of" in one["text"])  # said on the first screen
+    grave = {"met": "info", "not met": "fail", "not proven": "warn"}[verdict]
+    assert told["severity"] == grave
     doc.waived([made], design)
     assert verdict_of([made], "validation")["passed"] == (verdict == "met")
 
