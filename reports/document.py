@@ -116,14 +116,20 @@ def column(
 
 
 def table(
-    caption: str, columns: Sequence[Column], rows: Iterable[Mapping[str, Any]], note: str = ""
+    caption: str,
+    columns: Sequence[Column],
+    rows: Iterable[Mapping[str, Any] | Sequence[Any]],
+    note: str = "",
 ) -> Block:
-    """Make a table; a row is a mapping by column key, with ``_status`` where it has one."""
+    """Make a table; a row is a mapping by column key, with ``_status`` where it has one, or its cells."""
+    keys = [one["key"] for one in columns]
     return {
         "kind": "table",
         "caption": caption,
         "columns": list(columns),
-        "rows": [plain(row) for row in rows],
+        "rows": [
+            plain(row if isinstance(row, Mapping) else dict(zip(keys, row, strict=True))) for row in rows
+        ],
         "note": note,
     }
 
@@ -175,7 +181,7 @@ def listing(
     return table(caption, [one for one, _ in columns], rows, note)
 
 
-def figure(name: str, chart: Chart, *, caption: str, alt: str, layout: Layout = "wide") -> Block:
+def figure(name: str, chart: Chart, caption: str, *, alt: str = "", layout: Layout = "wide") -> Block:
     """Make a figure of a chart.
 
     Parameters
@@ -185,7 +191,7 @@ def figure(name: str, chart: Chart, *, caption: str, alt: str, layout: Layout = 
     caption : str
         What is seen; a figure must be understood alone.
     alt : str
-        What stands for it where it cannot be seen.
+        What stands for it where it cannot be seen; the caption, where nothing more is to be said.
     layout : str
         ``"wide"``, ``"half"`` of the page's width, or ``"tall"``: half as wide, two rows high.
     """
@@ -194,7 +200,7 @@ def figure(name: str, chart: Chart, *, caption: str, alt: str, layout: Layout = 
         "figure": name,
         "chart": chart_data(chart),
         "caption": caption,
-        "alt": alt,
+        "alt": alt or caption,
         "layout": layout,
     }
 

@@ -110,21 +110,21 @@ class Validation:
 
     @property
     def rest_words(self) -> str:
-        """What is said of a drive that does not come to rest and does not fail by it; empty otherwise."""
-        swing = self.hunting
-        if swing is None or self.rest is Verdict.NOT_MET:
+        """What is said of a drive that does not come to rest; empty where it does."""
+        if self.hunting is None:
             return ""
-        if self.rest is Verdict.NOT_PROVEN:
-            return f"not known whether the drive comes to rest {ending_of(self.design, swing)}"
-        return f"{ending_of(self.design, swing)}; accepted: {judged_by(self.design)}"
+        ends, known = ending_of(self.design, self.hunting), self.rest
+        if known is Verdict.MET:
+            return f"{ends}; accepted: {judged_by(self.design)}"
+        says = "does not come" if known is Verdict.NOT_MET else "is not known to come"
+        return f"the drive {says} to rest {ends}"
 
     @property
     def failures(self) -> tuple[str, ...]:
         """What the drive does that it must not, beside rows that are not met; a sentence each."""
         found = [f"the {name} loop is {self.figures[name].margins.verdict}" for name in self.unstable]
-        swing = self.hunting
-        if swing is not None and self.rest is Verdict.NOT_MET:
-            found.append(f"the drive does not come to rest {ending_of(self.design, swing)}")
+        if self.rest is Verdict.NOT_MET:
+            found.append(self.rest_words)
         if self.conditional is not None and self.conditional.diverges:
             ending = {"keeps oscillating": "oscillate", "is held by a limit": "stop short"}
             does = ending.get(self.conditional.ending, "diverge")
@@ -153,7 +153,8 @@ class Validation:
         """The verdict in words: rows counted, and what the drive does that it must not."""
         said = [self.tally.words("predictions"), *self.failures]
         said += [f"stability of the {name} loop not known" for name in self.undecided]
-        return "; ".join(filter(None, (*said, self.rest_words)))
+        said += [self.rest_words] if self.rest is not Verdict.NOT_MET else []
+        return "; ".join(filter(None, said))
 
     def __str__(self) -> str:
         return f"{self.design.name}: {self.words}"

@@ -95,7 +95,7 @@ def _figure(items: Sequence[AmplitudeMargin]) -> Block:
         "Margins after release from rest at small, medium and large deviations, limits active; hollow and "
         "dashed: with dry friction."
     )
-    return doc.figure("margins_by_amplitude", chart, caption=caption, alt=caption, layout="half")
+    return doc.figure("margins_by_amplitude", chart, caption, layout="half")
 
 
 def _table(items: Sequence[AmplitudeMargin]) -> Block:

@@ -38,8 +38,7 @@ def surface_figure(fit: SurfaceFit) -> Block:
             _ring(panel, (point.speed_rad_s, 1e3 * point.torque_Nm), point.run, 14.0)
     panel.y.limits(low=0.0)
     caption = "Friction torque of every run and the fitted surface, a line for each load"
-    alt = "Measured friction torque against motor speed at several loads, with straight fitted lines"
-    return doc.figure("identification_surface", chart, caption=caption, alt=alt)
+    return doc.figure("identification_surface", chart, caption)
 
 
 def _place(points: Sequence[Any]) -> tuple[list[float], list[float]]:
@@ -79,8 +78,7 @@ def residual_figure(fit: SurfaceFit) -> Block:
             if point.run in named:
                 _ring(panel, (at, float(value)), point.run, 13.0)
     caption = "Residuals of the runs less the most likely shared errors, with two standard deviations"
-    alt = "Residual torque of every run against speed and against load"
-    return doc.figure("identification_residuals", chart, caption=caption, alt=alt)
+    return doc.figure("identification_residuals", chart, caption)
 
 
 def region_figure(fit: SurfaceFit) -> Block:
@@ -103,8 +101,7 @@ def region_figure(fit: SurfaceFit) -> Block:
             panel.rule_y(sign * y, dash=2)
         panel.points([0.0], [0.0], marker="+", size=10.0, colour=style.INK, read=False)
     caption = "Joint 95 % regions of pairs of coefficients; dotted: the 95 % interval of each alone"
-    alt = "Ellipses of the uncertainty of pairs of friction coefficients, with and without shared errors"
-    return doc.figure("identification_region", chart, caption=caption, alt=alt)
+    return doc.figure("identification_region", chart, caption)
 
 
 def _ellipse(
@@ -128,8 +125,7 @@ def window_figures(result: CampaignResult) -> list[Block]:
         run, window = points[k].run, points[k].window
         chart = _window(runs[run].record, window.start_s, window.stop_s)
         caption = f"Run {run}, the steady part marked: slope at most {window.limit_rad_s2:.3g} rad/s²"
-        alt = f"Speed, current and torque of run {run} over time with the steady part shaded"
-        figures.append(doc.figure("identification_window", chart, caption=caption, alt=alt))
+        figures.append(doc.figure("identification_window", chart, caption))
     more = [doc.details("The first and the middle run", figures[1:])] if len(figures) > 1 else []
     return [*figures[:1], *more]
 

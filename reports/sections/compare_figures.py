@@ -70,8 +70,7 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
     style.frequency(bottom, (min(f[0] for f in hertz), max(f[-1] for f in hertz)))
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
     caption = f"{title}, {which}: the base and its variants."
-    alt = f"Bode diagram of the {which} of the {name} loop of {len(made)} designs."
-    return [doc.figure("overlay", chart, caption=caption, alt=alt)]
+    return [doc.figure("overlay", chart, caption)]
 
 
 def _look(k: int) -> style.Style:
@@ -101,8 +100,7 @@ def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[Block]:
         panel.curve(np.asarray(step.time_s)[keep] * scale, response, label, **_look(k))
     panel.x.limits(0.0)
     caption = f"{title}, unit step: the base and its variants."
-    alt = f"Step responses of the {name} loop of {len(shown)} designs."
-    return [doc.figure("overlay", chart, caption=caption, alt=alt)]
+    return [doc.figure("overlay", chart, caption)]
 
 
 def tornadoes(comparison: Comparison) -> Section:
@@ -173,8 +171,7 @@ def _tornado(comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], li
         panel.rule_x(limit, "limit", seen=True, colour=style.RED, width=1.4, dash=1)
     style.rows(panel, [_bar_label(bar) for bar in bars])
     caption = f"{words}: each parameter alone at both its ends."
-    alt = f"Tornado chart of {words}; the strongest is {bars[0].path}."
-    return doc.figure("tornado", chart, caption=caption, alt=alt)
+    return doc.figure("tornado", chart, caption)
 
 
 def _bar_label(bar: Sensitivity) -> str:

@@ -151,5 +151,4 @@ def signal_figure(signal: SignalComparison, first: str = "") -> Block:
     lower.y.label, lower.x.label = f"difference, {signal.unit}", "time, s"
     lower.x.limits(time[0], time[-1])
     caption = f"{first}{name}: measured and model, {_share(signal)} of the motion off"
-    alt = f"{name} over time, measured and from the model, and the difference of the two"
-    return doc.figure("correlation_signal", chart, caption=caption, alt=alt)
+    return doc.figure("correlation_signal", chart, caption)

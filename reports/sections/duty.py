@@ -112,7 +112,7 @@ def _figure(result: Duty) -> Block:
     if result.heating is not None:
         caption += " Right: the winding from ambient."
         _winding(chart.panel(y="winding, °C", title="Winding"), result.heating)
-    return doc.figure("duty", chart, caption=caption, alt=caption)
+    return doc.figure("duty", chart, caption)
 
 
 def _winding(panel: Panel, heat: Heating) -> None:

@@ -200,7 +200,7 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
     caption = "Position error over a slow triangular command; without friction only the small lag remains."
     if waits:
         caption += " Right: a step below the threshold waits until the speed integrator reaches breakaway."
-    return doc.figure("hysteresis", chart, caption=caption, alt=caption)
+    return doc.figure("hysteresis", chart, caption)
 
 
 def _summary(result: FrictionEffects, fine: float, small: str) -> str:

@@ -26,7 +26,7 @@ def sections(sweep: RestSweep, axis: str) -> list[Section]:
         "sliding loop does not include the reversals."
     )
     intro = "Dry friction has no small-signal gain where the speed changes sign: it depends on the amplitude."
-    block = doc.figure("rest_sweep", _chart(sweep), caption=caption, alt=caption)
+    block = doc.figure("rest_sweep", _chart(sweep), caption)
     return [doc.section("from-rest", "From rest: effect of dry friction", [block], result=words, intro=intro)]
 
 

@@ -52,7 +52,7 @@ def section(plan: Plan) -> Section:
         panel = chart.panel("time, s", f"command at the output, {unit}")
         panel.curve(plan.time_s[rows], plan.command[rows], "command", colour=style.BLUE)
         caption = "Command of all motions, one after the other"
-        blocks.append(doc.figure("plan", chart, caption=caption, alt=caption))
+        blocks.append(doc.figure("plan", chart, caption))
     intro = (
         f"Motions from rest to rest, as large as the limits of {plan.design.name} allow in simulation, "
         f"chosen one by one (A-optimal); recorded at 1 kHz with white noise {plan.noise:g} {drive} rms. "

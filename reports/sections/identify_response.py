@@ -85,6 +85,5 @@ def response_figures(result: FrequencyResult) -> list[Block]:
         panel.points(hertz, np.abs(measured), "measured", colour=style.BLUE)
         panel.curve(hertz, np.abs(model[k]), "two-mass model", **style.series(1))
         caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
-        alt = f"Magnitude of {label} over motor torque against frequency, measured and fitted"
-        figures.append(doc.figure("response", chart, caption=caption, alt=alt))
+        figures.append(doc.figure("response", chart, caption))
     return figures

@@ -57,7 +57,7 @@ def _sweep(sweep: BenchSweep) -> Block:
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
     caption = f"{LOOPS[sweep.loop]}, open: linear (line), simulated (circles)"
     caption += f"; largest difference {_largest([sweep]):.1e}."
-    return doc.figure("injected_sweep", chart, caption=caption, alt=caption)
+    return doc.figure("injected_sweep", chart, caption)
 
 
 def _largest(sweeps: Sequence[BenchSweep]) -> float:
@@ -107,7 +107,7 @@ def _step(shown: StepShown) -> Block:
         f"{LOOPS[shown.place]}: small step on the operating motion; largest difference {shown.row.error:.1e} "
         f"of its height, {shown.row.because.split(', of ')[-1]}."
     )
-    return doc.figure("small_step", chart, caption=caption, alt=caption, layout="half")
+    return doc.figure("small_step", chart, caption, layout="half")
 
 
 def _margin(shown: MarginShown) -> Block:
@@ -124,4 +124,4 @@ def _margin(shown: MarginShown) -> Block:
         f"{shown.frequency_hz:.4g} Hz. The run inside dies out, the run outside grows (circles), each by the "
         "predicted factor (lines)."
     )
-    return doc.figure("margin_runs", chart, caption=caption, alt=caption, layout="half")
+    return doc.figure("margin_runs", chart, caption, layout="half")

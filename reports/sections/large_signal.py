@@ -199,7 +199,7 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
         "Fundamental of the output relative to the command at several amplitudes, simulated at no load with "
         "friction and limits. Right: frequencies of −3 dB and −90° against amplitude. Gaps: not steady."
     )
-    return doc.figure("amplitude_bode", chart, caption=caption, alt=caption)
+    return doc.figure("amplitude_bode", chart, caption)
 
 
 def _bandwidths(panel: Panel, result: AmplitudeBode, scale: float, unit: str, full: float) -> None:
@@ -225,7 +225,6 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: s
         figure_column("bandwidth_90deg", "phase", format="sig:3"),
         doc.column("note", "Note"),
     ]
-    keys = [one["key"] for one in columns]
     rows: list[tuple[object, ...]] = []
     for fraction, amplitude in zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True):
         k = int(np.argmin(np.abs(amplitude_bode.all_amplitude_rad - amplitude)))
@@ -237,9 +236,7 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: s
         rows.append((100.0 * fraction, scale * amplitude, *corners, note))
     corners = (amplitude_bode.linear_minus3db_hz, amplitude_bode.linear_minus90deg_hz)
     rows.append((None, None, *corners, model))
-    return doc.table(
-        "Bandwidth against amplitude", columns, [dict(zip(keys, row, strict=True)) for row in rows]
-    )
+    return doc.table("Bandwidth against amplitude", columns, rows)
 
 
 def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[Block]:
@@ -272,7 +269,7 @@ def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str
             f" Not checked: they need Kv/w >= {FAST:g} (here {sawtooth.gain_over_frequency:.3g}) and a "
             f"reversal within {REVERSAL_DEG:g}° of the period (here {sawtooth.reversal_deg:.3g}°)."
         )
-    return [doc.figure("sawtooth", chart, caption=caption, alt=caption)]
+    return [doc.figure("sawtooth", chart, caption)]
 
 
 def _sawtooth_column(panels: list[Panel], run: SawtoothRun, scale: float, unit: str) -> None:

@@ -28,7 +28,7 @@ def section(design: Design, border: Onset) -> Section:
         "lowest line every linear figure of this report holds, except for dry friction."
     )
     rows = _rows(design, border, scale)
-    blocks = [doc.figure("onset", _chart(design, border, scale, unit), caption=caption, alt=caption)]
+    blocks = [doc.figure("onset", _chart(design, border, scale, unit), caption)]
     blocks += [_table(rows, unit)] if rows else []
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
     words = _result(rows, unit) if rows else _least(border, scale, unit)

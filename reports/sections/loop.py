@@ -142,7 +142,7 @@ def closed_bode(
     chart = loop_charts.closed_bode(curves, band, nyquist_hz(figures), name)
     corner, lag = (_hz(band.minus3db_hz), _hz(band.minus90deg_hz)) if band else (_hz(None), _hz(None))
     words = f"{title}, closed loop: −3 dB at {corner}, −90° at {lag}."
-    return doc.figure("closed_bode", chart, caption=words, alt=f"Bode diagram. {words}", layout="half")
+    return doc.figure("closed_bode", chart, words, alt=f"Bode diagram. {words}", layout="half")
 
 
 def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
@@ -196,7 +196,7 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
         f"{title}: sensitivity S = 1/(1 + L), peak {fixed(peaks.sensitivity_db, 2)} dB, "
         f"and closed loop T = L/(1 + L), peak {fixed(peaks.complementary_db, 2)} dB."
     )
-    return doc.figure("sensitivity", chart, caption=caption, alt=caption, layout="half")
+    return doc.figure("sensitivity", chart, caption, layout="half")
 
 
 def step(

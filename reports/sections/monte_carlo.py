@@ -194,8 +194,7 @@ def _figures(result: MonteCarloResult) -> list[Block]:
             _histogram(chart.panel(title=_words(column.name)), result, odds, column)
         names = ", ".join(_words(column.name) for _, column in part)
         caption = f"Distribution within the tolerances: {names}."
-        alt = f"Histograms of {names} with nominal design, worst case and limit."
-        blocks.append(doc.figure("distribution", chart, caption=caption, alt=alt))
+        blocks.append(doc.figure("distribution", chart, caption))
     return blocks
 
 

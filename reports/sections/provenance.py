@@ -15,14 +15,14 @@ def section(
 ) -> Section:
     """Make the section from the document's own head."""
     rows = [
-        {"what": "design", "value": f"{design['name']}, revision {design['revision'] or 'none'}"},
-        {"what": "design file", "value": design["origin"] or "none"},
-        {"what": "hash of the design (SHA-256)", "value": provenance["design_hash"]},
-        {"what": "actuator-lti", "value": provenance["version"]},
-        {"what": "commit", "value": provenance["commit"] or "not built from a git tree"},
-        {"what": "built", "value": provenance["time"]},
-        {"what": "Python", "value": f"{provenance['python']}, {provenance['platform']}"},
-        *({"what": name, "value": version} for name, version in provenance["libraries"].items()),
+        ("design", f"{design['name']}, revision {design['revision'] or 'none'}"),
+        ("design file", design["origin"] or "none"),
+        ("hash of the design (SHA-256)", provenance["design_hash"]),
+        ("actuator-lti", provenance["version"]),
+        ("commit", provenance["commit"] or "not built from a git tree"),
+        ("built", provenance["time"]),
+        ("Python", f"{provenance['python']}, {provenance['platform']}"),
+        *provenance["libraries"].items(),
     ]
     columns = [doc.column("what", "What"), doc.column("value", "Value")]
     blocks = [

@@ -55,7 +55,7 @@ def _figures(part: RecordFit, tests: Sequence[ResidualTest], axis: str) -> list[
 
 
 def _figure(name: str, chart: Chart, caption: str) -> Block:
-    return doc.figure(f"residual_{name}", chart, caption=caption, alt=caption)
+    return doc.figure(f"residual_{name}", chart, caption)
 
 
 def _over_time(part: RecordFit, unit: str) -> Chart:

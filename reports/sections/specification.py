@@ -164,7 +164,7 @@ def _planes(result: Specification) -> list[Block]:
             "motion needs, and the paths of standard manoeuvres at full deflection. Below zero it brakes; "
             "backward motion is turned over."
         )
-        blocks.append(doc.figure("torque_speed", chart, caption=caption, alt=caption))
+        blocks.append(doc.figure("torque_speed", chart, caption))
     return blocks
 
 

@@ -120,10 +120,7 @@ def _lost_motion(result: Stiffness) -> Block:
         doc.column("seen", "Simulated", unit, format="sig:4"),
     ]
     seen = None if lost.seen_rad is None else scale * lost.seen_rad
-    rows = [
-        {"what": "play", "foreseen": scale * lost.play_rad, "seen": None},
-        {"what": "lost motion", "foreseen": scale * lost.foreseen_rad, "seen": seen},
-    ]
+    rows = [("play", scale * lost.play_rad, None), ("lost motion", scale * lost.foreseen_rad, seen)]
     note = (
         "Lost motion as gear makers read it, the motor held: between the middles of hysteresis at ±3 % of "
         "the largest load moment, which goes slowly to either side."

@@ -150,8 +150,7 @@ def _curve(result: TuningResult) -> Block:
     if margin:
         panel.rule_y(max(margin), **required)
     caption = "Position bandwidth against the phase margin that every loop keeps at its worst corner."
-    alt = f"Curve of {len(result.trade_off)} points, phase margin falling with bandwidth."
-    return doc.figure("trade_off", chart, caption=caption, alt=alt)
+    return doc.figure("trade_off", chart, caption)
 
 
 def checks(result: TuningResult) -> Block:

@@ -111,7 +111,8 @@ def result(validation: Validation) -> str:
     """Say how many predictions are met, and what the drive does that it must not."""
     words = [validation.tally.words("predictions"), *validation.failures]
     words += [f"stability of the {name} loop not known" for name in validation.undecided]
-    return " ".join(f"{capital(each)}." for each in (*words, validation.rest_words) if each)
+    words += [validation.rest_words] if validation.rest is not Verdict.NOT_MET else []
+    return " ".join(f"{capital(each)}." for each in words if each)
 
 
 def findings(validation: Validation) -> list[Finding]:
@@ -127,6 +128,10 @@ def findings(validation: Validation) -> list[Finding]:
             text = f"{loop_name(row.loop)}: {quantity_name(row)} {says}."
             open_one: Severity = "info" if validation.waived(f"{row.loop}/{row.name}") else "warn"
             made.append(Finding(severity="fail" if grave else open_one, text=text, where="validation"))
+    if validation.rest_words:
+        waived = validation.rest is Verdict.MET or waiver_of_rest(validation.design) is not None
+        told: Severity = "fail" if validation.rest is Verdict.NOT_MET else "info" if waived else "warn"
+        made.insert(0, Finding(severity=told, text=f"{capital(validation.rest_words)}.", where="validation"))
     if validation.conditional is not None:
         made += findings_of(validation.conditional, validation.design.axis)
     if validation.design.coupling is None:
@@ -168,7 +173,8 @@ def _rows_item(validation: Validation, name: str, rows: Sequence[Check]) -> Verd
 
 
 def _item(id: str, label: str, passed: bool | None, reason: str, **counts: Any) -> VerdictItem:
-    return doc.verdict(f"{CHECKS}-{id}", label, passed=passed, reason=reason, comparison=">=", **counts)
+    side = ">=" if "limit" in counts else ""
+    return doc.verdict(f"{CHECKS}-{id}", label, passed=passed, reason=reason, comparison=side, **counts)
 
 
 def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
