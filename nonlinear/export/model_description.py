@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from actuator_lti.design.model import Design
 from actuator_lti.design.units import parse_unit
 from nonlinear.export.trace import LARGEST_INTEGER
-from nonlinear.export.variables import FIRST_FLAG, INITIAL_ANGLE, Variable
+from nonlinear.export.variables import INITIAL_ANGLE, Variable
 
 TIME = 0  # value reference of the independent variable (FMI 3.0)
 MODEL = "drive"  # name of the library and of its source folder
@@ -34,13 +34,14 @@ def description(
     tool : str
         Name and version of the tool.
     """
-    root = (_root_2 if version == 2 else _root_3)(design, token, sources, tool)
+    root = _root(design, token, sources, version, tool)
     root.append(_units(variables, version))
     log = ET.SubElement(root, "LogCategories")
     ET.SubElement(log, "Category", name="logStatusError", description="reasons of errors")
     period = repr(design.controller.period_s)
     ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=period)
-    (_variables_2 if version == 2 else _variables_3)(root, variables)
+    _variables(root, variables, version)
+    _structure(root, variables, version)
     ET.indent(root)
     text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
     return text
@@ -56,29 +57,19 @@ def _attributes(design: Design, tool: str) -> dict[str, str]:
     }
 
 
-def _root_2(design: Design, token: str, sources: Sequence[str], tool: str) -> ET.Element:
-    root = ET.Element(
-        "fmiModelDescription", {"fmiVersion": "2.0", "guid": token, **_attributes(design, tool)}
-    )
-    simulation = ET.SubElement(
-        root, "CoSimulation", modelIdentifier=MODEL, canHandleVariableCommunicationStepSize="true",
-        canGetAndSetFMUstate="true", canSerializeFMUstate="true", canNotUseMemoryManagementFunctions="true",
-    )  # fmt: skip
+def _root(design: Design, token: str, sources: Sequence[str], version: int, tool: str) -> ET.Element:
+    of_token, state = ("guid", "FMUstate") if version == 2 else ("instantiationToken", "FMUState")
+    about = {"fmiVersion": f"{version}.0", of_token: token, **_attributes(design, tool)}
+    root = ET.Element("fmiModelDescription", about)
+    can = {"modelIdentifier": MODEL, f"canGetAndSet{state}": "true", f"canSerialize{state}": "true"}
+    simulation = ET.SubElement(root, "CoSimulation", can, canHandleVariableCommunicationStepSize="true")
+    if version == 3:
+        simulation.set("fixedInternalStepSize", repr(design.controller.period_s))
+        return root
+    simulation.set("canNotUseMemoryManagementFunctions", "true")
     files = ET.SubElement(simulation, "SourceFiles")
     for name in sources:
         ET.SubElement(files, "File", name=name)
-    return root
-
-
-def _root_3(design: Design, token: str, sources: Sequence[str], tool: str) -> ET.Element:
-    root = ET.Element(
-        "fmiModelDescription", {"fmiVersion": "3.0", "instantiationToken": token, **_attributes(design, tool)}
-    )
-    ET.SubElement(
-        root, "CoSimulation", modelIdentifier=MODEL, canHandleVariableCommunicationStepSize="true",
-        canGetAndSetFMUState="true", canSerializeFMUState="true",
-        fixedInternalStepSize=repr(design.controller.period_s),
-    )  # fmt: skip
     return root
 
 
@@ -102,6 +93,8 @@ def _units(variables: Sequence[Variable], version: int) -> ET.Element:
 
 def _bounds(item: Variable) -> dict[str, str]:
     """Unit, range and size of a number; an integer has a range alone."""
+    if item.kind not in ("real", "integer"):
+        return {}
     if item.kind == "integer":
         return {"min": str(int(item.low)), "max": str(int(min(item.high, LARGEST_INTEGER)))}
     result = {}
@@ -143,50 +136,45 @@ def _common(item: Variable) -> dict[str, str]:
     }
 
 
-def _variables_2(root: ET.Element, variables: Sequence[Variable]) -> None:
-    types = {"real": "Real", "integer": "Integer", "boolean": "Boolean", "string": "String"}
+_TYPES = {
+    2: {"real": "Real", "integer": "Integer", "boolean": "Boolean", "string": "String"},
+    3: {"real": "Float64", "integer": "Int32", "boolean": "Boolean", "string": "String"},
+}
+
+
+def _variables(root: ET.Element, variables: Sequence[Variable], version: int) -> None:
     listed = ET.SubElement(root, "ModelVariables")
+    if version == 3:
+        ET.SubElement(
+            listed, "Float64", name="time", valueReference=str(TIME), causality="independent",
+            variability="continuous", unit="s", description="simulation time",
+        )  # fmt: skip
     for item in variables:
-        scalar = ET.SubElement(listed, "ScalarVariable", _common(item))
-        bounds = _bounds(item) if item.kind in ("real", "integer") else {}
-        ET.SubElement(scalar, types[item.kind], {**bounds, **_start(item)})
+        kind, own = _TYPES[version][item.kind], {**_bounds(item), **_start(item)}
+        if version == 2:
+            ET.SubElement(ET.SubElement(listed, "ScalarVariable", _common(item)), kind, own)
+        elif item.kind == "string":
+            ET.SubElement(ET.SubElement(listed, kind, _common(item)), "Start", value=str(item.start))
+        else:
+            ET.SubElement(listed, kind, {**_common(item), **own})
+
+
+def _structure(root: ET.Element, variables: Sequence[Variable], version: int) -> None:
+    """Outputs and what is unknown at the start, by place (FMI 2.0) or value reference (FMI 3.0)."""
     structure = ET.SubElement(root, "ModelStructure")
-    index = {item.reference: n + 1 for n, item in enumerate(variables)}
-    outputs = [item for item in variables if item.causality == "output"]
-    for name in ("Outputs", "InitialUnknowns"):
-        part = ET.SubElement(structure, name)
-        for item in outputs:
-            known = _known(item) if name == "InitialUnknowns" else []
-            text = " ".join(str(index[reference]) for reference in known)
-            ET.SubElement(part, "Unknown", index=str(index[item.reference]), dependencies=text)
+    place = {item.reference: n + 1 if version == 2 else item.reference for n, item in enumerate(variables)}
+    for name in ("Output", "InitialUnknown"):
+        part = ET.SubElement(structure, f"{name}s") if version == 2 else structure
+        tag, key = ("Unknown", "index") if version == 2 else (name, "valueReference")
+        for item in (item for item in variables if item.causality == "output"):
+            known = _known(item) if name == "InitialUnknown" else []
+            text = " ".join(str(place[reference]) for reference in known)
+            ET.SubElement(part, tag, {key: str(place[item.reference])}, dependencies=text)
 
 
 def _known(item: Variable) -> list[int]:
     """What an output's value at the start depends on: the angles on the start angle."""
     return [INITIAL_ANGLE] if item.name in ("output.angle", "motor.angle") else []
-
-
-def _variables_3(root: ET.Element, variables: Sequence[Variable]) -> None:
-    types = {"real": "Float64", "integer": "Int32", "boolean": "Boolean", "string": "String"}
-    listed = ET.SubElement(root, "ModelVariables")
-    ET.SubElement(
-        listed, "Float64", name="time", valueReference=str(TIME), causality="independent",
-        variability="continuous", unit="s", description="simulation time",
-    )  # fmt: skip
-    for item in variables:
-        if item.kind == "string":
-            element = ET.SubElement(listed, "String", _common(item))
-            ET.SubElement(element, "Start", value=str(item.start))
-        else:
-            bounds = _bounds(item) if item.kind in ("real", "integer") else {}
-            ET.SubElement(listed, types[item.kind], {**_common(item), **bounds, **_start(item)})
-    structure = ET.SubElement(root, "ModelStructure")
-    outputs = [item for item in variables if item.causality == "output"]
-    for name in ("Output", "InitialUnknown"):
-        for item in outputs:
-            known = _known(item) if name == "InitialUnknown" else []
-            text = " ".join(str(reference) for reference in known)
-            ET.SubElement(structure, name, valueReference=str(item.reference), dependencies=text)
 
 
 def build_description(sources: Sequence[str]) -> bytes:
@@ -199,6 +187,3 @@ def build_description(sources: Sequence[str]) -> bytes:
     ET.indent(root)
     text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
     return text
-
-
-__all__ = ["FIRST_FLAG", "MODEL", "build_description", "description"]
