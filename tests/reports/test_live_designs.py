@@ -58,6 +58,7 @@ def test_no_shipped_design_is_left_out() -> None:
 
 def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page], tmp_path) -> None:
     name, page = shown
+    assert page.evaluate("document.documentElement.scrollHeight") <= 6 * 900  # six screens open
     agree(read(page), command_line(saved(page, tmp_path / "same.toml")))
     verdicts_agree(page, command_line(tmp_path / "same.toml", "requirements"))
     before = read(page)

@@ -89,7 +89,9 @@ def test_a_requirement_that_fails_is_said_at_once(page: Page, tmp_path) -> None:
     done = CliRunner().invoke(build(), ["margins", str(saved(page, tmp_path / "hot.toml")), "--json"])
     verdicts = [item for item in json.loads(done.stdout)["requirements"] if item["verdict"] == "not met"]
     assert failing == sum(item["loop"] is not None for item in verdicts) > 0
-    assert f"{failing} of " in page.inner_text(".state")
+    assert f"{failing} not met" in page.inner_text(".state")
+    assert [item["id"] for item in verdicts] == ["phase-margin/position"]
+    assert ": phase margin of the position loop." in page.inner_text(".state")
 
 
 def test_undo_redo_reset_and_keyboard(page: Page) -> None:

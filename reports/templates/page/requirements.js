@@ -31,7 +31,7 @@ export const state = () => {
   if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
   const met = all.filter((one) => one.met).length, count = (many, word) => (many ? `, ${many} ${word}` : "");
   const designed = changes().length ? ` (as designed: ${old.length} not met)` : "";
-  const named = [...fails, ...open].slice(0, NAMED).map(({ item }) => [item.words, item.loop ? placed(item).toLowerCase() : placed(item)].join(" ").trim()), more = fails.length + open.length - named.length;
+  const named = [...fails, ...open].slice(0, NAMED).map(({ item }) => (item.loop ? `${item.words} of the ${placed(item).toLowerCase()}` : `${item.words} ${placed(item)}`.trim())), more = fails.length + open.length - named.length;
   if (total) words.push(`${met} of ${total} requirements met${count(fails.length, "not met")}${count(open.length, "not proven")}${designed}${named.length ? `: ${named.join(", ")}${more ? ` and ${more} more` : ""}` : ""}.`);
   else if (!data.apart.length) words.push("The design states no requirements.");
   if (data.apart.length) words.push(`${data.apart.length} found by a simulation of its own ${data.apart.length === 1 ? "does" : "do"} not follow: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
