@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from actuator_lti.design.model import Design
-from analyses.friction_effects.stick_slip import StickSlipCycle
 from analyses.limit_cycles.friction import cycles_of_friction, dry_Nm
 from analyses.limit_cycles.result import Confirmation, Cycle
 from analyses.limit_cycles.run import confirm
-from analyses.motion.settling import Settling, largest_swing, settle
+from analyses.limit_cycles.stick_slip import StickSlipCycle, stick_slip_cycle
+from analyses.motion.settling import Settling, noticed, settlings_of
 from analyses.specification.drive_figures import drive_figures
 from nonlinear.bench.on_the_bench import quiet
 
-BELOW = 0.3
+if TYPE_CHECKING:
+    from actuator_lti.loops import Loops
 
 
 @dataclass(frozen=True)
@@ -23,14 +25,17 @@ class LimitCycles:
 
     Attributes
     ----------
+    design : Design
+        Without counts and noise.
     confirmations : tuple of Confirmation
         Empty: the describing function predicts none.
     stick_slip : StickSlipCycle or None
         What the analysis of rest, breakaway and slip predicts beside it.
     settlings : tuple of Settling
-        Steps of several sizes, the last ones below the threshold: the drive rests, breaks away, and may hunt.
+        Steps of several sizes: the drive rests, breaks away, and may hunt.
     """
 
+    design: Design
     confirmations: tuple[Confirmation, ...]
     stick_slip: StickSlipCycle | None
     settlings: tuple[Settling, ...]
@@ -38,7 +43,7 @@ class LimitCycles:
     @property
     def hunting(self) -> Settling | None:
         """The largest motion of a step that does not come to rest; None: all do."""
-        return largest_swing(self.settlings)
+        return noticed(self.design, self.settlings)
 
     @property
     def by_friction(self) -> bool:
@@ -65,31 +70,26 @@ class LimitCycles:
 def limit_cycles(
     design: Design,
     load_Nm: float,
-    step_rad: float,
-    threshold_rad: float | None = None,
-    stick_slip: StickSlipCycle | None = None,
     predicted: tuple[Cycle, ...] | None = None,
+    loops: Loops | None = None,
 ) -> LimitCycles:
     """Predict limit cycles, look for them in the simulator, and wait what steps end in.
 
+    The steps are those that judge the whole drive, without counts and noise (`analyses.motion.settling`).
+
     Parameters
     ----------
-    step_rad : float
-        A step, and a tenth of it.
-    threshold_rad : float, optional
-        Command that breaks away at once; a step of `BELOW` of it is waited for too.
-    stick_slip : StickSlipCycle, optional
-        A cycle predicted by `analyses.friction_effects.stick_slip`; a step of its size is waited for too.
     predicted : tuple of Cycle, optional
         By describing function, if known already.
+    loops : Loops, optional
+        Sampled and sliding, of this design, if they are there already.
     """
     design = quiet(design)
     if predicted is None:
         predicted = described_cycles(design, load_Nm)
     checked = tuple(confirm(design, cycle) for cycle in predicted)
-    sizes = [step_rad, 0.1 * step_rad] + ([BELOW * threshold_rad] if threshold_rad else [])
-    sizes += [stick_slip.output_amplitude_rad] if stick_slip is not None else []
-    return LimitCycles(checked, stick_slip, tuple(settle(design, load_Nm, size) for size in sizes))
+    slips = stick_slip_cycle(design, load_Nm, loops)
+    return LimitCycles(design, checked, slips, settlings_of(design, loops, (load_Nm,)))
 
 
 def described_cycles(design: Design, load_Nm: float) -> tuple[Cycle, ...]:

@@ -14,7 +14,6 @@ from actuator_lti.loops import assemble_loops
 from analyses.friction_effects.breakaway import Threshold, threshold
 from analyses.friction_effects.cycles import LimitCycles, described_cycles, limit_cycles
 from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
-from analyses.friction_effects.stick_slip import stick_slip_cycle
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.limit_cycles.friction import at_load, dry_Nm
 from analyses.limit_cycles.result import Cycle
@@ -118,11 +117,8 @@ def _integrator(design: Design) -> str:
 def _point(
     design: Design, loops: Loops, load_Nm: float, settling_ticks: int, described: tuple[Cycle, ...]
 ) -> FrictionPoint:
-    step = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
     result = threshold(design, load_Nm)
     loop = None if result is None else hysteresis(design, load_Nm, result.static, settling_ticks)
     dry = float(dry_torque(design, load_Nm, 1))
-    breakaway = None if result is None else result.static.forward_rad
-    slips = None if result is None else stick_slip_cycle(design, loops, load_Nm, settling_ticks)
-    cycles = limit_cycles(design, load_Nm, step, breakaway, slips, described)
+    cycles = limit_cycles(design, load_Nm, described, loops)
     return FrictionPoint(load_Nm, dry, result, loop, cycles)

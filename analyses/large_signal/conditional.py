@@ -25,6 +25,7 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import stage_gain
 from actuator_lti.errors import TooManyTicks
+from actuator_lti.loops import exact_margins, periodic_loop
 from analyses.large_signal.settling_ticks import full_range
 from analyses.motion.settling import accepted_rad
 from nonlinear import LIMITERS, Rows
@@ -173,8 +174,6 @@ def conditional_stability(
     margins : mapping of str to ExactMargins, optional
         Those already known, by break point.
     """
-    from actuator_lti.loops import exact_margins
-
     known = dict(margins or {})
     margins = {
         point: known.get(point) or exact_margins(loops, point)
@@ -225,7 +224,6 @@ def _limits(design: Design) -> list[tuple[str, float, str]]:
 def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: str) -> Prediction | None:
     """The limit cycle at the lower gain margin; none where the drive drifts away there."""
     ratio = saturation_ratio(gain)
-    from actuator_lti.loops import periodic_loop
 
     hertz = _oscillation_hz(periodic_loop(loops, point), gain)
     if hertz == 0.0:

@@ -16,6 +16,8 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import breakaway_torque_Nm
 from actuator_lti.drive.steady import standing_gain, steady_input
+from actuator_lti.loops import assemble_loops
+from analyses.large_signal.steady_start import linear_steady_state
 from analyses.linear.linear_states import AT_REST, without_value
 
 if TYPE_CHECKING:
@@ -85,17 +87,13 @@ class _Slip:
         return -th, float(k + part) * self.period_s, max(rest, 0.0)
 
 
-def stick_slip_cycle(
-    design: Design, loops: Loops, load_Nm: float, settling_ticks: int
-) -> StickSlipCycle | None:
+def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None) -> StickSlipCycle | None:
     """Find the symmetric stick-slip cycle of a drive whose speed controller integrates.
 
     Parameters
     ----------
-    loops : Loops
-        Sampled and sliding, of this design.
-    settling_ticks : int
-        How long a slip is followed, in ticks.
+    loops : Loops, optional
+        Sampled and sliding, of this design, if they are there already.
 
     Returns
     -------
@@ -104,7 +102,7 @@ def stick_slip_cycle(
     """
     from scipy.optimize import brentq
 
-    slip = _slip(design, loops, load_Nm, settling_ticks)
+    slip = _slip(design, load_Nm, loops) if _may_be(design, load_Nm) else None
     if slip is None:
         return None
     threshold = slip.start / slip.gain
@@ -130,18 +128,23 @@ def stick_slip_cycle(
     return StickSlipCycle(error / design.total_ratio, hz, resting, slope)
 
 
-def _slip(design: Design, loops: Loops, load_Nm: float, ticks: int) -> _Slip | None:
-    """Follow the slip after breakaway in the linear loop; ``None`` where this cycle cannot be."""
-    velocity, friction, system = design.controller.velocity, design.friction, loops.tick_system
+def _may_be(design: Design, load_Nm: float) -> bool:
+    """Whether the slip is that of the linear loop, with a constant sliding friction alike either way."""
+    velocity, friction = design.controller.velocity, design.friction
+    integrates = velocity is not None and velocity.integral_time_s is not None
+    plain = design.controller.own_law is None  # what a law of one's own does meanwhile is not known here
     symmetric = friction.dry_torque_reverse_Nm is None and friction.offset_torque_Nm == 0.0
-    if velocity is None or velocity.integral_time_s is None or system is None or not symmetric:
+    dry = friction.law == "coulomb" and not friction.points and friction.dry_Nm(load_Nm) > 0.0
+    return integrates and plain and symmetric and dry and design.load.path != "back-drivable"
+
+
+def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
+    """Follow the slip after breakaway in the linear loop; ``None`` where this cycle cannot be."""
+    loops = assemble_loops(design) if loops is None else loops
+    velocity, friction, system = design.controller.velocity, design.friction, loops.tick_system
+    if velocity is None or velocity.integral_time_s is None or system is None:
         return None
-    if design.controller.own_law is not None:
-        return None  # what a law of one's own does meanwhile is not known here
-    if friction.points:
-        return None  # the slip is that of the linear loop: with a constant sliding friction
-    if friction.law != "coulomb" or design.load.path == "back-drivable" or friction.dry_Nm(load_Nm) == 0.0:
-        return None
+    ticks = linear_steady_state(loops, np.array([1.0])).settling_ticks
     torque = breakaway_torque_Nm(design, load_Nm, 1)
     current, volts = steady_input(design, torque, 0.0)
     start = torque / standing_gain(design)

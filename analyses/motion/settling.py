@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from math import degrees, inf, radians
+from typing import TYPE_CHECKING
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design, Requirement, Waiver
+from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
 from nonlinear.settling.rest import Rest, judge
+
+if TYPE_CHECKING:
+    from actuator_lti.loops import Loops
 
 SMALL = 1e-3  # of full deflection: a step beside those that the design asks for
 NOTICED = 1e-6  # of full deflection: a smaller swing is listed, it fails nothing
@@ -67,12 +72,28 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
     return Settling(step_rad, load_Nm, rest)
 
 
-def settlings_of(design: Design) -> tuple[Settling, ...]:
-    """What steps of the drive as it is end in, small to full, without load and at every named one."""
+def settlings_of(
+    design: Design, loops: Loops | None = None, loads_Nm: Iterable[float] | None = None
+) -> tuple[Settling, ...]:
+    """What steps of the drive as it is end in, small to full, without load and at every named one.
+
+    One is as large as a predicted stick-slip cycle: larger steps may slide to rest where it goes on for ever.
+
+    Parameters
+    ----------
+    loops : Loops, optional
+        Sampled and sliding, of this design, if they are there already.
+    loads_Nm : iterable of float, optional
+        Other loads.
+    """
     asked, full = design.validation, design.validation.full_deflection_rad
-    loads = dict.fromkeys((0.0, *asked.loads_Nm))
-    shares = sorted({SMALL, *asked.amplitude_fractions})
-    return tuple(settle(design, load, share * full) for load in loads for share in shares)
+    sizes = [full * share for share in sorted({SMALL, *asked.amplitude_fractions})]
+    return tuple(
+        settle(design, load, size)
+        for load in dict.fromkeys((0.0, *asked.loads_Nm) if loads_Nm is None else loads_Nm)
+        for slip in [stick_slip_cycle(design, load, loops)]
+        for size in (*sizes, *([] if slip is None else [slip.output_amplitude_rad]))
+    )
 
 
 def noticed(design: Design, settlings: Iterable[Settling]) -> Settling | None:

@@ -227,17 +227,18 @@ def _crossing_at_rest(t: Tangent, gain: float) -> _Crossing | None:
         return float(poles[k].real) - 1.0, float(errors[k])
 
     before = float(np.log(gain))
-    (last, blur), now = at(before), before + BESIDE
+    (last, _), now = at(before), before + BESIDE
     for _ in range(NEWTON_STEPS):
-        size, blur = at(now)
-        slope = (size - last) / (now - before)
-        if slope == 0.0:
+        size, _ = at(now)
+        if size == last:
             break
-        before, last, now = now, size, now - size / slope
+        before, last, now = now, size, now - size * (now - before) / (size - last)
         if not abs(now) < MOST_LOG:
             return None
         if abs(now - before) < 1e-14:
             break
+    (inside, blur), (outside, _) = at(now - BESIDE), at(now + BESIDE)
+    slope = (outside - inside) / (2.0 * BESIDE)
     return _Crossing(float(np.exp(now)), 0.0, slope, blur / max(abs(slope), 1e-300))
 
 

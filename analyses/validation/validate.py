@@ -243,7 +243,7 @@ class _Work:
         return sweep_from_rest(design, asked, amplitude, self._settle(), described=dry)
 
     def _settlings(self) -> tuple[Settling, ...]:
-        return settlings_of(self.design)
+        return settlings_of(self.design, self._loops)
 
     def _conditional(self) -> Conditional:
         return conditional_stability(self.design, self._loops, self._settle())

@@ -81,7 +81,7 @@ def test_hunting_needs_breakaway_above_sliding_friction(amber: Design, breakaway
     }
     design = with_values(amber, values)
     threshold = static_threshold(design).forward_rad
-    cycles = limit_cycles(design, 0.0, 0.05 * design.validation.full_deflection_rad, threshold)
+    cycles = limit_cycles(design, 0.0)
     assert cycles.confirmations == ()
     assert (cycles.hunting is not None) == hunts
     assert cycles.described == (not hunts)
@@ -100,7 +100,7 @@ def test_friction_keeps_an_unstable_loop_quiet_up_to_the_foreseen_amplitude(
 ) -> None:
     """Speed gain beyond its margin: small motion dies out, large grows; border to 15 %, frequency to 8 %."""
     design = with_values(amber, {"control.velocity.gain": 3.0})
-    cycles = limit_cycles(design, load, 1e-4)
+    cycles = limit_cycles(design, load)
     assert len(cycles.confirmations) == 1
     item = cycles.confirmations[0]
     assert not item.cycle.stable
@@ -112,7 +112,7 @@ def test_friction_keeps_an_unstable_loop_quiet_up_to_the_foreseen_amplitude(
 def test_the_foreseen_amplitude_grows_with_friction(amber: Design) -> None:
     """The slope 4 Tc/(pi W) at the border is the same, so W goes with Tc."""
     design = with_values(amber, {"control.velocity.gain": 3.0})
-    small, large = (limit_cycles(design, load, 1e-4).confirmations[0].cycle.inner_rad for load in (0.0, 8.0))
+    small, large = (limit_cycles(design, load).confirmations[0].cycle.inner_rad for load in (0.0, 8.0))
     friction = design.friction
     assert large / small == pytest.approx(friction.dry_Nm(8.0) / friction.dry_Nm(0.0), rel=1e-9)
 

@@ -10,8 +10,8 @@ from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import shipped_designs
 from actuator_lti.design.model import Filter
 from actuator_lti.errors import NumericalError
-from analyses.friction_effects.stick_slip import _slip
 from analyses.large_signal.steady_start import LEFT_AT_REST, PLACES, linear_steady_state
+from analyses.limit_cycles.stick_slip import _slip
 from analyses.linear.linear_states import without_value
 
 
@@ -36,10 +36,10 @@ def test_a_start_refuses_a_state_that_it_does_not_know() -> None:
 def test_a_stick_slip_cycle_is_not_foreseen_where_a_filter_holds_what_is_not_known() -> None:
     """A torque filter holds the breakaway torque before the slip, not zero, as it was taken."""
     design = load_design("ilr33-amber")
-    plain = _slip(design, assemble_loops(design), 1.0, 50)
+    plain = _slip(design, 1.0, assemble_loops(design))
     assert plain is not None
     low_pass = Filter(on="torque", kind="lowpass", frequency_rad_s=2000.0)
     velocity = replace(design.controller.velocity, filters=(low_pass,))
     filtered = replace(design, controller=replace(design.controller, velocity=velocity))
     assert any(name.startswith("torque1") for name in assemble_loops(filtered).tick_system.states)
-    assert _slip(filtered, assemble_loops(filtered), 1.0, 50) is None
+    assert _slip(filtered, 1.0, assemble_loops(filtered)) is None
