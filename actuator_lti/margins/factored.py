@@ -104,7 +104,7 @@ class Response:
         Raises
         ------
         Doubtful
-            The loop has none there.
+            The loop has none there, or one where the factors have two, or at the end of the axis.
         """
         if not w.size:
             return w, np.empty(0, dtype=complex)
@@ -125,8 +125,8 @@ class Response:
             L = self._late(x, loop.sharp_response(x))
             step = _newton_step(L, rate, gain)
             x, L = x - step, L * (1.0 - rate * step)
-        if not (np.abs(x - start) <= _FAR_OFF * start).all():
-            raise Doubtful("a crossing of the factors is none of the loop")
+        if not (np.abs(x - start) <= _FAR_OFF * start).all() or not (np.diff(x, append=loop.end) > 0.0).all():
+            raise Doubtful("a crossing of the factors is none of the loop, or two are one")
         return x, L
 
     def _rate(self, x: Real, rate: Complex) -> Complex:
