@@ -27,3 +27,20 @@ class Asked:
             metavar="FILE",
         ),
     ] = None
+    response: Annotated[
+        Path | None,
+        Option(
+            words="Measured response of a loop, laid over the model: CSV or .mat with frequency, dB and "
+            "deg or real and imaginary part, perhaps coherence or deviation.",
+            metavar="FILE",
+        ),
+    ] = None
+    response_of: Annotated[
+        str,
+        Option(
+            words="What --response was measured of: a loop or break point, and :T for its closed loop, "
+            ":S for its sensitivity; the open outermost loop.",
+            metavar="LOOP",
+        ),
+    ] = ""
+    averages: Annotated[int | None, Option(words="Averages behind the coherence of --response.")] = None

@@ -17,7 +17,7 @@ from analyses.specification.weakest import Spread, spread
 from reports import document as doc
 from reports.document_schema import Block, Row, Section, State, Status
 from reports.numbers import short, to_minus
-from reports.sections import requirements
+from reports.sections import measured, requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words
 from reports.terminal import Brief, SideBySide
 
@@ -89,6 +89,7 @@ def section(result: Margins) -> list[Section]:
     known = {**{LOOPS[name]: one for name, one in result.loops.items()}, **result.around}
     made = _loops(known, result.operating_points, f"{FORMS[asked.form].capitalize()}; {_where(result)}. ")
     made["blocks"] += [doc.text(note) for note in _notes(result, known)]
+    made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
     return [{**made, "result": f"{_stability(known)}. {judged['result']}"}, judged]
 
 
@@ -101,7 +102,10 @@ def brief(result: Margins) -> Brief:
     tables = [margin_table(own), spread_table(result.operating_points, known), response_table(every)]
     counts = [len(one.margins.gain_margins) + len(one.margins.phase_margins) for one in known.values()]
     crossings = [crossing_table(own)] if max(counts, default=0) > 2 else []
-    notes = [*by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
+    if result.measured is not None:
+        crossings += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
+    told = [] if result.measured is None else [measured.words(result.measured)]
+    notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
     return Brief(first["result"], [SideBySide(head, tables), *crossings, *judged["blocks"]], notes)
 
 

@@ -1,0 +1,74 @@
+"""A measured response over the model: truth is the model itself times a known error."""
+
+import json
+
+import control
+import numpy as np
+import pytest
+
+from actuator_lti import assemble_loops, stability_margins
+from actuator_lti.errors import InputError
+from analyses.margins.measured import measured_over
+from reports.cli.main import main
+from reports.sections.measured import blocks, words
+
+LOOPS = assemble_loops("ilr33-amber")
+HERTZ = np.geomspace(2.0, 1800.0, 160)
+
+
+def bench(
+    loop: str, kind: str = "L", gain: float = 1.05, delay_s: float = 0.0
+) -> control.FrequencyResponseData:
+    """The loop as a bench with another gain and a delay would measure it."""
+    at = LOOPS.present[loop]
+    hertz = HERTZ[2.1 * HERTZ * at.period_s < 1.0]
+    L = at.plain_open(np.exp(2j * np.pi * hertz * at.period_s)).reshape(-1)
+    L = L * gain * np.exp(-2j * np.pi * hertz * delay_s)
+    return control.FrequencyResponseData(
+        {"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}[kind], 2.0 * np.pi * hertz
+    )
+
+
+@pytest.mark.parametrize("kind", ["L", "T", "S"])
+def test_gain_and_delay_are_what_lies_between(kind: str) -> None:
+    one = measured_over(LOOPS, bench("velocity", kind, 1.05, 1e-4), f"velocity:{kind}")
+    np.testing.assert_allclose(one.difference_db, 20.0 * np.log10(1.05), atol=1e-9)
+    np.testing.assert_allclose(one.difference_deg, -360.0 * 1e-4 * one.frequency_hz, atol=1e-7)
+    assert "within 0.42 dB" in words(one)
+
+
+def test_margins_are_ranges_that_hold_the_true_ones() -> None:
+    one = measured_over(LOOPS, bench("velocity", gain=1.0), "velocity")
+    exact = stability_margins(LOOPS.velocity.open_loop)
+    low, high = one.margins.phase_margins[0].deg_range
+    assert low - 1e-6 <= exact.phase_margins[0].deg <= high + 1e-6
+    low, high = one.margins.gain_margins[0].ratio_range
+    assert low * (1 - 1e-9) <= exact.gain_margins[0].ratio <= high * (1 + 1e-9)
+    assert {block["kind"] for block in blocks(one)} >= {"table", "figure"}
+
+
+def test_stated_noise_covers_as_many_points_as_it_says(tmp_path) -> None:
+    rng, truth = np.random.default_rng(5), bench("position", gain=1.0)
+    L, n = truth.frdata.ravel(), truth.omega.size
+    noisy = L * (1.0 + 0.02 * (rng.normal(size=n) + 1j * rng.normal(size=n)) / np.sqrt(2.0))
+    rows = np.column_stack([truth.omega / (2.0 * np.pi), noisy.real, noisy.imag, np.full(n, 0.02)])
+    path = tmp_path / "r.csv"
+    np.savetxt(path, rows, delimiter=",", header="f_hz,real,imag,deviation", comments="", fmt="%.17g")
+    one = measured_over(LOOPS, path)
+    assert 0.95 * n <= one.within <= n  # 99 % of the circles
+    assert main(["margins", "ilr33-amber", "--response", str(path), "--out", str(tmp_path / "x")]) == 0
+
+
+def test_command_line(tmp_path, capsys) -> None:
+    truth = bench("velocity", gain=1.0)
+    path, L = tmp_path / "r.csv", truth.frdata.ravel()
+    rows = np.column_stack([truth.omega / (2.0 * np.pi), 20.0 * np.log10(np.abs(L)), np.degrees(np.angle(L))])
+    np.savetxt(path, rows, delimiter=",", header="f_hz,gain_db,phase_deg", comments="", fmt="%.17g")
+    asked = ["margins", "ilr33-amber", "--response", str(path), "--response-of"]
+    assert main([*asked, "velocity", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)["measured"]
+    assert max(map(abs, shown["difference_db"])) < 1e-9
+    assert main([*asked, "speed"]) == 2
+    assert "--response-of speed: allowed: " in capsys.readouterr().err
+    with pytest.raises(InputError, match="no two frequencies below"):
+        measured_over(LOOPS, control.FrequencyResponseData([1.0, 1j], [1e6, 2e6]), "current")
