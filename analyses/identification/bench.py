@@ -36,6 +36,7 @@ from analyses.identification.verdict import (
     Item,
     held_out_item,
     inputs_item,
+    kept_items,
     residual_item,
     rows_item,
     sampling_item,
@@ -117,7 +118,8 @@ def identify_bench(
     size = size_item(
         design, compared, kept_constants=electrical is None, loaded=any(is_loaded(record) for record in used)
     )
-    items = (*_fit_items(findings, size, model, limit), *sampled, *filter(None, lags))
+    kept = kept_items(model, _held(start, fixed, settings.friction), design.axis)
+    items = (*_fit_items(findings, size, model, limit), *kept, *sampled, *filter(None, lags))
     try:
         values = joint_values(start, model, inertia_to=settings.inertia_to)
         _refuse_settings(used, values.names)

@@ -15,8 +15,8 @@ from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows
-from analyses.identification.simultaneous import SURE, Lag, lag_of, shifted
-from analyses.records.consistency import Finding
+from analyses.identification.simultaneous import Lag, lag_of, shifted
+from analyses.records.consistency import SURE, Finding, rate_ratio
 from analyses.records.record import Record
 
 LEAST_RUN = 3
@@ -68,6 +68,9 @@ def diagnosed(
         model, simulated = fit(used)
         model = _with_error_of(sure, before, model)
     for record, part in zip(used, model.records, strict=True):
+        doubt = rate_ratio(start, record)
+        if doubt is not None and doubt.doubt:
+            model = _with_clock(model, doubt.doubt)
         drift = None if is_benchmark(record) else _drift(part, model)
         if drift is not None:
             found[record.name].append(drift[0])
@@ -108,6 +111,13 @@ def _with_error_of(lags: Sequence[Lag], before: JointModel, model: JointModel) -
     moved = model.values - before.values
     share = float(np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in lags]))
     return replace(model, covariance=model.covariance + share * np.outer(moved, moved))
+
+
+def _with_clock(model: JointModel, share: float) -> JointModel:
+    """The model with what a clock off by a share moves: a torque that is right over a stretched motion."""
+    powers = np.array([{"inertia": 2.0, "viscous": 1.0}.get(n.partition("_")[0], 0.0) for n in model.names])
+    moved = share * powers * model.values
+    return replace(model, covariance=model.covariance + np.outer(moved, moved))
 
 
 def _drift(part: RecordFit, model: JointModel) -> tuple[Finding, FloatArray] | None:

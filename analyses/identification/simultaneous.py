@@ -12,13 +12,12 @@ from analyses.estimation.arrays import FloatArray, picked
 from analyses.estimation.least_squares import covariance_of, told_apart
 from analyses.identification.joint_model import JointModel, Recipe
 from analyses.identification.rows import Rows, drive_of, rows_under
+from analyses.records.consistency import SURE
 from analyses.records.record import Record
 
 ROUNDS = 8
 SETTLED = 0.1
 LARGEST_STEP_S = 0.01
-SURE = 4.0
-"""Standard errors beyond which a lag is taken for one: by chance in one record of 16 000."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from actuator_lti.design.model import Design
+from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
 from analyses.identification.design_values import DesignValue, cause, told
 from analyses.records.consistency import Finding
@@ -97,6 +98,15 @@ def sampling_item(record: Record) -> Item | None:
     )
     label = f"{record.name}: current sampled fast enough"
     return Item(id=f"sampling-{record.name}", label=label, passed=not slow, reason=reason if slow else "")
+
+
+def kept_items(fit: Fit, held: Collection[str], axis: str) -> tuple[Item, ...]:
+    """The design's own values that these records neither confirm nor deny, whatever they are."""
+    return tuple(
+        Item(id=f"kept-{name}", label=parameter(name, axis).label, passed=None, reason=one.reason)
+        for name, one in fit.fixed.items()
+        if one.value and name not in held
+    )
 
 
 def rows_item(rows: int, parameters: int) -> Item:

@@ -13,14 +13,17 @@ from analyses.records.campaign_file import Campaign, RunEntry
 from analyses.records.clocks import ClockJoin, join_records
 from analyses.records.csv_stream import MAX_ROWS, read_csv_record
 from analyses.records.inputs import InputUse, account
-from analyses.records.json_reader import read_json_record
+from analyses.records.json_reader import load_json
 from analyses.records.mat_reader import read_mat_record
-from analyses.records.parquet_reader import read_parquet_record
+from analyses.records.parquet_reader import load_parquet
 from analyses.records.record import InputColumn, Record, RowCounts
 from analyses.records.spec import RecordSpec
+from analyses.records.table_record import record_of_columns
 
 USED = {"current": "torque kM i", "speed": "steady speed", "torque": "load", "angle": "check of the speed"}
 """What a campaign uses its signals for."""
+TABLES = {".parquet": load_parquet, ".pq": load_parquet, ".json": load_json}
+"""What gives the columns of a file by name, and its SHA-256, by its ending."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,10 +142,9 @@ def read_record(path: Path, spec: RecordSpec, max_rows: int = MAX_ROWS) -> Recor
     """A record of either kind, by the file's ending."""
     if path.suffix.lower() == ".mat":
         return read_mat_record(path, spec)
-    if path.suffix.lower() in (".parquet", ".pq"):
-        return read_parquet_record(path, spec)
-    if path.suffix.lower() == ".json":
-        return read_json_record(path, spec)
+    if (load := TABLES.get(path.suffix.lower())) is not None:
+        vectors, digest = load(path)
+        return record_of_columns(vectors, spec, path, digest)
     return read_csv_record(path, spec, max_rows=max_rows)
 
 

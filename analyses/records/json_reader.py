@@ -13,22 +13,6 @@ from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
 from analyses.estimation.arrays import FloatArray
-from analyses.records.record import Record
-from analyses.records.spec import RecordSpec
-from analyses.records.table_record import record_of_columns
-
-
-def read_json_record(path: str | Path, spec: RecordSpec) -> Record:
-    """Read columns of a JSON file into a record.
-
-    Raises
-    ------
-    InputError
-        Names the file, the column and the reason.
-    """
-    path = Path(path)
-    vectors, digest = load_json(path)
-    return record_of_columns(vectors, spec, path, digest)
 
 
 def load_json(path: Path) -> tuple[Mapping[str, FloatArray], str]:

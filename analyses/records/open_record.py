@@ -14,14 +14,12 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import MatContent
 from actuator_lti.files.reading import open_regular, shown_path
 from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
-from analyses.records.campaign_import import read_record
+from analyses.records.campaign_import import TABLES, read_record
 from analyses.records.csv_rows import STAMP
 from analyses.records.csv_stream import MAX_ROWS
 from analyses.records.inputs import spec_of_names
-from analyses.records.json_reader import load_json
 from analyses.records.mat_reader import columns_of, load_mat, names_in
 from analyses.records.naming import is_unit
-from analyses.records.parquet_reader import load_parquet
 from analyses.records.published import EMPS_SPEC, ODRIVE_SPEC
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec
@@ -131,10 +129,8 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
     """The layout of a file from the names in it."""
     if suffix == ".mat":
         return _spec_of_mat(path)
-    if suffix in (".parquet", ".pq"):
-        spec, why = spec_of_names(tuple(load_parquet(path)[0]))
-    elif suffix == ".json":
-        spec, why = spec_of_names(tuple(load_json(path)[0]))
+    if suffix in TABLES:
+        spec, why = spec_of_names(tuple(TABLES[suffix](path)[0]))
     else:
         head = _head(path)
         if head.startswith("%Motor characterization data"):

@@ -14,22 +14,6 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import read_bytes, shown_path
 from actuator_lti.start.extras import need
 from analyses.estimation.arrays import FloatArray
-from analyses.records.record import Record
-from analyses.records.spec import RecordSpec
-from analyses.records.table_record import record_of_columns
-
-
-def read_parquet_record(path: str | Path, spec: RecordSpec) -> Record:
-    """Read columns of a Parquet file into a record; columns that hold no numbers are left out.
-
-    Raises
-    ------
-    InputError
-        Names the file, the column and the reason.
-    """
-    path = Path(path)
-    vectors, digest = load_parquet(path)
-    return record_of_columns(vectors, spec, path, digest)
 
 
 def load_parquet(path: Path) -> tuple[Mapping[str, FloatArray], str]:

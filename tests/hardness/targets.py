@@ -38,7 +38,7 @@ from analyses.records import (
     read_csv_record,
     read_mat_record,
 )
-from analyses.records.parquet_reader import read_parquet_record
+from analyses.records.campaign_import import read_record
 from analyses.studies.sampling import read_table
 from nonlinear.runs.records import read_columns
 from reports.nightly.cache import Cache, CorruptEntry, sealed
@@ -126,6 +126,7 @@ CONTROLLERS = (
 )
 RESPONSE = b"f_hz,gain_db,phase_deg,coherence\n1,20,-90,0.99\n2,14,-95,0.98\n4,7.5,-102,0.9\n"
 SUMMARY = b'{"history": {"id": "x", "nights": 3, "approvals": 1}}'
+JSON_ROWS = b'{"t": [0.0, 1.0, 2.0], "i": [0.5, null, 1.5], "note": "text", "n": [1, 2, 3]}'
 SPEC = RecordSpec(
     format=CsvFormat(),
     time=TimeColumn(column="t"),
@@ -363,7 +364,8 @@ def targets() -> tuple[Target, ...]:
         Target("record", (ROWS,), lambda p: read_csv_record(p, SPEC), ".csv", share=600),
         Target("record by itself", (KNOWN_ROWS,), open_record, ".csv", share=600),
         Target("mat", mat_files(), lambda p: read_mat_record(p, SPEC), ".mat", share=1500),
-        Target("parquet", (parquet_file(),), lambda p: read_parquet_record(p, SPEC), ".parquet", share=800),
+        Target("JSON record", (JSON_ROWS,), lambda p: read_record(p, SPEC), ".json", tree_fault, share=600),
+        Target("parquet", (parquet_file(),), lambda p: read_record(p, SPEC), ".parquet", share=800),
         Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv", share=800),
         Target("samples", (b"motor.resistance,motor.inductance\n0.05,1e-5\n0.06,2e-5\n",),
                lambda p: read_table(p, ("motor.resistance", "motor.inductance")), ".csv", share=600),

@@ -14,7 +14,7 @@ from actuator_lti.bounds import JSON_DEPTH, KEY_PARTS, TEXT_CHARACTERS, TOML_BYT
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import parse_json, parse_toml
 from analyses.records import load_campaign, open_record, read_csv_record, read_mat_record
-from analyses.records.parquet_reader import read_parquet_record
+from analyses.records.campaign_import import read_record
 from nonlinear import commands
 
 
@@ -93,7 +93,7 @@ def test_a_key_twice(read, text: str) -> None:
 KINDS: dict[str, Callable[[Path], object]] = {
     ".csv": lambda path: read_csv_record(path, SPEC),
     ".mat": lambda path: read_mat_record(path, SPEC),
-    ".parquet": lambda path: read_parquet_record(path, SPEC),
+    ".parquet": lambda path: read_record(path, SPEC),
     ".toml": load_campaign,
     ".rec": open_record,
     ".cmd": lambda path: commands.recorded(path),

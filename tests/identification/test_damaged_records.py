@@ -133,6 +133,14 @@ def test_a_load_that_was_not_recorded_is_named_with_its_size(drive: Design) -> N
     assert "as under a load of 6.0" in "; ".join(item.reason for item in result.items)
 
 
+def test_a_load_friction_that_no_load_excites_is_not_determined(columns: Columns, drive: Design) -> None:
+    """1 000 times too large, over a record without a load: neither met nor failed, and it says why."""
+    wrong = with_values(drive, {"friction.load_coefficient": 1e3 * drive.friction.load_coefficient})
+    (item,) = (one for one in identify_bench(wrong, [_record(columns)]).items if one.id.startswith("kept-"))
+    assert (item.id, item.passed) == ("kept-load_coefficient", None)
+    assert item.reason == "is not excited at all: the design's value kept"
+
+
 def test_a_drift_widens_the_intervals(columns: Columns, drive: Design) -> None:
     """All torques grow by 20 % along the record: the intervals about their mean hold the truth."""
     rise = 1.0 + 0.2 * columns["time"] / columns["time"][-1]
@@ -140,6 +148,17 @@ def test_a_drift_widens_the_intervals(columns: Columns, drive: Design) -> None:
     assert "drift along the record: all torques change by +1" in _said(result)
     low, high = result.model.interval("dry")
     assert low < drive.friction.dry_torque_Nm < high
+
+
+def test_a_clock_a_little_off_is_said_and_widens_the_intervals(columns: Columns, drive: Design) -> None:
+    """1 % slow: the inertia is 2 % off, which no torque shows, but the speed beside the angle does."""
+    result = identify_bench(BASE, [_record({**columns, "time": 1.01 * columns["time"]}, (*BARE, "speed"))])
+    assert "off, or the scale of one of them, beyond their noise" in _said(result)
+    low, high = result.model.interval("inertia")
+    assert low < drive.inertia_kgm2 < high < 1.1 * drive.inertia_kgm2
+    right = identify_bench(BASE, [_record(columns, (*BARE, "speed"))])
+    assert "beyond their noise" not in _said(right)
+    assert right.model.std("inertia") < 0.1 * result.model.std("inertia")
 
 
 @pytest.mark.parametrize("signals", [ALL, BARE], ids=["all", "bare"])
