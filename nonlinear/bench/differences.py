@@ -2,10 +2,11 @@
 
 Which numbers take part, a kick at the place shows: those that it moves.  The tick is affine but for events,
 which are seen, and for what bends, of which the design says over how far: a moment over its angle, the tanh
-law beside its flat part.  So the steps begin far above the kick's own motion, or where what bends is moved by
-`BENT` of that, and fall by tens while a smaller one agrees better: larger ones bend, smaller ones are lost in
-rounding.  Each column is taken where two successive steps agree best, by what their difference does to the
-response.  The sum of these differences is the stated error.
+law beside its flat part.  So the steps begin far above the kick's own motion, or with the largest without an
+event, or where what bends is moved by `BENT` of that and the tanh law is flat in every tick; and they fall by
+tens while a smaller one agrees better: larger ones bend, smaller ones are lost in rounding.  Each column is
+taken where two successive steps agree best, by what their difference does to the response.  The sum of these
+differences is the stated error.
 """
 
 from __future__ import annotations
@@ -166,24 +167,47 @@ class Differences:
             (int(np.flatnonzero(self.moved == place)[0]), far) for place, far in found if place in self.moved
         )
 
+    def _largest(self) -> Floats:
+        """Steps far above the kick's own motion that in no tick move the speed out of the flat part of tanh.
+
+        Where it was between two ends of periods no event says, as of dry friction: the law is smooth.
+        """
+        steps, bias = FAR * self.scale, self.setup.bias
+        if self.setup.design.friction.law != "tanh" or not bias.friction_on:
+            return steps
+        rows, _ = self._stepped(steps)
+        states, injected = rows[:, : self.size].copy(), rows[:, self.size :]
+        moved = np.zeros(steps.size)
+        for tick in range(self.base + 1):
+            above, below = np.split(states[:, at.S_SPEED], 2)
+            moved = np.fmax(moved, np.abs(0.5 * (above - below)))
+            if tick < self.base:
+                self.drive.each(states, 1, self.injected.at, injected[:, tick // self.hold])
+        return np.fmin(steps, bias.room_rad_s * steps / np.maximum(moved, 1e-250))
+
     def _tried(self, rows: list[npt.NDArray[np.intp]]) -> list[tuple[_Columns, tuple[Floats, Floats]]]:
         """Columns by steps that fall by tens, of the rows of each thing that is read, and what is felt there.
 
-        Of each column until it had three without an event, and the last did not bend.
+        Of each column until it had three without an event, and the last did not bend.  Where events forbid
+        the larger ones, they begin with the largest without one, found by halves.
         """
-        steps, going, tried = FAR * self.scale, np.ones(self.scale.size, bool), list[tuple[Floats, Floats]]()
-        felt = list[tuple[Floats, Floats]]()
-        for _ in range(MOST_DECADES):
-            tried.append(self._differences(np.where(going, steps, 0.0)))
-            steps = 0.1 * steps
+        steps, going, seen = self._largest(), np.ones(self.scale.size, bool), np.zeros(self.scale.size, bool)
+        felt, tried = list[tuple[Floats, Floats]](), list[tuple[Floats, Floats]]()
+        for tries in range(1, MOST_DECADES + 1):
+            values, rounding = self._differences(np.where(going, steps, 0.0))
+            free = np.isfinite(values).all(axis=1)
+            small = free & ~seen & (tries > 1)
+            values[small] = np.nan
+            steps, seen = np.where(small, 5.0, np.where(seen & ~free, 0.5, 0.1)) * steps, seen | free
+            tried.append((values, rounding))
             for row, far in self._bends:
-                moved = np.abs(tried[-1][0][:, row])
+                moved = np.abs(values[:, row])
                 moved[row] = np.fmax(moved[row], 1.0)  # by the step itself
                 steps = np.fmin(steps, far / np.maximum(moved, 1e-250))
-            if len(tried) < LEAST:
+            if tries < LEAST:
                 continue
-            values, rounding = (np.stack(each) for each in zip(*tried, strict=True))
-            columns = [_Columns(values[:, :, each], rounding[:, :, each]) for each in rows]
+            whole, off = (np.stack(each) for each in zip(*tried, strict=True))
+            columns = [_Columns(whole[:, :, each], off[:, :, each]) for each in rows]
             going = ~columns[0].free
             if not going.any():
                 felt = felt or [self._felt(each.last) for each in columns]
@@ -204,13 +228,11 @@ class Differences:
         NaN where the step is 0 or lost in the number, and where an event took place.
         """
         asked = np.flatnonzero(steps > 0.0)
-        K, both = asked.size, np.arange(2 * asked.size)
+        K = asked.size
         columns = np.full((2, steps.size, self.moved.size + self.updates * self.injected.readings), np.nan)
         if K == 0:
             return columns[0], columns[1]
-        rows, places = np.tile(self.start, (2 * K, 1)), np.tile(self.places[asked], 2)
-        rows[both, places] += np.concatenate([steps[asked], -steps[asked]])
-        ends = rows[both, places]
+        rows, ends = self._stepped(steps[asked], asked)
         after, back, flags = self._runs(rows)
         found = np.concatenate([after[:, self.moved], back.reshape(2 * K, -1)], axis=1)
         calm = (flags == self.calm).all(axis=(1, 2)) & np.isfinite(found).all(axis=1)
@@ -219,6 +241,15 @@ class Differences:
         size = np.maximum(np.abs(found[:K]), np.abs(found[K:]))
         columns[:, asked] = (found[:K] - found[K:]) / width, np.spacing(size) / width
         return columns[0], columns[1]
+
+    def _stepped(
+        self, steps: Floats, numbers: slice | npt.NDArray[np.intp] = slice(None)
+    ) -> tuple[Floats, Floats]:
+        """Rows with numbers of the state one step above, then one below; where these numbers then are."""
+        both, places = np.arange(2 * steps.size), np.tile(self.places[numbers], 2)
+        rows = np.tile(self.start, (both.size, 1))
+        rows[both, places] += np.concatenate([steps, -steps])
+        return rows, rows[both, places]
 
 
 class _Columns:

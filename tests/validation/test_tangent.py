@@ -141,13 +141,18 @@ def test_drives_that_failed_once(seed: int) -> None:
         (720_019, ("velocity", "i_ref")),
         (240, ("command", "load")),
         (800_742, ("u",)),
+        (1_010_199, ("position", "i_ref")),
+        (1_010_254, ("w_ref", "i_ref")),
+        (1_010_187, ("velocity", "u", "output", "command")),
     ],
 )
 def test_drives_that_were_not_proven_once(seed: int, places: tuple[str, ...]) -> None:
     """Cogging of which large steps saw the mean; a twist beside a large angle; angles moved by 1e-13.
 
     A drive that stands with its coupling pressed was fed forward to the angle of its output (240).  The pole
-    that crosses at 0 Hz was taken for half a pair with the mode at rest (800 742).
+    that crosses at 0 Hz was taken for half a pair with the mode at rest (800 742).  Within a long period the
+    speed left the flat part of tanh unseen (1 010 199, 1 010 254); a pressed coupling parted at steps of
+    which tenths were lost in rounding (1 010 187).
     """
     design = full_drive(seed)
     bench = Bench(design, design)
