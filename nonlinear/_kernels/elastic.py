@@ -124,6 +124,7 @@ def walk(p, s, whole):  # type: ignore[no-untyped-def]
     left, level, events, steps = whole, 0, 0, 0
     while left > 0.0:
         steps += 1
+        s[layout.S_STEPS] += 1.0
         if events > int(p[layout.MAX_EVENTS]) or steps > at.MAX_STEPS:
             return layout.TOO_MANY_EVENTS
         if not (abs(s[layout.S_SPEED]) < FINITE and abs(s[at.ES_LOAD_SPEED]) < FINITE):

@@ -358,6 +358,7 @@ S_OVERLOAD: Continuous = next(_places)
 S_OVERLOADED: Flag = next(_places)
 S_EVENTS: Counter = next(_places)  # in all
 S_MAX_EVENTS: Counter = next(_places)  # most in one tick
+S_STEPS: Note = next(_places)  # integration steps within segments, in all: what a run costs beside its ticks
 STATE_NAMES = frozenset(name for name in dir() if name.startswith("S_"))
 S_NOISE: Note = next(_places)  # four random streams of two numbers: current, angle, output angle, jitter
 NOISE_CURRENT, NOISE_ANGLE, NOISE_OUTPUT, NOISE_INSTANT = range(4)

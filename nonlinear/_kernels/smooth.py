@@ -257,4 +257,5 @@ def tanh_segment(p, s, part, u):  # type: ignore[no-untyped-def]
             energy_step(p, s, form, th1 - th, i, w, u, Tb, n0, nm, nc)
         i, w, th = i1, w1, th1
         done += unit
+        s[layout.S_STEPS] += 1.0
     s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE] = i, w, th

@@ -19,7 +19,7 @@ Floats = npt.NDArray[np.float64]
 _SIGNALS = (at.COMMAND, at.BIAS, *(at.PROBES + k * at.PROBE_SIZE + at.PROBE_SIGNAL for k in range(4)))
 _TABLES = (at.LOAD_TABLE, at.TORQUE_TABLE, at.SUPPLY_TABLE)
 _NOISE = (at.CURRENT_NOISE, at.ANGLE_NOISE, at.OUTPUT_NOISE, at.JITTER)
-_COUNTED = {at.S_TICK, at.S_STATUS, at.S_AVERAGE_PLACE, at.S_EVENTS, at.S_MAX_EVENTS}
+_COUNTED = {at.S_TICK, at.S_STATUS, at.S_AVERAGE_PLACE, at.S_EVENTS, at.S_MAX_EVENTS, at.S_STEPS}
 _BEHIND = (
     *range(at.S_CURRENT, at.S_NOISE),
     *range(at.S_COMMAND_CHAIN, at.S_PROBE_PLACES),
@@ -62,6 +62,8 @@ class Running:
         Time series that the parameters refer to.
     start : ndarray
         The state that it began in.
+    work : int
+        Ticks that `advance` went on by, and integration steps within them.
 
     Examples
     --------
@@ -79,6 +81,7 @@ class Running:
     s: Floats
     tables: Floats
     start: Floats = field(init=False, repr=False)
+    work: int = field(init=False, default=0)
 
     def __post_init__(self) -> None:
         self.start = self.s.copy()
@@ -176,9 +179,10 @@ class Running:
         columns = at.HISTORY_PROBES + 2 * len(self._probing) + int(p[at.RARE_LOAD] > 0.0)
         columns += at.ELASTIC_COLUMNS * int(p[at.ELASTIC_DRIVE])
         history, flags, out = np.empty((columns, rows)), np.zeros(rows, np.uint16), np.zeros(at.OUT_SIZE)
-        before = self.s[at.S_EVENTS]
+        before, steps = self.s[at.S_EVENTS], self.s[at.S_STEPS]
         status = resume(p, self.s, self.tables, history, flags, out, np.zeros(2))
         self.s[at.S_TICK] = 0.0
+        self.work += ticks + int(self.s[at.S_STEPS] - steps)
         return Piece(history, flags, int(self.s[at.S_EVENTS] - before), STATUS[status])
 
     @property

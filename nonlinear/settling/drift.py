@@ -57,7 +57,7 @@ def even(step: Floats, other: Floats, scale: Floats) -> bool:
     return bool((same | (small(step, scale) & small(other, scale))).all())
 
 
-def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Floats) -> tuple[int, int]:
+def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Floats) -> int:
     """Set a drive forward by windows of one change each, as many as have no event.
 
     Parameters
@@ -68,18 +68,16 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
 
     Returns
     -------
-    windows, ticks : int
-        How far, 0 where the drive moves; and the ticks of work.
+    int
+        How far, 0 where the drive moves.
     """
     moves = np.isin(places, _ANGLES) & ~small(step, scale)
     if moves.any():
-        return 0, 0
-    stay, start, looks = drive.s.copy(), drive.s[places], 0
+        return 0
+    stay, start = drive.s.copy(), drive.s[places]
     step = np.where(small(step, scale) & (np.abs(step - before) > EVEN * np.abs(step)), 0.0, step)
 
     def holds(windows: int) -> bool:
-        nonlocal looks
-        looks += 1
         drive.s[:] = stay
         drive.s[places] = ahead = start + windows * step
         piece = drive.advance(CHECKED * drive.base_ticks)
@@ -97,7 +95,7 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
     if drive.p[at.OVERLOAD] > 0.0:
         ticks = low * DRIFT * drive.base_ticks
         drive.s[at.S_OVERLOAD] = overload(drive.p, stay, drive.s[at.S_CURRENT], ticks)
-    return low, looks * CHECKED * drive.base_ticks
+    return low
 
 
 def overload(p: Floats, s: Floats, current_A: float, ticks: int) -> float:

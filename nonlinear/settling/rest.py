@@ -12,7 +12,8 @@ question is asked of the whole state, and the drive is followed until it is answ
   more the later half is as large as the earlier, and an event, a limit or a sensor's counts are in it, as a
   linear drive has none.  Which one a drive ends in may depend on the step;
 - *diverging*: no finite state, or a motion that still grows at the end of the work;
-- *still moving*: none of these within `MOST_TICKS` ticks of work.
+- *still moving*: none of these within `MOST_WORK` ticks and integration steps, as a stiff drive takes
+  thousands of steps a tick.
 """
 
 from __future__ import annotations
@@ -35,8 +36,9 @@ Floats = npt.NDArray[np.float64]
 Verdict = Literal["at rest", "limit cycle", "still moving", "diverging"]
 
 PERIODS, ALIKE = 8, 0.01
-MOST_TICKS = 4_000_000
+MOST_WORK = 4_000_000  # ticks, and integration steps within them
 PIECE_TICKS = 4096
+PART_WORK = 512  # ticks and steps after which the work is looked at, where ticks may take many steps
 _RANGED = [1, at.HISTORY_ANGLE, 3, 4, 5, 6]  # both angles, currents, voltage, commands
 
 
@@ -60,8 +62,8 @@ class Rest:
         Limiters that act in the last half of the work.
     after_s : float
         From the start of the judgement to its end, waits that were leapt over included.
-    ticks : int
-        Ticks of work.
+    work : int
+        Ticks gone through, and integration steps within them.
     """
 
     verdict: Verdict
@@ -72,7 +74,7 @@ class Rest:
     periods: int
     limited: tuple[str, ...]
     after_s: float
-    ticks: int
+    work: int
 
     @property
     def comes_to_rest(self) -> bool:
@@ -80,15 +82,15 @@ class Rest:
         return self.verdict == "at rest"
 
 
-def judge(running: Running, most_ticks: int = MOST_TICKS) -> Rest | None:
+def judge(running: Running, most_work: int = MOST_WORK) -> Rest | None:
     """Follow a drive from its present state until it is known what it ends in.
 
     Parameters
     ----------
     running : Running
         Of a run (``run.running``) or of `nonlinear.Rows.running`; it is not changed.
-    most_ticks : int
-        Bound on the work.
+    most_work : int
+        Bound on the work, in ticks and integration steps within them; it ends with the part that passes it.
 
     Returns
     -------
@@ -102,10 +104,10 @@ def judge(running: Running, most_ticks: int = MOST_TICKS) -> Rest | None:
     'at rest'
     """
     drive = running.held()
-    return None if drive is None else _Watch(drive, most_ticks).judged()
+    return None if drive is None else _Watch(drive, most_work).judged()
 
 
-def first_motion_s(running: Running, most_ticks: int = MOST_TICKS) -> float:
+def first_motion_s(running: Running, most_work: int = MOST_WORK) -> float:
     """Time after which the motor first moves from where it is; inf: never, as far as the work goes.
 
     Raises
@@ -116,8 +118,8 @@ def first_motion_s(running: Running, most_ticks: int = MOST_TICKS) -> float:
     drive = running.held()
     if drive is None:
         raise InputError("first motion: command, load and supply must stay as they are")
-    watch, start = _Watch(drive, most_ticks), drive.s[at.S_ANGLE]
-    while watch.ticks < most_ticks and not watch.quiet():
+    watch, start = _Watch(drive, most_work), drive.s[at.S_ANGLE]
+    while not watch.spent and not watch.quiet():
         moved = np.concatenate([seen[2] for seen in watch.seen[-2:]]) != start / drive.p[at.RATIO]
         if moved.any():
             return float(np.concatenate(watch.times[-2:])[np.argmax(moved)])
@@ -129,8 +131,8 @@ class _Watch:
     """The drive and what was seen of it."""
 
     drive: Running
-    most_ticks: int
-    ticks: int = 0  # of work
+    most_work: int
+    rate: float = float(PART_WORK)  # of work, a tick; not known before the first one
     periods: int = 0  # gone by, leaps included
     times: list[Floats] = field(default_factory=list)
     seen: list[Floats] = field(default_factory=list)  # per piece: reference, followed, motor
@@ -148,7 +150,7 @@ class _Watch:
     def judged(self) -> Rest:
         """Go on until the verdict is known."""
         due, periods = 8, max(PIECE_TICKS // self.drive.base_ticks, 2)
-        while self.ticks < self.most_ticks:
+        while not self.spent:
             piece = self._advance(periods)
             if piece.status != "ok":
                 return self._rest("diverging")
@@ -168,10 +170,10 @@ class _Watch:
 
     def _advance(self, periods: int) -> Piece:
         """Go on and keep one entry a period."""
-        base = self.drive.base_ticks
-        piece = self.drive.advance(periods * base, base)
+        piece = self._gone(periods)
+        periods = piece.flags.size
         self.times.append(self.period_s * np.arange(self.periods, self.periods + periods, dtype=float))
-        self.ticks, self.periods = self.ticks + periods * base, self.periods + periods
+        self.periods += periods
         self.seen.append(self._signals(piece.columns))
         flags = int(np.bitwise_or.reduce(piece.flags))
         self.acted.append((periods, flags, piece.events))
@@ -179,6 +181,28 @@ class _Watch:
         self.ranges.append((ranged.min(axis=1), ranged.max(axis=1)))
         self.scales.take(self.drive, piece)
         return piece
+
+    @property
+    def spent(self) -> bool:
+        """Whether the work is done."""
+        return self.drive.work >= self.most_work
+
+    def _gone(self, periods: int) -> Piece:
+        """Go on; of a drive whose ticks may take many steps, in parts and no further than the work allows."""
+        drive, base, parts = self.drive, self.drive.base_ticks, list[Piece]()
+        if drive.p[at.LAW] == 0.0 and drive.p[at.ELASTIC_DRIVE] == 0.0:
+            return drive.advance(periods * base, base)
+        while periods and not (parts and self.spent):
+            part = max(min(int(PART_WORK / (base * self.rate)), periods), 1)
+            before, periods = drive.work, periods - part
+            parts.append(drive.advance(part * base, base))
+            self.rate = (drive.work - before) / (part * base)
+        return Piece(
+            np.concatenate([part.columns for part in parts], axis=1),
+            np.concatenate([part.flags for part in parts]),
+            sum(part.events for part in parts),
+            next((part.status for part in parts if part.status != "ok"), "ok"),
+        )
 
     def _signals(self, columns: Floats) -> Floats:
         """Command, what follows it, and the motor's part of that, all in the command's unit."""
@@ -199,6 +223,8 @@ class _Watch:
         for _ in range(2):
             pieces.append(self._advance(DRIFT))
             states.append(drive.s[places])
+        if any(piece.flags.size < DRIFT for piece in pieces):
+            return False  # cut short, as the work is done
         scale = self.scales.states[places]
         before, step = change(states[1], states[0]), change(states[2], states[1])
         nothing = bool((small(before, scale) & small(step, scale)).all())
@@ -206,8 +232,8 @@ class _Watch:
             return True
         if not all(eventless(piece) for piece in pieces) or not even(step, before, scale):
             return False
-        windows, ticks = leap(drive, places, step, before, scale)
-        self.periods, self.ticks = self.periods + windows * DRIFT, self.ticks + ticks
+        windows = leap(drive, places, step, before, scale)
+        self.periods += windows * DRIFT
         if windows:
             followed, motor = (float(values[-1]) for values in self.seen[-1][1:])
             self.stood.append(_Stand(self.period_s * self.periods, len(self.seen), followed, motor))
@@ -309,7 +335,7 @@ class _Watch:
                 if any(flags & bit for _, flags, _ in acted)
             ),
             after_s=self.periods * self.period_s,
-            ticks=self.ticks,
+            work=self.drive.work,
         )
 
 
