@@ -14,7 +14,7 @@ from actuator_lti.design.model import Design, Parameter
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.sections import part_at, parts_of, with_part
 from actuator_lti.design.tolerances import rescaled
-from actuator_lti.design.units import si_text
+from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 
@@ -111,7 +111,7 @@ def with_values(design: Design, values: Mapping[str, float], *, check: bool = Tr
         field, _ = located(design, path)
         number = _allowed(field, path, value, structure)
         changes.setdefault(path.rpartition(".")[0], {})[field.attribute] = number
-        parameters[path] = _changed(design.parameters.get(path), field, path, number, structure)
+        parameters[path] = _changed(design.parameters.get(path), field, path, number, design)
     changed = _replaced(design, changes, parameters)
     if check:
         check_design(changed, design.origin or design.name)
@@ -128,13 +128,12 @@ def _allowed(field: Field, path: str, value: float, structure: Structure) -> flo
     return int(number) if field.kind == "integer" else number
 
 
-def _changed(old: Parameter | None, field: Field, path: str, value: float, structure: Structure) -> Parameter:
+def _changed(old: Parameter | None, field: Field, path: str, value: float, design: Design) -> Parameter:
     if old is not None and old.value == value:
         return old
-    unit = field.unit(structure)
-    new = Parameter(
-        path=path, text=si_text(value, unit), value=value, unit=unit, symbol=field.symbol, source="changed"
-    )
+    unit = field.unit(Structure.of(design))
+    text = si_text(value, ampere_unit(path, unit, design.motor.constants))
+    new = Parameter(path=path, text=text, value=value, unit=unit, symbol=field.symbol, source="changed")
     if old is None:
         return new
     grade = old.grade if old.source.startswith("changed") else ""
@@ -154,13 +153,12 @@ def _replaced(
 
 def pedigrees(design: Design) -> tuple[Parameter, ...]:
     """A :class:`Parameter` for every numeric key of a design, also those that its file left to defaults."""
-    structure = Structure.of(design)
     result = []
     for path in paths_of(design):
         known = design.parameters.get(path)
         if known is None:
             value, field = parameter_value(design, path), located(design, path)[0]
-            known = _changed(None, field, path, value, structure)
+            known = _changed(None, field, path, value, design)
             text = f"{value:g}" if known.unit == "1" else f"{value:g} {known.unit}"
             known = replace(known, text=text, source="default")
         result.append(known)

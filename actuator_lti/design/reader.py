@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import replace
 from datetime import date
-from math import pi, sqrt
+from math import isinf, pi, sqrt
 from typing import Any
 
 from actuator_lti.asked.quantities import QUANTITIES
@@ -23,7 +23,7 @@ from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.sections import RECORDS, Section, children
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.tolerances import read_tolerance
-from actuator_lti.design.units import parse_limit, parse_quantity, si_text
+from actuator_lti.design.units import ampere_unit, parse_limit, parse_quantity, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
@@ -34,6 +34,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
 _FIELD_OF_LEAD = FIELDS["screw.lead"]
 _CONVENTION = re.compile(r"(?<=[AV])[ _]?(rms|eff|peak|pk)\b", re.IGNORECASE)
+_DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
 _AMPERE = re.compile(r"\bA\b")
 _DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}  # section 1 of model.md
 _UPSIDE_DOWN = {"motor.back_emf_constant": (1.0, "{angle}/(V*s)"), "control.period": (2.0 * pi, "rad/s")}
@@ -238,7 +239,7 @@ class Reader:
         """
         unit, power = field.unit(self.structure), field.travel_power()
         if isinstance(text, str) and (convention := _CONVENTION.search(text)):
-            plain = _CONVENTION.sub("", text)
+            plain = _CONVENTION.sub(" dc", text)
             return self.quantity(plain, field) * self._amperes(field, unit, convention[1].lower())
         rotary = field.unit(replace(self.structure, axis="rotary"))
         factors = {unit: 1.0}
@@ -247,12 +248,26 @@ class Reader:
         refused: list[InputError] = []
         for one, factor in factors.items():
             try:
-                return parse_quantity(text, one) * factor
+                value = parse_quantity(text, one) * factor
             except InputError as error:
                 refused.append(error)
+            else:
+                return self._said(text, field, value)
             if field.path in _UPSIDE_DOWN and (turned := _turned(field.path, text, one)) is not None:
                 return turned * factor
         raise refused[-1]
+
+    def _said(self, text: Any, field: Field, value: float) -> float:
+        """The value, unless an AC motor has several amperes that the text may mean."""
+        unit = field.unit(self.structure)
+        which = ampere_unit(field.path, unit, self.constants)
+        if which == unit or value == 0.0 or isinf(value) or not isinstance(text, str) or _DIRECT.search(text):
+            return value
+        own = "rms" if self.constants == "rms-line" else "peak"
+        raise InputError(
+            "which amperes of the AC motor is not said; "
+            f"allowed: {which.replace('dc', own)} (its data sheet's) or {which} (the model's)"
+        )
 
     def _amperes(self, field: Field, unit: str, convention: str) -> float:
         """From amperes rms or peak to those of the model: i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak."""

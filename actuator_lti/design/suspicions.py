@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from math import isfinite, pi
 
@@ -10,7 +9,6 @@ from actuator_lti.design.checks_elastic import elastic_warnings
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 
-_BARE_AMPERE = re.compile(r"[0-9 /](?:[kmuµ]?A)\b(?![ _]?(?:rms|eff|peak|pk|dc)\b)", re.IGNORECASE)
 GRADES = {"", "A", "B", "C", "D", "X"}  # of a source, or several with "/" between
 
 
@@ -25,7 +23,7 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     """
     design = as_design(design)
     checks = (
-        _sampling, _crossovers, _law, _limits, _unused, _loads, _pedigree, _encoder, _ac_motor,
+        _sampling, _crossovers, _law, _limits, _unused, _loads, _pedigree, _encoder,
         elastic_warnings,
     )  # fmt: skip
     return tuple(line for check in checks for line in check(design))
@@ -159,20 +157,3 @@ def _encoder(design: Design) -> Iterator[str]:
     if isfinite(top) and step > 0.05 * top:
         unit = "m/s" if design.axis == "linear" else "rad/s"
         yield f"encoder.counts_per_rev: one count is {step:.3g} {unit}, more than 5 % of limits.speed"
-
-
-def _ac_motor(design: Design) -> Iterator[str]:
-    rms = {"rms-line": 1.5**0.5, "peak-phase": 3**0.5 / 2}.get(design.motor.constants)
-    if rms is None:
-        return
-    unit = "A rms" if design.motor.constants == "rms-line" else "A peak"
-    for path, item in design.parameters.items():
-        si = item.unit
-        if not path.startswith(("limits.", "control.")) or not _BARE_AMPERE.search(item.text):
-            continue
-        factor = rms if "A" in si.partition("/")[2] else 1.0 / rms
-        other = si.replace("A", unit)
-        yield (
-            f"{path}: {item.value:g} {si} of the equivalent DC motor, that is {item.value * factor:.4g} "
-            f"{other}; say which it is: A rms, A peak or A dc"
-        )

@@ -73,6 +73,7 @@ _WORD = 4  # letters from which a name may stand in the plural: "volts", but "As
 _PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")
 _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
 
+_AMPERE = re.compile(r"\bA\b")
 _TOKEN = re.compile(
     r"\s*(?:(?P<name>[A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))|(?P<power>\^-?[1-6])|(?P<sign>[*/()]))"
 )
@@ -354,6 +355,25 @@ def si_text(value: float, unit: str) -> str:
     ('0.06 ohm', '66.0')
     """
     return repr(value) if unit == "1" else f"{value!r} {unit}"
+
+
+def ampere_unit(path: str, unit: str, constants: str) -> str:
+    """The unit of a limit or gain as a file has to say it: of an AC motor, which amperes.
+
+    Parameters
+    ----------
+    path, unit : str
+        Key, and the SI unit of its quantity.
+    constants : str
+        Of the motor: ``"dc"``, or how an AC motor's data sheet gives its constants.
+
+    Examples
+    --------
+    >>> ampere_unit("limits.peak_current", "A", "rms-line"), ampere_unit("limits.peak_current", "A", "dc")
+    ('A dc', 'A')
+    """
+    several = constants != "dc" and path.startswith(("limits.", "control."))
+    return _AMPERE.sub("A dc", unit) if several else unit
 
 
 def parse_limit(text: str | float | int, unit: str) -> float:

@@ -11,7 +11,7 @@ from dataclasses import fields as dataclass_fields
 from math import inf, isfinite
 from typing import Any
 
-from actuator_lti.design.fields import Field, Structure, field_of, fields_in
+from actuator_lti.design.fields import Structure, field_of, fields_in
 from actuator_lti.design.loader import as_design, design_from_tree
 from actuator_lti.design.model import (
     Controller,
@@ -26,7 +26,7 @@ from actuator_lti.design.model import (
 )
 from actuator_lti.design.sections import RECORDS, SECTIONS, at_place, parts_of
 from actuator_lti.design.settings_file import object_entry
-from actuator_lti.design.units import si_text
+from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
@@ -90,20 +90,21 @@ def _section(design: Design, part: Any, name: str, template: str, structure: Str
         value = getattr(part, field.attribute)
         known = design.parameters.get(f"{name}.{field.key}")
         if known is not None and known.value == value:
-            section[field.key] = _entry(known)
+            section[field.key] = _entry(known, design.motor.constants)
         elif value is not None and value != inf and value != defaults[field.attribute]:
-            section[field.key] = _bare(field, value, part, structure)
+            unit = part.unit if field.kind == "limit" else field.unit(structure)
+            unit = ampere_unit(f"{name}.{field.key}", unit, design.motor.constants)
+            section[field.key] = _bare(value, unit)
     unsaid = name == "validation" and not any(path.startswith("validation.") for path in design.parameters)
     if unsaid and len(section) == 1 and part.full_deflection_rad == default_deflection(design.axis):
         return {}
     return section
 
 
-def _bare(field: Field, value: Any, part: Any, structure: Structure) -> Any:
+def _bare(value: Any, unit: str) -> Any:
     """A value without a pedigree."""
     if isinstance(value, tuple):
-        return [_bare(field, item, part, structure) for item in value]
-    unit = part.unit if field.kind == "limit" else field.unit(structure)
+        return [_bare(item, unit) for item in value]
     return value if isinstance(value, str | bool) or unit == "1" else si_text(value, unit)
 
 
@@ -119,11 +120,11 @@ def _written(text: str) -> str | int | float:
     return text
 
 
-def _entry(known: Parameter) -> Any:
+def _entry(known: Parameter, constants: str) -> Any:
     value = _written(known.text)
     more: Tree = {key: getattr(known, key) for key in ("source", "grade") if getattr(known, key)}
     if known.tolerance is not None:
-        more["tolerance"] = _tolerance(known.tolerance, known.unit)
+        more["tolerance"] = _tolerance(known.tolerance, ampere_unit(known.path, known.unit, constants))
     return {"value": value, **more} if more else value
 
 
@@ -192,6 +193,7 @@ def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
     for path, value in values.items():
         field = field_of(path)
         unit = "1" if field is None or field.kind != "quantity" else field.unit(structure)
+        unit = ampere_unit(path, unit, design.motor.constants)
         plain = isinstance(value, int | float) and not isinstance(value, bool)
         result[path] = si_text(float(value), unit) if plain and unit != "1" else value
     return result

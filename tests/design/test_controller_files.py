@@ -73,6 +73,8 @@ def without(stage: str) -> Design:
          {"control.position.gain": 20, "control.period": 1.25e-4, "limits.speed": 20 * pi,
           "encoder.bandwidth": 1000}, "config.pole_pairs, axis0.controller.config.enable_vel_limit"),
         (NEWER, "", (0.11,), {"encoder.bandwidth": 900}, ".enable_vel_limit, axis0.encoder.config.x"),
+        # the firmware's own: 1000 rad/s
+        (ODRIVE.replace('"bandwidth": 1', '"x": 1'), "", (0.11,), {"encoder.bandwidth": 1000}, "config.x"),
         # iq = error in electrical rpm times s_pid_kp/20 times l_current_max
         (VESC, "", (0.0138 * sqrt(3) / PEAK, 0.0138 / 18.1, PEAK * ERPM * 0.004 / 20 * 60, 0.5),
          {"limits.peak_current": PEAK * 60}, ": foc_f_zv"),

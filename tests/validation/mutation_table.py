@@ -107,7 +107,7 @@ def changed(design: Design, key: str) -> Iterator[tuple[str, Design | str]]:
         try:
             yield words, design.with_values({key: other})
         except InputError as error:
-            yield words, str(error)
+            yield words, str(error).splitlines()[0]
 
 
 def first_row(design: Design, model: Design) -> Row | None:
