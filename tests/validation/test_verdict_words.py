@@ -68,7 +68,7 @@ def test_an_unstable_loop_is_not_met_and_its_response_still_is() -> None:
 def hunting(step_rad: float, swing_rad: float, hertz: float) -> Settling:
     rest = Rest(
         verdict="limit cycle", error=0.0, amplitude=swing_rad, motor_amplitude=swing_rad, frequency_hz=hertz,
-        periods=8, limited=(), after_s=1.0, ticks=1,
+        periods=8, limited=(), after_s=1.0, work=1,
     )  # fmt: skip
     return Settling(step_rad, 0.0, rest)
 
