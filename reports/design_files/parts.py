@@ -52,7 +52,7 @@ def with_parts(text: str, motor: str | None, gear: str | None) -> str:
     """A design file's text with a motor, a gear or both, and with limits, load and gains that suit them.
 
     The load has the motor's inertia, seen through the gear. The current loop crosses at 2000 rad/s, the
-    velocity loop at 240 rad/s or an eighth of the frequency of spring and load, the position loop at a quarter.
+    velocity loop at 240 rad/s or an eighth of the spring's frequency, the position loop at a quarter of that.
     """
     chosen = {kind: part(kind, name) for kind, name in (("motor", motor), ("gear", gear)) if name is not None}
     if motor is not None:
@@ -145,4 +145,4 @@ def _said(value: object, source: str, grade: str) -> str:
 
 
 def _derived(value: float, unit: str, source: str, grade: str = "D") -> str:
-    return _said(f"{value:.3g} {unit}", source, grade)
+    return _said(f"{float(f'{value:.3g}'):g} {unit}", source, grade)
