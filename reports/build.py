@@ -41,6 +41,9 @@ def report(
     validation: bool = True,
     also: Sequence[str] = (),
     added: Sequence[doc.Section] = (),
+    response: Any = None,
+    response_of: str = "",
+    averages: int | None = None,
     source: str | None = None,
     step: Step = _unseen,
 ) -> Document:
@@ -57,6 +60,11 @@ def report(
         Further sections, of `reports.analyses.FURTHER`.
     added : sequence of section
         Sections of other documents, put before the further ones.
+    response : path or control.FrequencyResponseData, optional
+        A measured response, laid over the model; of what, and with how many averages behind its coherence, as
+        `analyses.margins.measured.measured_over` has it.
+    response_of : str
+    averages : int, optional
     source : str, optional
         See `design_report`; the file's text where ``design`` is a name or a path.
     step : callable, optional
@@ -84,7 +92,7 @@ def report(
     if source is None and not isinstance(design, Design):
         source = design_text(design)
     with step(f"further sections of {drive.name}"):
-        parts = [*added, *further_sections(drive, also)]
+        parts = [*_measured(drive, response, response_of, averages), *added, *further_sections(drive, also)]
     if validation:
         with step(f"validating {drive.name}") as validating:
             parts = [*validation_sections(drive, validating), *parts]
@@ -94,6 +102,15 @@ def report(
         with step("drawing figures") as drawing:
             write_report(made, out, progress=drawing)
     return made
+
+
+def _measured(design: Design, response: Any, place: str, averages: int | None) -> list[doc.Section]:
+    from actuator_lti.loops import assemble_loops
+    from analyses.margins.measured import measured_if_asked
+    from reports.sections import measured
+
+    laid = measured_if_asked(assemble_loops(design), response, place, averages)
+    return [] if laid is None else [measured.section(laid)]
 
 
 def design_report(

@@ -82,7 +82,8 @@ def far_note(far: int) -> tuple[str, ...]:
     """What is said of crossings that are not listed."""
     if not far:
         return ()
-    return (f"{far} crossing(s) of the negative real axis whose margin is above 200 dB are not listed",)
+    crossings = "1 crossing" if far == 1 else f"{far} crossings"
+    return (f"not listed, as their margin is above 200 dB: {crossings} of the negative real axis",)
 
 
 def hidden_notes(at_zero: int, border: tuple[tuple[float, int], ...] = (), right: int = 0) -> tuple[str, ...]:
@@ -103,14 +104,15 @@ def hidden_notes(at_zero: int, border: tuple[tuple[float, int], ...] = (), right
         )
     elif at_zero or border:
         at = f"{at_zero} at zero frequency" if at_zero else ""
-        pairs = ", ".join(f"{times} pair(s) at {w:.6g}" for w, times in border)
+        pairs = ", ".join(f"{times} pair{'s' * (times > 1)} at {w:.6g}" for w, times in border)
         notes.append(
             f"modes on the stability boundary that the loop neither drives nor sees are left out "
             f"({', '.join(filter(None, (at, pairs)))} of the s-plane): the margins are those of what is "
             "seen; inside, the loop is not asymptotically stable"
         )
     if right:
-        notes.append(f"{right} unstable mode(s) that the loop neither drives nor sees")
+        modes = "1 unstable mode" if right == 1 else f"{right} unstable modes"
+        notes.append(f"{modes} that the loop neither drives nor sees")
     return tuple(notes)
 
 

@@ -17,17 +17,19 @@ PARABOLA_SHARE = 0.6  # how far from that of a parabola train
 FRICTION_DB, FRICTION_DEG = 1.0, 10.0
 STEADY = 0.02
 CRITERIA = (
-    "no motion: at rest at every tick of the last window; stick-slip: at rest at "
-    f"{STICK_FRACTION:.0%} of its ticks or more; triangle: third harmonic, in phase as in a triangle, above "
-    f"{TRIANGLE_SHARE:.0%} of 1/9; parabola: the same within {PARABOLA_SHARE:.0%} of 1/27, with the other "
-    f"sign (both only where a limit acts); sine: distortion below {SINE_DISTORTION:.0%}; else distorted. "
-    f"Not steady: fundamental still changing by more than {STEADY:.0%} from one window to the next."
+    "no motion: at rest at every tick of the last window; "
+    f"stick-slip: at rest at {100 * STICK_FRACTION:.0f} % of its ticks or more; "
+    f"triangle: third harmonic, in phase as in a triangle, above {100 * TRIANGLE_SHARE:.0f} % of 1/9; "
+    f"parabola: the same within {100 * PARABOLA_SHARE:.0f} % of 1/27, with the other sign "
+    f"(both only where a limit acts); sine: distortion below {100 * SINE_DISTORTION:.0f} %; else distorted. "
+    f"Not steady: fundamental still changing by more than {100 * STEADY:.0f} % from one window to the next."
 )
 CAUSE_RULE = (
-    "The limit named is the one that acts at most ticks of the last window. Where none acts: stiction if the "
-    f"drive rests at {STICK_FRACTION:.0%} of the ticks or more. Where the fundamental is off the linear one "
-    f"by more than {FRICTION_DB:g} dB or {FRICTION_DEG:g}°: dry friction if it is not so without dry "
-    "friction, else play, gravity or counts. Else none: the linear model holds."
+    "The limit named is the one that acts at most ticks of the last window. Where none acts: stiction if "
+    f"the drive rests at {100 * STICK_FRACTION:.0f} % of the ticks or more. "
+    f"Where the fundamental is off the linear one by more than {FRICTION_DB:g} dB or {FRICTION_DEG:g}°: "
+    "dry friction if it is not so without dry friction, else play, gravity or counts. "
+    "Else none: the linear model holds."
 )
 
 

@@ -129,7 +129,9 @@ def sawtooth(
     slowest = min(result.output_rate_rad_s for result in figures)
     rate = limit / design.total_ratio
     if slowest < rate * (1.0 - 1e-9):
-        reason = f"not every load lets the drive reach its speed limit: it stays at {slowest / rate:.0%}"
+        reason = (
+            f"not every load lets the drive reach its speed limit: it stays at {100 * slowest / rate:.0f} %"
+        )
         return Sawtooth(amplitude, 0.0, rate, 0.0, 0.0, False, (), reason)
     wanted = OVERRUN * rate / (2.0 * math.pi * amplitude) if frequency_hz is None else frequency_hz
     chosen = tone(wanted, design, least_updates=400)

@@ -67,6 +67,15 @@ class Measured:
         return int(np.count_nonzero(np.abs(self.measured - self.model) <= self.radius))
 
 
+def measured_if_asked(loops: Loops, source: Any, place: str, averages: int | None) -> Measured | None:
+    """`measured_over`, where there is a response; what is said of one that is not there is refused."""
+    if source is not None:
+        return measured_over(loops, source, place, averages)
+    if place or averages is not None:
+        raise InputError(f"--{'response-of' if place else 'averages'}: allowed with --response")
+    return None
+
+
 def measured_over(loops: Loops, source: Any, place: str = "", averages: int | None = None) -> Measured:
     """Lay a measured response over the loop that it was measured of.
 

@@ -12,7 +12,7 @@ from actuator_lti.loops import Loops, assemble_loops
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 from analyses.linear.loop_survey import OperatingPointFigures, operating_points
 from analyses.margins.asked import Asked
-from analyses.margins.measured import Measured, measured_over
+from analyses.margins.measured import Measured, measured_if_asked
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
 from analyses.specification.weakest import Spread, spread
 
@@ -84,7 +84,7 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
     )
     step = asked.form != "continuous"  # with delays it takes its time
     around = {} if asked.around is None else _around(loops, asked.around, step=step)
-    measured = asked.response and measured_over(loops, asked.response, asked.response_of, asked.averages)
+    measured = measured_if_asked(loops, asked.response, asked.response_of, asked.averages)
     figures = all_loop_figures(loops, step=step, certify=True, locked=True)
     usual = (asked.form, asked.operating_point) == ("sampled", "sliding")
     return Margins(
@@ -94,7 +94,7 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
         requirements=evaluate_requirements(design, figures if usual else None),
         around=around,
         operating_points=tuple(operating_points(design, [], described=False, certify=False)),
-        measured=measured or None,
+        measured=measured,
     )
 
 

@@ -114,7 +114,9 @@ def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
     least, limits = operating_motion_at(design, SLOWEST * FASTEST_RAD_S, loads[-1]), design.limits
     stuck = least.voltage_V > limits.voltage_V or least.current_A > limits.peak_current_A
     if stuck or bent_about_rest(design):
-        message = f"friction takes more than {1.0 if stuck else MOST:.0%} of the current or voltage limit"
+        message = (
+            f"friction takes more than {100 if stuck else 100 * MOST:.0f} % of the current or voltage limit"
+        )
         raise InputError(f"{message}: no steady motion to test on", where=design.name)
     return standing(design)
 

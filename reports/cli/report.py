@@ -39,6 +39,16 @@ AlsoOption = Annotated[
         help=f"Add what takes its time: {', '.join(FURTHER)}, or all (repeatable).",
     ),
 ]
+ResponseOption = Annotated[
+    Path | None,
+    typer.Option("--response", metavar="FILE", help="Lay a measured response of a loop over the model."),
+]
+ResponseOfOption = Annotated[
+    str, typer.Option("--response-of", metavar="LOOP", help="What --response was measured of; see margins.")
+]
+AveragesOption = Annotated[
+    int | None, typer.Option("--averages", help="Averages behind the coherence of --response.")
+]
 PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for signing as well.")]
 
 
@@ -51,6 +61,9 @@ def report(
     summary: SummaryOption = False,
     include: IncludeOption = None,
     also: AlsoOption = None,
+    response: ResponseOption = None,
+    response_of: ResponseOfOption = "",
+    averages: AveragesOption = None,
     as_json: JsonOption = False,
     quiet: QuietOption = False,
 ) -> None:
@@ -79,6 +92,9 @@ def report(
         validation=validation,
         also=FURTHER if also and "all" in also else also or (),
         added=[p for path in include or () for p in load(path)["sections"] if p["id"] != "provenance"],
+        response=response,
+        response_of=response_of,
+        averages=averages,
         source=None if changes else design_text(design),
         step=partial(progress, quiet=quiet),
     )

@@ -80,7 +80,7 @@ def _ending(conditional: Conditional, scale: float, unit: str) -> str:
     }
     words = sizes[conditional.ending]
     if conditional.limiter:
-        words += f"; the {conditional.limiter} limit acts {conditional.limiter_share:.0%} of the time"
+        words += f"; the {conditional.limiter} limit acts {100 * conditional.limiter_share:.0f} % of the time"
     return words
 
 

@@ -48,7 +48,9 @@ def sentence(one: Counts, axis: str) -> str:
 def _facts(one: Counts, axis: str) -> list[FactItem]:
     scale, unit, speed = _units(axis)
     name = NAMES[one.sensor]
-    linear = f"Linear within {WITHIN:.0%} from this amplitude at the sensor on, by describing function"
+    linear = (
+        f"Linear within {100 * WITHIN:.0f} % from this amplitude at the sensor on, by describing function"
+    )
     items = [
         doc.fact(f"{name}: one count", one.quantum_rad * scale, unit),
         doc.fact("Ripple of the motor's speed, largest", one.ripple_rad_s, speed),

@@ -146,7 +146,7 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
 def _map_words(amplitude_map: AmplitudeMap) -> str:
     """Say in words what the map shows."""
     shares = {name: amplitude_map.share((name,)) for name in CAUSES}
-    parts = [f"{name} {share:.0%}" for name, share in shares.items() if share > 0.0]
+    parts = [f"{name} {100 * share:.0f} %" for name, share in shares.items() if share > 0.0]
     return "Map of amplitude and frequency; share of the points by what acts: " + ", ".join(parts)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from reports import document as doc
 from reports.charts import style
 from reports.charts.style import Chart
-from reports.document_schema import Block, Row
+from reports.document_schema import Block, Row, Section
 from reports.sections.names import LOOPS
 
 if TYPE_CHECKING:
@@ -43,8 +43,16 @@ def words(one: Measured) -> str:
         told += f"; at {one.within} of {db.size} points it lies within the spread ({one.source})"
     beyond = f" {one.beyond} points above half the sampling frequency are left out." if one.beyond else ""
     left = f" {one.left_out} rows without numbers are left out." if one.left_out else ""
-    place = LOOPS.get(one.loop, f"loop at {one.loop}").lower()
-    return f"{one.name} over the {place}. {told}.{beyond}{left} {one.note}".strip()
+    return f"{one.name} over the {_place(one)}. {told}.{beyond}{left} {one.note}".strip()
+
+
+def _place(one: Measured) -> str:
+    return LOOPS.get(one.loop, f"loop at {one.loop}").lower()
+
+
+def section(one: Measured) -> Section:
+    """Make the section from `analyses.margins.measured.measured_over`."""
+    return doc.section("measured-response", "Measured response", blocks(one)[1:], result=words(one))
 
 
 def blocks(one: Measured) -> list[Block]:
@@ -97,13 +105,16 @@ def _margins(one: Measured) -> list[Row]:
 def _bode(one: Measured) -> Block:
     chart = Chart(width=style.WIDE, height=410.0)
     top, bottom = chart.column(1.15, 1.0)
-    f, first = one.frequency_hz, 0.0
+    f, first, shown = one.frequency_hz, 0.0, []
     top.x.log = bottom.x.log = True
     for k, (label, L) in enumerate((("measured", one.measured), ("model", one.model))):
         db, phase = 20.0 * np.log10(np.abs(L)), np.degrees(np.unwrap(np.angle(L)))
         if k:  # of the same turn as the measurement
+            phase += 360.0 * np.round((first - phase[0]) / 360.0)
+        shown += phase.tolist()
+        if k:
             top.curve(f, db, label, **style.series(k))
-            bottom.curve(f, phase + 360.0 * np.round((first - phase[0]) / 360.0), label, **style.series(k))
+            bottom.curve(f, phase, label, **style.series(k))
             continue
         first, reach = phase[0], np.minimum(one.radius / np.abs(L), 0.999)
         top.points(f, db, label, colour=style.BLUE)
@@ -116,7 +127,8 @@ def _bode(one: Measured) -> Block:
                 [ring], "99 % of the measurement" if panel is top else "", colour=style.BLUE, opacity=0.15
             )
     top.y.label, bottom.y.label, bottom.x.label = "magnitude, dB", "phase, deg", "frequency, Hz"
-    caption = f"{one.name}: measured loop with its spread, and the model"
+    style.phase_axis(bottom, shown)
+    caption = f"{one.name}: measured {_place(one)} with its spread, and the model"
     return doc.figure(
         "measured", chart, caption=caption, alt="Measured and modelled open loop over frequency"
     )

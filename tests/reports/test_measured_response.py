@@ -9,6 +9,7 @@ import pytest
 from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.errors import InputError
 from analyses.margins.measured import measured_over
+from reports.build import report
 from reports.cli.main import main
 from reports.sections.measured import blocks, words
 
@@ -68,7 +69,13 @@ def test_command_line(tmp_path, capsys) -> None:
     assert main([*asked, "velocity", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)["measured"]
     assert max(map(abs, shown["difference_db"])) < 1e-9
+    made = report("ilr33-amber", validation=False, response=path, response_of="velocity")
+    (section,) = [one for one in made["sections"] if one["id"] == "measured-response"]
+    assert "velocity loop. The model explains the measurement within 0.00 dB" in section["result"]
     assert main([*asked, "speed"]) == 2
     assert "--response-of speed: allowed: " in capsys.readouterr().err
+    for command in ("margins", "report"):
+        assert main([command, "ilr33-amber", "--averages", "8", "--out", str(tmp_path / "x")]) == 2
+        assert "--averages: allowed with --response" in capsys.readouterr().err
     with pytest.raises(InputError, match="no two frequencies below"):
         measured_over(LOOPS, control.FrequencyResponseData([1.0, 1j], [1e6, 2e6]), "current")
