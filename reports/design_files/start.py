@@ -28,10 +28,20 @@ class Asked:
     kind: Annotated[
         str | None, Option(words=f"Start from a typical drive: {', '.join(KINDS)}.", metavar="KIND")
     ] = None
+    motor: Annotated[
+        str | None, Option(words="Motor of the catalogue; a wrong name lists them all.", metavar="NAME")
+    ] = None
+    gear: Annotated[
+        str | None, Option(words="Gear of the catalogue; a wrong name lists them all.", metavar="NAME")
+    ] = None
     force: Annotated[bool, FORCE] = False
 
     def __post_init__(self) -> None:
         """Refuse a kind that there is not, and two sources."""
+        if (self.motor is not None or self.gear is not None) and (self.kind or self.source):
+            raise InputError(
+                f"--{'gear' if self.motor is None else 'motor'}: not allowed beside --kind and --from"
+            )
         if self.kind is not None and self.source is not None:
             raise InputError(f'--kind = "{self.kind}": not allowed beside --from')
         if self.kind is not None and self.kind not in KINDS:
@@ -59,9 +69,13 @@ def start(asked: Asked) -> Started:
     from actuator_lti.design import read_design_text
     from actuator_lti.files.atomic import write_text
     from reports.cli.targets import refuse_existing
+    from reports.design_files.parts import with_parts
 
     refuse_existing(asked.file, asked.force)
-    text = _renamed(_source_text(KINDS[asked.kind] if asked.kind else asked.source), asked.file.stem)
+    text = _source_text(KINDS[asked.kind] if asked.kind else asked.source)
+    if asked.motor is not None or asked.gear is not None:
+        text = with_parts(text, asked.motor, asked.gear)
+    text = _renamed(text, asked.file.stem)
     read_design_text(text, str(asked.file))
     write_text(asked.file, text)
     return Started(str(asked.file))
