@@ -27,7 +27,7 @@ from actuator_lti.batch._figures import (
 from actuator_lti.margins.trust import told_from_zero
 from actuator_lti.systems.rest_mode import without_rest_mode
 
-AT_BORDER = 1e-10  # distance of the largest pole from the unit circle within which rounding decides
+AT_BORDER = 1e-10  # of the largest pole from the unit circle, or T(0) from 1/2: rounding decides
 _GROWTH = 10.0  # of an open-loop pole in one sample: below it the entries stay small
 _MOST_ERROR = 1e-10  # relative, of the response at a crossover: the margins are then good to 1e-8
 _BETWEEN = (0.03, 0.3, 1.0, 2.5)
@@ -60,7 +60,8 @@ def withhold(A: np.ndarray, B: np.ndarray, C: np.ndarray, poles: np.ndarray, row
 def _odd_crossovers(A: np.ndarray, B: np.ndarray, C: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Which designs have a number of gain crossovers that does not fit the gain at both ends."""
     above_one = rows[:, DC_GAIN] > 0.5  # |L(0)| > 1 from T(0) = L(0)/(1 + L(0)), also with a pole there
-    suspect = np.flatnonzero((rows[:, GAIN_CROSSOVERS] % 2.0 == 1.0) != above_one)
+    either = np.abs(rows[:, DC_GAIN] - 0.5) < AT_BORDER  # |L(0)| = 1 but for rounding: both numbers fit
+    suspect = np.flatnonzero(((rows[:, GAIN_CROSSOVERS] % 2.0 == 1.0) != above_one) & ~either)
     suspect = suspect[np.isfinite(rows[suspect, DC_GAIN])]
     at_nyquist = [abs(_response(A[k], B[k], C[k], -1.0)) for k in suspect]
     return suspect[~(np.array(at_nyquist) > 1.0)]

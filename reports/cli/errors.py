@@ -63,6 +63,8 @@ def run(call: Callable[[], object], options: Callable[[], Mapping[str, str]] = d
     try:
         status = _run(call, options)
     except Exception as error:  # noqa: BLE001 - the one place for what nobody foresaw
+        if late := time_limit.struck():
+            return _say(f"numerical failure: {late}", NO_RESULT)
         return _say(f"{reason(error)}; traceback: {write_crash_file(traceback_of(error))}", NO_RESULT)
     finally:
         time_limit.stop()

@@ -13,6 +13,7 @@ from actuator_lti.errors import OutOfTime
 STUDIES = ("compare", "montecarlo", "nightly", "tune")
 HARD_FACTOR, HARD_EXTRA_S = 1.25, 30.0  # the rest of a report is written between the two
 _timers: list[threading.Timer] = []
+_struck: list[str] = []
 
 
 def usual(command: str | None) -> float:
@@ -40,6 +41,7 @@ def start(seconds: float) -> None:
 
 def stop() -> None:
     """Take both limits away."""
+    _struck.clear()
     while _timers:
         _timers.pop().cancel()
         if threading.current_thread() is threading.main_thread() and hasattr(signal, "setitimer"):
@@ -47,8 +49,17 @@ def stop() -> None:
             signal.signal(signal.SIGALRM, signal.SIG_DFL)
 
 
+def struck() -> str:
+    """What is said of the limit once it has been met; empty before.
+
+    A library may be in the middle of a conversion then, and give the error as one of its own.
+    """
+    return _struck[0] if _struck else ""
+
+
 def _refuse(seconds: float) -> None:
-    raise OutOfTime(_words(seconds))
+    _struck.append(_words(seconds))
+    raise OutOfTime(_struck[0])
 
 
 def _end(seconds: float) -> None:

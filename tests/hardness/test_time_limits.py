@@ -9,8 +9,10 @@ import sys
 import pytest
 
 from actuator_lti.bounds import COMMAND_SECONDS, STUDY_SECONDS
+from actuator_lti.errors import OutOfTime
 from reports.cli import time_limit
 from reports.cli.app import PANELS
+from reports.cli.errors import run
 
 SECONDS = 1.0
 STARTED_S = 60.0  # until Python has read its modules on a machine that is busy
@@ -51,3 +53,17 @@ def test_every_command_has_a_stated_time() -> None:
         name for name in commands if name in time_limit.STUDIES
     ]
     assert time_limit.usual(None) == COMMAND_SECONDS.most
+
+
+def test_a_library_that_makes_an_error_of_its_own_of_it_changes_nothing(capsys) -> None:
+    def late() -> object:
+        time_limit.start(60.0)
+        try:
+            time_limit._refuse(60.0)
+        except OutOfTime as error:
+            raise TypeError("cannot convert") from error
+        return 0
+
+    assert run(late) == 3
+    assert "not finished within 60 s" in capsys.readouterr().err
+    assert not time_limit.struck()

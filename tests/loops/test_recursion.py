@@ -57,7 +57,8 @@ def between_two_gears() -> Design:
 
 
 OPEN = replace(drive_d(), controller=Controller(period_s=1e-4, computing_delay_s=1.5e-4))
-KINDS = {**DRIVES, "open-loop voltage": OPEN, "coupling between two gears": between_two_gears()}
+PLAIN = {name: one for name, one in DRIVES.items() if not one.friction.points}  # its friction is a slope
+KINDS = {**PLAIN, "open-loop voltage": OPEN, "coupling between two gears": between_two_gears()}
 DELAYS, RATES = (0.0, 0.5, 1.0, 1.5), ((1, 1), (2, 10))
 ESTIMATES = (
     Encoder(speed="difference"),

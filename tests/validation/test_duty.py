@@ -121,7 +121,7 @@ def test_section_figure_and_command(capsys: pytest.CaptureFixture[str]) -> None:
     told = json.loads(capsys.readouterr().out)
     assert told["rms_A"] < told["continuous_A"] == 6.0
     assert main(["duty", "joint", "--share", "0"]) == 2
-    assert "share 0.0: allowed: above 0" in capsys.readouterr().err
+    assert "--share 0: allowed: above 0, at most 1" in capsys.readouterr().err
     assert main(["duty", "joint", "--frequency", "1e-320"]) == 2
     assert "Hz: at least" in capsys.readouterr().err
     with pytest.raises(InputError, match="no current"):

@@ -1,5 +1,5 @@
 // Hands on the curves: the loop's gain on Bode and Nyquist, the corner of a PI, the filters; marks of the margins.
-import { PLACE, STABLE, desk, tell } from "./desk.js";
+import { PLACE, STABLE, data, desk, tell } from "./desk.js";
 import { commit, keys, past, preview } from "./history.js";
 import { unmet } from "./requirements.js";
 import { digits } from "./words.js";
@@ -46,16 +46,16 @@ const turned = (phase) => -180 + 360 * Math.round((phase + 180) / 360);
 // the quoted margins on the curves as changed: found on the curves where the figures say how large they are
 export const marginMarks = (hertz, { gain, phase }) => {
   const own = desk.now.loops[desk.shown].figures, top = [], bottom = [], bad = unmet(desk.now);
-  const mark = (list, name, words, unit, x, y, to) => {
-    const value = own[PLACE[name]];
-    if (Number.isFinite(value)) list.push({ x, y, to, colour: bad(desk.shown, name) ? "fail" : "pass", words: `${words} ${digits(value, 3)} ${unit} at ${digits(x, 3)} Hz` });
+  const mark = (list, name, x, y, to) => {
+    const value = own[PLACE[name]], { label, unit } = data.figures.find((one) => one.name === name);
+    if (Number.isFinite(value)) list.push({ x, y, to, colour: bad(desk.shown, name) ? "fail" : "pass", words: `${label.toLowerCase()} ${digits(value, 3)} ${unit} at ${digits(x, 3)} Hz` });
   };
   if (own[STABLE] === 1) {
     const level = Math.round((Math.min(...phase) + 180) / 360);
     const across = [...Array(1 - Math.min(level, 0)).keys()].flatMap((turn) => crossings(hertz, phase, -180 - 360 * turn, gain));
     const gm = nearest(across, -own[PLACE.gain_margin]), pm = nearest(crossings(hertz, gain, 0, phase).map(([f, at]) => [f, at - turned(at), at]), own[PLACE.phase_margin]);
-    if (gm) mark(top, "gain_margin", "gain margin", "dB", gm[0], gm[1], 0);
-    if (pm) mark(bottom, "phase_margin", "phase margin", "deg", pm[0], pm[2], turned(pm[2]));
+    if (gm) mark(top, "gain_margin", gm[0], gm[1], 0);
+    if (pm) mark(bottom, "phase_margin", pm[0], pm[2], turned(pm[2]));
   }
   tell("bode", "marks", { panel: 0, marks: [...top, ...handles(hertz, gain)] });
   tell("bode", "marks", { panel: 1, marks: bottom });
