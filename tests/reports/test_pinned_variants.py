@@ -22,6 +22,7 @@ CURSOR = """(name) => { const svg = document.querySelector(`[data-chart=${name}]
 def press(page: Page, does: str, letter: str = "") -> None:
     of = f'[data-letter="{letter}"]' if letter else ""
     settled(page, lambda: page.click(f'[data-do="{does}"]{of}'))
+    page.wait_for_selector("#hands-on[data-behind=done]")
 
 
 def column(page: Page, heading: str) -> list[str]:
@@ -46,7 +47,6 @@ def test_variants_stand_side_by_side_and_undo_holds(opens, tmp_path) -> None:
         press(page, "pin")
         wanted[letter] = command_line(saved(page, tmp_path / f"{letter}.toml"))["position"]
     press(page, "reset")
-    page.wait_for_selector("#hands-on[data-behind=done]")
     followed = page.evaluate("JSON.parse(document.getElementById('live-data').textContent).figures")
     for letter, figures in wanted.items():
         for cell, figure in zip(column(page, letter), followed, strict=False):
