@@ -17,7 +17,7 @@ EXTRAS := $(patsubst %,--extra %,cluster dev docs export nightly pdf plot tables
 COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
   --no-emit-options --no-emit-index-url --no-emit-find-links --constraint constraints.txt
 
-.PHONY: page differential newest installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
+.PHONY: page d3 differential newest installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
 
 # The main job.
 report: $(CORE)
@@ -70,8 +70,12 @@ machines: $(ALL)
 # The page's scripts: types, rules, and their pure parts by node's own runner.
 page:
 	@if command -v npm >/dev/null 2>&1 && npm ci --silent --no-audit --no-fund; then \
-	  npx tsc -p jsconfig.json && npx eslint reports/templates/page && node --test tests/page/*.test.mjs; \
+	  node d3.bundle.js --check && npx tsc -p jsconfig.json && npx eslint reports/templates/page && node --test tests/page/*.test.mjs; \
 	else echo "no npm here, or no registry: the page's scripts are not checked"; fi
+
+# d3's axes and zoom for the page, anew from the versions in package-lock.json.
+d3:
+	npm ci --silent --no-audit --no-fund && node d3.bundle.js
 
 check: $(ALL) page
 	$(BIN)/ruff check .

@@ -15,25 +15,13 @@ from actuator_lti.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class Bound:
-    """The most of something that is taken in.
+    """The most of something that is taken in."""
 
-    Attributes
-    ----------
-    what : str
-        In words, plural where it counts.
-    most : int
-    unit : str
-        Empty for a count.
-    asked_by : str
-        The option or key to change; empty where the input itself is too large.
-    reason : str
-    """
-
-    what: str
+    what: str  # in words, plural where it counts
     most: int
     reason: str
-    unit: str = ""
-    asked_by: str = ""
+    unit: str = ""  # empty for a count
+    asked_by: str = ""  # the option or key to change; empty where the input itself is too large
 
     @property
     def allowed(self) -> str:

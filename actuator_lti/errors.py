@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
+from numbers import Integral
+from reprlib import Repr
+from typing import Any
 
 LONGEST = 1000  # characters of a refusal; what stands in a file may be longer
 
@@ -65,3 +69,47 @@ class OutOfTime(Exception):
 
 class TooManyTicks(NumericalError):
     """Runs that would take longer than anybody waits for; nothing has been computed."""
+
+
+def finite_number(name: str, value: Any, allowed: str = "a finite number, in SI") -> float:
+    """An argument that is one finite real number; anything else is refused with what is allowed.
+
+    Examples
+    --------
+    >>> finite_number("load_Nm", "4 N*m")
+    Traceback (most recent call last):
+    actuator_lti.errors.InputError: load_Nm = '4 N*m': must be a finite number, in SI
+    """
+    try:
+        number = float("nan" if isinstance(value, str | bytes) else value)
+    except (TypeError, ValueError, OverflowError):
+        number = float("nan")
+    if not isfinite(number):
+        raise InputError(f"{name} = {shown(value)}: must be {allowed}")
+    return number
+
+
+def whole_number(name: str, value: Any, least: int = 1) -> int:
+    """An argument that is a whole number from ``least`` on.
+
+    Examples
+    --------
+    >>> whole_number("cycles", 2.5)
+    Traceback (most recent call last):
+    actuator_lti.errors.InputError: cycles = 2.5: must be a whole number, at least 1
+    """
+    if not isinstance(value, Integral) or value < least:
+        raise InputError(f"{name} = {shown(value)}: must be a whole number, at least {least}")
+    return int(value)
+
+
+_SHORT = Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 100
+
+
+def shown(value: Any) -> str:
+    """What was given instead, for one line: the ends of what is long."""
+    try:
+        return str(value) if isinstance(value, float) else _SHORT.repr(value)
+    except ValueError:
+        return "a number of more digits than Python writes"

@@ -22,21 +22,11 @@ FORESEEN = NumericalError | OutOfTime
 
 @dataclass(frozen=True)
 class Missing:
-    """A part that could not be computed.
+    """A part that could not be computed."""
 
-    Attributes
-    ----------
-    part : str
-        In words.
-    why : str
-        One line.
-    traceback : str
-        Where it happened; empty for a numerical failure, which was foreseen.
-    """
-
-    part: str
-    why: str
-    traceback: str
+    part: str  # in words
+    why: str  # one line
+    traceback: str  # where it happened; empty for a numerical failure, which was foreseen
 
 
 _noted: ContextVar[list[Missing] | None] = ContextVar("noted", default=None)

@@ -20,27 +20,15 @@ UNITS = ("_rad_s", "_rad", "_hz", "_Nm", "_s", "_degC", "_V", "_A")
 
 @dataclass(frozen=True, kw_only=True)
 class Option:
-    """A field as an option of a command.
+    """A field as an option of a command."""
 
-    Attributes
-    ----------
-    words : str
-        What it is, and its default where the design gives it.
-    metavar : str
-        What stands for the value in the help.
-    flag : str
-        The option, without dashes; the field's name without its unit where empty.
-    kind : {"plain", "output", "load", "command"}
-        ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without;
-        ``"command"``: of the command of the outermost loop, with or without.
-    argument : bool
-        Whether it stands by its place, without a flag; it has to be given where it has no default.
-    """
-
-    words: str
-    metavar: str = ""
-    flag: str = ""
+    words: str  # what it is, and its default where the design gives it
+    metavar: str = ""  # what stands for the value in the help
+    flag: str = ""  # the option, without dashes; the field's name without its unit where empty
+    # ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without;
+    # ``"command"``: of the command of the outermost loop, with or without
     kind: Kind = "plain"
+    # Whether it stands by its place, without a flag; it has to be given where it has no default
     argument: bool = False
 
 

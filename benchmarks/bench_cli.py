@@ -67,7 +67,7 @@ def drawing_rows(quick: bool = False) -> Iterable[Row]:
     from reports.html import page
 
     design = load_design("ilr33-amber")
-    made = loads(dumps(design_report(design, validation_sections(design, timing=False))))
+    made = loads(dumps(design_report(design, validation_sections(design))))
     blocks = figures(made)
     times = 1 if quick else 3
     note = f"{len(blocks)} figures, processor time, median of {times}"
@@ -75,7 +75,7 @@ def drawing_rows(quick: bool = False) -> Iterable[Row]:
     yield Row(group="cli", name="static figures of a report", measured=drawn, unit="s", target=1.5, note=note)
     size = len(page(made)) / 1e6
     yield Row(group="cli", name="page of a report", measured=size, unit="MB", target=2.5)
-    again = processor_s(lambda: design_report(design, validation_sections(design, timing=False)))
+    again = processor_s(lambda: design_report(design, validation_sections(design)))
     whole = again + processor_s(lambda: page(made))
     yield Row(
         group="cli", name="whole report with validation", measured=whole, unit="s", target=3.0,

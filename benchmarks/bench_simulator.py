@@ -20,7 +20,7 @@ from benchmarks.plain_servo import PlainServo
 from benchmarks.row import Row
 from nonlinear import Rows, commands, loads, simulate
 from nonlinear._kernels import layout as at
-from nonlinear.native import call
+from nonlinear.native import parameters, resume
 
 Floats = npt.NDArray[np.float64]
 GROUP = "simulator"
@@ -75,8 +75,15 @@ def sawtooth(design: Design | None = None) -> Rows:
 def seconds_of(row: np.ndarray, repeats: int) -> float:
     """Best time of the compiled run with its history."""
     history, flags = room(row)
-    out, shared, tables = np.zeros(at.OUT_SIZE), np.zeros(2), np.zeros(1)
-    return best_of(lambda: call(row, tables, history, flags, out, shared), repeats)
+    return best_of(lambda: run(row, history, flags), repeats)
+
+
+def run(row: np.ndarray, history: np.ndarray, flags: np.ndarray) -> np.ndarray:
+    """The compiled run of a row, from its parameters on; what it sums up."""
+    out = np.zeros(at.OUT_SIZE)
+    p, s = parameters(row)
+    resume(p, s, np.zeros(1), history, flags, out, np.zeros(2))
+    return out
 
 
 def room(row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -196,8 +203,7 @@ def two_mass_with_play(best: float, quick: bool) -> Row:
     rows["load"] = 4.0
     rows.sine("command", np.radians(5.0), 1.0)
     row = rows.values[0]
-    (history, flags), out, shared = room(row), np.zeros(at.OUT_SIZE), np.zeros(2)
-    taken = best_of(lambda: call(row, np.zeros(1), history, flags, out, shared), 2 if quick else 8)
+    taken, out = seconds_of(row, 2 if quick else 8), run(row, *room(row))
     return Row(
         group=GROUP,
         name="two masses with play and both sides' friction over the baseline, time a tick",
@@ -213,9 +219,7 @@ def two_threads(quick: bool) -> Row:
     batch = sawtooth().repeat(1000)
     batch["ticks"] = 2000 if quick else 20_000
     batch.sine("command", np.linspace(0.001, 0.1, 1000), 3.0)
-    pairs = [
-        [best_of(lambda n=n: batch.run(threads=n), 1, time.perf_counter) for n in (1, 2)] for _ in range(3)
-    ]
+    pairs = [[best_of(partial(batch.run, threads=n), 1, time.perf_counter) for n in (1, 2)] for _ in range(3)]
     one, two = np.array(pairs).min(axis=0)
     return Row(
         group=GROUP,
@@ -255,8 +259,7 @@ def constant_cost(quick: bool) -> Iterator[Row]:
     costs = []
     for ticks in (10**4, 10**6, 10**7 if quick else 10**8):
         row[at.TICKS] = ticks
-        history, flags, out = np.empty((0, 0)), np.empty(0, np.uint16), np.zeros(at.OUT_SIZE)
-        work = partial(call, row, np.zeros(1), history, flags, out, np.zeros(2))
+        work = partial(run, row, np.empty((0, 0)), np.empty(0, np.uint16))
         costs.append(best_of(work, 50 if ticks <= 10**6 else 1) / ticks)
     yield Row(
         group=GROUP,

@@ -199,7 +199,7 @@ def _dask(quick: bool) -> Iterator[Row]:
     def run(engine: Engine) -> float:
         with tempfile.TemporaryDirectory() as folder:
             store = Store.open(Path(folder), {}, 1000 if quick else 4096)
-            return _timed(lambda: engine.run(task, store.chunks(count), store.write))[0]
+            return _timed(lambda: engine.map(task, store.chunks(count), store.write))[0]
 
     with (
         distributed.LocalCluster(
@@ -207,7 +207,7 @@ def _dask(quick: bool) -> Iterator[Row]:
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
-        client.run(task.evaluate, 0, 10)  # every worker has its compiled code
+        client.run(task, (0, 10))  # every worker has its compiled code
         engines = (Engine(threads=2), Engine(scheduler=cluster.scheduler_address))
         taken = [[run(engine) for engine in engines] for _ in range(2)]
     here, there = (min(pair) for pair in zip(*taken, strict=True))

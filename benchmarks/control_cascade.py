@@ -16,7 +16,12 @@ from actuator_lti.design.model import Design
 
 def build(design: Design, load_Nm: float) -> control.InterconnectedSystem:
     """Position P, velocity PI and current PI around the drive, from ``ref`` (output, rad) to ``th``."""
-    m, c, limits = design.motor, design.controller, design.limits
+    m, limits, place = design.motor, design.limits, design.controller.position_loop
+    velocity, current = design.controller.velocity, design.controller.current
+    assert velocity is not None  # the baseline's cascade
+    assert velocity.integral_time_s is not None
+    assert current is not None
+    assert current.integral_time_s is not None
     Tc, Cv, ws = (
         design.friction.dry_Nm(load_Nm),
         design.friction.viscous(),
@@ -43,15 +48,15 @@ def build(design: Design, load_Nm: float) -> control.InterconnectedSystem:
         return control.nlsys(update, output, inputs=["r", "y"], outputs=["v"], states=1, name=name)
 
     def position(t: float, x: np.ndarray, u: np.ndarray, params: dict) -> np.ndarray:
-        return np.clip([c.position.gain * (N * u[0] - u[1])], -limits.speed_rad_s, limits.speed_rad_s)
+        return np.clip([place.gain * (N * u[0] - u[1])], -limits.speed_rad_s, limits.speed_rad_s)
 
     systems = [
         control.nlsys(
             drive, lambda t, x, u, p: x, inputs=["u"], outputs=["i", "w", "th"], states=3, name="d"
         ),
         control.nlsys(None, position, inputs=["ref", "th"], outputs=["w_ref"], name="p"),
-        pi_controller("v", c.velocity.gain, c.velocity.integral_time_s, limits.peak_current_A),
-        pi_controller("c", c.current.gain_V_A, c.current.integral_time_s, limits.voltage_V),
+        pi_controller("v", velocity.gain, velocity.integral_time_s, limits.peak_current_A),
+        pi_controller("c", current.gain_V_A, current.integral_time_s, limits.voltage_V),
     ]
     wires = [
         ["d.u", "c.v"],

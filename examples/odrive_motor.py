@@ -23,7 +23,7 @@ from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import by_record, correlated_covariance
-from analyses.records import open_record
+from analyses.records.open_record import open_record
 from analyses.records.record import Record
 
 ESTIMATOR_RAD_S = 1000.0

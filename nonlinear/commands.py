@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import isfinite, pi
+from math import pi
+from operator import length_hint
 from os import PathLike
 
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES
-from actuator_lti.errors import InputError
+from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES, Bound
+from actuator_lti.errors import InputError, finite_number, shown, whole_number
 from nonlinear._kernels import layout as at
 
 __all__ = [
@@ -125,6 +126,8 @@ class Command:
         """Value at each of the first ``ticks`` ticks, as the simulator sees it."""
         from nonlinear.native import fill
 
+        _positive("values", period_s=period_s)
+        SIGNAL_ROWS.check(whole_number("ticks", ticks, 0))
         row, table = np.zeros(at.SIGNAL_SIZE), self.table(period_s, ticks)
         write(self, row, 0, 0, 0 if table is None else table.size)
         out = np.empty(ticks)
@@ -144,8 +147,7 @@ def write(command: Command, row: Floats, place: int, offset: int, length: int) -
 
 def _finite(kind: str, **values: float) -> None:
     for name, value in values.items():
-        if not isfinite(value):
-            raise InputError(f"command {kind}: {name} = {value}: must be a finite number")
+        finite_number(f"command {kind}: {name}", value)
 
 
 def _positive(kind: str, **values: float) -> None:
@@ -153,6 +155,38 @@ def _positive(kind: str, **values: float) -> None:
     for name, value in values.items():
         if value <= 0.0:
             raise InputError(f"command {kind}: {name} = {value}: must be positive")
+
+
+def numbers_of(name: str, given: npt.ArrayLike) -> Floats:
+    """An argument that is a number or a series of them, as one row; counted before it is laid out."""
+    _count(given, SIGNAL_ROWS, name)
+    try:
+        if isinstance(given, Sequence) and len(given) and isinstance(given[0], range):
+            raise TypeError
+        return np.asarray(given, dtype=float).ravel()
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{name} = {shown(given)}: must be numbers, in SI") from None
+
+
+def _count(given: object, bound: Bound, name: str = "") -> None:
+    """Refuse what says that it is longer than a bound."""
+    try:
+        count: float = length_hint(given)
+    except OverflowError:
+        count = float("inf")
+    bound.check(count, name=name)
+
+
+def _frequencies(kind: str, given: Sequence[float]) -> Floats:
+    """Positive frequencies, at least one and not too many."""
+    _count(given, TONES)
+    f = numbers_of(f"command {kind}: frequencies_hz", given)
+    TONES.check(f.size)
+    for one in f:
+        _positive(kind, frequencies_hz=float(one))
+    if not f.size:
+        raise InputError(f"command {kind}: at least one frequency needed")
+    return f
 
 
 def hold(angle_rad: float = 0.0) -> Command:
@@ -176,6 +210,8 @@ def step(amplitude_rad: float, start_s: float = 0.0) -> Command:
 def ramp(rate_rad_s: float, start_s: float = 0.0, stop_s: float = float("inf")) -> Command:
     """Constant speed of the output from ``start_s`` to ``stop_s``, held afterwards."""
     _finite("ramp", rate_rad_s=rate_rad_s, start_s=start_s)
+    if stop_s != float("inf"):
+        _finite("ramp", stop_s=stop_s)
     if not stop_s > start_s:
         raise InputError(f"command ramp: stop_s = {stop_s}: must be later than start_s = {start_s}")
     return Command("ramp", at.RAMP, (rate_rad_s, start_s, stop_s - start_s))
@@ -226,12 +262,9 @@ def stepped_sine(
     """
     _finite("stepped_sine", amplitude_rad=amplitude_rad)
     _positive("stepped_sine", period_s=period_s)
-    TONES.check(len(frequencies_hz))
-    for frequency in frequencies_hz:
-        _positive("stepped_sine", frequencies_hz=frequency)
-    if cycles < 1 or settle_cycles < 0 or not len(frequencies_hz):
-        raise InputError("command stepped_sine: at least one frequency and one cycle needed")
-    f = _sampled_at("stepped_sine", frequencies_hz, period_s)
+    f = _sampled_at("stepped_sine", _frequencies("stepped_sine", frequencies_hz), period_s)
+    whole_number("command stepped_sine: cycles", cycles)
+    whole_number("command stepped_sine: settle_cycles", settle_cycles, 0)
     SIGNAL_ROWS.check(cycles + settle_cycles)
     slowest = float(f.min()) * period_s
     SIGNAL_ROWS.check((cycles + settle_cycles) / slowest if slowest else np.inf)
@@ -265,16 +298,11 @@ def multisine(
     """
     _finite("multisine", amplitude_rad=amplitude_rad)
     _positive("multisine", duration_s=duration_s, period_s=period_s)
-    TONES.check(len(frequencies_hz))
+    given = _frequencies("multisine", frequencies_hz)
     SIGNAL_ROWS.check(duration_s / period_s)
-    TONE_TICKS.check(len(frequencies_hz) * duration_s / period_s)
-    if seed < 0:
-        raise InputError(f"command multisine: seed = {seed}: must be 0 or more")
-    for frequency in frequencies_hz:
-        _positive("multisine", frequencies_hz=frequency)
-    if not len(frequencies_hz):
-        raise InputError("command multisine: at least one frequency needed")
-    wanted = _sampled_at("multisine", frequencies_hz, period_s)
+    TONE_TICKS.check(given.size * duration_s / period_s)
+    whole_number("command multisine: seed", seed, 0)
+    wanted = _sampled_at("multisine", given, period_s)
     periods = np.rint(wanted * duration_s)
     if periods.min() < 1.0:
         message = f"command multisine: {wanted.min():g} Hz: less than one period in {duration_s:g} s"
@@ -291,9 +319,8 @@ def multisine(
     return Command("multisine", at.TABLE, (), float(f.max()), float(t[-1]), np.vstack([t, values]))
 
 
-def _sampled_at(kind: str, frequencies_hz: Sequence[float], period_s: float) -> Floats:
-    """Frequencies as an array, each refused that samples cannot hold."""
-    f = np.asarray(frequencies_hz, dtype=float)
+def _sampled_at(kind: str, f: Floats, period_s: float) -> Floats:
+    """The frequencies, refused where samples cannot hold one."""
     if f.max() * period_s >= 0.5:
         message = f"command {kind}: {f.max():g} Hz: must be below the Nyquist frequency"
         raise InputError(f"{message} of its table, {0.5 / period_s:g} Hz")
@@ -376,7 +403,7 @@ def on_its_clock(time_s: npt.ArrayLike, values: npt.ArrayLike, where: str = "ser
 
 def _checked(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str) -> tuple[Floats, Floats]:
     """Rising finite times and as many finite values."""
-    times, values = np.asarray(time_s, dtype=float).ravel(), np.asarray(angle_rad, dtype=float).ravel()
+    times, values = numbers_of("times", time_s), numbers_of("angles", angle_rad)
     if times.size != values.size or times.size < 2:
         raise InputError(
             f"{times.size} times and {values.size} angles: equal numbers, at least 2, needed", where

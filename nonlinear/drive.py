@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.errors import InputError, NumericalError, finite_number
 from nonlinear._kernels import layout as at
+from nonlinear.commands import numbers_of
 from nonlinear.native import control_tick, parameters, tick
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.setup import put_state
@@ -62,7 +63,7 @@ class Drive:
     ) -> None:
         row = design_row(design, friction_on=friction_on, limits_on=limits_on)
         put_state(row, initial or State())
-        row[at.LOAD] = load_Nm
+        row[at.LOAD] = finite_number("load_Nm", load_Nm)
         self.design = design
         self._p, self._s = parameters(row)
         self._io = np.zeros(at.IO_SIZE)
@@ -123,10 +124,11 @@ class Drive:
 
     def set(self, state: Floats) -> None:
         """Go on from a state that `get` of a drive of the same design returned."""
-        if state.shape != self._s.shape:
-            message = f"state of {state.size} numbers: this drive has {self._s.size}"
+        given = numbers_of("state", state)
+        if given.size != self._s.size:
+            message = f"state of {given.size} numbers: this drive has {self._s.size}"
             raise InputError(message, where=self.design.name)
-        self._s[:] = state
+        self._s[:] = given
 
     def value(self, name: str) -> float:
         """A number of the state by its name in `STATE_NAMES`."""

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import finite_number
 from nonlinear.commands import Command, on_its_clock
 
 __all__ = ["LoadMoment", "constant", "proportional", "series"]
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,16 +27,13 @@ class LoadMoment:
 
 def constant(moment_Nm: float) -> LoadMoment:
     """The same moment all the time."""
-    if not np.isfinite(moment_Nm):
-        raise InputError(f"load_Nm = {moment_Nm}: must be a finite number")
-    return LoadMoment(constant_Nm=float(moment_Nm))
+    return LoadMoment(constant_Nm=finite_number("load_Nm", moment_Nm))
 
 
 def proportional(slope_Nm_rad: float, offset_Nm: float = 0.0) -> LoadMoment:
     """Load torque ``offset + slope * output angle``; a negative slope pulls the canard back."""
-    if not (np.isfinite(slope_Nm_rad) and np.isfinite(offset_Nm)):
-        raise InputError(f"load slope = {slope_Nm_rad}, offset = {offset_Nm}: must be finite numbers")
-    return LoadMoment(constant_Nm=float(offset_Nm), slope_Nm_rad=float(slope_Nm_rad))
+    offset = finite_number("offset_Nm", offset_Nm)
+    return LoadMoment(constant_Nm=offset, slope_Nm_rad=finite_number("slope_Nm_rad", slope_Nm_rad))
 
 
 def series(time_s: npt.ArrayLike, moment_Nm: npt.ArrayLike, where: str = "load series") -> LoadMoment:

@@ -38,15 +38,13 @@ _ENTRIES = (
 LIBRARY = Library("run", _FOLDER, _ENTRIES, source_files(_FOLDER / "_kernels", Path(signals.__file__)), forms)
 
 
-def call(row: Floats, tables: Floats, history: Floats, flags: Flags, out: Floats, shared: Floats) -> int:
-    """Run one row, see `nonlinear._kernels.run`; ``history`` is (columns, rows) or empty."""
-    return resume(*parameters(row), tables, history, flags, out, shared)
-
-
 def resume(
     p: Floats, s: Floats, tables: Floats, history: Floats, flags: Flags, out: Floats, shared: Floats
 ) -> int:
-    """Go on from the state ``s``, which is changed, until tick ``p[TICKS]``; see `call`."""
+    """Go on from the state ``s``, which is changed, until tick ``p[TICKS]``, see `nonlinear._kernels.run`.
+
+    ``history`` is (columns, rows) or empty.
+    """
     io, block = np.zeros(layout.IO_SIZE), np.zeros(layout.BLOCK_SIZE)
     return int(LIBRARY.functions.run(p, s, io, block, tables, history.reshape(-1), flags, out, shared))
 

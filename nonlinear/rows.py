@@ -164,9 +164,19 @@ class Rows:
         """Keep minimum and maximum of every signal over the run."""
         self["with_extremes"] = 1.0
 
-    def run(self, *, threads: int | None = None, progress: Progress | None = None) -> BatchResult:
-        """Run all rows over the cores; what is kept of each is in the result."""
-        return run_rows(self.values, self.tables.joined(), threads=threads, progress=progress)
+    def run(
+        self,
+        *,
+        threads: int | None = None,
+        progress: Progress | None = None,
+        drives: Sequence[Running] | None = None,
+    ) -> BatchResult:
+        """Run all rows over the cores; what is kept of each is in the result.
+
+        With ``drives`` (`running`, one a row) each goes on from where it is, and stays where its row ends.
+        """
+        tables = self.tables.joined()
+        return run_rows(self.values, tables, threads=threads, progress=progress, drives=drives)
 
     def running(self, k: int = 0) -> Running:
         """One row at its start, to go on from piece by piece."""

@@ -38,64 +38,32 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Analysis:
-    """A question to a design.
+    """A question to a design."""
 
-    Attributes
-    ----------
-    name : str
-        Of the command, and of the section's module where that has no name of its own.
-    group : str
-        Panel of the help in which the command stands.
-    words : str
-        The command's help; its first paragraph stands in the list.
-    request : type or None
-        Dataclass of what is asked, its fields annotated (`analyses.request`); None: nothing.
-    function : str
-        ``package.name`` of ``(design, request) -> result``; ``analyses.NAME.NAME`` where empty. Where the
-        result says ``passed``, that is the exit status.
-    shown : str
-        The section's module in `reports.sections`, whose ``section(result)`` shows the result; without a page
-        that of a list.
-    also : bool
-        Whether a report has the section where it is asked for (``--also``).
-    doing : str
-        What the bar says while the function works, which then takes ``progress``.
-    alone : bool
-        Whether it is asked of no design; it has no page then.
-    page : bool
-        Whether it has a page (``--out``).
-    study : bool
-        Whether it is asked of a study (a file, or a design with variants), not of a design.
-    written : str
-        A flag of the request that is set where the answer is written as a page or as JSON.
-    keeps : bool
-        Whether the function takes ``out`` as well, the folder, and keeps there what it finds.
-    warns : bool
-        Whether what is suspicious about the design is said first.
-    stem : str
-        Name of the page's files; that of the command where empty.
-    out : str
-        Folder of the page where none is given; without it, a page is made only where ``--out`` says so.
-    example : str
-        Module whose docstring holds a file to start from, behind ``::``; ``--example`` prints it.
-    """
-
-    name: str
-    group: str
-    words: str
+    name: str  # of the command, and of the section's module where that has no name of its own
+    group: str  # panel of the help in which the command stands
+    words: str  # the command's help; its first paragraph stands in the list
+    # Dataclass of what is asked, its fields annotated (`analyses.request`); None: nothing
     request: type | None = None
+    # ``package.name`` of ``(design, request) -> result``; ``analyses.NAME.NAME`` where empty. Where the
+    # result says ``passed``, that is the exit status.
     function: str = ""
+    # The section's module in `reports.sections`, whose ``section(result)`` shows the result; without a page
+    # that of a list
     shown: str = ""
-    also: bool = False
-    doing: str = ""
-    alone: bool = False
-    page: bool = True
-    study: bool = False
+    also: bool = False  # whether a report has the section where it is asked for (``--also``)
+    doing: str = ""  # what the bar says while the function works, which then takes ``progress``
+    alone: bool = False  # whether it is asked of no design; it has no page then
+    page: bool = True  # whether it has a page (``--out``)
+    study: bool = False  # whether it is asked of a study (a file, or a design with variants), not of a design
+    # Whether the function takes ``out`` as well, the folder, and keeps there what it finds
     keeps: bool = False
-    written: str = ""
-    warns: bool = False
-    stem: str = ""
+    written: str = ""  # a flag of the request that is set where the answer is written as a page or as JSON
+    warns: bool = False  # whether what is suspicious about the design is said first
+    stem: str = ""  # name of the page's files; that of the command where empty
+    # Folder of the page where none is given; without it, a page is made only where ``--out`` says so
     out: str = ""
+    # Module whose docstring holds a file to start from, behind ``::``; ``--example`` prints it
     example: str = ""
 
     def asked(self, design: Design | Study | None, chosen: Tree) -> tuple[Any, ...]:
@@ -317,6 +285,7 @@ ANALYSES = (
         group="Bench records",
         request=CorrelationAsked,
         function="analyses.correlation.run.correlate",
+        shown="correlation",
         doing="simulating",
         stem="correlation",
         words="""

@@ -10,7 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from actuator_lti.design import design_hash
+from actuator_lti.design.model import Design
 from actuator_lti.files.reading import shown_path
+from actuator_lti.files.tree import Tree
+from analyses.linear.held_loops import HELD
+from analyses.linear.loop_figures import LoopFigures
 from reports.document import plain
 
 
@@ -22,11 +27,7 @@ def as_json(value: Any) -> Any:
     >>> as_json(1j), as_json(np.array([1.0, np.inf]))
     ({'size': 1.0, 'phase_deg': 90.0}, [1.0, None])
     """
-    from actuator_lti.design.model import Design
-
     if isinstance(value, Design):
-        from actuator_lti.design import design_hash
-
         return {"name": value.name, "hash": design_hash(value)}
     if is_dataclass(value) and not isinstance(value, type):
         return _named(value)
@@ -45,12 +46,55 @@ def as_json(value: Any) -> Any:
 
 def _named(value: Any) -> Any:
     """A result by its names, but the fields that ``repr`` leaves out; of a loop the figures."""
-    from analyses.linear.loop_figures import LoopFigures
-    from reports.loop_json import loop_json
-
     if isinstance(value, LoopFigures):
         return plain(loop_json(value))
     names = [each.name for each in fields(value) if each.repr]
     for kind in type(value).__mro__:
         names += [name for name, one in vars(kind).items() if isinstance(one, property)]
     return {name: as_json(getattr(value, name)) for name in dict.fromkeys(names)}
+
+
+def loop_json(figures: LoopFigures) -> Tree:
+    """Give everything known of one loop; a figure that does not exist is null."""
+    m, band, peaks, step = figures.margins, figures.bandwidth, figures.peaks, figures.step
+    return {
+        "stable": m.stable,
+        "verdict": m.verdict,
+        "evidence": m.evidence,
+        "evidence_reason": m.evidence_reason,
+        "gain_margin_db": m.gain_margin_db,
+        "phase_margin_deg": m.phase_margin_deg,
+        "delay_margin_s": m.delay_margin_s,
+        "modulus_margin": m.modulus_margin,
+        "modulus_frequency_rad_s": m.modulus_frequency_rad_s,
+        "disk_margin": m.disk_margin.alpha if m.disk_margin else None,
+        "gain_margins": [
+            {"ratio": g.ratio, "db": g.db, "frequency_rad_s": g.frequency_rad_s} for g in m.gain_margins
+        ],
+        "phase_margins": [{"deg": p.deg, "frequency_rad_s": p.frequency_rad_s} for p in m.phase_margins],
+        "delay_margins": [
+            {"seconds": d.seconds, "samples": d.samples, "frequency_rad_s": d.frequency_rad_s}
+            for d in m.delay_margins
+        ],
+        "bandwidth_hz": band.minus3db_hz if band else None,
+        "bandwidth_90deg_hz": band.minus90deg_hz if band else None,
+        "resonance_peak_db": band.resonance_peak_db if band else None,
+        "sensitivity_peak_db": m.sensitivity_peak_db,
+        "complementary_peak_db": peaks.complementary_db if peaks else None,
+        "rise_time_s": step.rise_time_s if step else None,
+        "overshoot_percent": step.overshoot_percent if step else None,
+        "settling_time_s": step.settling_time_s if step else None,
+        "period_s": m.period_s,
+        "band_rad_s": list(m.band_rad_s),
+        "notes": [*m.notes, *figures.notes],
+        **({"rotor": "free"} if figures.locked is not None else {}),
+        **{
+            key: more | loop_json(other)
+            for key, more, other in (
+                ("judged", {"how": HELD.get(figures.loop.name)}, figures.held),
+                ("rotor_locked", {}, figures.locked),
+                ("to_reference", {}, figures.reference),
+            )
+            if other is not None
+        },
+    }

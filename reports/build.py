@@ -14,6 +14,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
 from analyses.corners import corners
+from analyses.isolation import attempt, isolated
 from reports import document as doc
 from reports.analyses import BY_NAME, FURTHER, Analysis
 from reports.document_schema import Document
@@ -119,23 +120,11 @@ def design_report(
     progress: Progress | None = None,
     source: str | None = None,
 ) -> Document:
-    """Compute the report of a design as a document.
+    """Compute the report of a design as a document of `reports.document`.
 
-    Parameters
-    ----------
-    design : Design
-    validation : sequence of section, optional
-        Sections of the validator (or others), put after those of the loops, the verdicts of the validator
-        before them; their verdicts count.
-    progress : callable, optional
-        Called with (steps done, steps in all).
-    source : str, optional
-        The text that the design was read from: the page changes that, not one written anew.
-
-    Returns
-    -------
-    dict
-        The document of `reports.document`: plain JSON.
+    Sections of the validator (or others) are put after those of the loops, the verdicts of the validator
+    before them; their verdicts count. ``source``: the text that the design was read from; the page changes
+    that, not one written anew.
 
     Raises
     ------
@@ -143,7 +132,6 @@ def design_report(
         From the computations. Whatever else fails leaves out its part only: a notice stands in its place, and
         `analyses.isolation.drain` gives it.
     """
-    from analyses.isolation import attempt, isolated
     from reports.live import live_model
     from reports.provenance import provenance
     from reports.sections import answer
@@ -194,7 +182,6 @@ def _views(
     design: Design, survey: LoopSurvey | None
 ) -> tuple[WeakPoint | None, Mapping[str, Mapping[str, Spread]], Corners | None]:
     """The weakest point of all views, the spread over the operating points, and the corners."""
-    from analyses.isolation import attempt
     from analyses.specification.weakest import spread, weakest
 
     if survey is None:
@@ -206,7 +193,6 @@ def _views(
 
 def _mend(point: WeakPoint | None, survey: LoopSurvey | None, bounds: Corners | None) -> str:
     """Say which move mends the weakest point, where it is beyond its limit."""
-    from analyses.isolation import attempt
     from analyses.specification.mending import mending
     from reports.sections.answer import NO_MOVE, move_words
 
@@ -220,7 +206,6 @@ def _loops(
     design: Design, progress: Progress | None
 ) -> tuple[Mapping[str, LoopFigures], list[doc.Section], LoopSurvey | None]:
     """Compute the linear loops and make their sections; none where the loops themselves fail."""
-    from analyses.isolation import attempt
     from analyses.linear.loop_survey import survey_loops
     from analyses.specification.requirements import evaluate_requirements
 
@@ -239,8 +224,6 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
     InputError
         For a name that is none.
     """
-
-    from analyses.isolation import attempt, isolated
 
     for name in names:
         if name not in FURTHER:
@@ -264,7 +247,6 @@ def _further(one: Analysis, design: Design) -> doc.Section:
 
 def validation_sections(design: Design, progress: Progress | None = None) -> list[doc.Section]:
     """Put the predictions to the simulator; a design that cannot be tested says why."""
-    from analyses.isolation import attempt, isolated
     from analyses.validation import validate
     from reports.sections.validation import section
 
@@ -290,15 +272,12 @@ def notices(missing: Sequence[Missing], id: str) -> list[doc.Section]:
 
 def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) -> list[doc.Section]:
     """Make the sections about the linear loops, verdicts first."""
-    from analyses.isolation import attempt
     from reports.sections import (
-        break_points,
         delays,
         forms,
         limits,
         loop,
         margins,
-        operating_points,
         requirements,
         stiffness,
     )
@@ -312,8 +291,8 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     for name, result in figures.items():
         makers[f"Loop {name}"] = partial(loop.section, name, design, result)
     makers["Forms"] = lambda: forms.section(survey.forms, survey.refused)
-    makers["Break points"] = lambda: break_points.section(survey.break_points, figures)
-    makers["Operating points"] = lambda: operating_points.section(survey.operating_points, design)
+    makers["Break points"] = lambda: forms.break_points(survey.break_points, figures)
+    makers["Operating points"] = lambda: forms.operating_points(survey.operating_points, design)
     if survey.budgets:
         makers["Delays"] = lambda: delays.section(survey.budgets)
     if design.coupling is not None or design.load.path == "back-drivable":
@@ -333,10 +312,10 @@ def closing_sections(
     checked: bool = True,
 ) -> list[doc.Section]:
     """Make the sections that every report of a design ends with; ``checked``: by simulation too."""
-    from reports.sections import answer, parameters, provenance
+    from reports.sections import answer, parameters
 
     findings = () if checked else (answer.unchecked(),)
-    return [parameters.section(design, warnings), provenance.section(head, origin, findings)]
+    return [parameters.section(design, warnings), parameters.provenance(head, origin, findings)]
 
 
 def design_head(design: Design) -> Tree:

@@ -24,11 +24,7 @@ _PLACES = ("hz", "frequency", "rad/s")
 def certain(value: Any, name: str = "") -> Any:
     """Round every number of plain data to what is certain.
 
-    Parameters
-    ----------
-    value : plain data
-    name : str
-        Keys (and unit of the column) that it stands under: they tell differences and places of maxima.
+    ``name``: keys (and unit of the column) that it stands under, which tell differences and places of maxima.
 
     Examples
     --------

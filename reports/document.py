@@ -28,18 +28,19 @@ from reports.document_schema import (
     Block,
     Cell,
     Column,
+    Counts,
     Document,
     FactItem,
+    Finding,
     Layout,
     Row,
     Section,
     Severity,
+    State,
     Status,
     VerdictItem,
     validate,
 )  # fmt: skip
-from reports.findings import Finding
-from reports.findings import plain as plain_findings
 from reports.verdict_summary import verdict_of, walk
 from reports.visible import visible
 
@@ -51,10 +52,10 @@ T = TypeVar("T")
 Shown = tuple[Column, Callable[[Any], Any]]
 
 __all__ = [
-    "Block", "Cell", "Column", "Document", "Row", "Section", "VerdictItem", "abscissa", "certain", "check",
-    "column", "details", "document", "dumps", "fact", "facts", "figure", "figures", "listing", "load",
-    "loads", "of", "plain", "rounded", "section", "table", "text", "validate", "verdict", "verdicts",
-    "waived", "walk", "with_columns",
+    "Block", "Cell", "Column", "Counts", "Document", "Finding", "Row", "Section", "State",
+    "VerdictItem", "certain", "check", "column", "details", "document", "dumps", "fact",
+    "facts", "figure", "figures", "listing", "load", "loads", "of", "plain", "rounded", "section",
+    "table", "text", "validate", "verdict", "verdicts", "waived", "walk", "with_columns",
 ]  # fmt: skip
 
 
@@ -92,23 +93,14 @@ def rounded(values: Any, digits: int = 5) -> list[float | None]:
     return [float(f"{item:.{digits}g}") if math.isfinite(item) else None for item in array.tolist()]
 
 
-def abscissa(values: Any, digits: int = 5) -> list[float]:
-    """Give what stands along an axis, where every value is there, as `rounded` gives a curve."""
-    return [float(f"{item:.{digits}g}") for item in np.asarray(values, dtype=float).tolist()]
-
-
 def column(
     key: str, label: str, unit: str = "", *, align: Align | None = None, format: str = "text", better: int = 0
 ) -> Column:
     """Describe a table's column.
 
-    Parameters
-    ----------
-    format : str
-        ``"text"``, ``"sig:3"`` (significant digits), ``"short:4"`` (the same without trailing zeros),
-        ``"fix:1"`` (decimals), ``"int"`` (a count), ``"ms:3"`` (ms, or s for a long time) or ``"yesno"``.
-    better : int
-        Which way is better from night to night: +1 more, -1 less, +2 or -2 that of the magnitude; 0: neither.
+    ``format``: ``"text"``, ``"sig:3"`` (significant digits), ``"short:4"`` (the same without trailing zeros),
+    ``"fix:1"`` (decimals), ``"int"`` (a count), ``"ms:3"`` (ms, or s for a long time) or ``"yesno"``.
+    ``better`` from night to night: +1 more, -1 less, +2 or -2 that of the magnitude; 0: neither.
     """
     side: Align = align or ("left" if format in ("text", "yesno") else "right")
     made: Column = {"key": key, "label": label, "unit": unit, "align": side, "format": format}
@@ -182,18 +174,10 @@ def listing(
 
 
 def figure(name: str, chart: Chart, caption: str, *, alt: str = "", layout: Layout = "wide") -> Block:
-    """Make a figure of a chart.
+    """Make a figure of a chart; ``name`` is its kind, such as ``"bode"``.
 
-    Parameters
-    ----------
-    name : str
-        What kind of figure it is, such as ``"bode"``.
-    caption : str
-        What is seen; a figure must be understood alone.
-    alt : str
-        What stands for it where it cannot be seen; the caption, where nothing more is to be said.
-    layout : str
-        ``"wide"``, ``"half"`` of the page's width, or ``"tall"``: half as wide, two rows high.
+    The caption says what is seen: a figure must be understood alone. ``alt`` stands for it where it cannot be
+    seen; ``layout``: wide, half of the page's width, or tall (half as wide, two rows high).
     """
     return {
         "kind": "figure",
@@ -317,22 +301,11 @@ def section(
     findings: Iterable[Finding] = (),
     verdict: Verdict | None = None,
 ) -> Section:
-    """Make a section.
+    """Make a section; ``id`` is its anchor.
 
-    Parameters
-    ----------
-    id : str
-        Its anchor.
-    result : str
-        One sentence that says what was found; it comes first.
-    intro : str
-        How it was found.
-    told : Severity, optional
-        How grave the result is, where the first screen says it.
-    findings : iterable of Finding
-        What else the first screen has to say of it.
-    verdict : Verdict, optional
-        Not proven: a report is not proven by this section, whatever its verdicts.
+    ``result``: one sentence that says what was found, ``intro``: how. ``told``: how grave the result is,
+    where the first screen says it; ``findings``: what else that has to say. Where ``verdict`` is not proven,
+    a report is not proven by this section, whatever its verdicts.
     """
     first = [Finding(severity=told, text=result, where=id)] if told and result else []
     made: Section = {
@@ -342,7 +315,7 @@ def section(
         "intro": intro,
         "status": status,
         "blocks": list(blocks),
-        "findings": plain_findings([*first, *findings]),
+        "findings": [*first, *findings],
     }
     return made if verdict is None else {**made, "verdict": verdict.value}
 

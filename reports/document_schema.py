@@ -184,12 +184,12 @@ class GlanceLoop(TypedDict):
     figures: list[GlanceFigure]
 
 
-class FindingItem(TypedDict):
-    """One sentence that a reader must know."""
+class Finding(TypedDict):
+    """One sentence that the reader of a drive must know."""
 
-    severity: Severity
-    text: str
-    where: str
+    severity: Severity  # fail: unfit as it is; warn: to be watched; info: good to know
+    text: str  # a whole sentence, with the figure that it is about
+    where: str  # the id of the section that shows it
 
 
 class Weakest(TypedDict):
@@ -224,7 +224,7 @@ class GlanceBlock(TypedDict):
     linear: NotRequired[str]
     bars: NotRequired[list[Bar]]
     more_bars: NotRequired[int]
-    findings: list[FindingItem]
+    findings: list[Finding]
     more: int
 
 
@@ -243,7 +243,7 @@ class Section(TypedDict):
     intro: str
     status: Status
     verdict: NotRequired[Judged]
-    findings: NotRequired[list[FindingItem]]
+    findings: NotRequired[list[Finding]]
     blocks: list[Block]
 
 

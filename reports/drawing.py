@@ -24,16 +24,8 @@ def draw_all(
 ) -> list[str]:
     """Draw figure blocks, in order; one that fails is a notice in its place, and is noted.
 
-    Parameters
-    ----------
-    blocks : sequence of mapping
-        Figure blocks of a document; their charts pass through JSON, so that a page equals one made of
-        report.json.
-    progress : callable, optional
-        Called with (drawn, in all).
-    page : bool
-        For a page: a picture a column, colours as CSS variables with the light ones as fallback, the legend
-        as a list. Otherwise one picture with plain colours.
+    For a page: a picture a column, colours as CSS variables with the light ones as fallback, the legend as a
+    list. Otherwise one picture with plain colours.
     """
     drawn: list[str] = []
     for k, block in enumerate(blocks):

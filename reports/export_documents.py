@@ -8,6 +8,9 @@ from pathlib import Path
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from analyses.linear.code_check import CodeCheck
+from analyses.validation.row import Row
+from reports.html import page
+from reports.sections.validation import loop_name, quantity_name
 
 
 def export_documents(design: Design, check: CodeCheck | None = None) -> dict[str, bytes]:
@@ -17,8 +20,6 @@ def export_documents(design: Design, check: CodeCheck | None = None) -> dict[str
     licence.
     """
     from reports.build import design_report
-    from reports.export_check import check_text
-    from reports.html import page
 
     return {
         "index.html": page(design_report(design)).encode(),
@@ -37,3 +38,64 @@ def licence_text() -> str:
         return distribution("actuator-lti").read_text("licenses/LICENSE") or "MIT"
     except PackageNotFoundError:
         return "MIT"
+
+
+TITLE = "## Margins of the compiled code"
+GROUPS = (
+    ("response", "(relative)", ("response",)),
+    ("gain margin", "(factor)", ("gain_margin", "gain_margin_up", "gain_margin_down")),
+    ("phase margin", "deg", ("phase_margin",)),
+    ("delay margin", "s", ("delay_margin",)),
+)
+
+
+def check_text(check: CodeCheck | None, *, single_precision: bool = False) -> str:
+    """The section of a README, as Markdown; without a check it was not asked for.
+
+    What is measured is the code in double precision, also where the files are in single.
+    """
+    if check is None:
+        return f"{TITLE}\n\nNot measured at this export (`--no-check`).\n"
+    if check.reason:
+        return f"{TITLE}\n\nNot measured: {check.reason}.\n"
+    double = " Measured in double precision." if single_precision else ""
+    rows = "\n".join(_row(entry) for entry in check.entries)
+    return f"""{TITLE}
+
+This code, compiled by `{check.compiler}`, took the simulator's place: its derivative over one base period
+(central differences), a small step of each loop, and runs 1 % inside and outside of each gain margin, on a
+constant speed. Beside it the linear loops.{double}
+
+{summary(check)}
+
+| loop | quantity | unit | linear | this code | error | allowed | |
+|---|---|---|---|---|---|---|---|
+{rows}
+"""
+
+
+def summary(check: CodeCheck) -> str:
+    """One sentence: how many predictions are met, and the largest differences of the margins."""
+    if check.reason:
+        return f"margins of the compiled code: not measured ({check.reason})"
+    words = []
+    for name, unit, quantities in GROUPS:
+        worst = check.largest(*quantities)
+        if worst is not None:
+            words.append(f"{name} {worst.error:.2g} {unit} ({loop_name(worst.loop)})")
+    met = len(check.entries) - len(check.failed)
+    ends = f"; largest difference: {', '.join(words)}" if words else ""
+    return (
+        f"{met} of {len(check.entries)} predictions of the linear loops are met by the compiled code{ends}."
+    )
+
+
+def _row(row: Row) -> str:
+    words = [loop_name(row.loop), quantity_name(row), row.unit]
+    numbers = [_number(row.predicted, ".6g"), _number(row.found, ".6g")]
+    numbers += [f"{row.error:.1e}", f"{row.allowed:.2g}"]
+    return "| " + " | ".join([*words, *numbers, str(row.verdict)]) + " |"
+
+
+def _number(value: float | None, form: str) -> str:
+    return "" if value is None else format(value, form)

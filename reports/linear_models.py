@@ -2,18 +2,15 @@
 
 The sampled form is exact; the continuous one carries its delays apart
 (`actuator_lti.systems.delay_system`). What is
-written is one tree of names, units, matrices and margins; `read_models` gives it back from any of the files,
-and `system_of` one of its systems as margins, bandwidths and step figures take it.
+written is one tree of names, units, matrices and margins.
 """
 
 from __future__ import annotations
 
-import ast
 import io
 import json
 from dataclasses import asdict
-from math import isfinite, isqrt
-from pathlib import Path
+from math import isfinite
 from pprint import pformat
 from typing import TYPE_CHECKING, Any
 
@@ -148,32 +145,6 @@ def _system(system: Any, unit_in: str, unit_out: str) -> Tree:
     }
 
 
-def system_of(entry: Tree) -> Any:
-    """A system of a tree, written by any of the formats."""
-    from actuator_lti.systems.plain_delays import PlainDelaySystem
-    from actuator_lti.systems.plain_system import PlainSystem
-
-    n = isqrt(np.size(entry["A"]))
-    names: dict[str, Any] = {
-        "name": str(entry["name"]),
-        "source": str(entry["input"]),
-        "signal": str(entry["output"]),
-    }
-    names["states"] = tuple(str(state) for state in np.atleast_1d(entry["states"]))
-    k = np.size(entry["delays_s"]) if "delays_s" in entry else 0
-    sizes = {
-        "A": (n, n), "B": (n, 1), "C": (1, n), "D": (1, 1), "B1": (n, 1), "B2": (n, k), "C1": (1, n),
-        "C2": (k, n), "D11": (1, 1), "D12": (1, k), "D21": (k, 1), "D22": (k, k), "delays_s": (k,),
-    }  # fmt: skip
-    known = _DELAYED if "delays_s" in entry else _MATRICES
-    parts: dict[str, Any] = {
-        part: np.asarray(entry[part], dtype=float).reshape(sizes[part]) for part in known
-    }
-    if "delays_s" in entry:
-        return PlainDelaySystem(**parts, **names)
-    return PlainSystem(**parts, dt=float(entry["dt"]), **names)
-
-
 def written_models(tree: Tree, to: str) -> bytes:
     """The file of a tree.
 
@@ -205,39 +176,3 @@ def _for_matlab(value: Any) -> Any:
         texts = any(isinstance(item, str) for item in value)
         return np.array(value, dtype=object if texts else float)
     return value
-
-
-def _from_mat(path: Path) -> Any:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    try:
-        return loadmat(path, simplify_cells=True)
-    except (MatReadError, NotImplementedError) as error:
-        raise ValueError(error) from None
-
-
-def read_models(path: str | Path) -> Tree:
-    """The tree of a file that `written_models` made; its ending says how.
-
-    Raises
-    ------
-    InputError
-        For a file that is none.
-    """
-    path = Path(path)
-    try:
-        if path.suffix == ".mat":
-            tree: Any = _from_mat(path)
-        elif path.suffix == ".py":
-            body = ast.parse(path.read_text(encoding="utf-8")).body
-            tree = next(ast.literal_eval(one.value) for one in body if isinstance(one, ast.Assign))
-        else:
-            tree = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, SyntaxError, StopIteration) as error:
-        raise InputError(f"cannot be read: {error}", where=str(path)) from None
-    if not isinstance(tree, dict) or tree.get("schema") != SCHEMA:
-        raise InputError(
-            f"no linear models; allowed: a file of actuator-lti export linear ({SCHEMA})", where=str(path)
-        )
-    return tree

@@ -14,6 +14,7 @@ from jinja2 import Environment, PackageLoader
 
 IMPORT = re.compile(r'^import \{ ([\w, ]+) \} from "\./(\w+)\.js";\n', re.MULTILINE)
 ASIDE = re.compile(r"^[ \t]+|^//[^\n]*\n", re.MULTILINE)  # what a page does not need: indents, remarks
+GIVEN = re.compile(r"export\{([^}]*)\};\n?$")  # what a library put together by others says at its end
 EXPORT = re.compile(r"^export (const|class) (\w+)", re.MULTILINE)
 
 
@@ -44,6 +45,9 @@ def _take(name: str, made: dict[str, str], above: tuple[str, ...]) -> None:
     for _, other in wanted:
         _take(other, made, (*above, name))
     taken = "".join(f"const {{ {names} }} = {other}$;\n" for names, other in wanted)
-    given = ", ".join(name for _, name in EXPORT.findall(text))
-    body = ASIDE.sub("", EXPORT.sub(r"\1 \2", IMPORT.sub("", text)))
+    if library := GIVEN.search(text):
+        given = re.sub(r"([\w$]+) as (\w+)", r"\2: \1", library[1])
+    else:
+        given = ", ".join(name for _, name in EXPORT.findall(text))
+    body = ASIDE.sub("", GIVEN.sub("", EXPORT.sub(r"\1 \2", IMPORT.sub("", text))))
     made[name] = f"const {name}$ = (() => {{\n{taken}{body}return {{ {given} }};\n}})();\n"

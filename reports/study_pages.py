@@ -19,10 +19,10 @@ def study_document(
     from actuator_lti.design import design_hash
     from reports.build import design_head
     from reports.provenance import provenance
-    from reports.sections import provenance as provenance_section
+    from reports.sections import parameters
 
     head, origin = design_head(design), provenance(design_hash(design))
-    parts = [*sections, provenance_section.section(head, origin)]
+    parts = [*sections, parameters.provenance(head, origin)]
     return doc.document(
         title=title, subtitle=subtitle, design=head, provenance=origin, sections=parts, kind=kind
     )

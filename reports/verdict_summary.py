@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any, cast
 
 from actuator_lti.asked.verdict import Role, Tally, Verdict
-from reports.document_schema import Block, Counts, VerdictItem
+from reports.document_schema import Block, Counts, Finding, VerdictItem
 from reports.document_schema import Verdict as Overall
 
 WORDS = {
@@ -15,6 +15,7 @@ WORDS = {
     "checks": "checks by simulation",
     "odds": "requirements under tolerances",
 }
+SEVERITIES = ("fail", "warn", "info")
 _SECTIONS: tuple[tuple[str, str, Role], ...] = (
     ("failed_sections", "failed", "fail"),
     ("unproven_sections", "not proven", "warn"),
@@ -86,6 +87,13 @@ def walk(part: Mapping[str, Any]) -> Iterable[Block]:
     for block in part.get("blocks", ()):
         yield block
         yield from walk(block)
+
+
+def gathered(sections: Iterable[Mapping[str, Any]]) -> list[Finding]:
+    """Collect the findings that sections carry, the gravest first, each once."""
+    every = [item for part in sections for item in part.get("findings", ())]
+    apart = {(item["severity"], item["text"], item["where"]): item for item in every}
+    return sorted(apart.values(), key=lambda item: SEVERITIES.index(item["severity"]))
 
 
 def verdict_words(verdict: Mapping[str, Any]) -> list[str]:

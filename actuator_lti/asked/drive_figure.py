@@ -18,11 +18,6 @@ _SOURCES = {"capability": capability, "stiffness": stiffness_figures}
 def drive_figure(design: Design, name: str, load_Nm: float = 0.0) -> Any:
     """A figure in its unit, a float or an array; NaN where the drive has none.
 
-    Raises
-    ------
-    InputError
-        For another name, or a load that is not finite.
-
     Examples
     --------
     >>> from actuator_lti.design import load_design

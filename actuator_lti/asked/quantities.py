@@ -18,70 +18,37 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A figure of merit.
+    """A figure of merit."""
 
-    Attributes
-    ----------
-    name : str
-        As a requirement names it.
-    unit, linear_unit : str
-        In reports; on a linear axis, where that differs.
-    scope : {"loop", "drive", "analysis"}
-        ``analysis``: of one design at a time, by `analyses.specification.asked_figures`; studies of many
-        leave it out. description : str
-        How it is defined, for people who write requirements.
-    words : str
-        What reports call it.
-    reader : str
-        Where it is found: ``"margins.gain_margin_db"``, or an attribute of what `source` names; empty where
-        `cornered`.
-    source : {"loop", "capability", "stiffness", "analysis"}
-        What has it: the figures of a loop, `actuator_lti.drive.facts.Capability`,
-        `actuator_lti.loops.stiffness.StiffnessFigures`, or
-        `analyses.specification.asked_figures.AskedFigures`. better : {1, -1}
-        Whether larger or smaller is better.
-    absolute : bool
-        Whether its magnitude counts: a gain margin down as one up, a lead as a lag.
-    closed : bool
-        Whether it is a figure of the closed loop, which an unstable one has not.
-    timed : bool
-        Whether it is one of the step response: stairs of samples, without a slope.
-    size : float
-        Its usual size: what a distance to a limit of 0 is measured by.
-    heading : str
-        What the tables of a report call its column; empty where they have none.
-    title : str
-        What stands beside its number elsewhere; `words` with a capital where left out.
-    at_a_glance : str
-        How the first screen of a report writes it, such as ``fix:1``; empty where it does not show it.
-    followed : bool
-        Whether the table of the live page shows it.
-    cornered : str
-        The figure of a loop whose least over loops and corners it is: `analyses.corners` then has a corner
-        with the worst ends of the tolerances for that figure.
-    tolerance : float
-        In its unit: a smaller difference between two nights is rounding. A part in a thousand of the figure,
-        where that is more, counts as none in any case.
-    """
-
-    name: str
-    unit: str
+    name: str  # as a requirement names it
+    unit: str  # in reports
+    # ``analysis``: of one design at a time, by `analyses.specification.asked_figures`; studies of many leave
+    # it out
     scope: Literal["loop", "drive", "analysis"]
-    description: str
-    words: str
+    description: str  # how it is defined, for people who write requirements
+    words: str  # what reports call it
+    # Where it is found: ``"margins.gain_margin_db"``, or an attribute of what `source` names; empty where
+    # `cornered`
     reader: str
-    better: Literal[1, -1]
-    linear_unit: str = ""
-    absolute: bool = False
-    closed: bool = True
-    timed: bool = False
-    size: float = 1.0
+    better: Literal[1, -1]  # whether larger or smaller is better
+    linear_unit: str = ""  # in reports of a linear axis, where that differs
+    absolute: bool = False  # whether its magnitude counts: a gain margin down as one up, a lead as a lag
+    closed: bool = True  # whether it is a figure of the closed loop, which an unstable one has not
+    timed: bool = False  # whether it is one of the step response: stairs of samples, without a slope
+    size: float = 1.0  # its usual size: what a distance to a limit of 0 is measured by
+    # What has it: the figures of a loop, `actuator_lti.drive.facts.Capability`,
+    # `actuator_lti.loops.stiffness.StiffnessFigures`, or `analyses.specification.asked_figures.AskedFigures`
     source: Literal["loop", "capability", "stiffness", "analysis"] = "loop"
-    heading: str = ""
-    title: str = ""
+    heading: str = ""  # what the tables of a report call its column; empty where they have none
+    title: str = ""  # what stands beside its number elsewhere; `words` with a capital where left out
+    # How the first screen of a report writes it, such as ``fix:1``; empty where it does not show it
     at_a_glance: str = ""
-    followed: bool = False
+    followed: bool = False  # whether the table of the live page shows it
+    # The figure of a loop whose least over loops and corners it is: `analyses.corners` then has a corner with
+    # the worst ends of the tolerances for that figure
     cornered: str = ""
+    # In its unit: a smaller difference between two nights is rounding. A part in a thousand of the figure,
+    # where that is more, counts as none in any case.
     tolerance: float = 1e-9
 
     @property
@@ -255,10 +222,7 @@ def distance_from_minus_one(quantity: str, value: float) -> float | None:
 def reserve(quantity: str, value: float, limit: float, distance: float) -> float:
     """What is left to a limit as a share of it, negative beyond; of margins by their distance from -1.
 
-    Parameters
-    ----------
-    distance : float
-        To the limit, positive on the good side.
+    ``distance`` to the limit is positive on the good side.
 
     Examples
     --------

@@ -15,7 +15,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.delays.form import delay_form, in_series
 from actuator_lti.margins.delays.response import DelayResponse
 from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS
-from actuator_lti.margins.exact.extremes import smallest
+from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.loop import exact_loop, exact_polynomials
 from actuator_lti.margins.given import Given, given_of, whole_samples
 from actuator_lti.margins.late_response import first_turn, nearest_behind_delay

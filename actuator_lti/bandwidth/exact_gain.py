@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import flint
 
-from actuator_lti.margins.exact.extremes import least
+from actuator_lti.margins.exact.crossings import least
 from actuator_lti.margins.exact.roots import all_roots, even_and_odd, positive_roots
 from actuator_lti.systems.exact_fraction import Fraction, double
 
@@ -17,23 +17,13 @@ _V = flint.fmpq_poly([0, 1])
 
 @dataclass(frozen=True)
 class ExactGain:
-    """|H|^2 over v = w^2, a fraction of two polynomials; w = tan(angle/2) for a sampled system.
+    """|H|^2 over v = w^2, a fraction of two polynomials; w = tan(angle/2) for a sampled system."""
 
-    Attributes
-    ----------
-    above, below : fmpq_poly
-        |num(j w)|^2 and |den(j w)|^2.
-    real, imag : fmpq_poly
-        num(j w) conj(den(j w)) = real + j w imag.
-    dc : fmpq
-        H at zero frequency, with its sign.
-    """
-
-    above: flint.fmpq_poly
+    above: flint.fmpq_poly  # |num(j w)|^2 and |den(j w)|^2
     below: flint.fmpq_poly
-    real: flint.fmpq_poly
+    real: flint.fmpq_poly  # num(j w) conj(den(j w)) = real + j w imag
     imag: flint.fmpq_poly
-    dc: flint.fmpq
+    dc: flint.fmpq  # H at zero frequency, with its sign
 
     def crossings(self, level_squared: float) -> list[float]:
         """Every w > 0 at which |H| passes sqrt(level_squared) |H(0)|; where it only touches is left out."""

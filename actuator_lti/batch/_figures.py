@@ -24,6 +24,7 @@ from ._response import (
 )
 
 LISTED = 6  # crossovers of each kind that are kept
+FARTHEST = 1e10  # gain margin of 200 dB: what lies beyond, up or down, is not listed
 HIDDEN = 1e-10  # distance from 1 within which an eigenvalue is the angle's, which an inner loop does not see
 # Columns of a row of figures; crossover lists follow at FIRST_GAIN and FIRST_PHASE (pairs x, value).
 (
@@ -56,6 +57,13 @@ def _list(row, counter, first, x, value):
         row[first + 2 * k] = x
         row[first + 2 * k + 1] = value
     row[counter] = float(k + 1)
+
+
+@kernel
+def _list_negative(row, x, real):
+    """Add a crossing of the negative real axis, where its gain margin lies within 200 dB."""
+    if real < -1.0 / FARTHEST and real > -FARTHEST:
+        _list(row, PHASE_CROSSOVERS, FIRST_PHASE, x, -1.0 / real)
 
 
 @kernel
@@ -132,8 +140,8 @@ def _crossing(mode, x1, f1, x2, f2, row, n, h, b, c, work, state, exchanged):
     x, rr, ri = root(mode, 1.0, 0.0, x1, f1, x2, f2, n, h, b, c, work, state, exchanged)
     if mode == GAIN:
         _list(row, GAIN_CROSSOVERS, FIRST_GAIN, x, math.atan2(-ri, -rr))
-    elif rr < 0.0:
-        _list(row, PHASE_CROSSOVERS, FIRST_PHASE, x, -1.0 / rr)
+    else:
+        _list_negative(row, x, rr)
 
 
 @kernel
@@ -170,10 +178,9 @@ def ends(response_dc, response_nyquist, count, xs, rs, row):
     for k in range(count):
         if xs[k] > 0.3:
             size = max(size, size_at(rs, k))
-    if math.isfinite(response_dc) and response_dc < 0.0:
-        _list(row, PHASE_CROSSOVERS, FIRST_PHASE, 0.0, -1.0 / response_dc)
+    _list_negative(row, 0.0, response_dc)
     if response_nyquist < -LOST * size:
-        _list(row, PHASE_CROSSOVERS, FIRST_PHASE, math.pi, -1.0 / response_nyquist)
+        _list_negative(row, math.pi, response_nyquist)
 
 
 @kernel

@@ -1,14 +1,16 @@
-"""The margins to quote from a row of figures: the same as `LinearFigures.quantity`, emitted only."""
+"""The figures to quote from a row of figures, compiled: those of `LinearFigures.quantity` and of the page."""
 
 # mypy: disallow-untyped-defs=False
 from __future__ import annotations
 
 import math
 
+from actuator_lti.asked.quantities import MOST_RESONANCE_DB
 from actuator_lti.compiled.kernel import kernel
 
 from ._figures import (
     BANDWIDTH_X,
+    COLUMNS,
     DC_GAIN,
     FIRST_GAIN,
     FIRST_PHASE,
@@ -61,14 +63,29 @@ def quoted(row, period, out):
     _margins(row, period, out)
     out[MODULUS_MARGIN] = row[MODULUS]
     out[SENSITIVITY_PEAK] = -_decibel(row[MODULUS])
-    out[RESONANCE_PEAK] = math.nan
-    if abs(row[DC_GAIN]) > 0.0:
-        out[RESONANCE_PEAK] = max(_decibel(row[PEAK_T] / abs(row[DC_GAIN])), 0.0)
     out[BANDWIDTH_HZ] = row[BANDWIDTH_X] / period / (2.0 * math.pi)
     out[BANDWIDTH_90DEG] = row[QUARTER_X] / period / (2.0 * math.pi)
+    peak = _decibel(row[PEAK_T] / abs(row[DC_GAIN])) if abs(row[DC_GAIN]) > 0.0 else math.nan
+    out[RESONANCE_PEAK] = max(peak, 0.0)
+    if not peak <= MOST_RESONANCE_DB:  # the gain at zero frequency is no more than nothing
+        out[RESONANCE_PEAK], out[BANDWIDTH_HZ], out[BANDWIDTH_90DEG] = math.nan, math.nan, math.nan
     out[RISE_TIME], out[OVERSHOOT_PERCENT] = row[RISE] * period, row[OVERSHOOT]
     out[SETTLING_TIME] = row[SETTLING] * period
     out[IS_STABLE] = row[STABLE]
     if row[STABLE] != 1.0:
         for k in range(SENSITIVITY_PEAK, IS_STABLE):
             out[k] = math.nan
+    if math.isnan(row[STABLE]):  # withheld
+        for k in range(QUOTED):
+            out[k] = math.nan
+
+
+@kernel
+def many_quoted(count, rows, periods, out, row, own):
+    """The same of many rows one after the other; ``row`` and ``own`` lend their space."""
+    for k in range(count):
+        for j in range(COLUMNS):
+            row[j] = rows[COLUMNS * k + j]
+        quoted(row, periods[k], own)
+        for j in range(QUOTED):
+            out[QUOTED * k + j] = own[j]

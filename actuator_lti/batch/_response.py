@@ -88,7 +88,7 @@ def _eliminated(n, h, b, x, work, state, exchanged):
 
 
 @kernel
-def _substituted(n, c, work, state):
+def substituted(n, c, work, state):
     """Back substitution in place; returns c times the solution."""
     response_r, response_i = 0.0, 0.0
     i = n - 1
@@ -123,7 +123,7 @@ def _again(n, c, work, state, exchanged):
         carry_i = after_i - (factor_r * carry_i + factor_i * carry_r)
         carry_r = next_r
     state[2 * n - 2], state[2 * n - 1] = carry_r, carry_i
-    total_r, total_i = _substituted(n, c, work, state)
+    total_r, total_i = substituted(n, c, work, state)
     return total_r, total_i
 
 
@@ -131,7 +131,7 @@ def _again(n, c, work, state, exchanged):
 def response_at(n, h, b, c, x, work, state, exchanged):
     """L alone at the angle x, with the bits of `evaluate`."""
     _eliminated(n, h, b, x, work, state, exchanged)
-    response_r, response_i = _substituted(n, c, work, state)
+    response_r, response_i = substituted(n, c, work, state)
     return response_r, response_i
 
 
@@ -139,7 +139,7 @@ def response_at(n, h, b, c, x, work, state, exchanged):
 def evaluate(n, h, b, c, x, work, state, exchanged):
     """L and dL/dx at the angle x (rad per sample), by Gaussian elimination with row exchanges."""
     delta_r, delta_i = _eliminated(n, h, b, x, work, state, exchanged)
-    response_r, response_i = _substituted(n, c, work, state)
+    response_r, response_i = substituted(n, c, work, state)
     again_r, again_i = _again(n, c, work, state, exchanged)
     slope_r, slope_i = times(1.0 + delta_r, delta_i, again_i, -again_r)
     return response_r, response_i, slope_r, slope_i

@@ -7,6 +7,7 @@ import math
 
 from actuator_lti.compiled.kernel import kernel
 
+from ._at_dc import level_at_dc, rounding_at_dc
 from ._figures import (
     COLUMNS,
     DC_GAIN,
@@ -28,6 +29,7 @@ from ._figures import (
 from ._linalg import balance, hessenberg
 from ._response import CAPACITY, DEEPEST, GAIN, PHASE, response_at, scan
 from ._step import step_figures
+from ._withheld import rounding_decides
 
 TOP = math.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated apart
 LOWEST = 1e-7  # first scanned angle, unless a pole is slower
@@ -35,7 +37,6 @@ POINTS = 600  # angles to start from
 SMOOTH = 0.05
 NO_GAIN = 1e-6  # of the peak of |T|: less at DC (120 dB) is the rounding of a response that is zero there
 LOG_10 = 2.302585092994046
-NO_PIVOT = 1e-30  # far below the rounding of any entry that balancing leaves
 
 
 @kernel
@@ -95,88 +96,6 @@ def _grid(n, poles, points):
 
 
 @kernel
-def _pivoted(n, k, system, first, right):
-    """Exchange rows so that the largest pivot stands in row k; one of zero counts as rounding."""
-    best = k
-    for i in range(k + 1, n):
-        if abs(system[first + i * n + k]) > abs(system[first + best * n + k]):
-            best = i
-    kept = right[k]
-    right[k] = right[best]
-    right[best] = kept
-    for j in range(k, n):
-        kept = system[first + k * n + j]
-        system[first + k * n + j] = system[first + best * n + j]
-        system[first + best * n + j] = kept
-    if system[first + k * n + k] == 0.0:
-        system[first + k * n + k] = NO_PIVOT
-
-
-@kernel
-def _solved(n, system, transposed, right):
-    """Solve the system at the start of a row, or its transpose, behind it; ``right`` becomes the solution."""
-    first = n * n
-    for i in range(n):
-        for j in range(n):
-            system[first + i * n + j] = system[j * n + i] if transposed else system[i * n + j]
-    for k in range(n):
-        _pivoted(n, k, system, first, right)
-        for i in range(k + 1, n):
-            factor = system[first + i * n + k] / system[first + k * n + k]
-            right[i] -= factor * right[k]
-            for j in range(k, n):
-                system[first + i * n + j] -= factor * system[first + k * n + j]
-    i = n - 1
-    while i >= 0:
-        for j in range(i + 1, n):
-            right[i] -= system[first + i * n + j] * right[j]
-        right[i] /= system[first + i * n + i]
-        i -= 1
-
-
-@kernel
-def _null_vector(n, system, transposed, vector):
-    """What the system, all but singular, takes to nothing; its largest element is one."""
-    for i in range(n):
-        vector[i] = 1.0
-    for _round in range(2):
-        _solved(n, system, transposed, vector)
-        largest = 0.0
-        for i in range(n):
-            largest = max(largest, abs(vector[i]))
-        for i in range(n):
-            vector[i] /= largest
-
-
-@kernel
-def _at_dc(n, a, b, c, closed, poles, first, system, left, right):
-    """c (I - A + closed b c)^-1 b without the modes at DC that do not show: T, or L where ``closed`` is 0.
-
-    Each of these, found among the poles from ``first`` on, is moved away by v w' of its right and left
-    eigenvectors. A is as it is, not yet of Hessenberg form, which keeps 16 digits of A but not of slow poles,
-    the differences of A and the identity.
-    """
-    for i in range(n):
-        for j in range(n):
-            system[i * n + j] = closed * b[i] * c[j] - a[i * n + j]
-        system[i * n + i] = 1.0 - a[i * n + i] + closed * b[i] * c[i]
-    for k in range(n):
-        if math.hypot(poles[first + k] - 1.0, poles[first + n + k]) <= HIDDEN:
-            _null_vector(n, system, False, right)
-            _null_vector(n, system, True, left)
-            for i in range(n):
-                for j in range(n):
-                    system[i * n + j] += right[i] * left[j]
-    for i in range(n):
-        right[i] = b[i]
-    _solved(n, system, False, right)
-    total = 0.0
-    for i in range(n):
-        total += c[i] * right[i]
-    return total
-
-
-@kernel
 def _closed_figures(count, n, a, b, c, lead, dc, row, xs, rs, ss, work, state, exchanged):
     """DC gain, resonance and bandwidths of a closed loop whose response is scanned."""
     row[DC_GAIN] = dc
@@ -189,7 +108,12 @@ def _closed_figures(count, n, a, b, c, lead, dc, row, xs, rs, ss, work, state, e
 
 @kernel
 def _open_dc(dc, at_rest):
-    """L at DC: infinite for an integrator, else what was found where it fits T, the more exact one."""
+    """L at DC: infinite for an integrator, else what was found where it fits T, the more exact one.
+
+    Where T is next to nothing there, ``dc`` is NaN: what was found, which is 0 where rounding decides it.
+    """
+    if math.isnan(dc):
+        return at_rest
     if not abs(1.0 - dc) > 1e-9:
         return math.inf
     around = dc / (1.0 - dc)
@@ -200,8 +124,7 @@ def _open_dc(dc, at_rest):
 def _open_figures(count, n, a, b, c, at_rest, row, xs, rs, ss, work, state, exchanged):
     """Crossovers and modulus margin of an open loop whose response is scanned."""
     row[GAIN_CROSSOVERS], row[PHASE_CROSSOVERS] = 0.0, 0.0
-    dc = row[DC_GAIN]
-    open_dc = 0.0 if math.isnan(dc) else _open_dc(dc, at_rest)
+    open_dc = _open_dc(row[DC_GAIN], at_rest)
     at_r, at_i = response_at(n, a, b, c, math.pi, work, state, exchanged)
     crossovers(GAIN, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
     crossovers(PHASE, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
@@ -231,8 +154,10 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
     figures are written. The other rows lend their space: see `many_loops`.
     """
     balance(n, a, b, c)
-    at_rest = _at_dc(n, a, b, c, 0.0, poles, 0, work, exchanged, state)
-    dc = _at_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, poles, 2 * n, work, exchanged, state)
+    at_rest = level_at_dc(n, a, b, c, 0.0, poles, 0, work, exchanged, state)
+    if abs(at_rest) < rounding_at_dc(n, a, b, c, work, exchanged, state):
+        at_rest = 0.0
+    dc = level_at_dc(n, a, b, c, 0.0 if math.isnan(lead) else 1.0, poles, 2 * n, work, exchanged, state)
     hessenberg(n, a, b, c, state)
     for i in range(n):
         a[i * n + i] -= 1.0
@@ -258,6 +183,14 @@ def _copied(count, source, first, to):
 
 
 @kernel
+def _taken(n, k, A, B, C, a, b, c):
+    """Take the k-th loop out of many."""
+    _copied(n * n, A, n * n * k, a)
+    _copied(n, B, n * k, b)
+    _copied(n, C, n * k, c)
+
+
+@kernel
 def many_loops(
     count, n, A, B, C, poles, leads, time_figures, out,
     a, b, c, own, row, points, stack, xs, rs, ss, work, state, exchanged,
@@ -265,20 +198,24 @@ def many_loops(
     """Fill the k-th row of ``out`` for every open loop by `one_loop`, each by itself.
 
     The loops lie in A, B, C and poles one after the other; those whose first pole is NaN are left as they
-    are. The rows behind ``out`` lend their space, see `room`.
+    are, and those whose figures rounding decides have none. The rows behind ``out`` lend their space, see
+    `room`.
     """
     for k in range(count):
         if math.isnan(poles[4 * n * k]):
             continue
-        _copied(n * n, A, n * n * k, a)
-        _copied(n, B, n * k, b)
-        _copied(n, C, n * k, c)
+        _taken(n, k, A, B, C, a, b, c)
         _copied(4 * n, poles, 4 * n * k, own)
         _copied(COLUMNS, out, COLUMNS * k, row)
         one_loop(
             n, a, b, c, own, leads[k], time_figures > 0, row,
             points, stack, xs, rs, ss, work, state, exchanged,
         )  # fmt: skip
+        _taken(n, k, A, B, C, a, b, c)
+        if not math.isnan(leads[k]) and rounding_decides(n, a, b, c, own, row, work, state, exchanged):
+            for j in range(COLUMNS):
+                row[j] = math.nan
+            row[GAIN_CROSSOVERS], row[PHASE_CROSSOVERS] = 0.0, 0.0
         for j in range(COLUMNS):
             out[COLUMNS * k + j] = row[j]
 

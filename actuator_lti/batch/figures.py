@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from math import inf, pi
 from typing import Any
 
 import numpy as np
 
-from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS, MOST_RESONANCE_DB
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS
 from actuator_lti.batch.parameters import Population
 from actuator_lti.drive.angle import pushes_away
 from actuator_lti.drive.operating import Operating, OperatingPoint
@@ -100,7 +99,10 @@ class LinearFigures:
         """
         if name not in LOOP_QUANTITIES:
             raise InputError(f"quantity {name!r}: one of {', '.join(LOOP_QUANTITIES)}")
-        return np.where(self.withheld(loop), np.nan, getattr(self, f"_{name}")(loop))
+        from actuator_lti.batch.library import quoted
+
+        rows = self.raw[:, self._index(loop)]
+        return quoted(rows, self._period(loop))[:, list(LOOP_QUANTITIES).index(name)].copy()
 
     def _index(self, loop: str) -> int:
         if loop not in self.loops:
@@ -124,62 +126,6 @@ class LinearFigures:
             np.take_along_axis(margins, order, 1),
             self._column(loop, counter).astype(int),
         )
-
-    def _where_stable(self, loop: str, values: np.ndarray) -> np.ndarray:
-        return np.where(self.stable(loop), values, np.nan)
-
-    def _gain_margin(self, loop: str) -> np.ndarray:
-        db = 20.0 * np.log10(self.phase_crossovers(loop).margin)
-        return _nearest_zero(db)
-
-    def _phase_margin(self, loop: str) -> np.ndarray:
-        return _nearest_zero(self.gain_crossovers(loop).margin)
-
-    def _delay_margin(self, loop: str) -> np.ndarray:
-        result = self.gain_crossovers(loop)
-        angle = np.radians(np.where(result.margin > 0, result.margin, result.margin + 360.0))
-        delays = np.where(np.isnan(angle), inf, angle / result.frequency_rad_s)
-        return np.where(self.stable(loop), delays.min(axis=1), 0.0)
-
-    def _modulus_margin(self, loop: str) -> np.ndarray:
-        return self._column(loop, 3).copy()
-
-    def _sensitivity_peak(self, loop: str) -> np.ndarray:
-        return self._where_stable(loop, -20.0 * np.log10(self._modulus_margin(loop)))
-
-    def _resonance_peak(self, loop: str) -> np.ndarray:
-        return self._where_measured(loop, np.maximum(self._peak_db(loop), 0.0))
-
-    def _bandwidth(self, loop: str) -> np.ndarray:
-        return self._where_measured(loop, self._column(loop, 7) / self._period(loop) / (2 * pi))
-
-    def _bandwidth_90deg(self, loop: str) -> np.ndarray:
-        return self._where_measured(loop, self._column(loop, 8) / self._period(loop) / (2 * pi))
-
-    def _peak_db(self, loop: str) -> np.ndarray:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(20.0 * np.log10(self._column(loop, 5) / np.abs(self._column(loop, 9))))
-
-    def _where_measured(self, loop: str, values: np.ndarray) -> np.ndarray:
-        """Where the loop is stable, and its gain at zero frequency is more than nothing."""
-        return self._where_stable(loop, np.where(self._peak_db(loop) > MOST_RESONANCE_DB, np.nan, values))
-
-    def _rise_time(self, loop: str) -> np.ndarray:
-        return self._where_stable(loop, self._column(loop, 10) * self._period(loop))
-
-    def _overshoot(self, loop: str) -> np.ndarray:
-        return self._where_stable(loop, self._column(loop, 11))
-
-    def _settling_time(self, loop: str) -> np.ndarray:
-        return self._where_stable(loop, self._column(loop, 12) * self._period(loop))
-
-
-def _nearest_zero(values: np.ndarray) -> np.ndarray:
-    """Of each row the value nearest to zero, inf where there is none."""
-    size = np.where(np.isnan(values), inf, np.abs(values))
-    best = np.argmin(size, axis=1)
-    rows = np.arange(len(values))
-    return np.where(np.isinf(size[rows, best]), inf, values[rows, best])
 
 
 def linear_figures(
@@ -281,6 +227,7 @@ def _fill(
     """Figures of every loop of stacked designs, or of one."""
     for stage in wired.stages if only is None else (only,):
         rows = np.full((len(chosen), out.shape[2]), np.nan)
+        rows[:, [1, 2]] = 0.0  # crossovers
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)
         loop = fundamental(stage_blocks(wired, stage))
         _figures_of(loop, lead, time_figures and response is None, rows)
@@ -295,7 +242,6 @@ def _fill(
 def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -> None:
     """Write the figures of a stacked open loop (lead NaN: of a closed loop's response)."""
     from actuator_lti.batch.library import many_loops
-    from actuator_lti.batch.withheld import withhold
 
     A, B, C = _stacked(block, len(rows))
     leads = np.array(np.broadcast_to(np.asarray(lead, dtype=float), len(rows)))
@@ -305,8 +251,6 @@ def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -
     poles = np.stack([part for each in result for part in (each.real, each.imag)], axis=1)
     poles[~finite] = np.nan
     many_loops(A, B, C, poles, leads, time_figures, rows)
-    if not np.isnan(leads).any():
-        withhold(A, B, C, poles, rows)
 
 
 def _command_path(wired: Drive) -> tuple[Any, Block | None]:

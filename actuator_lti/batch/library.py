@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.batch._figures import COLUMNS
+from actuator_lti.batch._quoted import QUOTED
 from actuator_lti.batch._run import room
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.compiled.library import Entry, Library, source_files
@@ -19,7 +21,10 @@ _LOOPS: tuple[Kind, ...] = ("int", "int", *(_ROW,) * 5, "int", _ROW)
 LIBRARY = Library(
     "figures",
     _FOLDER,
-    (Entry("actuator_lti.batch._run", "many_loops", (*_LOOPS, *(_ROW,) * len(room(1)))),),
+    (
+        Entry("actuator_lti.batch._run", "many_loops", (*_LOOPS, *(_ROW,) * len(room(1)))),
+        Entry("actuator_lti.batch._quoted", "many_quoted", ("int", *(_ROW,) * 5)),
+    ),
     source_files(_FOLDER, wanted="_*.py"),
 )
 
@@ -29,18 +34,18 @@ def many_loops(
 ) -> None:
     """Fill ``out[k]`` with the figures of every open loop A[k], B[k], C[k].
 
-    Parameters
-    ----------
-    A, B, C : ndarray, shapes (count, n, n), (count, n), (count, n)
-    poles : ndarray, shape (count, 4, n)
-        Real and imaginary parts of the open loop's, then of the closed loop's; where the first is NaN, the
-        row is left as it is.
-    leads : ndarray, shape (count,)
-        See `actuator_lti.batch._run.one_loop`.
-    time_figures : bool
-    out : ndarray, shape (count, columns)
+    Shapes (count, n, n), (count, n), (count, n); ``poles`` (count, 4, n) holds real and imaginary parts of
+    the open loop's, then of the closed loop's; where the first is NaN, the row is left as it is.
     """
     count, n = B.shape
     flat = [each.reshape(-1) for each in (A, B, C, poles, leads)]
     lent = [np.zeros(length) for length in room(n)]
     LIBRARY.functions.many_loops(count, n, *flat, int(time_figures), out.reshape(-1), *lent)
+
+
+def quoted(rows: Floats, period_s: Floats) -> Floats:
+    """Figures to quote of each row, shape (count, names of `LOOP_QUANTITIES` and whether it is stable)."""
+    out, given = np.zeros((len(rows), QUOTED)), (np.ascontiguousarray(each) for each in (rows, period_s))
+    flat = [each.reshape(-1) for each in (*given, out)]
+    LIBRARY.functions.many_quoted(len(rows), *flat, np.zeros(COLUMNS), np.zeros(QUOTED))
+    return out

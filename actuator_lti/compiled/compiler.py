@@ -78,21 +78,10 @@ def compiler_for(target: str) -> list[str]:
 
 
 def compile_library(text: str, output: str, target: str, *, portable: bool = False) -> bytes:
-    """Compile one C file to a shared library for `HERE` or another of `TARGETS`.
+    """Compile one C file to a shared library called ``output`` for `HERE` or another of `TARGETS`.
 
-    Parameters
-    ----------
-    text : str
-    output : str
-        Its file name.
-    target : str
-    portable : bool
-        For every machine of the target, as in a wheel: by zig, with an old C library.
-
-    Raises
-    ------
-    InputError
-        Where there is no compiler, or it fails.
+    ``portable``: for every machine of the target, as in a wheel: by zig, with an old C library. `InputError`:
+    there is no compiler, or it fails.
     """
     compiler, zig = system_compiler(), zig_command()
     if target == HERE and compiler and not portable:

@@ -26,18 +26,9 @@ _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "=="
 class Expressions:
     """Translates the expressions of one function.
 
-    Parameters
-    ----------
-    function : Function
-        Whose variables and arguments are known so far.
-    call : callable
-        Analyses a called function for the kinds of its arguments.
-    constants : dict of str to int or float
-        Filled with every named constant that is used.
-    prefix : str
-        In front of the names of minimum and maximum.
-    form : Form, optional
-        Whose known numbers the function's row holds.
+    ``call`` analyses a called function for the kinds of its arguments; ``constants`` is filled with every
+    named constant that is used; ``prefix`` stands in front of the names of minimum and maximum; ``form``
+    knows numbers that the function's row holds.
     """
 
     def __init__(

@@ -20,24 +20,12 @@ _COMPARE: dict[type, Callable[[Any, Any], bool]] = {
 
 @dataclass(frozen=True)
 class Form:
-    """The form of a kernel for rows ``row`` that hold known numbers.
+    """The form of a kernel for rows ``row`` that hold known numbers."""
 
-    Attributes
-    ----------
-    of : str
-        Name of the kernel.
-    name : str
-        Of the form.
-    row : str
-        Argument that holds the known numbers, in every function.
-    known : mapping of int to float
-        What stands at which place.
-    """
-
-    of: str
-    name: str
-    row: str
-    known: Mapping[int, float]
+    of: str  # name of the kernel
+    name: str  # of the form
+    row: str  # argument that holds the known numbers, in every function
+    known: Mapping[int, float]  # what stands at which place
 
     def test(self) -> str:
         """Whether a row holds the known numbers, in C."""

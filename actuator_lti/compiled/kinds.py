@@ -31,36 +31,20 @@ class EmitError(ValueError):
 
 @dataclass
 class Function:
-    """One function of the program, analysed for one list of argument kinds.
-
-    Attributes
-    ----------
-    name : str
-    module : str
-    tree : ast.FunctionDef
-    scope : dict
-        The globals of its module.
-    arguments : dict of str to Kind
-    prefix : str
-        In front of its name in C.
-    returns : tuple of Kind or None
-        None where nothing is returned; one kind is a plain value.
-    variables : dict of str to Kind
-        Local variables in order of first assignment, loop indices apart.
-    written : set of str
-        Row arguments whose elements it, or a function it calls, assigns.
-    """
+    """One function of the program, analysed for one list of argument kinds."""
 
     name: str
     module: str
     file: str
     first_line: int
     tree: ast.FunctionDef
-    scope: dict[str, Any]
+    scope: dict[str, Any]  # the globals of its module
     arguments: dict[str, Kind]
-    prefix: str
-    returns: tuple[Kind, ...] | None = None
+    prefix: str  # in front of its name in C
+    returns: tuple[Kind, ...] | None = None  # None where nothing is returned; one kind is a plain value
+    # local variables in order of first assignment, loop indices apart
     variables: dict[str, Kind] = field(default_factory=dict)
+    # row arguments whose elements it, or a function it calls, assigns
     written: set[str] = field(default_factory=set)
 
     @property

@@ -37,6 +37,9 @@ _C_TYPES: dict[Kind | None, Any] = {
 }  # fmt: skip
 
 
+_PLACE = ctypes.c_double * 0
+
+
 @dataclass(frozen=True)
 class Entry:
     """A kernel that is called from Python: where it is written, kinds of its arguments and of its result."""
@@ -87,10 +90,11 @@ class Written:
         return lambda: self._function(*arguments)
 
 
-def _row(array: Any) -> int:
-    assert array.flags.c_contiguous
-    place: int = array.ctypes.data
-    return place
+def _row(array: Any) -> Any:
+    if array.flags.writeable:
+        return _PLACE.from_buffer(array)  # refuses what is not contiguous
+    assert array.flags.c_contiguous  # of another process: no buffer of ctypes, which may be written
+    return array.ctypes.data
 
 
 def _bytes(array: Any) -> _Bytes:
@@ -108,27 +112,13 @@ _PASSED: dict[Kind, Callable[[Any], Any]] = {
 
 @dataclass(frozen=True)
 class Library:
-    """A library of kernels.
+    """A library of kernels."""
 
-    Attributes
-    ----------
-    name : str
-        Stem of its file.
-    folder : Path
-        Of the package; the file lies in ``_native`` there.
-    entries : tuple of Entry
-        What Python calls.
-    sources : tuple of Path
-        Modules that its C is emitted from, beside the emitter's.
-    forms : callable
-        Second forms of its functions, see `emit_c`.
-    """
-
-    name: str
-    folder: Path
-    entries: tuple[Entry, ...]
-    sources: tuple[Path, ...]
-    forms: Callable[[], tuple[Form, ...]] = tuple
+    name: str  # stem of its file
+    folder: Path  # of the package; the file lies in ``_native`` there
+    entries: tuple[Entry, ...]  # what Python calls
+    sources: tuple[Path, ...]  # modules that its C is emitted from, beside the emitter's
+    forms: Callable[[], tuple[Form, ...]] = tuple  # second forms of its functions, see `emit_c`
     _others: list[Any] = field(default_factory=list)
 
     def path(self, target: str = HERE) -> Path:

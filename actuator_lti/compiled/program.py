@@ -32,27 +32,13 @@ __all__ = ["EmitError", "Program", "emit_c"]
 
 @dataclass(frozen=True)
 class Program:
-    """C text of functions and what they need.
+    """C text of functions and what they need."""
 
-    Attributes
-    ----------
-    constants : mapping of str to int or float
-        Named constants used, in the order of first use.
-    types : str
-        Structures of functions with several results.
-    functions : str
-        Definitions, callees first; entries have external linkage, all others are static.
-    declarations : mapping of str to str
-        Prototype of each entry function.
-    prefix : str
-        In front of every function and type name.
-    """
-
-    constants: Mapping[str, Constant]
-    types: str
-    functions: str
-    declarations: Mapping[str, str]
-    prefix: str
+    constants: Mapping[str, Constant]  # named constants used, in the order of first use
+    types: str  # structures of functions with several results
+    functions: str  # definitions, callees first; entries have external linkage, all others are static
+    declarations: Mapping[str, str]  # prototype of each entry function
+    prefix: str  # in front of every function and type name
 
     @property
     def helpers(self) -> list[str]:
@@ -70,11 +56,11 @@ class Program:
         """The constants as C, whole numbers as one enum; ``notes`` says what each is."""
         notes = notes or {}
         whole = [(name, value) for name, value in self.constants.items() if isinstance(value, int)]
-        lines = ["enum {"]
+        listed = []
         for name, number in sorted(whole, key=lambda item: (item[1], item[0])):
             note = f" /* {_plain(notes[name])} */" if notes.get(name) else ""
-            lines.append(f"{INDENT}{name} = {number},{note}")
-        lines.append("};")
+            listed.append(f"{INDENT}{name} = {number},{note}")
+        lines = ["enum {", *listed, "};"] if listed else []
         for name, value in self.constants.items():
             if isinstance(value, float):
                 lines.append(f"static const double {name} = {c_float(value)};")
@@ -89,21 +75,10 @@ class Program:
 def emit_c(
     entries: Mapping[Any, Sequence[Kind]], prefix: str = "drive_", forms: Sequence[Form] = ()
 ) -> Program:
-    """C99 for compiled functions and everything that they call.
+    """C99 for compiled functions, with the kinds of their arguments, and everything that they call.
 
-    Parameters
-    ----------
-    entries : mapping of compiled function to sequence of {"float", "int", "bool", "row"}
-        The functions to be called from outside, with the kinds of their arguments.
-    prefix : str
-        In front of every function and type name.
-    forms : sequence of Form
-        Second forms of functions that these call; the function itself chooses by its row, at every call.
-
-    Raises
-    ------
-    EmitError
-        At the first construct outside the subset, with its file and line.
+    ``forms`` are second forms of functions that these call; the function itself chooses by its row, at every
+    call. `EmitError`: the first construct outside the subset, with its file and line.
     """
     collector = Collector(prefix)
     names = [collector.call(python, list(kinds), None, None).name for python, kinds in entries.items()]

@@ -31,23 +31,12 @@ Replaced = Callable[[list[ast.expr], "Leftover"], ast.expr | None]
 
 @dataclass
 class Leftover:
-    """One function that is left.
-
-    Attributes
-    ----------
-    name : str
-    python : callable
-        The kernel.
-    tree : ast.FunctionDef
-        What is left of it.
-    arguments : tuple of str
-        Those that its text still uses.
-    """
+    """One function that is left."""
 
     name: str
-    python: Any
-    tree: ast.FunctionDef
-    arguments: tuple[str, ...] = ()
+    python: Any  # the kernel
+    tree: ast.FunctionDef  # what is left of it
+    arguments: tuple[str, ...] = ()  # those that its text still uses
     known: dict[str, Any] = field(default_factory=dict)
 
 
@@ -55,15 +44,9 @@ class Leftover:
 class Residual:
     """Follows kernels; what it leaves is in ``functions``, callees first.
 
-    Parameters
-    ----------
-    look : callable
-        The number at a place of a row, by the row's argument, which is called alike in every function; None
-        where it is not known.
-    replaced : mapping of kernel to callable
-        What stands for a call of a kernel, of its arguments and the function that calls it; None: the call.
-    constants : mapping of str to float
-        Named constants that have another value here.
+    ``look`` gives the number at a place of a row, by the row's argument, which is called alike in every
+    function, or None; ``replaced`` what stands for a call of a kernel, of its arguments and the function that
+    calls it; ``constants`` named ones that have another value here.
     """
 
     look: Callable[[str, int], float | None]

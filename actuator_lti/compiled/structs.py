@@ -35,16 +35,9 @@ class Member:
 
 @dataclass(frozen=True)
 class Struct:
-    """A structure in place of a row.
+    """A structure in place of a row."""
 
-    Attributes
-    ----------
-    type, argument : str
-        Names in C, of it and of the pointer to it.
-    members : tuple of Member
-    """
-
-    type: str
+    type: str  # names in C, of it and of the pointer to it
     argument: str
     members: tuple[Member, ...]
 

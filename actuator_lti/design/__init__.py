@@ -1,7 +1,7 @@
 """The design file: one TOML text per drive, read into frozen dataclasses in SI units."""
 
 from actuator_lti.asked.quantities import QUANTITIES
-from actuator_lti.design.access import parameter_value, paths_of, pedigrees, with_values
+from actuator_lti.design.access import parameter_value, paths_of, with_values
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.loader import as_design, load_design, read_design_text
@@ -26,7 +26,6 @@ __all__ = [
     "no_load_speed",
     "parameter_value",
     "paths_of",
-    "pedigrees",
     "read_design_text",
     "shipped_designs",
     "sweep",

@@ -151,20 +151,6 @@ def _replaced(
     return replace(design, parameters=FrozenMap({**design.parameters, **parameters}), correlations=kept)
 
 
-def pedigrees(design: Design) -> tuple[Parameter, ...]:
-    """A :class:`Parameter` for every numeric key of a design, also those that its file left to defaults."""
-    result = []
-    for path in paths_of(design):
-        known = design.parameters.get(path)
-        if known is None:
-            value, field = parameter_value(design, path), located(design, path)[0]
-            known = _changed(None, field, path, value, design)
-            text = f"{value:g}" if known.unit == "1" else f"{value:g} {known.unit}"
-            known = replace(known, text=text, source="default")
-        result.append(known)
-    return tuple(result)
-
-
 def stacked(design: Design, values: Mapping[str, Any]) -> Design:
     """A design with arrays in place of some numbers: many designs of one structure, unchecked."""
     changes: dict[str, dict[str, Any]] = {}

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from math import inf, log
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from math import inf, log, pi
 
 import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
-from actuator_lti.design.checks_control import CONTROL_CHECKS
-from actuator_lti.design.checks_elastic import check_elastic, check_place
-from actuator_lti.design.fields import Structure, fields_in
+from actuator_lti.design.checks_control import CONTROL_CHECKS, check_temperature
+from actuator_lti.design.checks_elastic import ELASTIC_CHECKS, check_place
+from actuator_lti.design.fields import ALL_FIELDS, Field, Structure
 from actuator_lti.design.mistakes import Findings, Refusal
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Correlation, Design, Requirement
 from actuator_lti.design.plant import no_load_speed
-from actuator_lti.design.sections import parts_of
+from actuator_lti.design.sections import part_at
+from actuator_lti.design.unread import UNREAD, readable
 from actuator_lti.files.reading import shown
 
 CHECKS = "validation"  # what the ids of checks by simulation begin with
@@ -26,38 +28,42 @@ _ELECTRICAL = {
 }
 
 
-def check_design(design: Design, where: str, lines: Mapping[str, int] | None = None) -> None:
-    """Refuse a design whose values contradict each other.
-
-    Parameters
-    ----------
-    design : Design
-    where : str
-        Its file, for errors.
-    lines : mapping, optional
-        The line of each dotted key.
+def check_design(design: Design, where: str) -> None:
+    """Refuse a design whose values contradict each other; ``where`` names its file.
 
     Raises
     ------
     InputError
-        All at once: line, key, value and what is allowed.
+        All at once: key, value and what is allowed.
     """
-    findings = Findings(where, lines)
-    for checks in (FIRST_RELATIONS, (*RELATIONS, _requirements, _waivers, _correlations)):
-        for check in checks:
-            findings.extend(check(design))
-        findings.refuse()
+    findings = Findings(where)
+    findings.extend(contradictions(design))
+    findings.refuse()
+
+
+def contradictions(design: Design) -> Iterator[Refusal]:
+    """What the relations between keys refuse, of all those whose own keys are read."""
+    for check in FIRST_RELATIONS:
+        refused = tuple(readable(check(design)))
+        yield from refused
+        unsure = {path.partition(".")[0] for path, *_ in refused}
+        design = replace(design, **dict.fromkeys(unsure, UNREAD))
+    for check in (*RELATIONS, _requirements, _waivers, _correlations):
+        yield from readable(check(design))
 
 
 def _most(design: Design) -> Iterator[Refusal]:
     """Keys that say themselves what bounds them."""
-    structure = Structure.of(design)
-    for section, path, part in parts_of(design):
-        for field in fields_in(section.template):
-            most, why = (inf, "") if field.most is None else field.most(design)
-            value, unit = getattr(part, field.attribute), field.unit(structure)
-            if field.most is not None and value > most:
-                yield f"{path}.{field.key}", f"{value:g} {unit}", f"{why}; allowed: at most {most:.4g} {unit}"
+    for field in ALL_FIELDS:
+        if field.most is not None:
+            yield from readable(_bounded(field, field.most, design))
+
+
+def _bounded(field: Field, bound: Callable[[Design], tuple[float, str]], design: Design) -> Iterator[Refusal]:
+    value, unit = getattr(part_at(design, field.section), field.attribute), field.unit(Structure.of(design))
+    most, why = bound(design)
+    if value > most:
+        yield field.path, f"{value:g} {unit}", f"{why}; allowed: at most {most:.4g} {unit}"
 
 
 def _motor(design: Design) -> Iterator[Refusal]:
@@ -70,7 +76,8 @@ def _motor(design: Design) -> Iterator[Refusal]:
         return
     for key, value in given.items():
         if value is None:
-            yield f"motor.{key}", "", "missing; allowed: R, L, kM and kE together, or motor.source_gain alone"
+            words = "R, L, kM and kE together, or motor.source_gain alone"
+            yield f"motor.{key}", "", f"missing; allowed: {words}{_without(key, given)}"
     same = design.effective_motor
     kM, kE = same.torque_constant_Nm_A, same.back_emf_constant_Vs_rad
     if kM is not None and kE is not None and abs(kE - kM) > 0.1 * kM * (1 + 1e-12):
@@ -83,14 +90,24 @@ def _motor(design: Design) -> Iterator[Refusal]:
         )
 
 
+def _without(key: str, given: Mapping[str, float | None]) -> str:
+    """What to write where the sheet does not have it."""
+    other = {"torque_constant": "back_emf_constant", "back_emf_constant": "torque_constant"}.get(key, "")
+    if given.get(other) is not None:
+        return f"; of a DC motor it is the number of motor.{other} in SI, {given[other]:g}"
+    usual = "; where the sheet has none, R times the electrical time constant, 0.1 to 1 ms of a small motor"
+    return usual if key == "inductance" else ""
+
+
+_AC = ": see motor.constants, if it is an AC motor"
 _FACTORS = {
-    "sqrt(2), rms against peak": 2**0.5,
-    "sqrt(3), phase against line-line": 3**0.5,
-    "sqrt(3/2), rms line-line against N m/A rms": 1.5**0.5,
-    "sqrt(3) and sqrt(2) together, V rms of a phase against N m/A peak": 6**0.5,
-    "3/2, dq against phase": 1.5,
+    f"sqrt(2), rms against peak{_AC}": 2**0.5,
+    f"sqrt(3), phase against line-line{_AC}": 3**0.5,
+    f"sqrt(3/2), rms line-line against N m/A rms{_AC}": 1.5**0.5,
+    f"sqrt(3) and sqrt(2) together, V rms of a phase against N m/A peak{_AC}": 6**0.5,
+    f"3/2, dq against phase{_AC}": 1.5,
     "60/(2 pi), per rpm against per rad/s": 9.549296585513721,
-    "1000": 1e3,
+    "1000, rpm against krpm or mN*m against N*m": 1e3,
     "9.549 V/krpm": 1e3 / 9.549296585513721,
 }
 
@@ -98,63 +115,86 @@ _FACTORS = {
 def _factor_named(ratio: float) -> str:
     """The usual factor between data-sheet conventions that explains a ratio kE/kM, or nothing."""
     off, words = min((abs(abs(log(ratio)) - log(factor)), words) for words, factor in _FACTORS.items())
-    return f"; the ratio is {words}: see motor.constants" if off < 0.08 else ""
+    return f"; the ratio is {words}" if off < 0.08 else ""
 
 
-def _stages(design: Design) -> Iterator[Refusal]:
-    control = design.controller
-    if control.current is not None and not design.motor.has_electrical_dynamics:
+def _current_loop(design: Design) -> Iterator[Refusal]:
+    if design.controller.current is not None and not design.motor.has_electrical_dynamics:
         yield "control.current", "a table", "not allowed with motor.source_gain, which has no current"
+
+
+def _multiples(design: Design) -> Iterator[Refusal]:
+    control = design.controller
     n_v = control.velocity.every if control.velocity else 1
     n_p = control.position.every if control.position else n_v
     if n_p % n_v:
         yield "control.position.every", n_p, f"allowed: a multiple of control.velocity.every = {n_v}"
-    delay, period = control.computing_delay_s, control.period_s
+
+
+def _delay(design: Design) -> Iterator[Refusal]:
+    delay, period = design.controller.computing_delay_s, design.controller.period_s
     if delay > 100 * period:
         yield "control.computing_delay", f"{delay:g} s", f"allowed: at most 100 ticks of {period:g} s"
 
 
-def _limits(design: Design) -> Iterator[Refusal]:
-    limits, top = design.limits, no_load_speed(design)
-    peak, continuous = limits.peak_current_A, limits.continuous_current_A
-    if top < limits.speed_rad_s < inf:
+def _top_speed(design: Design) -> Iterator[Refusal]:
+    speed, top = design.limits.speed_rad_s, no_load_speed(design)
+    if top < speed < inf:
         unit = "m/s" if design.axis == "linear" else "rad/s"
-        allowed = f"the supply cannot reach it; allowed: at most U/kE = {top:.4g} {unit}"
-        yield "limits.speed", f"{limits.speed_rad_s:.4g} {unit}", allowed
+        turns = "" if design.axis == "linear" else f" ({top * 30.0 / pi:.4g} rpm)"
+        allowed = f"the supply cannot reach it; allowed: at most U/kE = {top:.4g} {unit}{turns}"
+        yield "limits.speed", f"{speed:.4g} {unit}", allowed
+
+
+def _currents(design: Design) -> Iterator[Refusal]:
+    peak, continuous = design.limits.peak_current_A, design.limits.continuous_current_A
     if peak < continuous < inf:
         allowed = f"allowed: at most limits.peak_current = {peak:g} A"
         yield "limits.continuous_current", f"{continuous:g} A", allowed
 
 
-FIRST_RELATIONS = (check_place, _motor)  # the others ask for an inertia and for constants
-RELATIONS = (_stages, _most, *CONTROL_CHECKS, check_elastic, _limits)
+FIRST_RELATIONS = (check_place, check_temperature, _motor)  # the others ask for an inertia and constants
+RELATIONS = (
+    _current_loop, _multiples, _delay, _most, *CONTROL_CHECKS, *ELASTIC_CHECKS, _top_speed, _currents,
+)  # fmt: skip
 """Between the numbers of a drive; an exported one checks them again when they are changed."""
 
 
 def _requirements(design: Design) -> Iterator[Refusal]:
-    seen: set[str] = set()
+    for number, item in enumerate(design.requirements):
+        for check in (_named_once, _limit, _asked_of):
+            yield from readable(check(item, design, number))
+
+
+def _named_once(item: Requirement, design: Design, number: int) -> Iterator[Refusal]:
+    if any(item.id == other.id for other in design.requirements[:number]):
+        yield f"requirement.{item.id}.id", shown(item.id), "allowed: each id once"
+
+
+def _limit(item: Requirement, *_: object) -> Iterator[Refusal]:
+    path = f"requirement.{item.id}"
+    if item.minimum is None and item.maximum is None:
+        yield path, "", "missing limit; allowed: minimum, maximum or both"
+    elif item.minimum is not None and item.maximum is not None and item.minimum > item.maximum:
+        yield f"{path}.minimum", item.minimum, f"allowed: at most maximum = {item.maximum}"
+
+
+def _asked_of(item: Requirement, design: Design, *_: object) -> Iterator[Refusal]:
+    """The loop, the rotor and the response that it is of."""
+    path, quantity = f"requirement.{item.id}", QUANTITIES[item.quantity]
     present = {"every", *design.controller.stages}
-    for item in design.requirements:
-        path, quantity = f"requirement.{item.id}", QUANTITIES[item.quantity]
-        if item.id in seen:
-            yield f"{path}.id", shown(item.id), "allowed: each id once"
-        seen.add(item.id)
-        if item.minimum is None and item.maximum is None:
-            yield path, "", "missing limit; allowed: minimum, maximum or both"
-        elif item.minimum is not None and item.maximum is not None and item.minimum > item.maximum:
-            yield f"{path}.minimum", item.minimum, f"allowed: at most maximum = {item.maximum}"
-        if quantity.scope == "loop" and item.loop not in present:
-            given = "missing" if item.loop is None else shown(item.loop)
-            yield f"{path}.loop", given, f"allowed: {', '.join(sorted(present))}"
-        elif quantity.scope != "loop" and item.loop is not None:
-            yield f"{path}.loop", shown(item.loop), f"{item.quantity} is of the drive, no loop"
-        current = "current" in present and item.loop in ("current", "every")
-        if item.rotor is not None and not current:
-            yield f"{path}.rotor", shown(item.rotor), "allowed: of the current loop only"
-        answers = item.loop in ("position", "every") and quantity.of_response
-        if item.to is not None and not (answers and "position" in present):
-            allowed = "allowed: of bandwidth, resonance and step of the position loop only"
-            yield f"{path}.to", shown(item.to), allowed
+    if quantity.scope == "loop" and item.loop not in present:
+        given = "missing" if item.loop is None else shown(item.loop)
+        yield f"{path}.loop", given, f"allowed: {', '.join(sorted(present))}"
+    elif quantity.scope != "loop" and item.loop is not None:
+        yield f"{path}.loop", shown(item.loop), f"{item.quantity} is of the drive, no loop"
+    current = "current" in present and item.loop in ("current", "every")
+    if item.rotor is not None and not current:
+        yield f"{path}.rotor", shown(item.rotor), "allowed: of the current loop only"
+    answers = item.loop in ("position", "every") and quantity.of_response
+    if item.to is not None and not (answers and "position" in present):
+        allowed = "allowed: of bandwidth, resonance and step of the position loop only"
+        yield f"{path}.to", shown(item.to), allowed
 
 
 def _waivers(design: Design) -> Iterator[Refusal]:
@@ -171,25 +211,28 @@ def _waivers(design: Design) -> Iterator[Refusal]:
 
 
 def _correlations(design: Design) -> Iterator[Refusal]:
-    index = {path: i for i, path in enumerate(p for p, item in design.parameters.items() if item.tolerance)}
+    known = {path: item for path, item in design.parameters.items() if item is UNREAD or item.tolerance}
+    matrix = np.eye(len(known))
     seen: set[frozenset[str]] = set()
-    matrix = np.eye(len(index))
     for number, item in enumerate(design.correlations, 1):
-        pair = frozenset((item.first, item.second))
-        allowed = ", ".join(index) or "none, no value has a tolerance"
-        unknown = [key for key in ("first", "second") if getattr(item, key) not in index]
-        for key in unknown:
-            path = f"correlation.{number}.{key}"
-            yield path, shown(getattr(item, key)), f"allowed: keys with a tolerance ({allowed})"
-        if len(pair) == 1 or pair in seen:
-            yield f"correlation.{number}", f'"{item.first}", "{item.second}"', "allowed: each pair once"
-        elif not unknown:
-            i, j = index[item.first], index[item.second]
-            matrix[i, j] = matrix[j, i] = item.coefficient
-        seen.add(pair)
+        yield from readable(_pair(item, f"correlation.{number}", tuple(known), seen, matrix))
     if design.correlations and np.linalg.eigvalsh(matrix)[0] < -1e-12:
-        yield (
-            "correlation",
-            "",
-            "the coefficients contradict each other; allowed: a positive semidefinite matrix",
-        )
+        allowed = "the coefficients contradict each other; allowed: a positive semidefinite matrix"
+        yield "correlation", "", allowed
+
+
+def _pair(
+    item: Correlation, path: str, known: tuple[str, ...], seen: set[frozenset[str]], matrix: np.ndarray
+) -> Iterator[Refusal]:
+    """One correlation, which is put into the matrix of all."""
+    unknown = [key for key in ("first", "second") if getattr(item, key) not in known]
+    for key in unknown:
+        allowed = f"keys with a tolerance ({', '.join(known) or 'none, no value has a tolerance'})"
+        yield f"{path}.{key}", shown(getattr(item, key)), f"allowed: {allowed}"
+    pair = frozenset((item.first, item.second))
+    if len(pair) == 1 or pair in seen:
+        yield path, f'"{item.first}", "{item.second}"', "allowed: each pair once"
+    elif not unknown:
+        i, j = known.index(item.first), known.index(item.second)
+        matrix[i, j] = matrix[j, i] = float(item.coefficient)
+    seen.add(pair)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from actuator_lti.design.mistakes import Refusal
-from actuator_lti.design.model import Coupling, Design
+from actuator_lti.design.model import Design
 from actuator_lti.files.reading import shown
+
+_DRIVABLE = 'load.path = "back-drivable"'  # the default locks itself
 
 
 def check_place(design: Design) -> Iterator[Refusal]:
@@ -19,43 +21,51 @@ def check_place(design: Design) -> Iterator[Refusal]:
             yield key, shown(name), f"is no gear; allowed: {known}"
 
 
-def check_elastic(design: Design) -> Iterator[Refusal]:
-    """Refuse a drive train that the event-driven plant cannot be.
-
-    A coupling or play without an inertia behind it, with the tanh law, or before the self-locking stage; a
-    self-locking stage whose friction would give energy; friction of a load that has no coupling before it.
-    """
-    coupling, friction = design.coupling, design.load.friction
-    if friction is not None and coupling is None:
-        yield "load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone"
+def _behind(design: Design) -> Iterator[Refusal]:
+    """Friction of a load that has no coupling before it; a coupling without an inertia behind it."""
+    coupling = design.coupling
     if coupling is None:
-        return
-    if design.load_side_inertia_kgm2 <= 0.0:
+        if design.load.friction is not None:
+            yield "load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone"
+    elif design.load_side_inertia_kgm2 <= 0.0:
         allowed = "allowed with an inertia behind it; load.inertia, or that of a gear behind it, is missing"
         yield "coupling.stiffness", f"{coupling.stiffness_Nm_rad:g}", allowed
-    yield from _bends(coupling)
-    if design.friction.law == "tanh":
+
+
+def _law(design: Design) -> Iterator[Refusal]:
+    if design.coupling is not None and design.friction.law == "tanh":
         yield "friction.law", '"tanh"', 'allowed with a coupling: "coulomb"'
-    names, locking = [gear.name for gear in design.gears], design.load.locking_gear
-    locks = names.index(locking) + 1 if locking else len(names)
+
+
+def _locking(design: Design) -> Iterator[Refusal]:
+    """A self-locking stage behind the coupling, or whose friction would give energy."""
+    coupling, locking = design.coupling, design.load.locking_gear
+    if coupling is None:
+        return
     if design.load.path != "self-locking":
         if locking is not None:
             yield "load.locking_gear", f'"{locking}"', 'allowed with load.path = "self-locking"'
         return
+    names = [gear.name for gear in design.gears]
+    locks = names.index(locking) + 1 if locking else len(names)
     least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
     if design.gears_before_coupling < locks:
         allowed = (
             f"lies before the self-locking stage; allowed: {', '.join(names[locks - 1 :])}, "
-            "load.locking_gear with a gear before the coupling, or load.path = back-drivable"
+            f"load.locking_gear with a gear before the coupling, or {_DRIVABLE}"
         )
         yield "coupling.after", f'"{coupling.after or ""}"', allowed
     elif coefficient < least * (1 - 1e-12):
-        allowed = f"a self-locking stage with less than 1/N gives energy; allowed: at least {least:g}"
+        reason = "a self-locking stage with less than 1/N gives energy"
+        allowed = f"{reason}; allowed: at least {least:g}, or {_DRIVABLE}"
         yield "friction.load_coefficient", f"{coefficient:g}", allowed
 
 
-def _bends(coupling: Coupling) -> Iterator[Refusal]:
+def _bends(design: Design) -> Iterator[Refusal]:
     """Torques and stiffnesses of a spring that bends: each with its other, in order."""
+    coupling = design.coupling
+    if coupling is None:
+        return
     bends = [(coupling.torque_1_Nm, coupling.stiffness_2_Nm_rad)]
     bends.append((coupling.torque_2_Nm, coupling.stiffness_3_Nm_rad))
     for number, (torque, stiffness) in enumerate(bends, 1):
@@ -67,6 +77,10 @@ def _bends(coupling: Coupling) -> Iterator[Refusal]:
     if second is not None and (first is None or first >= second):
         allowed = "above coupling.torque_1" if first is not None else "with coupling.torque_1"
         yield "coupling.torque_2", f"{second:g}", f"allowed: {allowed}"
+
+
+ELASTIC_CHECKS = (_behind, _bends, _law, _locking)
+"""What the event-driven plant of a drive train cannot be."""
 
 
 def elastic_warnings(design: Design) -> Iterator[str]:
@@ -83,5 +97,5 @@ def elastic_warnings(design: Design) -> Iterator[str]:
     if rigid and loaded and coefficient < least * (1 - 1e-12):
         yield (
             f"friction.load_coefficient: {coefficient:g} is less than 1/N = {least:g}: the friction of a "
-            "self-locking drive cannot hold its load"
+            f"self-locking drive cannot hold its load; or is {_DRIVABLE}?"
         )

@@ -5,7 +5,8 @@ Read into the keys of ``[friction]`` that follow from them, which is what a desi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from math import prod
 from typing import Any
@@ -15,6 +16,7 @@ from actuator_lti.design.field import Field, Structure, positive, quantity
 from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.mistakes import Refusal
 from actuator_lti.design.units import si_text
+from actuator_lti.design.unread import UNREAD, readable
 from actuator_lti.files.tree import Tree
 
 _CURRENT, _SPEED, _SHARE = "motor.no_load_current", "motor.no_load_speed", "motor.no_load_dry_share"
@@ -29,19 +31,10 @@ SHEET: tuple[Field, ...] = (
 )  # fmt: skip
 """Keys of a file that no part of a design has an attribute for."""
 
-WORDS = {
-    "speed_constant": 'back_emf_constant, which takes "317 rpm/V" too',
-    "backlash": "play of [coupling]",
-    "mass": "inertia, in kg on a linear axis",
-    "friction_torque": "dry_torque of [friction]",
-    "nominal_voltage": "voltage of [limits]",
-    "nominal_current": "continuous_current of [limits]",
-    "stall_current": "peak_current of [limits]",
-    "max_speed": "speed of [limits]",
-}
-"""Data sheets' words for what a design file has under another name."""
 FROM = "from data sheet: "
 """What the source of a value begins with that follows from such keys."""
+_WORD = re.compile(r"(?P<table>motor|gear\.[\w-]+)\.(?P<key>no_load_\w+|efficiency) = (?P<text>.+)")
+_OPEN = "100.0 %"  # tolerance of a friction whose share is not said
 _TAKEN = {
     _CURRENT: ("dry_torque", "viscous", "dry_torque_reverse", "viscous_reverse", "point"),
     "gear.efficiency": ("load_coefficient",),
@@ -53,35 +46,77 @@ def sheet_fields(template: str) -> tuple[Field, ...]:
     return tuple(field for field in SHEET if field.section == template)
 
 
+def as_stated(tree: Tree, changed: Collection[str]) -> None:
+    """Put a sheet's own keys back in place of the friction read from them, unless that is changed itself.
+
+    So that it is read again from what is changed besides: a ratio, the load's path, the torque constant.
+    """
+    friction, pairs = tree.get("friction", {}), tree.get("correlation", [])
+    for keys in _TAKEN.values():
+        paths = {f"friction.{key}" for key in keys}
+        if any(path.startswith((*paths, "correlation")) or path == "friction" for path in changed):
+            continue
+        read = {key: friction[key] for key in keys if key in friction}
+        if all(_is_read(entry, tree) for entry in read.values()):
+            for key, entry in read.items():
+                _put_back(tree, entry)
+                del friction[key]
+            pairs[:] = [pair for pair in pairs if not {pair["first"], pair["second"]} <= paths]
+
+
+def _is_read(entry: Any, tree: Tree) -> bool:
+    """Whether a value of friction and its tolerance are as a sheet's keys were read: no words of a user."""
+    source = entry.get("source", "") if isinstance(entry, dict) else ""
+    tables = {"motor", *(f"gear.{gear['name']}" for gear in tree.get("gear", ()))}
+    words = [_WORD.fullmatch(word) for word in source.removeprefix(FROM).partition("; ")[0].split(", ")]
+    read = source.startswith(FROM) and entry.get("tolerance", _OPEN) == _OPEN
+    return read and all(word is not None and word["table"] in tables for word in words)
+
+
+def _put_back(tree: Tree, entry: Tree) -> None:
+    words, _, source = entry["source"].removeprefix(FROM).partition("; ")
+    tables = {"motor": tree["motor"], **{f"gear.{gear['name']}": gear for gear in tree.get("gear", ())}}
+    for word in map(_WORD.fullmatch, words.split(", ")):
+        assert word is not None
+        stated = {"value": word["text"], "source": source, "grade": entry.get("grade", "")}
+        tables[word["table"]][word["key"]] = stated
+
+
 class DataSheet:
-    """What a file states so: values with their pedigree, by dotted key."""
+    """What a file states so: values with their pedigree, by dotted key, `UNREAD` where they could not be."""
 
     def __init__(self, stated: dict[str, model.Parameter], tree: Tree) -> None:
         self.stated = stated
-        self.motor, self.friction = (_table(tree.get(key)) for key in ("motor", "friction"))
-        self.gears = {path: item for path, item in stated.items() if path.startswith("gear.")}
+        friction = tree.get("friction")
+        self.friction = friction if isinstance(friction, dict) else {}
+        self.gears = {path: item for path, item in stated.items() if path.startswith(("gear.", "gear["))}
 
-    def refusals(self) -> Iterator[Refusal]:
+    def refusals(self, design: model.Design) -> Iterator[Refusal]:
         """What stands beside what it takes the place of, and what lacks its other half."""
         for path, item in self.stated.items():
-            for key in _TAKEN["gear.efficiency" if path in self.gears else _CURRENT]:
-                entry = self.friction.get(key)
-                if isinstance(entry, dict) and str(entry.get("source", "")).startswith(FROM):
-                    yield path, item.text, f"was read into friction.{key}; change that, or the file"
-                elif entry is not None:
-                    yield path, item.text, f"not allowed beside friction.{key}, which says the same; give one"
-            if item.tolerance is not None:
-                yield f"{path}.tolerance", "", "allowed: none here; of the keys of friction"
-            if path in (_SPEED, _SHARE) and _CURRENT not in self.stated:
-                yield path, item.text, f"needs {_CURRENT}"
-            if path == _CURRENT and "torque_constant" not in self.motor:
-                yield path, item.text, "needs motor.torque_constant"
+            yield from readable(self._beside(path, item, design))
+        yield from readable(self._halved())
+
+    def _beside(self, path: str, item: model.Parameter, design: model.Design) -> Iterator[Refusal]:
+        for key in _TAKEN["gear.efficiency" if path in self.gears else _CURRENT]:
+            if key in self.friction:
+                yield path, item.text, f"not allowed beside friction.{key}, which says the same; give one"
+        if item.tolerance is not None:
+            yield f"{path}.tolerance", "", "allowed: none here; of the keys of friction"
+        if path in (_SPEED, _SHARE) and _CURRENT not in self.stated:
+            yield path, item.text, f"needs {_CURRENT}"
+        if path == _CURRENT and design.motor.torque_constant_Nm_A is None:
+            yield path, item.text, "needs motor.torque_constant"
+
+    def _halved(self) -> Iterator[Refusal]:
         share = self.stated.get(_SHARE)
         if _CURRENT in self.stated and _SPEED not in self.stated and (share is None or share.value < 1.0):
             yield _SPEED, "", f"missing; {_CURRENT} needs it"
 
     def read_into(self, design: model.Design) -> model.Design:
         """The design with the friction that follows."""
+        if design.friction is UNREAD:
+            return design
         if _CURRENT in self.stated:
             design = self._no_load(design)
         return self._loaded(design) if self.gears else design
@@ -99,7 +134,7 @@ class DataSheet:
         if _SHARE in self.stated:
             return design
         open_ = {path: replace(design.parameters[path], tolerance=model.Tolerance(
-            kind="uniform", half_width=value, text="100.0 %")) for path, value in values.items()}  # fmt: skip
+            kind="uniform", half_width=value, text=_OPEN)) for path, value in values.items()}  # fmt: skip
         pair = model.Correlation(first="friction.dry_torque", second="friction.viscous", coefficient=-1.0)
         parameters = model.FrozenMap({**design.parameters, **open_})
         return replace(design, parameters=parameters, correlations=(*design.correlations, pair))
@@ -128,7 +163,3 @@ class DataSheet:
         attributes: dict[str, Any] = {FIELDS[path].attribute: value for path, value in values.items()}
         friction = replace(design.friction, **attributes)
         return replace(design, friction=friction, parameters=model.FrozenMap({**design.parameters, **made}))
-
-
-def _table(raw: Any) -> Tree:
-    return raw if isinstance(raw, dict) else {}

@@ -81,7 +81,8 @@ class Field:
         drive = "A" if structure.has_current else "V"
         if self.path == "control.position.gain" and structure.has_velocity:
             return "1/s"
-        return self.unit_template.format(drive=drive, **words)
+        unit = self.unit_template.format(drive=drive, **words)
+        return "1" if unit == "rad/rad" else unit
 
     def travel_power(self) -> int:
         """n, where a value in rotary units becomes one in linear units times p^n, p the travel per radian.

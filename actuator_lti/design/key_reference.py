@@ -49,7 +49,12 @@ def _entry(field: Field, kind: type | None, structure: Structure) -> KeyEntry:
     unit = "1" if field.kind in ("text", "label", "choice", "flag") else field.unit(structure)
     same = {item.name: getattr(field, item.name) for item in fields(KeyEntry) if hasattr(field, item.name)}
     return KeyEntry(
-        **{**same, "unit": unit, "default": _default(field, kind, unit), "allowed": _allowed(field, unit)}
+        **{
+            **same,
+            "unit": unit,
+            "default": "" if field.required else _default(field, kind, unit),
+            "allowed": _allowed(field, unit),
+        }
     )
 
 

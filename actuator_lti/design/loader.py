@@ -7,7 +7,7 @@ from functools import lru_cache
 from os import PathLike, fspath
 from pathlib import Path
 
-from actuator_lti.design.checks import check_design
+from actuator_lti.design.checks import contradictions
 from actuator_lti.design.mistakes import Findings, lines_of, nearest
 from actuator_lti.design.model import Design
 from actuator_lti.design.reader import read_tree
@@ -119,6 +119,8 @@ def design_from_tree(
     tree: Tree, origin: str, lines: Mapping[str, int] | None = None, folder: Path = Path()
 ) -> Design:
     """Build and check a design from a parsed TOML tree, whose keys stand on these lines of a text."""
-    design = read_tree(tree, origin, Findings(origin, lines, folder))
-    check_design(design, origin, lines)
+    findings = Findings(origin, lines, folder)
+    design = read_tree(tree, origin, findings)
+    findings.extend(contradictions(design))
+    findings.refuse()
     return design

@@ -53,13 +53,7 @@ class Findings:
             self.note(*refusal)
 
     def refuse(self) -> None:
-        """Refuse the file if anything was found.
-
-        Raises
-        ------
-        InputError
-            The only mistake, or all of them (`actuator_lti.errors.Mistakes`), in the order of the file.
-        """
+        """Refuse the file if anything was found: an InputError, or all in its order (`Mistakes`)."""
         errors = [error for _, error in sorted(self.found, key=lambda item: item[0])]
         if len(errors) > MOST:
             errors[MOST:] = [InputError(f"and {len(errors) - MOST} more mistakes", where=self.where)]
@@ -72,10 +66,15 @@ class Findings:
         return self.lines.get(path, 0)
 
 
+def meant_of(word: str, known: Iterable[str]) -> str:
+    """The known word that is nearest to one, or nothing where none is near."""
+    return next(iter(get_close_matches(word, list(known), 1, 0.65)), "")
+
+
 def nearest(word: str, known: Iterable[str]) -> str:
     """`` (nearest known: "x")``, or nothing where none is near."""
-    near = get_close_matches(word, list(known), 1, 0.5)
-    return f' (nearest known: "{near[0]}")' if near else ""
+    near = meant_of(word, known)
+    return f' (nearest known: "{near}")' if near else ""
 
 
 def lines_of(text: str, tree: Tree) -> dict[str, int]:

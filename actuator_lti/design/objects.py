@@ -60,19 +60,8 @@ def import_objects(objects: ControllerObjects, base: Design, where: str = "setti
     Objects that no key of a design holds are kept in ``design.objects`` and written back by
     :func:`export_objects`.
 
-    Parameters
-    ----------
-    objects : ControllerObjects
-        The settings, with the calibration of the velocity gain that is to be used.
-    base : Design
-        A rotary drive with all three loops.
-    where : str
-        The file, for errors.
-
-    Raises
-    ------
-    InputError
-        If a value leaves its object's range, an object appears twice, or the design cannot hold it.
+    The base is a rotary drive with all three loops; else, and for a value out of its object's range, an
+    InputError names the file ``where``.
     """
     _check_cascade(base)
     given = _checked(objects.values, where)
@@ -166,25 +155,10 @@ def _import_notes(given: _Values, factor: float, design: Design) -> tuple[str, .
 
 
 def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
-    """A controller's settings from a design.
+    """A controller's settings from a rotary drive with all three loops, unknown objects as they were.
 
-    Parameters
-    ----------
-    design : Design
-        A rotary drive with all three loops.
-    complete : bool, optional
-        Whether to add the objects that the imported settings did not have.  By default only a design
-        that was never imported gets all of them.
-
-    Returns
-    -------
-    Exported
-        Objects in the order of their index, unknown ones as they were.
-
-    Raises
-    ------
-    InputError
-        If a value does not fit the range of its object.
+    ``complete`` adds those that the imported settings did not have; by default only a design that was never
+    imported gets them. A value that does not fit its object's range is an InputError.
     """
     _check_cascade(design)
     before = design.objects

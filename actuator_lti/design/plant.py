@@ -45,7 +45,8 @@ class Motor:
         "torque_constant", "{torque}/A", "kM", "torque per ampere", example="5.9 mN*m/A")] = None
     back_emf_constant_Vs_rad: Annotated[float | None, positive(
         "back_emf_constant", "V*s/{angle}", "kE",
-        "back-EMF per rad/s; a speed constant, 83.4 rpm/V, is turned over", example="5.9 mV*s/rad")] = None
+        "back-EMF per rad/s; a speed constant, 83.4 rpm/V, is turned over (of peak-phase it is line-line)",
+        example="5.9 mV*s/rad")] = None
     source_gain_Nm_V: Annotated[float | None, positive(
         "source_gain", "{torque}/V", "g", "gain of an ideal torque source, instead of R, L, kM, kE",
         example="35.15 N/V")] = None
@@ -63,8 +64,9 @@ class Motor:
         low=-7.0, high=7.0, example="180 deg")] = 0.0
     constants: Annotated[MotorConstants, choice(
         "constants",
-        "how the data sheet gives kM, kE, R and L: dc (phase-phase), rms-line (N m/A rms, V rms "
-        "line-line, R and L line-line), peak-phase (dq: A and V peak of a phase, R and L per phase)")] = "dc"
+        "how the data sheet gives kM, kE, R and L: dc (phase-phase; a stepper per phase), rms-line "
+        "(N m/A rms, V rms line-line, R and L line-line), peak-phase (dq: A and V peak of a phase, R and L "
+        "per phase)")] = "dc"
 
     @property
     def has_electrical_dynamics(self) -> bool:
@@ -240,7 +242,8 @@ def _most_order(design: "Design", peak_Nm: float, ratio: float) -> tuple[float, 
     if speed == inf:
         return 0.0, "held over a tick, it needs a bound of the speed, limits.speed"
     most = MOST_PHASE_rad / (speed * Ts)
-    return most, f"held over a tick, of which {speed:.4g} 1/s passes more than {MOST_PHASE_rad} rad"
+    unit = "rad/s" if design.axis == "rotary" else "m/s"
+    return most, f"held over a tick, in which {speed:.4g} {unit} passes more than {MOST_PHASE_rad} rad of it"
 
 
 def _largest_damping(design: "Design") -> tuple[float, str]:

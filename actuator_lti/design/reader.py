@@ -1,6 +1,6 @@
 """From the tree of a design file to a :class:`Design` in SI units: one walk over the declared keys.
 
-A mistake is noted and the walk goes on, so that all are told at once.
+A mistake is noted and the walk goes on, past what is `UNREAD` then, so that all are told at once.
 """
 
 from __future__ import annotations
@@ -14,16 +14,18 @@ from typing import Any
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design import model
-from actuator_lti.design.data_sheet import WORDS, DataSheet, sheet_fields
-from actuator_lti.design.field import Field, Structure
+from actuator_lti.design.data_sheet import DataSheet, sheet_fields
+from actuator_lti.design.field import Axis, Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
 from actuator_lti.design.law_sources import PARTS, read_law
-from actuator_lti.design.mistakes import Findings, nearest
+from actuator_lti.design.mistakes import Findings, meant_of, nearest
 from actuator_lti.design.parameters import FrozenMap
-from actuator_lti.design.sections import RECORDS, Section, children
+from actuator_lti.design.sections import BY_PATH, RECORDS, Section, children
 from actuator_lti.design.settings_file import objects_from
+from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import ampere_unit, parse_limit, parse_quantity, si_text
+from actuator_lti.design.unread import UNREAD, UnreadError
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
@@ -35,102 +37,116 @@ _ENTRY = ("value", "source", "grade", "tolerance")
 _FIELD_OF_LEAD = FIELDS["screw.lead"]
 _CONVENTION = re.compile(r"(?<=[AV])[ _]?(rms|eff|peak|pk)\b", re.IGNORECASE)
 _DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
-_AMPERE = re.compile(r"\bA\b")
+_PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev
+_AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
+_PEAK = {"rms-line": sqrt(2.0), "peak-phase": 1.0}  # of one ampere or volt of a sheet
 _DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}  # section 1 of model.md
-_UPSIDE_DOWN = {"motor.back_emf_constant": (1.0, "{angle}/(V*s)"), "control.period": (2.0 * pi, "rad/s")}
+_UPSIDE_DOWN = {
+    "motor.back_emf_constant": (1.0, "{angle}/(V*s)"),
+    "motor.cogging_periods": (2.0 * pi, "{angle}"),
+    "control.period": (2.0 * pi, "rad/s"),
+}
 
 
 def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
-    """The design of a tree; relations between its keys are checked by `checks.check_design`.
-
-    Raises
-    ------
-    InputError
-        All mistakes at once: file, line, key, value and what is allowed.
-    """
+    """The design of a tree, `UNREAD` where there are findings; relations between its keys are `checks`."""
     reader = Reader(tree, findings)
-    values = reader.values("design", tree.get("design"), "design")
+    values, _ = reader.values("design", tree.get("design"), "design")
     tables = ["design", *(item.key for item in children("")), *(item.key for item in RECORDS), "objects"]
     meant = reader.known(tree, tables, "")
     parts = reader.tables("", tree, meant)
     records = {record.attribute: reader.items(record, tree.get(record.key, [])) for record in RECORDS}
     objects = reader.objects(tree.get("objects"))
-    sheet = DataSheet(reader.stated, tree)
-    findings.extend(sheet.refusals())
-    findings.refuse()
     # 10 deg (0.01 m) without a load where the file does not say what to validate
     fallback = model.Validation(full_deflection_rad=model.default_deflection(reader.structure.axis))
-    values["title"] = values.get("title") or values["name"]
+    name = values.setdefault("name", UNREAD)
+    values["title"] = UNREAD if values.get("title") is UNREAD else values.get("title") or name
     design = model.Design(
         **{**values, "validation": fallback, **parts, **records},
         objects=objects,
         origin=origin,
         parameters=FrozenMap(reader.parameters),
     )
-    return sheet.read_into(design)
+    sheet = DataSheet(reader.stated, tree)
+    contradicted = tuple(sheet.refusals(design))
+    findings.extend(contradicted)
+    try:
+        return replace(design, friction=UNREAD) if contradicted else sheet.read_into(design)
+    except UnreadError:
+        return replace(design, friction=UNREAD)
 
 
 class Reader:
-    """Reads one tree; what it cannot read it notes and leaves out."""
+    """Reads one tree; what it cannot read it notes, and has `UNREAD` for it."""
 
     def __init__(self, tree: Tree, findings: Findings) -> None:
         self.findings = findings
         self.parameters: dict[str, model.Parameter] = {}
         self.stated: dict[str, model.Parameter] = {}
-        head, control = (
-            tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control")
+        head, control, motor = (
+            tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control", "motor")
         )
-        axis: Any = head.get("axis", "rotary")
-        self.structure = Structure(
-            axis if axis == "linear" else "rotary", "velocity" in control, "current" in control
-        )
-        motor = tree.get("motor")
-        self.constants: Any = motor.get("constants", "dc") if isinstance(motor, dict) else "dc"
+        axis, self.constants = _meant(head, "design.axis"), _meant(motor, "motor.constants")
+        stages = {meant_of(f"{key}", ("current", "velocity", "position")) for key in control}
+        self.structure = Structure(axis, "velocity" in stages, "current" in stages)
         self.travel_m_rad: float | None = None
         self.travel_m_rad = self._travel(tree.get("screw"))
 
-    def refuse(self, path: str, value: object, reason: str) -> None:
-        """Note the mistake of one key."""
+    def refuse(self, path: str, value: object, reason: str) -> Any:
+        """Note the mistake of one key, which is unread."""
         self.findings.note(path, shown(value), reason)
+        return UNREAD
 
-    def missing(self, path: str, field: Field | None = None) -> None:
-        """Note that a key is missing."""
+    def missing(self, path: str, field: Field | None = None) -> Any:
+        """Note that a key is missing, which is unread."""
         self.findings.note(path, "", f"missing{_example(field)}")
+        return UNREAD
 
     def known(self, table: Tree, known: Iterable[str], path: str) -> list[str]:
         """Note unknown keys; gives the known ones that they are near to."""
         known, meant = list(known), []
         for key in table:
             if key not in known:
-                hint = f" (it is {WORDS[key]})" if key in WORDS else nearest(key, known)
+                word = key_for(path, key)
+                said = f" ({word})" if word.startswith("not ") else f" (it is {word})"
+                hint = said if word else nearest(key, known)
                 where = f"{path}.{key}" if path else key
-                self.refuse(where, table[key], f"unknown key{hint}; allowed: {', '.join(known)}")
-                meant += [one for one in known if f'"{one}"' in hint]
+                self.refuse(where, table[key], f"unknown key{hint or '; allowed: ' + ', '.join(known)}")
+                meant += [one for one in known if re.search(rf"\b{one}\b(?! of)", hint)]
         return meant
 
-    def values(self, template: str, table: Any, path: str, inner: Iterable[str] = ()) -> Tree:
-        """Attributes and values of the keys that stand in one table."""
+    def values(
+        self, template: str, table: Any, path: str, inner: Iterable[str] = ()
+    ) -> tuple[Tree, list[str]]:
+        """Attributes and values of the keys of one table, and the keys that unknown ones are near to."""
         if not isinstance(table, dict):
-            self.missing(path) if table is None else self.refuse(path, table, "allowed: a table")
-            return {}
+            allowed = f"allowed: a table{f', [{path}]' if path in BY_PATH else ''}"
+            self.missing(path) if table is None else self.refuse(path, table, allowed)
+            return {}, []
         fields, stated = fields_in(template), sheet_fields(template)
         meant = self.known(table, (*(field.key for field in (*fields, *stated)), *inner), path)
         for field in stated:
             where = f"{path}.{field.key}"
-            if field.key in table and self.entry(field, table[field.key], where) is not None:
+            if field.key in (*table, *meant):
+                self.stated[where] = UNREAD
+            if field.key in table and self.entry(field, table[field.key], where) is not UNREAD:
                 self.stated[where] = self.parameters.pop(where)
         values: Tree = {}
         for field in fields:
             where = f"{path}.{field.key}"
             if field.key in table:
                 values[field.attribute] = self.value(field, table, where)
-            elif field.required and field.key not in meant and not (field.key == "gain" and "law" in table):
-                self.missing(where, field)
-        return values
+            elif field.key in meant:
+                values[field.attribute] = self.parameters[where] = UNREAD
+            elif field.required and not (field.key == "gain" and "law" in table):
+                values[field.attribute] = self.missing(where, field)
+        return values, meant
 
     def value(self, field: Field, table: Tree, path: str) -> Any:
-        """One value as the design has it; None where it is refused."""
+        """One value as the design has it."""
         raw = table[field.key]
+        if raw is UNREAD:
+            return UNREAD
         if field.kind == "limit":
             return self.limit(table.get("quantity"), raw, path)
         if field.kind in ("quantity", "integer"):
@@ -146,33 +162,37 @@ class Reader:
             hint = (
                 nearest(raw, field.choices).strip() + "; " if field.choices and isinstance(raw, str) else ""
             )
-            self.refuse(path, raw, f"{hint.removeprefix('; ')}allowed: {field.allowed('1')}")
+            return self.refuse(path, raw, f"{hint.removeprefix('; ')}allowed: {field.allowed('1')}")
         return raw
 
     def words(self, field: Field, raw: Any, path: str) -> tuple[str, ...]:
         """Some of the words that a key may have, each once."""
         known = raw if isinstance(raw, list) and all(isinstance(word, str) for word in raw) else []
+        if not known or len({*known}) != len(known):
+            return self.refuse(path, raw, f"allowed: a list of {', '.join(field.choices)}, each at most once")
+        read = tuple(known)
         for word in known:
             if word not in field.choices:
                 hint = nearest(word, field.choices)
-                self.refuse(path, word, f"unknown{hint}; allowed: {', '.join(field.choices)}")
-        if not known or len({*known}) != len(known):
-            self.refuse(path, raw, f"allowed: a list of {', '.join(field.choices)}, each at most once")
-        return tuple(known)
+                read = self.refuse(path, word, f"unknown{hint}; allowed: {', '.join(field.choices)}")
+        return read
 
-    def entry(self, field: Field, raw: Any, path: str) -> float | int | None:
+    def entry(self, field: Field, raw: Any, path: str) -> Any:
         """A value with its pedigree, which is kept."""
+        self.parameters[path] = UNREAD
         table = raw if isinstance(raw, dict) else {"value": raw}
         self.known(table, _ENTRY, path)
         if "value" not in table:
-            self.missing(f"{path}.value", field)
-            return None
+            return self.missing(f"{path}.value", field)
         for key in ("source", "grade"):
             if not isinstance(table.get(key, ""), str):
                 self.refuse(f"{path}.{key}", table[key], "allowed: text")
         value = self.number(field, table["value"], path)
-        if value is None:
-            return None
+        if value is UNREAD:
+            return UNREAD
+        tolerance = self.tolerance(field, table.get("tolerance"), value, f"{path}.tolerance")
+        if tolerance is UNREAD:
+            return value
         unit = field.unit(self.structure)
         self.parameters[path] = model.Parameter(
             path=path,
@@ -182,7 +202,7 @@ class Reader:
             symbol=field.symbol,
             source=table.get("source", ""),
             grade=table.get("grade", ""),
-            tolerance=self.tolerance(field, table.get("tolerance"), value, f"{path}.tolerance"),
+            tolerance=tolerance,
         )
         return value
 
@@ -195,55 +215,66 @@ class Reader:
             return read_tolerance(raw, value, lambda text: self.quantity(text, field), field, unit)
         except InputError as error:
             at = f"{path}.{error.where}" if error.where else path
-            self.refuse(at, raw if error.where is None else raw[error.where], error.message)
-        return None
+            return self.refuse(at, raw if error.where is None else raw[error.where], error.message)
 
-    def numbers(self, field: Field, raw: Any, path: str) -> tuple[float | None, ...]:
+    def numbers(self, field: Field, raw: Any, path: str) -> Any:
         """A list of numbers."""
         if not isinstance(raw, list):
-            self.refuse(path, raw, "allowed: a list")
-            return ()
-        if not 0 < len(raw) <= MAX_LIST:
-            self.findings.note(path, "", f"allowed: 1 to {MAX_LIST} items")
-        return tuple(self.number(field, one, f"{path}[{k}]") for k, one in enumerate(raw[:MAX_LIST], 1))
+            return self.refuse(path, raw, "allowed: a list")
+        read = tuple(self.number(field, one, f"{path}[{k}]") for k, one in enumerate(raw[:MAX_LIST], 1))
+        return read if 0 < len(raw) <= MAX_LIST else self._too_many(path, MAX_LIST)
 
-    def rows(self, field: Field, raw: Any, path: str) -> tuple[tuple[float | None, ...], ...]:
+    def _too_many(self, path: str, most: int) -> Any:
+        self.findings.note(path, "", f"allowed: 1 to {most} items")
+        return UNREAD
+
+    def rows(self, field: Field, raw: Any, path: str) -> Any:
         """A list of rows of numbers."""
         if not isinstance(raw, list) or not all(isinstance(row, list) for row in raw):
-            self.refuse(path, raw, "allowed: a list of rows, each a list of numbers")
-            return ()
+            return self.refuse(path, raw, "allowed: a list of rows, each a list of numbers")
         return tuple(self.numbers(field, row, f"{path}[{k}]") for k, row in enumerate(raw[:MAX_LIST], 1))
 
-    def number(self, field: Field, raw: Any, path: str) -> float | int | None:
-        """A number in SI; None where it is refused."""
+    def number(self, field: Field, raw: Any, path: str) -> Any:
+        """A number in SI."""
         unit = field.unit(self.structure)
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
-            self.refuse(path, raw, f"allowed: a number with its unit, as text{_example(field)}")
-            return None
+            return self.refuse(path, raw, f"allowed: a number with its unit, as text{_example(field)}")
         try:
             value = self.quantity(raw, field)
         except InputError as error:
-            self.refuse(path, raw, error.message)
-            return None
+            return self.refuse(path, raw, f"{error.message}{self._other_axis(raw, field)}")
         if field.kind == "integer" and value != int(value):
-            self.refuse(path, raw, "allowed: a whole number")
-        elif not field.accepts(value):
-            self.refuse(path, raw, f"allowed: {field.allowed(unit)}")
+            return self.refuse(path, raw, "allowed: a whole number")
+        if not field.accepts(value):
+            return self.refuse(path, raw, f"allowed: {field.allowed(unit)}")
         return int(value) if field.kind == "integer" else value
+
+    def _other_axis(self, raw: Any, field: Field) -> str:
+        """That a unit would be one of the other kind of axis."""
+        axis: Axis = "linear" if self.structure.axis == "rotary" else "rotary"
+        unit = field.unit(replace(self.structure, axis=axis))
+        try:
+            parse_quantity(raw, unit)
+        except InputError:
+            return ""
+        return f'; {unit} with design.axis = "{axis}"' if unit != field.unit(self.structure) else ""
 
     def quantity(self, text: Any, field: Field) -> float:
         """The SI value of a text; behind a screw also from the units of a rotary axis.
 
-        A speed constant is read as the back-EMF constant that it is upside down, a sampling rate as its
-        period, amperes rms or peak as those of the motor that the model has.
+        A speed constant is read as the back-EMF constant that it is upside down (that of a motor stated per
+        phase is line-line, as makers have it), a sampling rate as its period, a magnet pitch as its order,
+        amperes rms or peak as those of the motor that the model has.
         """
         unit, power = field.unit(self.structure), field.travel_power()
+        if field is _FIELD_OF_LEAD and isinstance(text, str):
+            text = _PER_TURN.sub("", text)
         if isinstance(text, str) and (convention := _CONVENTION.search(text)):
             plain = _CONVENTION.sub(" dc", text)
             return self.quantity(plain, field) * self._amperes(field, unit, convention[1].lower())
         rotary = field.unit(replace(self.structure, axis="rotary"))
         factors = {unit: 1.0}
-        if self.travel_m_rad is not None and power and rotary != unit and isinstance(text, str):
+        if self.travel_m_rad is not None and power and rotary != unit:
             factors = {rotary: self.travel_m_rad**power, unit: 1.0}
         refused: list[InputError] = []
         for one, factor in factors.items():
@@ -254,7 +285,8 @@ class Reader:
             else:
                 return self._said(text, field, value)
             if field.path in _UPSIDE_DOWN and (turned := _turned(field.path, text, one)) is not None:
-                return turned * factor
+                line = field.section == "motor" and self.constants == "peak-phase"
+                return turned * factor / (sqrt(3.0) if line else 1.0)
         raise refused[-1]
 
     def _said(self, text: Any, field: Field, value: float) -> float:
@@ -270,40 +302,53 @@ class Reader:
         )
 
     def _amperes(self, field: Field, unit: str, convention: str) -> float:
-        """From amperes rms or peak to those of the model: i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak."""
-        given = "rms-line" if convention in ("rms", "eff") else "peak-phase"
-        if self.constants == "dc" or (field.section == "motor" and self.constants != given):
-            raise InputError(f'allowed: with motor.constants = "{given}"')
-        above, _, below = unit.partition("/")
-        power = len(_AMPERE.findall(above)) - len(_AMPERE.findall(below))
-        if field.section != "motor" and not power:
-            raise InputError(f"allowed: a number with a unit like {unit}, as the model has it")
-        return 1.0 if field.section == "motor" else float(_DC_PER[given] ** power)
+        """From amperes rms or peak to those of the model: i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak.
 
-    def limit(self, quantity: Any, raw: Any, path: str) -> float | None:
+        Constants of the motor become those of its convention, rms or peak; kE against kM tells a wrong one.
+        """
+        given = "rms-line" if convention in ("rms", "eff") else "peak-phase"
+        if self.constants == "dc":
+            phase = ", where R and L are per phase" if given == "peak-phase" else ""
+            allowed = f'allowed: with motor.constants = "{given}"{phase}'
+            raise InputError(
+                f"{allowed}; where the sheet's R, L, kM and kE are line-line and in these amperes: A"
+            )
+        own = field.section == "motor"
+        above, _, below = unit.partition("/")
+        sized = _SIZED if own else _AMPERE
+        power = len(sized.findall(above)) - len(sized.findall(below))
+        if own:
+            return float((_PEAK[given] / _PEAK[self.constants]) ** power)
+        if not power:
+            raise InputError(f"allowed: a number with a unit like {unit}, as the model has it")
+        return float(_DC_PER[given] ** power)
+
+    def limit(self, quantity: Any, raw: Any, path: str) -> Any:
         """A limit in the unit in which its quantity is reported."""
         known = QUANTITIES.get(quantity) if isinstance(quantity, str) else None
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
-            self.refuse(path, raw, "allowed: a number with its unit, as text")
-        elif known is not None:
-            try:
-                return parse_limit(raw, known.unit_for(self.structure.axis))
-            except (InputError, ValueError) as error:
-                self.refuse(path, raw, getattr(error, "message", str(error)))
-        return None
+            return self.refuse(path, raw, "allowed: a number with its unit, as text")
+        if known is None:
+            return UNREAD
+        try:
+            return parse_limit(raw, known.unit_for(self.structure.axis))
+        except (InputError, ValueError) as error:
+            return self.refuse(path, raw, getattr(error, "message", str(error)))
 
     def part(self, section: Section, raw: Any, path: str) -> Any:
-        """What one table becomes, with the tables inside it; None once there are mistakes."""
+        """What one table becomes, with the tables inside it."""
         inner = children(section.path)
         raw = self.law(raw, path) if section.kind is model.Law else raw
         names = [*(item.key for item in inner), *(["name"] if section.many == "named" else [])]
-        values = {**self.values(section.template, raw, path, names), **self.tables(section.path, raw)}
-        if self.findings.found:
-            return None
+        values, meant = self.values(section.template, raw, path, names)
+        values |= self.tables(section.path, raw, meant)
+        if not isinstance(raw, dict):
+            return UNREAD
         if section.many == "named":
-            values["name"] = raw["name"]
+            values["name"] = raw["name"] if path == f"{section.path}.{raw.get('name')}" else UNREAD
         if section.kind is model.Requirement:
-            values["unit"] = QUANTITIES[raw["quantity"]].unit_for(self.structure.axis)
+            known = QUANTITIES.get(f"{raw.get('quantity')}")
+            values["unit"] = known.unit_for(self.structure.axis) if known else UNREAD
         return section.kind(**values)
 
     def law(self, raw: Any, path: str) -> Any:
@@ -315,39 +360,40 @@ class Reader:
         if "file" not in raw:
             return raw
         file, rest = raw["file"], {key: value for key, value in raw.items() if key != "file"}
-        twice = [key for key in (*PARTS, "L", "period") if key in rest]
+        held = dict.fromkeys((*PARTS, "L", "period"), UNREAD)
+        twice = [key for key in held if key in rest]
         if not isinstance(file, str) or twice:
             self.refuse(f"{path}.file", file, f"allowed: a file's name, without {', '.join(twice) or 'more'}")
-            return rest
+            return {**held, **rest}
         try:
-            return {**read_law(self.findings.folder / file), **rest}
+            held = read_law(self.findings.folder / file)
         except InputError as error:
             self.refuse(f"{path}.file", file, error.message)
-        return rest
+        return {**held, **rest}
 
     def tables(self, path: str, table: Any, meant: Iterable[str] = ()) -> Tree:
         """The parts of the tables that lie in a table (``""``: in the file), where they are written."""
         result: Tree = {}
         for section in children(path) if isinstance(table, dict) else ():
-            if section.many:
+            if section.key in meant and section.key not in table:
+                result[section.attribute] = UNREAD
+            elif section.many:
                 result[section.attribute] = self.items(section, table.get(section.key, []))
-            elif section.key in table or (section.required and section.key not in meant):
+            elif section.key in table or section.required:
                 result[section.attribute] = self.part(section, table.get(section.key), section.path)
         return result
 
-    def items(self, section: Section, raw: Any) -> tuple[Any, ...]:
+    def items(self, section: Section, raw: Any) -> Any:
         """The parts of repeated tables, each known by its name, id or number."""
         most = MAX_GEARS if section.many == "named" else MAX_LIST
         if not isinstance(raw, list):
-            self.refuse(section.path, raw, f"allowed: [[{section.path}]] tables")
-        elif len(raw) > most:
-            self.findings.note(section.path, "", f"allowed: 1 to {most} items")
-        else:
-            paths: list[str] = []
-            for index, table in enumerate(raw):
-                paths.append(self._label(section, table, index, paths))
-            return tuple(self.part(section, *item) for item in zip(raw, paths, strict=True))
-        return ()
+            return self.refuse(section.path, raw, f"allowed: [[{section.path}]] tables")
+        if len(raw) > most:
+            return self._too_many(section.path, most)
+        paths: list[str] = []
+        for index, table in enumerate(raw):
+            paths.append(self._label(section, table, index, paths))
+        return tuple(self.part(section, *item) for item in zip(raw, paths, strict=True))
 
     def _label(self, section: Section, table: Any, index: int, before: list[str]) -> str:
         """The dotted path of a repeated table; the name of one that is known by it is checked."""
@@ -359,11 +405,11 @@ class Reader:
         if section.label or not isinstance(table, dict):
             return path if isinstance(name, str) else numbered
         if name is None:
-            self.missing(f"{numbered}.name")
+            self.findings.note(f"{numbered}.name", "", 'missing; example: name = "planetary"')
         elif not (isinstance(name, str) and _NAME.match(name)):
-            self.refuse(
-                f"{numbered}.name", name, "allowed: 1 to 64 letters, digits, - and _, no dot or space"
-            )
+            plain = re.sub(r"[^A-Za-z0-9_-]+", "-", f"{name}").strip("-_")[:64] or "first"
+            allowed = f'allowed: 1 to 64 letters, digits, - and _, no dot or space, as "{plain}"'
+            self.refuse(f"{numbered}.name", name, allowed)
         elif path in before:
             self.refuse(f"{numbered}.name", name, "allowed: each name once")
         else:
@@ -387,9 +433,17 @@ class Reader:
         lead: Any = screw.get("lead") if isinstance(screw, dict) else None
         lead = lead.get("value") if isinstance(lead, dict) else lead
         try:
-            return model.Screw(lead_m=parse_quantity(lead, _FIELD_OF_LEAD.unit(self.structure))).travel_m_rad
+            value = self.quantity(lead, _FIELD_OF_LEAD)
+            return model.Screw(lead_m=value if _FIELD_OF_LEAD.accepts(value) else 0.01).travel_m_rad
         except (InputError, TypeError):
-            return None  # told where the lead itself is read
+            return model.Screw(lead_m=0.01).travel_m_rad  # told where the lead itself is read
+
+
+def _meant(table: Tree, path: str) -> Any:
+    """The word of a key on which the reading of others depends: where it is none, the nearest."""
+    field = FIELDS[path]
+    default = field.choices[0]
+    return meant_of(f"{table.get(field.key, default)}", field.choices) or default
 
 
 def _one_row(value: Any) -> bool:
@@ -416,7 +470,7 @@ def _example(field: Field | None) -> str:
     if field is None:
         return ""
     example = f'example: {field.key} = "{field.example}" ({field.description})'
-    return f"; {example if field.example else f'it is the {field.description}'}"
+    return f"; {example if field.example else field.description}"
 
 
 def _turned(path: str, text: Any, unit: str) -> float | None:

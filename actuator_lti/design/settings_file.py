@@ -20,17 +20,7 @@ _LABEL = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{4})(?:\.([0-9A-Fa-f]{2}))?\Z")
 def read_settings(path: str | Path, velocity_gain_factor: float | None = None) -> ControllerObjects:
     """Read a settings file; XML where it begins with ``<``, else TOML.
 
-    Parameters
-    ----------
-    path : str or path
-        At most 1 MiB, UTF-8.
-    velocity_gain_factor : float, optional
-        1 (per rad/s) or 9.549 (per rpm); without it what a TOML file says, else 1.
-
-    Raises
-    ------
-    InputError
-        One line: file, object, value and what is allowed.
+    The factor is 1 (per rad/s) or 9.549 (per rpm); without it what a TOML file says, else 1.
     """
     where = shown(str(path), 200)[1:-1]
     text = decode(read_bytes(Path(path), "settings file"), where)

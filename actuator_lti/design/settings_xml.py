@@ -130,21 +130,9 @@ def settings_xml(objects: ControllerObjects, into: Path | None = None) -> tuple[
 def update_settings_xml(
     text: str, objects: ControllerObjects, where: str = "settings"
 ) -> tuple[str, tuple[str, ...]]:
-    """Put settings into an existing device configuration, which keeps all else that it holds but comments.
+    """Put settings into the device configuration that they came from, which keeps all but its comments.
 
-    Parameters
-    ----------
-    text : str
-        The device configuration that the settings came from.
-    objects : ControllerObjects
-        The settings to put into it.
-    where : str
-        Its file, for errors.
-
-    Returns
-    -------
-    (str, tuple of str)
-        The new text, and the labels of objects that it has no place for.
+    Gives the new text, and the labels of objects that it has no place for.
     """
     for prefix, uri in re.findall(r'xmlns(?::([A-Za-z][\w.-]*))?\s*=\s*"([^"]*)"', text):
         if not re.fullmatch(r"ns[0-9]+", prefix):

@@ -11,7 +11,7 @@ _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9])")
 _COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
 _SIGNS = str.maketrans({"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"'})
-_POWER = re.compile(r"[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")  # min⁻¹
+_POWER = re.compile(r"[-⁻]?[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")  # min⁻¹
 _GROUPS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:[ \u00a0\u2009\u202f][0-9]{3})+(?![0-9/])")  # 10 600
 # How data sheets write what is not a product of names: each becomes one, in this order.
 _SPELLINGS = (
@@ -25,14 +25,16 @@ _SPELLINGS = (
     (re.compile(r"(?<=[AV]) ?_?(?:DC|dc)\b"), ""),  # of the motor that the model has: direct
     (re.compile(r"(?<=[A-Za-z])\^?-([123])\b"), r"^-\1"),  # min-1
     (re.compile(r"(?<=[A-Za-z])([23])(?![0-9])"), r"^\1"),  # cm2
-    (re.compile(r"(?<=[A-Za-z23])-(?=[A-Za-z])"), "*"),  # oz-in
+    (re.compile(r"(?<=[A-Za-z23])[-.](?=[A-Za-z])"), "*"),  # oz-in, g.cm2
     (re.compile(r"\b(?:r|U|tr|rev)/min\b"), "rpm"),
+    (re.compile(r"\brps\b"), "rev/s"),
     (re.compile(r"/ *\(? *1000 *(rpm|1/min|min\^-1)\b *\)?"), r"/(1000*(\1))"),
     (re.compile(r"\b(k?g)(c?m\^2)"), r"\1*\2"),  # gcm2
 )
-_POWER_OF_TEN = re.compile(r"(?<=[0-9.])\s*[x×·*]\s*10\s*\^?\s*([+-]?[0-9]{1,3})\b")
+_POWER_OF_TEN = re.compile(r"(?<=[0-9.])\s*(?:[x×·*]|(?<=\s)\.)\s*10\s*\^?\s*([+-]?[0-9]{1,3})\b")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _OVER = re.compile(r"\s*([0-9]+\.?[0-9]*)\s*([/:])\s*([0-9]+\.?[0-9]*)\s*\Z")
+_BITS = re.compile(r"\s*(?:([0-9]{1,2})[ -]?bits?|2\^([0-9]{1,2}))\s*\Z")  # of an encoder
 LONGEST = 120  # characters of a quantity
 
 
@@ -45,7 +47,9 @@ def tidy(unit: str) -> str:
 
 
 def split_quantity(text: str) -> tuple[float, str]:
-    """Number and unit of a written quantity; ``43:1`` and ``343/8`` are numbers without one."""
+    """Number and unit of a written quantity; ``43:1``, ``343/8`` and ``17 bit`` are numbers without one."""
+    if bits := _BITS.match(text) if len(text) <= LONGEST else None:
+        return 2.0 ** int(bits[1] or bits[2]), ""
     if over := _OVER.match(text) if len(text) <= LONGEST else None:
         above, below = float(over[1]), float(over[3])
         if over[2] == ":" and above < below:

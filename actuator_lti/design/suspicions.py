@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from math import isfinite, pi
 
 from actuator_lti.design.checks_elastic import elastic_warnings
+from actuator_lti.design.data_sheet import FROM
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 
@@ -116,6 +117,14 @@ def _loads(design: Design) -> Iterator[str]:
 
     largest, given = design.load.moment_max_Nm, stall_torque_Nm(design)
     unit, holding = "N" if design.axis == "linear" else "N*m", given * design.total_ratio
+    losses = design.parameters.get("friction.load_coefficient")
+    if losses is not None and losses.source.startswith(FROM) and design.load.path == "self-locking":
+        lost = losses.value * design.total_ratio
+        if 0.0 < lost < 2.0:
+            yield (
+                f"load.path: self-locking, which gears of {100 / lost:.3g} % are not (only below 50 %); "
+                'load.path = "back-drivable"?'
+            )
     if design.load.path == "back-drivable" and largest > holding:
         yield (
             f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {holding:.3g} {unit} "

@@ -49,6 +49,7 @@ _DERIVED = {
     "Ncm": ("0.01", "N*m"),
     "Nmm": ("0.001", "N*m"),
     "Nms": ("1", "N*m*s"),
+    "Ns": ("1", "N*s"),
     "ozin": ("1", "ozf*in"),
     "lbin inlb": ("1", "lbf*in"),
     "lbft ftlb": ("1", "lbf*ft"),
@@ -68,6 +69,7 @@ _DERIVED = {
     "KV": ("0.10471975511965977", "rad/(V*s)"),
     "Hz hertz": ("6.283185307179586", "rad/s"),
     "count cpr": ("1", "1"),
+    "line": ("4", "1"),  # of an encoder: two edges of two tracks
 }
 _WORD = 4  # letters from which a name may stand in the plural: "volts", but "As" is no unit
 _PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")
@@ -358,14 +360,7 @@ def si_text(value: float, unit: str) -> str:
 
 
 def ampere_unit(path: str, unit: str, constants: str) -> str:
-    """The unit of a limit or gain as a file has to say it: of an AC motor, which amperes.
-
-    Parameters
-    ----------
-    path, unit : str
-        Key, and the SI unit of its quantity.
-    constants : str
-        Of the motor: ``"dc"``, or how an AC motor's data sheet gives its constants.
+    """The unit of a limit or gain as a file has to say it: of an AC motor (``constants``), which amperes.
 
     Examples
     --------
@@ -390,6 +385,8 @@ def parse_limit(text: str | float | int, unit: str) -> float:
         raise InputError(f"{error}; allowed: a number with a unit like {unit}") from None
     if written == unit:
         return number
+    if written == "dB":
+        raise InputError(f"wrong dimension, a ratio in decibels; allowed: a number with a unit like {unit}")
     if unit == "dB":
         raise InputError('allowed: a number in dB such as "6 dB"')
     return parse_quantity(text, unit) / parse_unit(unit).factor

@@ -6,13 +6,17 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict, is_dataclass
 from dataclasses import fields as dataclass_fields
 from math import inf, isfinite
-from typing import Any
+from typing import Any, cast
 
+from actuator_lti.design.access import located
+from actuator_lti.design.data_sheet import as_stated
 from actuator_lti.design.fields import Structure, field_of, fields_in
 from actuator_lti.design.loader import as_design, design_from_tree
+from actuator_lti.design.mistakes import Findings
 from actuator_lti.design.model import (
     Controller,
     ControllerObjects,
@@ -24,6 +28,7 @@ from actuator_lti.design.model import (
     Validation,
     default_deflection,
 )
+from actuator_lti.design.reader import Reader
 from actuator_lti.design.sections import RECORDS, SECTIONS, at_place, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.design.units import ampere_unit, si_text
@@ -158,6 +163,7 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
         As :func:`load_design`, also for an unknown key.
     """
     tree = design_tree(design)
+    as_stated(tree, overrides)
     for path, value in overrides.items():
         _override(tree, path, value, design)
     return design_from_tree(tree, design.origin or design.name)
@@ -199,6 +205,23 @@ def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
     return result
 
 
+def read_value(design: Design, path: str, text: str | float) -> float:
+    """A numeric key's value in SI as the design's file would have it from this text; a bare number is in SI.
+
+    Raises
+    ------
+    InputError
+        For an unknown key, a wrong unit, or a value that the key does not allow.
+    """
+    field, _ = located(design, path)
+    with suppress(ValueError):
+        text = with_units(design, {path: float(text)})[path]
+    findings = Findings(design.origin or design.name)
+    value = Reader(design_tree(design), findings).number(field, text, path)
+    findings.refuse()
+    return cast("float", value)
+
+
 def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
     parts = path.split(".")
     here: Any = tree
@@ -210,6 +233,10 @@ def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
             here = here.setdefault(part, [] if ".".join(parts[: depth + 1]) in lists else {})
         if here is None:
             raise InputError(f"{path}: the design {design.name} has no {'.'.join(parts[: depth + 1])}")
+    if isinstance(here, list):
+        table = path.rpartition(".")[0]
+        names = [f"{table}.{_label(item, k)}.{parts[-1]}" for k, item in enumerate(here, 1)]
+        raise InputError(f"{path}: which one? allowed: {', '.join(names) or f'none, no [[{table}]]'}")
     if not isinstance(here, dict):
         raise InputError(f"{path}: unknown key; allowed: a key of the design file")
     old = here.get(parts[-1])

@@ -260,7 +260,6 @@ def plot_run(run: Any, axes: Any = None) -> list[Axes]:
 
     Parameters
     ----------
-    run : nonlinear.Trajectory
     axes : four of matplotlib's axes, optional
         See `nonlinear.Trajectory.plot`.
     """

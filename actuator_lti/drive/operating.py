@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isfinite, pi
+from math import pi
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, finite_number
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, FrictionPoint
@@ -70,9 +70,7 @@ class Operating:
         if self.rotor not in get_args(RotorState):
             raise InputError(f"rotor = {self.rotor!r}: free or locked")
         for name in ("load_Nm", "speed_rad_s", "angle_rad", "twist_rad"):
-            value = getattr(self, name)
-            if isinstance(value, str) or not isfinite(value):
-                raise InputError(f"{name} = {value!r}: must be a finite number, in SI")
+            finite_number(name, getattr(self, name))
         amplitude = self.speed_amplitude_rad_s
         if self.point == "describing-function" and (amplitude is None or not 0 < amplitude < float("inf")):
             raise InputError(f"speed_amplitude_rad_s = {amplitude}: must be positive (motor side)")

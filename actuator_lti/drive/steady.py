@@ -47,11 +47,6 @@ def voltage_limit_torque_Nm(design: Design, speed_rad_s: Any) -> Any:
     return kM * (design.limits.voltage_V - kE * speed_rad_s) / circuit_resistance_ohm(design)
 
 
-def no_load_speed_rad_s(design: Design) -> Any:
-    """Motor speed at which the back-EMF is the voltage limit, ``U/kE``."""
-    return design.limits.voltage_V / _winding(design.effective_motor)[2]
-
-
 def standing_gain(design: Design) -> Any:
     """Motor torque at rest per unit of what the controllers in front set: A, or V without a current loop."""
     motor = design.effective_motor

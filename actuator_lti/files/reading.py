@@ -13,6 +13,7 @@ import re
 import stat
 import tomllib
 import unicodedata
+from difflib import get_close_matches
 from os import PathLike
 from typing import Any, BinaryIO
 
@@ -58,7 +59,9 @@ def _written(value: object) -> str:
 
 
 def shown_path(path: str | PathLike[str]) -> str:
-    """A path as it may be printed."""
+    """A path as it may be printed; what is no path is refused."""
+    if not isinstance(path, str | bytes | PathLike):
+        raise InputError(f"{path!r}: allowed: the path of a file")
     return shown(os.fspath(path), 200)[1:-1]
 
 
@@ -74,7 +77,9 @@ def open_regular(path: str | PathLike[str], what: str = "file") -> BinaryIO:
     try:
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except FileNotFoundError:
-        raise InputError(f"cannot be read: no such file; allowed: a {what}", where=where) from None
+        raise InputError(
+            f"cannot be read: no such file{_near(path)}; allowed: a {what}", where=where
+        ) from None
     except IsADirectoryError:
         raise InputError(f"is a directory; allowed: a {what}", where=where) from None
     except (OSError, ValueError) as error:
@@ -85,6 +90,16 @@ def open_regular(path: str | PathLike[str], what: str = "file") -> BinaryIO:
         kind = "is a directory" if stat.S_ISDIR(mode) else "is no regular file"
         raise InputError(f"{kind}; allowed: a {what}", where=where)
     return os.fdopen(handle, "rb")
+
+
+def _near(path: str | PathLike[str]) -> str:
+    """The file of nearly that name in the same folder."""
+    folder, name = os.path.split(os.fsdecode(path))
+    try:
+        near = get_close_matches(name, os.listdir(folder or "."), 1, 0.8)
+    except OSError:
+        return ""
+    return f" (there is {shown(near[0])})" if near else ""
 
 
 def _reason(error: OSError | ValueError) -> str:
@@ -189,6 +204,8 @@ def _hint(text: str, error: Exception) -> str:
         return "; this looks like JSON, TOML is wanted"
     if re.match(r"[^=\[#]*[,;\t][^=\[#]*$", lines[0]):
         return "; this looks like a table of numbers, TOML is wanted: a record, and no design?"
+    if "Illegal character" in str(error) and line.partition("#")[0].count('"') % 2:
+        return "; a quote that is opened in this line is not closed"
     if result := _COMMA.match(line):
         return f"; use a decimal point: {result[1]} = {result[2].replace(',', '.')}"
     if result := _UNQUOTED.match(line):

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from functools import partial
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TypedDict, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 from actuator_lti.design.loader import as_design
 from actuator_lti.drive.operating import Operating
-from actuator_lti.drive.wiring import Drive, wire
+from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.flow import ALL
-from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
+from actuator_lti.loops.result import Form, InnerLoops, Loops
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from actuator_lti.design.model import Design
     from actuator_lti.drive.operating import OperatingPoint, RotorState
-    from actuator_lti.loops.limiters import LimiterPath
-    from actuator_lti.loops.simulation import TickSystem
 
 
 def assemble_loops(
@@ -107,18 +103,17 @@ def loops_at(
         raise InputError(f"inner_loops = {inner_loops!r}: one of {', '.join(get_args(InnerLoops))}")
     if not wired.stages and at.rotor == "locked":
         raise InputError("rotor = 'locked': the design has no current loop")
-    opened = {stage: wired.inside(stage) if inner_loops == "open" else () for stage in wired.stages}
-    delays = ALL if form == "continuous" else frozenset[str]()
+    time: Any  # the module of the algebra of time, and what each of its functions takes besides the drive
+    more: tuple[frozenset[str], ...] = ()
     if form == "sampled":
-        from actuator_lti.loops import sampled
-
-        parts = _sampled(wired)
-        stages = {stage: sampled.stage_loop(wired, stage, opened[stage]) for stage in wired.stages}
+        from actuator_lti.loops import sampled as time
     else:
-        from actuator_lti.loops import continuous
+        from actuator_lti.loops import continuous as time
 
-        parts = _continuous(wired, delays)
-        stages = {stage: continuous.stage_loop(wired, stage, delays, opened[stage]) for stage in wired.stages}
+        more = (ALL if form == "continuous" else frozenset(),)
+    opened = {stage: wired.inside(stage) if inner_loops == "open" else () for stage in wired.stages}
+    stages = {stage: time.stage_loop(wired, stage, *more, opened[stage]) for stage in wired.stages}
+    whole, sampled_form = at.rotor == "free", form == "sampled"
     return Loops(
         design=design,
         form=form,
@@ -127,44 +122,10 @@ def loops_at(
         current=stages.get("current"),
         velocity=stages.get("velocity"),
         position=stages.get("position"),
-        period_s=wired.tick_s if form == "sampled" else None,
-        **parts,
+        break_points={point: time.point_loop(wired, point, *more) for point in wired.points},
+        limiters=time.limiters(wired, *more) if whole else {},
+        plain_response=time.reference_to_output(wired, *more) if whole else None,
+        moment_system=partial(time.moment_to_output, wired, *more) if whole else None,
+        tick_system=time.tick_system(wired) if whole and sampled_form else None,
+        period_s=wired.tick_s if sampled_form else None,
     )
-
-
-class Parts(TypedDict):
-    """What of `Loops` differs by the algebra of time."""
-
-    break_points: dict[str, Loop]
-    limiters: dict[str, LimiterPath]
-    plain_response: Any
-    moment_system: Callable[[], Any] | None
-    tick_system: TickSystem | None
-
-
-def _sampled(wired: Drive) -> Parts:
-    from actuator_lti.loops import sampled
-    from actuator_lti.loops.limiter_responses import sampled_limiters
-
-    whole = wired.operating.rotor == "free"
-    return {
-        "break_points": {point: sampled.point_loop(wired, point) for point in wired.points},
-        "limiters": sampled_limiters(wired) if whole else {},
-        "plain_response": sampled.reference_to_output(wired) if whole else None,
-        "moment_system": partial(sampled.moment_to_output, wired) if whole else None,
-        "tick_system": sampled.tick_system(wired) if whole else None,
-    }
-
-
-def _continuous(wired: Drive, delays: frozenset[str]) -> Parts:
-    from actuator_lti.loops import continuous
-    from actuator_lti.loops.limiter_responses import continuous_limiters
-
-    whole = wired.operating.rotor == "free"
-    return {
-        "break_points": {point: continuous.point_loop(wired, point, delays) for point in wired.points},
-        "limiters": continuous_limiters(wired, delays) if whole else {},
-        "plain_response": continuous.reference_to_output(wired, delays) if whole else None,
-        "moment_system": partial(continuous.moment_to_output, wired, delays) if whole else None,
-        "tick_system": None,
-    }

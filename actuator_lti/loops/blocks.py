@@ -15,12 +15,7 @@ from actuator_lti.systems.rest_mode import without_rest_mode
 def seen(depends: np.ndarray, start: np.ndarray) -> np.ndarray:
     """Which states an output sees, through others as well.
 
-    Parameters
-    ----------
-    depends : ndarray of bool, shape (n, n)
-        Whether state r is computed from state c.
-    start : ndarray of bool, shape (n,)
-        What the output looks at itself.
+    ``depends[r, c]``: state r is computed from state c; ``start``: what the output looks at itself.
     """
     result, new = start.copy(), start
     while new.any():
@@ -43,17 +38,8 @@ class Block:
     states: tuple[str, ...]
 
     def pruned(self) -> Block:
-        """Without the states that the output does not see (the motor angle inside an inner loop, say).
-
-        Nor those that the input does not reach, such as the filter of the command.
-        """
-        n = len(self.states)
-        depends = np.any(self.A.reshape(-1, n, n) != 0, axis=0)
-        used = seen(depends, np.any(self.C.reshape(-1, n) != 0, axis=0))
-        used &= seen(depends.T, np.any(self.B.reshape(-1, n) != 0, axis=0))
-        names = tuple(name for name, there in zip(self.states, used, strict=True) if there)
-        A = self.A[..., used, :][..., :, used]
-        return Block(A, self.B[..., used, :], self.C[..., :, used], self.D, names)
+        """Without the states that are not used, see `pruned`."""
+        return pruned([self])[0]
 
     def shown(self) -> Block:
         """Without a mode at zero frequency that it does not show, see `rest_mode`; one design only."""
@@ -68,6 +54,31 @@ class Block:
     def sensitivity(self) -> Block:
         """S = 1/(1 + L). Needs D = 0."""
         return replace(self, A=self.A - self.B @ self.C, C=-self.C, D=np.ones_like(self.D))
+
+
+def used(blocks: Sequence[Block]) -> np.ndarray:
+    """Which of the common states of blocks their outputs see and their inputs reach, in any of the blocks.
+
+    The motor angle inside an inner loop is not seen, the filter of the command not reached.
+    """
+    n = len(blocks[0].states)
+
+    def there(name: str, *shape: int) -> np.ndarray:
+        parts = (getattr(block, name).reshape(-1, *shape) for block in blocks)
+        return np.any([np.any(part != 0, axis=0) for part in parts], axis=0)
+
+    depends = there("A", n, n)
+    return seen(depends, there("C", n)) & seen(depends.T, there("B", n))
+
+
+def pruned(blocks: Sequence[Block]) -> list[Block]:
+    """The blocks without the states that none of them uses."""
+    kept = used(blocks)
+    names = tuple(name for name, there in zip(blocks[0].states, kept, strict=True) if there)
+    return [
+        Block(b.A[..., kept, :][..., :, kept], b.B[..., kept, :], b.C[..., :, kept], b.D, names)
+        for b in blocks
+    ]
 
 
 def compose(ticks: Sequence[Tick]) -> tuple[np.ndarray, np.ndarray]:

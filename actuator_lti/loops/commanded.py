@@ -32,24 +32,10 @@ _OVER = 1e-9  # of the final value: less is no overshoot
 
 
 def commanded_bandwidth(response: Any, mean: CommandMean) -> Bandwidth:
-    """Bandwidths of a response behind the mean of its command.
+    """Bandwidths of a response, from the reference of the drive to what it moves, behind the command's mean.
 
-    Parameters
-    ----------
-    response : PlainSystem, DelaySystem or python-control system
-        From the reference of the drive to what it moves.
-    mean : CommandMean
-
-    Returns
-    -------
-    Bandwidth
-        ``crossings_rad_s`` are those up to the first zero of the mean, below which the gain has fallen for
-        certain; the phase is followed to that zero, where it turns by 180 deg.
-
-    Raises
-    ------
-    InputError
-        As `closed_loop_bandwidth`.
+    ``crossings_rad_s`` are those up to the first zero of the mean, below which the gain has fallen for
+    certain; the phase is followed to that zero, where it turns by 180 deg.
     """
     own = closed_loop_bandwidth(response, mean.delay_s)
     zero_rad_s, turn = mean.first_zero_rad_s, own.minus90deg_rad_s
@@ -154,14 +140,9 @@ class _Gain:
 
 
 def commanded_step(response: Any, own: StepFigures, mean: CommandMean) -> StepFigures:
-    """Figures of the step behind the mean, at samples: each is the mean of the last n of the step itself.
+    """Figures of a sampled response's step behind the mean: samples are means of the last n of the step.
 
-    Parameters
-    ----------
-    response : PlainSystem or python-control system
-        Sampled.
-    own : StepFigures
-        Of that response; it has settled before the end of its own time.
+    ``own`` are those of the response itself; it has settled before the end of its own time.
     """
     period = float(own.period_s or 0.0)
     loop, count = rational_loop(response), round(float(own.time_s[-1]) / period) + 1 + mean.samples

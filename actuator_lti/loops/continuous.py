@@ -11,7 +11,8 @@ from actuator_lti.drive.wiring import ERRORS, MEASURED, Drive
 from actuator_lti.errors import InputError
 from actuator_lti.loops.blocks import seen
 from actuator_lti.loops.flow import SOURCES, Flow, FlowProgram
-from actuator_lti.loops.result import Loop
+from actuator_lti.loops.limiters import LimiterPath, Response, limiter_paths
+from actuator_lti.loops.result import Loop, loop_of
 from actuator_lti.loops.sampled import whole_path
 from actuator_lti.systems.plain_delays import PlainDelaySystem, static
 from actuator_lti.systems.rest_mode import without_rest_mode
@@ -51,10 +52,7 @@ def systems(flow: Flow, source: str, signal: str, scale: float = 1.0) -> list[Pl
 def joined(parts: list[PlainDelaySystem]) -> PlainDelaySystem:
     """``sum_j s^j G_j`` as one proper system: s (s I - A)^-1 B is B + (s I - A)^-1 A B.
 
-    Raises
-    ------
-    InputError
-        Where it is not proper, as with a derivative without a filter.
+    Refused where it is not proper, as with a derivative without a filter.
     """
     if len(parts) == 1:
         return parts[0]
@@ -87,20 +85,9 @@ def finished(system: PlainDelaySystem, name: str, source: str, signal: str) -> A
     return system.to_state_space()
 
 
-def _loop(wired: Drive, loop: PlainDelaySystem, name: str, point: str, signals: tuple[str, str]) -> Loop:
-    error, measured = signals
-    label, unit = name.replace(" ", "_"), wired.unit(error)
-    one = static(np.eye(1))
-    return Loop(
-        name=name,
-        break_point=point,
-        plain_open=finished(loop, f"{label}_open_loop", error, measured),
-        plain_closed=finished(loop.feedback(), f"{label}_closed_loop", "reference", measured),
-        plain_sensitivity=finished(one.feedback(loop), f"{label}_sensitivity", "reference", error),
-        period_s=None,
-        unit_in=unit,
-        unit_out=unit,
-    )
+def _loop(wired: Drive, loop: PlainDelaySystem, name: str, point: str) -> Loop:
+    parts = (loop, loop.feedback(), static(np.eye(1)).feedback(loop))
+    return loop_of(wired, name, point, parts, finished)
 
 
 def stage_system(
@@ -118,15 +105,14 @@ def stage_system(
 
 def stage_loop(wired: Drive, stage: str, delays: frozenset[str], opened: tuple[str, ...] = ()) -> Loop:
     """The loop of a stage, see `stage_system`."""
-    loop = stage_system(wired, stage, delays, opened)
-    return _loop(wired, loop, stage, wired.target[stage], wired.around(stage))
+    return _loop(wired, stage_system(wired, stage, delays, opened), stage, wired.target[stage])
 
 
 def point_loop(wired: Drive, point: str, delays: frozenset[str]) -> Loop:
     """The loop seen at a break point with all other loops closed."""
     flow = FlowProgram(wired, wired.outermost, point, (), delays).flow()
     loop = joined(systems(flow, "cut", point, scale=-1.0))
-    return _loop(wired, loop, f"at {point}", point, (point, f"{point}_returned"))
+    return _loop(wired, loop, f"at {point}", point)
 
 
 def _whole(wired: Drive, delays: frozenset[str]) -> Flow:
@@ -144,3 +130,20 @@ def moment_to_output(wired: Drive, delays: frozenset[str]) -> Any:
     """Moment on the output shaft to the output angle, all loops closed."""
     system = delay_system(_whole(wired, delays), "moment", "output_angle")
     return finished(system, "moment_to_output", "moment", "output_angle")
+
+
+def limiters(wired: Drive, delays: frozenset[str]) -> dict[str, LimiterPath]:
+    """From the command to what stands in front of each limiter; the change of a command as its derivative."""
+    flow = _whole(wired, delays)
+
+    def evaluate(signals: tuple[str, ...], every: int, rate: bool) -> Response:
+        terms = [systems(flow, "ref", signal) for signal in signals]
+
+        def response(omega: np.ndarray) -> np.ndarray:
+            s = 1j * omega
+            values = [sum((s**j * part(s) for j, part in enumerate(parts)), 0 * s) for parts in terms]
+            return np.array(values) * s if rate else np.array(values)
+
+        return response
+
+    return limiter_paths(wired, evaluate, np.inf)

@@ -35,42 +35,21 @@ _LOW = 1e-4  # of the frequency asked for: where unwrapping starts
 
 @dataclass(frozen=True)
 class DelayBudget:
-    """Phase of a loop at one frequency in degrees, item by item; negative is lag.
-
-    Attributes
-    ----------
-    loop : str
-    frequency_rad_s : float
-    controller_deg : float
-        PI(s), or 0 for P.
-    plant_deg : float
-        Motor and load, with the inner loops closed and ideal.
-    filters_deg : mapping of str to float
-        Each filter in or inside the loop, in the order of the signal, by kind and frequency.
-    measurement_deg : float
-        Age of a speed taken by difference (0 where w itself is measured; the lag of a tracking loop is in the
-        plant's item).
-    hold_deg : float
-        Holds of all rates inside this loop.
-    computing_delay_deg : float
-    sampling_deg : float
-        The rest up to the exact sampled loop: digital instead of continuous PI, aliasing.
-    total_deg : float
-        Phase of the sampled loop, the sum of the items.
-    one_more_sample_deg : float
-        What one more base period of computing delay would add (not in the total).
-    """
+    """Phase of a loop at one frequency in degrees, item by item; negative is lag."""
 
     loop: str
     frequency_rad_s: float
-    controller_deg: float
-    plant_deg: float
+    controller_deg: float  # PI(s), or 0 for P
+    plant_deg: float  # motor and load, with the inner loops closed and ideal
+    # Age of a speed taken by difference (0 where w itself is measured; the lag of a tracking loop is in the
+    # plant's item)
     measurement_deg: float
-    hold_deg: float
+    hold_deg: float  # holds of all rates inside this loop
     computing_delay_deg: float
-    sampling_deg: float
-    total_deg: float
-    one_more_sample_deg: float
+    sampling_deg: float  # the rest up to the exact sampled loop: digital instead of continuous PI, aliasing
+    total_deg: float  # phase of the sampled loop, the sum of the items
+    one_more_sample_deg: float  # what one more base period of computing delay would add (not in the total)
+    # Each filter in or inside the loop, in the order of the signal, by kind and frequency
     filters_deg: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -98,7 +77,6 @@ def delay_budget(
 
     Parameters
     ----------
-    design : Design
     loop_name : {"current", "velocity", "position"}
         The loop broken at its own error, inner loops closed.
     frequency_rad_s : float

@@ -49,10 +49,7 @@ class Flow:
 class FlowProgram(Program):
     """The linear drive in continuous time (see `Program`).
 
-    Attributes
-    ----------
-    delays : frozenset of str
-        Which delays are kept, of `ALL`: none is the form ``ideal``; some, for the delay budget.
+    ``delays`` says which of `ALL` are kept: none is the form ``ideal``; some, for the delay budget.
     """
 
     delays: frozenset[str] = ALL
@@ -112,12 +109,8 @@ class FlowWalk(Walk):
 
     def apply(self, name: str, block: Block, value: Row) -> Row:
         """The continuous realisation."""
-        realisation = block.continuous
-        names = [f"{name}.{k}" for k in range(len(realisation.B))]
-        x = [self.state(each) for each in names]
-        for each, row, gain in zip(names, realisation.A, realisation.B, strict=True):
-            self.rate[each] = total(a * s for a, s in zip(row, x, strict=True)) + gain * value
-        return total(c * s for c, s in zip(realisation.C, x, strict=True)) + realisation.D * value
+        names = [f"{name}.{k}" for k in range(len(block.continuous.B))]
+        return self.realised(names, block.continuous, value)
 
     def derivative(self, name: str, value: Row, period_s: Any) -> Row:
         """The difference over the period; ideal: the derivative, by the chain rule."""

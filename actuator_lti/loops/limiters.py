@@ -22,33 +22,24 @@ if TYPE_CHECKING:
     from actuator_lti.drive.wiring import Drive
     from actuator_lti.loops.result import Loops
 
+Response = Callable[[np.ndarray], np.ndarray]
+
 
 @dataclass(frozen=True)
 class LimiterPath:
-    """From the command at the output shaft to the quantity in front of a limiter, all loops closed.
+    """From the command at the output shaft to the quantity in front of a limiter, all loops closed."""
 
-    Attributes
-    ----------
-    name : str
-        Of `actuator_lti.drive.signals.LIMITERS`. ``"speed"``: speed command before the clamp (rad/s, motor
-        side). ``"acceleration"``: its change per update over the period of the position loop (rad/s^2).
-        ``"current"``: current command before the clamp (A). ``"voltage"``: voltage before the clamp (V).
-        ``"torque-command"``: what the velocity controller gives to the torque filters. ``"overload"``: the
-        motor current, whose square the protection averages.
-    limit : float
-        The limit, same unit; ``inf`` where there is none.
-    unit : str
-    nyquist_rad_s : float
-        pi over the period of the outermost loop for the sampled form, else ``inf``.
-    averaged_s : float or None
-        Time constant of the mean square that the limiter looks at; ``None`` for the value itself.
-    """
-
+    # Of `actuator_lti.drive.signals.LIMITERS`. ``"speed"``: speed command before the clamp (rad/s, motor
+    # side). ``"acceleration"``: its change per update over the period of the position loop (rad/s^2).
+    # ``"current"``: current command before the clamp (A). ``"voltage"``: voltage before the clamp (V).
+    # ``"torque-command"``: what the velocity controller gives to the torque filters. ``"overload"``: the
+    # motor current, whose square the protection averages.
     name: str
-    limit: float
+    limit: float  # the limit, same unit; ``inf`` where there is none
     unit: str
-    nyquist_rad_s: float
-    _evaluate: Callable[[np.ndarray], np.ndarray]
+    nyquist_rad_s: float  # pi over the period of the outermost loop for the sampled form, else ``inf``
+    _evaluate: Response
+    # Time constant of the mean square that the limiter looks at; ``None`` for the value itself
     averaged_s: float | None = None
 
     def responses(self, omega_rad_s: Any) -> np.ndarray:
@@ -100,24 +91,15 @@ class LimiterPath:
 
 @dataclass(frozen=True)
 class Onset:
-    """The limit of linear validity: smallest A_k over the limiters, and which one it is.
+    """The limit of linear validity: smallest A_k over the limiters, and which one it is."""
 
-    Attributes
-    ----------
-    omega_rad_s : ndarray, shape (K,)
-    amplitude_rad : ndarray, shape (K,)
-        Peak command amplitude; rad, of other drives rad/s, A or V (see the module). ``inf`` where nothing
-        limits.
-    active : tuple of str
-        Name of the limiter reached first at each frequency; ``""`` where nothing limits.
-    each_rad : mapping of str to ndarray
-        A_k of every limiter.
-    """
-
-    omega_rad_s: np.ndarray
+    omega_rad_s: np.ndarray  # shape (K,)
+    # Peak command amplitude, shape (K,); rad, of other drives rad/s, A or V (see the module). ``inf`` where
+    # nothing limits
     amplitude_rad: np.ndarray
+    # Name of the limiter reached first at each frequency; ``""`` where nothing limits
     active: tuple[str, ...]
-    each_rad: Mapping[str, np.ndarray]
+    each_rad: Mapping[str, np.ndarray]  # A_k of every limiter
 
 
 def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = None) -> Onset:
@@ -198,7 +180,7 @@ def _integral_clamped(design: Design, stage: str) -> bool:
 
 def limiter_paths(
     wired: Drive,
-    evaluate: Callable[[tuple[str, ...], int, bool], Callable[[np.ndarray], np.ndarray]],
+    evaluate: Callable[[tuple[str, ...], int, bool], Response],
     nyquist_rad_s: float,
 ) -> dict[str, LimiterPath]:
     """All limiter paths; ``evaluate(signals, every, rate)`` gives the function of frequency."""
@@ -206,7 +188,7 @@ def limiter_paths(
     # the reference of a speed drive is the motor's, its command the output's
     geared = wired.design.total_ratio if wired.outermost == "velocity" else 1.0
 
-    def from_output(place: Place) -> Callable[[np.ndarray], np.ndarray]:
+    def from_output(place: Place) -> Response:
         response = evaluate(place.signals, place.every, place.limiter.kind == "rate")
         return lambda omega: geared * response(omega)
 

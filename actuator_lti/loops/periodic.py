@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.blocks import Block, seen, siso
+from actuator_lti.loops.blocks import Block, siso, used
 from actuator_lti.loops.tick import TickProgram
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.systems.rest_mode import System, without_common_rest_mode
@@ -83,27 +83,18 @@ def fundamental(blocks: Sequence[Block]) -> Block:
 
 @dataclass(frozen=True)
 class ExactMargins:
-    """Borders of stability of a sampled loop from the eigenvalues over one whole period.
-
-    Attributes
-    ----------
-    stable : bool
-    gain_upper, gain_lower : float
-        Factor on the loop gain at the break point that first brings an eigenvalue to the unit circle, going
-        up from 1 and down from 1; ``inf`` and 0 where there is none within a factor of 1e4. NaN if unstable.
-    delay_s : float or None
-        Smallest added computing delay that does so, in s (only at ``"u"``; ``inf`` if none within the bound
-        asked for; NaN if unstable). It moves the hold within the tick, so where it is no whole number of
-        ticks it differs a little from phase margin over frequency, which delays the sampled signal.
-    spectral_radius : float
-        Largest eigenvalue magnitude over one position period.
-    """
+    """Borders of stability of a sampled loop from the eigenvalues over one whole period."""
 
     stable: bool
+    # Factor on the loop gain at the break point that first brings an eigenvalue to the unit circle, going up
+    # from 1 and down from 1; ``inf`` and 0 where there is none within a factor of 1e4. NaN if unstable.
     gain_upper: float
     gain_lower: float
+    # Smallest added computing delay that does so, in s (only at ``"u"``; ``inf`` if none within the bound
+    # asked for; NaN if unstable). It moves the hold within the tick, so where it is no whole number of ticks
+    # it differs a little from phase margin over frequency, which delays the sampled signal.
     delay_s: float | None
-    spectral_radius: float
+    spectral_radius: float  # largest eigenvalue magnitude over one position period
 
 
 @dataclass(frozen=True)
@@ -111,19 +102,11 @@ class PeriodicLoop:
     """A loop cut at a break point over one period of the drive: M updates, each with its own matrices.
 
     As many states as the drive has, where the time-invariant system of the fundamental has M times as many.
-
-    Attributes
-    ----------
-    systems : sequence of (A, B, C)
-        One an update: y = C x seen at its start, e held over it.
-    dt : float
-        Time between two updates, s.
-    hidden : int
-        How many eigenvalues stand at 1 whatever the gain (`hidden_at_rest`); they are none of its modes.
     """
 
-    systems: Sequence[System]
-    dt: float
+    systems: Sequence[System]  # one an update: y = C x seen at its start, e held over it
+    dt: float  # time between two updates, s
+    # How many eigenvalues stand at 1 whatever the gain (`hidden_at_rest`); they are none of its modes
     hidden: int = 0
 
     def modes(self, gain: npt.ArrayLike = 1.0) -> np.ndarray:
@@ -215,12 +198,10 @@ def _parts(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
 
 def _split(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
     """The same with the modes at rest."""
-    A, B, C = (np.stack([getattr(block, name) for block in blocks]) for name in "ABC")
-    depends = (A != 0.0).any(axis=0)
-    used = seen(depends, (C != 0.0).any(axis=(0, 1))) & seen(depends.T, (B != 0.0).any(axis=(0, 2)))
+    inside = used(blocks)
     moved, others = (
-        [(a[np.ix_(part, part)], b[part], c[:, part]) for a, b, c in zip(A, B, C, strict=True)]
-        for part in (used, ~used)
+        [(one.A[np.ix_(part, part)], one.B[part], one.C[:, part]) for one in blocks]
+        for part in (inside, ~inside)
     )
     return moved, [(a, np.zeros_like(b), np.zeros_like(c)) for a, b, c in others]
 
@@ -279,25 +260,32 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
 def _delay_border(wired: Drive, longest_ticks: float, now: PeriodicLoop) -> float:
     """The first computing delay at which a mode comes to the unit circle; whole updates are a queue."""
     Ts, every = wired.tick_s, wired.interval[wired.producer("u")]
-    resting = len(_split(point_blocks(wired, "u"))[0][0][0]) != len(now.systems[0][0])  # whatever the delay
+    resting = _states(_split(point_blocks(wired, "u"))[0]) - _states(now.systems)  # whatever the delay
 
     @cache
-    def part(ticks: float) -> list[System]:
+    def part(ticks: float) -> PeriodicLoop:
         later, _ = _split(point_blocks(wired.later(ticks * Ts), "u"))
-        return _without_rest(later) if resting else later
+        left = _without_rest(later) if resting else later
+        taken = _states(later) - _states(left)
+        return PeriodicLoop(left, Ts, now.hidden + resting - taken)
 
     def excess(ticks: float) -> float:
         updates, rest = divmod(ticks, every)
-        return float(PeriodicLoop(_queued(part(rest), int(updates)), Ts, now.hidden).radius()) - 1
+        later = part(rest)
+        return float(replace(later, systems=_queued(later.systems, int(updates))).radius()) - 1
 
     step = 1 / _DELAY_STEPS_A_TICK
     grid = np.array([0.0, *np.arange(step, longest_ticks, step)])
     return _first_border(excess, grid, float("inf")) * Ts
 
 
-def _queued(systems: list[System], updates: int) -> list[System]:
+def _states(systems: Sequence[System]) -> int:
+    return len(systems[0][0])
+
+
+def _queued(systems: Sequence[System], updates: int) -> Sequence[System]:
     """With what enters delayed by whole updates."""
-    n, queued = len(systems[0][0]), []
+    n, queued = _states(systems), []
     for A, B, C in systems if updates else ():
         over = np.eye(n + updates, k=-1)  # what enters is the first of the queue
         over[:n, :n], over[n, : n + 1], over[:n, -1:] = A, 0.0, B

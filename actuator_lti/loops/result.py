@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 from actuator_lti.drawing.faces import draw
+from actuator_lti.errors import InputError
 from actuator_lti.systems.as_control import as_control
 
 Form = Literal["sampled", "continuous", "ideal"]
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from actuator_lti.design.model import Design
     from actuator_lti.drive.operating import Operating
+    from actuator_lti.drive.wiring import Drive
     from actuator_lti.loops.limiters import LimiterPath
     from actuator_lti.loops.simulation import TickSystem
 
@@ -106,6 +108,26 @@ class Loop:
         return f"Loop({self.name}, broken at {self.break_point}, in {self.unit_in}, {kind}{periodic})"
 
 
+def loop_of(
+    wired: Drive, name: str, point: str, parts: tuple[Any, Any, Any],
+    named: Callable[[Any, str, str, str], Any], period_s: float | None = None, *, periodic: bool = False,
+) -> Loop:  # fmt: skip
+    """A loop of L, T and S; ``named`` gives each system its name, input and output."""
+    error, measured = wired.around(name) if name in wired.stages else (point, f"{point}_returned")
+    label, unit = name.replace(" ", "_"), wired.unit(error)
+    return Loop(
+        name=name,
+        break_point=point,
+        plain_open=named(parts[0], f"{label}_open_loop", error, measured),
+        plain_closed=named(parts[1], f"{label}_closed_loop", "reference", measured),
+        plain_sensitivity=named(parts[2], f"{label}_sensitivity", "reference", error),
+        period_s=period_s,
+        unit_in=unit,
+        unit_out=unit,
+        periodic=periodic,
+    )
+
+
 @dataclass(frozen=True, repr=False)
 class Loops:
     """All loops of a design in one form at one operating point.
@@ -162,7 +184,7 @@ class Loops:
 
         The compliance, as a python-control system; its inverse is the dynamic stiffness. It is made when it
         is first asked for: with slow outer stages it has hundreds of states
-        (`actuator_lti.loops.compliance` has the same response with few). None with the rotor locked.
+        (`actuator_lti.loops.stiffness` has the same response with few). None with the rotor locked.
         """
         return None if self.moment_system is None else as_control(self.moment_system())
 
@@ -181,6 +203,17 @@ class Loops:
         """The loops that exist, innermost first, by name."""
         named = {"current": self.current, "velocity": self.velocity, "position": self.position}
         return {name: loop for name, loop in named.items() if loop is not None}
+
+    def __getitem__(self, name: str) -> Loop:
+        """A loop or break point by its name."""
+        known = self.present | dict(self.break_points)
+        if name not in known:
+            raise InputError(f"loops[{name!r}]: allowed: {', '.join(known)}")
+        return known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """The names of the loops, innermost first, and of the break points."""
+        return iter((*self.present, *self.break_points))
 
     def plot_bode(self, axes: Any = None) -> list[Axes]:
         """Draw the open loops of all stages in one Bode figure; gives matplotlib's axes."""

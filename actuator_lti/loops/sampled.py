@@ -2,38 +2,30 @@
 
 from __future__ import annotations
 
+from functools import partial
+
+import numpy as np
+
 from actuator_lti.drive.wiring import COMMANDS, ERRORS, MEASURED, Drive
-from actuator_lti.loops.blocks import Block
+from actuator_lti.loops.blocks import Block, compose
+from actuator_lti.loops.limiters import LimiterPath, Response, limiter_paths
 from actuator_lti.loops.periodic import cyclic, fundamental, phase_blocks, point_blocks
-from actuator_lti.loops.result import Loop
+from actuator_lti.loops.result import Loop, loop_of
 from actuator_lti.loops.simulation import OUTPUTS, TickSystem
 from actuator_lti.loops.tick import TickProgram
 from actuator_lti.systems.plain_system import PlainSystem
+from actuator_lti.systems.resolvent import states_at
 
 
-def _system(block: Block, period_s: float, name: str, source: str, signal: str) -> PlainSystem:
-    """A block of one design with its period and its names."""
+def _system(block: Block, name: str, source: str, signal: str, period_s: float) -> PlainSystem:
+    """A block of one design under its names, with its period."""
     return PlainSystem(block.A, block.B, block.C, block.D, period_s, name, source, signal, block.states)
 
 
-def _loop(
-    wired: Drive, block: Block, name: str, point: str, signals: tuple[str, str], periodic: bool
-) -> Loop:
-    block, period = block.shown(), wired.period_s(wired.producer(point))
-    error, measured = signals
-    unit = wired.unit(error)
-    label = name.replace(" ", "_")
-    return Loop(
-        name=name,
-        break_point=point,
-        plain_open=_system(block, period, f"{label}_open_loop", error, measured),
-        plain_closed=_system(block.feedback(), period, f"{label}_closed_loop", "reference", measured),
-        plain_sensitivity=_system(block.sensitivity(), period, f"{label}_sensitivity", "reference", error),
-        period_s=period,
-        unit_in=unit,
-        unit_out=unit,
-        periodic=periodic,
-    )
+def _loop(wired: Drive, blocks: list[Block], name: str, point: str) -> Loop:
+    block, period = fundamental(blocks).shown(), wired.period_s(wired.producer(point))
+    parts, named = (block, block.feedback(), block.sensitivity()), partial(_system, period_s=period)
+    return loop_of(wired, name, point, parts, named, period, periodic=len(blocks) > 1)
 
 
 def stage_blocks(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> list[Block]:
@@ -55,23 +47,19 @@ def stage_blocks(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> list
 
 def stage_loop(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> Loop:
     """The loop of a stage, see `stage_blocks`."""
-    blocks = stage_blocks(wired, stage, opened)
-    return _loop(wired, fundamental(blocks), stage, wired.target[stage], wired.around(stage), len(blocks) > 1)
+    return _loop(wired, stage_blocks(wired, stage, opened), stage, wired.target[stage])
 
 
 def point_loop(wired: Drive, point: str) -> Loop:
     """The loop seen at a break point with all other loops closed."""
-    blocks = point_blocks(wired, point)
-    return _loop(
-        wired, fundamental(blocks), f"at {point}", point, (point, f"{point}_returned"), len(blocks) > 1
-    )
+    return _loop(wired, point_blocks(wired, point), f"at {point}", point)
 
 
 def reference_to_output(wired: Drive) -> PlainSystem:
     """Command to what the outermost stage moves, at its instants (see `Loops.reference_to_output`)."""
     source, signal, every, label = whole_path(wired)
     block = fundamental_path(TickProgram(wired, wired.outermost), every, "ref", signal)
-    return _system(block.shown(), every * wired.tick_s, "reference_to_output", source, label)
+    return _system(block.shown(), "reference_to_output", source, label, every * wired.tick_s)
 
 
 def fundamental_path(program: TickProgram, every: int, source: str, signal: str) -> Block:
@@ -97,7 +85,7 @@ def moment_to_output(wired: Drive) -> PlainSystem:
     fundamental of the periodic loop.
     """
     block = fundamental_path(TickProgram(wired, wired.outermost), 1, "moment", "output_angle")
-    return _system(block, wired.tick_s, "moment_to_output", "moment", "output_angle")
+    return _system(block, "moment_to_output", "moment", "output_angle", wired.tick_s)
 
 
 def tick_system(wired: Drive) -> TickSystem:
@@ -105,3 +93,40 @@ def tick_system(wired: Drive) -> TickSystem:
     program = TickProgram(wired, wired.outermost)
     signals = program.tick(0).signals
     return TickSystem(program, tuple(name for name in OUTPUTS if name in signals))
+
+
+def limiters(wired: Drive) -> dict[str, LimiterPath]:
+    """From the command to what stands in front of each limiter: a row for every tick where that is updated.
+
+    A sinusoid passes every phase of the samples, so the peak of the samples is the magnitude of the row.
+    """
+    program = TickProgram(wired, wired.outermost)
+    ticks = [program.tick(k) for k in range(program.ticks)]
+    n, period = len(program.states), program.ticks * wired.tick_s
+    A, B = compose(ticks)
+
+    def evaluate(signals: tuple[str, ...], every: int, rate: bool) -> Response:
+        rows = []
+        for j in range(0, program.ticks, every):
+            before = compose(ticks[:j]) if j else (np.eye(n), np.zeros_like(B))
+            seen = [ticks[j].signals[signal] for signal in signals]
+            rows += [np.append(row[:n] @ before[0], row[:n] @ before[1][:, 0] + row[n]) for row in seen]
+        table = np.array(rows)
+
+        def response(omega: np.ndarray) -> np.ndarray:
+            z = np.exp(1j * omega * period)
+            values = table[:, :n] @ states_at(A, B[:, [0]], z)[:, :, 0].T + table[:, [n]]
+            return _changes(values, omega * period) / (every * wired.tick_s) if rate else values
+
+        return response
+
+    return limiter_paths(wired, evaluate, np.pi / period)
+
+
+def _changes(values: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Change of each update's value from that before it; the last one before the first is a turn older."""
+    if len(values) == 1:
+        return values * -np.expm1(-1j * turn)
+    before = np.roll(values, 1, axis=0)
+    before[0] *= np.exp(-1j * turn)
+    return values - before

@@ -28,15 +28,10 @@ class TickSystem:
     that pushes the output shaft forward, both held over the tick (dry friction while w > 0: T = -Tc; of the
     load while W > 0: M = -N_r C0_l).  With the feed-forward the command before t_0 counts as 0 unless
     `initial_state` says otherwise (``ref_prev``, motor side).
-
-    Attributes
-    ----------
-    program : TickProgram
-    outputs : tuple of str
-        Those of `OUTPUTS` that the drive has, at t_k; motor side but for what is behind the coupling.
     """
 
     program: TickProgram
+    # Those of `OUTPUTS` that the drive has, at t_k; motor side but for what is behind the coupling
     outputs: tuple[str, ...]
 
     @property
@@ -78,21 +73,10 @@ class TickSystem:
         initial: np.ndarray | None = None,
         moment_Nm: np.ndarray | float = 0.0,
     ) -> dict[str, np.ndarray]:
-        """Run the recursion from t_0.
+        """Run the recursion from t_0, see `initial_state`; gives `outputs` at t_k, each of shape (K,).
 
-        Parameters
-        ----------
-        reference_rad : ndarray, shape (K,)
-            Command at t_k in its own unit (read only where the outermost loop updates).
-        torque_Nm, moment_Nm : float or ndarray, shape (K,)
-            Torque at the motor shaft, accelerating; moment on the output shaft, pushing forward.
-        initial : ndarray, optional
-            State at t_0, see `initial_state`.
-
-        Returns
-        -------
-        dict of str to ndarray, shape (K,)
-            `outputs` at t_k.
+        The command is that at t_k in its own unit (read only where the outermost loop updates), the torque
+        accelerates the motor shaft, the moment pushes the output shaft forward; each of shape (K,), or one.
         """
         reference = np.asarray(reference_rad, dtype=float)
         given = (torque_Nm, moment_Nm)

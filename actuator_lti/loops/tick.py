@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.law import Law, Matrices
-from actuator_lti.drive.blocks import Block, Realisation
+from actuator_lti.drive.blocks import Block
 from actuator_lti.loops.rows import Row, table, total
 from actuator_lti.loops.walk import INPUTS, Program, Walk
 
@@ -112,15 +112,7 @@ class TickWalk(Walk):
 
     def apply(self, name: str, block: Block, value: Row) -> Row:
         """The sampled realisation."""
-        return self.realisation(name, block.states, block.sampled, value)
-
-    def realisation(self, name: str, states: tuple[str, ...], realisation: Realisation, value: Row) -> Row:
-        """Put a realisation's states on and give its output."""
-        names = [f"{name}.{state}" for state in states]
-        x = [self.state(each) for each in names]
-        for each, row, gain in zip(names, realisation.A, realisation.B, strict=True):
-            self.next[each] = total(a * s for a, s in zip(row, x, strict=True)) + gain * value
-        return total(c * s for c, s in zip(realisation.C, x, strict=True)) + realisation.D * value
+        return self.realised([f"{name}.{state}" for state in block.states], block.sampled, value)
 
     def derivative(self, name: str, value: Row, period_s: Any) -> Row:
         """(x_k - x_{k-1})/T."""

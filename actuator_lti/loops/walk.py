@@ -19,7 +19,7 @@ from typing import Any
 
 from actuator_lti.design.law import Law, Matrices
 from actuator_lti.drive import blocks
-from actuator_lti.drive.blocks import Block
+from actuator_lti.drive.blocks import Block, Realisation
 from actuator_lti.drive.wiring import ERRORS, Drive, present
 from actuator_lti.loops.rows import Row, total
 
@@ -30,25 +30,15 @@ OWN_SIGNALS = {"current": "i", "angle": "th", "output_angle": "output_angle"}
 
 @dataclass(frozen=True)
 class Program:
-    """The linear drive up to a stage, perhaps with one signal cut.
-
-    Attributes
-    ----------
-    drive : Drive
-    outer : str
-        Outermost stage that runs; its reference is the input ``ref`` (of the position at the output shaft).
-    cut : str or None
-        A break point (``u``, ``i_ref``, ``w_ref``, ``output``) or an error (``e_i``, ``e_w``, ``e_th``)
-        that is replaced by the input ``cut`` where it is updated; what arrives is the signal of that
-        name.
-    opened : tuple of str
-        Stages whose feedback is taken away; their controllers stay in the path.
-    """
+    """The linear drive up to a stage, perhaps with one signal cut."""
 
     drive: Drive
+    # Outermost stage that runs; its reference is the input ``ref`` (of the position at the output shaft)
     outer: str
+    # A break point (``u``, ``i_ref``, ``w_ref``, ``output``) or an error (``e_i``, ``e_w``, ``e_th``) that is
+    # replaced by the input ``cut`` where it is updated; what arrives is the signal of that name
     cut: str | None = None
-    opened: tuple[str, ...] = ()
+    opened: tuple[str, ...] = ()  # stages whose feedback is taken away; their controllers stay in the path
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
@@ -119,7 +109,7 @@ class Walk(ABC):
 
     @abstractmethod
     def moves(self, name: str, value: Row) -> None:
-        """What a state of such a law becomes, or its derivative."""
+        """What a state becomes, or its derivative."""
 
     @abstractmethod
     def derivative(self, name: str, value: Row, period_s: Any) -> Row:
@@ -128,6 +118,13 @@ class Walk(ABC):
     @abstractmethod
     def estimated(self, block: Block, speed: Row, angle: Row) -> Row:
         """A speed estimated from an angle."""
+
+    def realised(self, names: list[str], block: Realisation, value: Row) -> Row:
+        """Put the states of a block's realisation on, under their names, and give its output."""
+        x = [self.state(each) for each in names]
+        for each, row, gain in zip(names, block.A, block.B, strict=True):
+            self.moves(each, total(a * s for a, s in zip(row, x, strict=True)) + gain * value)
+        return total(c * s for c, s in zip(block.C, x, strict=True)) + block.D * value
 
     # -- the drive ----------------------------------------------------------------------------------------
 

@@ -1,20 +1,14 @@
 """Margins of a single loop: every crossover, both ways to stability, modulus and disk margin.
 
-`engine` asks, `results` answers. In double precision: `loop`, its factors (`factored`, `factors_on_axis`),
-the compiled search of the axis (`axis_search`, `axis_parts`), all together in `checked`. What that cannot
-check: `exact` for rational loops, `delays` for exact delays; data of a measurement: `measured`.
+`engine` asks, `results` answers. In double precision: `loop`, its factors (`factored`), the compiled search
+of the axis (`axis_search`, `axis_parts`), all together in `checked`. What that cannot check: `exact` for
+rational loops, `delays` for exact delays; data of a measurement: `measured`.
 """
 
 from actuator_lti.margins.engine import stability_margins
 from actuator_lti.margins.measured.data import MeasuredResponse
-from actuator_lti.margins.results import (
-    Agreement,
-    DelayMargin,
-    DiskMargin,
-    GainMargin,
-    PhaseMargin,
-    StabilityMargins,
-)
+from actuator_lti.margins.results import StabilityMargins
+from actuator_lti.margins.single import Agreement, DelayMargin, DiskMargin, GainMargin, PhaseMargin
 
 __all__ = [
     "Agreement",

@@ -6,16 +6,8 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from actuator_lti.margins.results import (
-    Agreement,
-    DelayMargin,
-    DiskMargin,
-    Evidence,
-    GainMargin,
-    PhaseMargin,
-    StabilityMargins,
-    Verdict,
-)
+from actuator_lti.margins.results import Evidence, StabilityMargins, Verdict
+from actuator_lti.margins.single import Agreement, DelayMargin, DiskMargin, GainMargin, PhaseMargin
 
 FARTHEST = 1e10
 
@@ -46,36 +38,22 @@ def assembled(
     """Put a result together; without figures they are withheld."""
     if band_rad_s is None:
         band_rad_s = (0.0, math.inf if period_s is None else math.pi / period_s)
-    stable, verdict = verdict_of(agreement) if figures is not None else (None, "undecided")
-    if figures is None or stable is None:
+    verdict = _verdict(agreement)
+    if figures is None or verdict == "undecided":
         return StabilityMargins(
             None, "undecided", (), (), (), None, None, None, period_s, delay_s, band_rad_s, method, agreement,
             notes, "withheld", reason,
         )  # fmt: skip
     return StabilityMargins(
-        stable=stable,
-        verdict=verdict,
-        gain_margins=figures.gain_margins,
-        phase_margins=figures.phase_margins,
-        delay_margins=delay_margins(figures.phase_margins, period_s),
-        modulus_margin=figures.modulus[0],
-        modulus_frequency_rad_s=figures.modulus[1],
-        disk_margin=DiskMargin(*figures.disk),
-        period_s=period_s,
-        delay_s=delay_s,
-        band_rad_s=band_rad_s,
-        method=method,
-        agreement=agreement,
-        notes=notes,
-        evidence=evidence,
-        evidence_reason=reason,
-        hidden_border_modes=hidden_border,
-    )
+        verdict == "stable", verdict, figures.gain_margins, figures.phase_margins,
+        delay_margins(figures.phase_margins, period_s), *figures.modulus, DiskMargin(*figures.disk), period_s,
+        delay_s, band_rad_s, method, agreement, notes, evidence, reason, hidden_border_modes=hidden_border,
+    )  # fmt: skip
 
 
 def out_of_sight(L: complex) -> bool:
-    """Whether a crossing of the negative real axis is too small to be listed: a margin above 200 dB."""
-    return abs(L) < 1.0 / FARTHEST
+    """Whether a crossing of the negative real axis is not listed: its margin is beyond 200 dB, up or down."""
+    return not 1.0 / FARTHEST <= abs(L) <= FARTHEST
 
 
 def far_note(far: int) -> tuple[str, ...]:
@@ -83,18 +61,12 @@ def far_note(far: int) -> tuple[str, ...]:
     if not far:
         return ()
     crossings = "1 crossing" if far == 1 else f"{far} crossings"
-    return (f"not listed, as their margin is above 200 dB: {crossings} of the negative real axis",)
+    return (f"not listed, as their margin is beyond 200 dB: {crossings} of the negative real axis",)
 
 
 def hidden_notes(at_zero: int, border: tuple[tuple[float, int], ...] = (), right: int = 0) -> tuple[str, ...]:
-    """What is said of modes that the loop neither drives nor sees.
-
-    Parameters
-    ----------
-    at_zero, right : int
-        How many there are at zero frequency, and unstable ones.
-    border : tuple
-        w of the s-plane of each undamped pair, and how often it occurs.
+    """What is said of modes that the loop neither drives nor sees: how many at zero frequency, pairs on the
+    boundary (w of the s-plane, how often), unstable ones.
     """
     notes = []
     if at_zero == 1 and not border:
@@ -116,17 +88,14 @@ def hidden_notes(at_zero: int, border: tuple[tuple[float, int], ...] = (), right
     return tuple(notes)
 
 
-def verdict_of(agreement: Agreement) -> tuple[bool | None, Verdict]:
-    """Verdict from the two ways; both are asked only where no pole is on the border."""
-    if not agreement.agree:
-        return None, "undecided"
-    counts = (agreement.unstable_poles, agreement.unstable_nyquist)
-    count = next((c for c in counts if c is not None), None)
-    if count is None:
-        return None, "undecided"
-    if count:
-        return False, "unstable"
-    return (False, "on the border") if agreement.border_poles else (True, "stable")
+def _verdict(agreement: Agreement) -> Verdict:
+    """From the two ways; both are asked only where no pole is on the border."""
+    counts = {agreement.unstable_poles, agreement.unstable_nyquist} - {None}
+    if not counts or not agreement.agree:
+        return "undecided"
+    if counts != {0}:
+        return "unstable"
+    return "on the border" if agreement.border_poles else "stable"
 
 
 def delay_margins(phase_margins: tuple[PhaseMargin, ...], period_s: float | None) -> tuple[DelayMargin, ...]:

@@ -1,18 +1,18 @@
-"""The axis in the parts in which a factored loop is searched: its ends, all crossings, smallest distances."""
+"""The axis in the parts in which a factored loop is searched: ends, crossings, smallest distances, turns."""
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.axis_search import Found, nearest, passages, search
+from actuator_lti.margins.axis_search import Factored, Found, nearest, passages, search
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.factored import Response
-from actuator_lti.margins.factors_on_axis import Factored
-from actuator_lti.margins.loop import Mask, Real
+from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.trust import Doubtful
 
 _LOW, _HIGH = 1e-3, 1e3  # of the smallest and largest root: where the ends of the axis begin
@@ -96,12 +96,7 @@ def _turning_stop(
 def _stop(factors: Factored, high: float) -> float:
     """A frequency above which gain and phase follow the slope at infinity."""
     slope = factors.at_infinity
-    high = max(high, 10.0 * high * math.exp(-factors.log_at(high)[0] / slope))
-    if not high < 1e150:
-        raise Doubtful("too wide a range")
-    if slope % 2 == 0 and abs(math.sin(factors.log_at(high)[1])) < _HARDLY:
-        raise Doubtful("the phase hardly leaves the real axis at an end of the axis")
-    return high
+    return _told(factors, max(high, 10.0 * high * math.exp(-factors.log_at(high)[0] / slope)), slope)
 
 
 def _start(factors: Factored, low: float) -> float:
@@ -111,12 +106,16 @@ def _start(factors: Factored, low: float) -> float:
         if abs(factors.log_at(0.0)[0]) < _NEAR_ONE:
             raise Doubtful("the gain is one at an end of the axis")
         return 0.0
-    low = min(low, 0.1 * low * math.exp(-factors.log_at(low)[0] / order))
-    if not 1e-150 < low < 1e150:
+    return _told(factors, min(low, 0.1 * low * math.exp(-factors.log_at(low)[0] / order)), order)
+
+
+def _told(factors: Factored, end: float, slope: float) -> float:
+    """An end of the axis at which the side of the real axis on which the loop lies is known."""
+    if not 1e-150 < end < 1e150:
         raise Doubtful("too wide a range")
-    if order % 2 == 0 and abs(math.sin(factors.log_at(low)[1])) < _HARDLY:
+    if slope % 2 == 0 and abs(math.sin(factors.log_at(end)[1])) < _HARDLY:
         raise Doubtful("the phase hardly leaves the real axis at an end of the axis")
-    return low
+    return end
 
 
 def axis_ends(factors: Factored, response: Response) -> tuple[complex, complex]:
@@ -127,7 +126,6 @@ def axis_ends(factors: Factored, response: Response) -> tuple[complex, complex]:
 
 def merged(parts: list[Part]) -> tuple[Real, Real, Mask, int]:
     """All crossings in order of w."""
-
     gain, real, rising = map(np.concatenate, zip(*(part.in_w for part in parts), strict=True))
     return gain, real, rising, sum(part.found.far for part in parts)
 
@@ -157,3 +155,51 @@ def distances_over(
         (d.at(L[w]) if w in L else value, response.frequency(w))
         for d, (value, w) in zip(distances, best, strict=True)
     ]
+
+
+def half_turns_about(
+    factors: Factored,
+    response: Response,
+    parts: list[Part],
+    ends: tuple[complex, complex],
+    real_L: Complex,
+    rising: Mask,
+) -> int:
+    """Turns of 1 + L about the origin from zero frequency to the end of the axis, in half turns."""
+    around = np.abs(real_L) > 1.0
+    cut = int(np.count_nonzero(rising & around)) - int(np.count_nonzero(~rising & around))
+    cut += sum(part.found.turns for part in parts)
+    angle, first = _from_zero(factors, response, parts[0].found, ends[0])
+    more, last = _to_end(response, parts[-1], ends[1])
+    return round((angle + last - first + more) / math.pi) + 2 * cut
+
+
+def _from_zero(factors: Factored, response: Response, found: Found, dc: complex) -> tuple[float, float]:
+    """The turn of 1 + L up to just above zero frequency, and its angle there."""
+    if not factors.at_zero < 0.0:
+        return 0.0, _leaving(1.0 + dc.real, found)
+    low = float(found.known[0, 0])
+    on_real, on_axis = response.real_point(low), complex(response.at(np.array([low]))[0])
+    turn, about = _angle_between(1.0 + on_real, 1.0 + on_axis), 0.5 * math.pi * factors.at_zero
+    turn += 2.0 * math.pi * round((about - turn) / (2.0 * math.pi))
+    return turn, cmath.phase(1.0 + on_axis)
+
+
+def _angle_between(start: complex, stop: complex) -> float:
+    """Angle from one point to another of the same closed half plane."""
+    return cmath.phase(stop * start.conjugate())
+
+
+def _leaving(F: float, found: Found) -> float:
+    """The angle of 1 + L beside an end of the axis, where it is F."""
+    if F >= 0.0:
+        return 0.0
+    return -math.pi if found.rate > 0.0 else math.pi
+
+
+def _to_end(response: Response, part: Part, end: complex) -> tuple[float, float]:
+    """The turn of 1 + L onto the real axis at the end, and its angle before."""
+    F = 1.0 + end
+    if response.delay:
+        return _angle_between(F, complex(F.real)), cmath.phase(F)
+    return 0.0, -_leaving(F.real, part.found)

@@ -1,13 +1,18 @@
-"""What a factored loop does on the axis: every crossing and passage of a level, its smallest distance to -1.
+"""A loop by its factors on the stability boundary, with the range of gain and phase over whole intervals.
 
-The search is compiled (`actuator_lti.axis`); here it is called, with as much room as it needs.
+On s = j w every factor (s - r) moves steadily between few places: its gain falls to w = Im r and rises from
+there, its phase turns one way, and both rates have one peak. Between these places the sum of what the factors
+change by bounds what L does: gain, phase and their rates are known over whole intervals, but for rounding.
+A sampled loop is held in s = (z - 1)/(z + 1), w = tan(angle/2); there a delay of q samples, e^(-j q angle),
+is the factor ((1 - s)/(1 + s))^q.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,56 +21,110 @@ from actuator_lti.axis import _nearest, _search
 from actuator_lti.axis._factors import BOUNDS, slot
 from actuator_lti.axis.library import LIBRARY
 from actuator_lti.margins.distances import Distance
-from actuator_lti.margins.factors_on_axis import Factored
-from actuator_lti.margins.loop import Mask, Real
+from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.trust import Doubtful
 
+_NEXT_TO_AXIS = 1e-14  # relative: a root on the axis itself is held this far from it
 _ROOM, _MORE, _MOST = 1 << 11, 8, 1 << 23  # intervals: asked for first, each time more, and no more than that
 Place = tuple[float, float]
 
 
 @dataclass(frozen=True)
+class Factored:
+    """log L = constant + sum of weights log(s - roots) - delay s."""
+
+    roots: Complex  # (m,): zeros count positive, poles negative; conjugates are both there
+    weights: Real
+    delay: float  # in the unit 1/w (continuous loops only)
+    log_gain: float = 0.0  # the constant, so that gain and phase are those of L; the phase modulo a full turn
+    phase: float = 0.0
+    slack: float = 0.0  # how far the factors may be from the loop: log gain, and phase in rad
+
+    @cached_property
+    def at_zero(self) -> float:
+        """Weight of the roots at zero frequency: negative for integrators."""
+        return float(self.weights[self.roots == 0.0].sum())
+
+    @cached_property
+    def at_infinity(self) -> float:
+        """Slope of the gain at infinity in powers of w."""
+        return float(self.weights.sum())
+
+    def reciprocal(self) -> Factored:
+        """L(1/s), which on j/w is the conjugate of L on j w: infinity lies at zero. No delay."""
+        away = self.roots != 0.0
+        roots, weights = 1.0 / self.roots[away], self.weights[away]
+        constant = float(-(weights * np.log(np.abs(roots))).sum())
+        if self.at_infinity:
+            roots, weights = np.append(roots, 0.0), np.append(weights, -self.at_infinity)
+        other = replace(self, roots=roots, weights=weights, log_gain=self.log_gain + constant, phase=0.0)
+        one = np.ones(1)
+        phase = -float(self.log_value(one)[1][0] + other.log_value(one)[1][0])
+        whole = (self.weights == np.round(self.weights)).all()  # behind part of a sample L is not real there
+        return replace(other, phase=half_turn(phase) if whole else phase)
+
+    @cached_property
+    def _off_axis(self) -> Real:
+        off: Real = np.maximum(np.abs(self.roots.real), _NEXT_TO_AXIS * np.abs(self.roots.imag))
+        return off
+
+    @cached_property
+    def _turning(self) -> Real:
+        turning: Real = np.where(self.roots.real > 0.0, -self.weights, self.weights)
+        return turning
+
+    @cached_property
+    def table(self) -> Real:
+        """What the compiled search knows of each factor, then of the loop, see `actuator_lti.axis`."""
+        roots = (self.roots.real, self.roots.imag, self._off_axis, self.weights, self._turning)
+        return np.concatenate((*roots, (self.log_gain, self.phase, self.delay, self.slack)))
+
+    @cached_property
+    def places(self) -> Real:
+        """Frequencies w > 0 between which every factor is monotone, in order; some twice."""
+        im = self.roots.imag
+        w = np.concatenate((im - self._off_axis, im, im + self._off_axis))
+        return np.sort(w[w > 0.0])
+
+    def log_value(self, w: Real) -> Real:
+        """Log gain and phase (continuous, less whole turns), shape (2, points)."""
+        y, a = w[:, None] - self.roots.imag, self._off_axis
+        gain = 0.5 * np.log(y * y + a * a) @ self.weights + self.log_gain
+        return np.array((gain, np.arctan2(y, a) @ self._turning - self.delay * w + self.phase))
+
+    def log_at(self, w: float) -> tuple[float, float]:
+        """The same at one frequency."""
+        parts = np.empty(slot(self.roots.size))
+        LIBRARY.functions.evaluated(self.roots.size, self.table, w, parts, 0)
+        gain, phase = parts[-5:-3].tolist()
+        return gain, phase
+
+
+def half_turn(phase: float) -> float:
+    """The constant phase where L is real at w = 0: what its factors turn by cancels there."""
+    return float(np.pi * round(phase / np.pi))
+
+
+@dataclass(frozen=True)
 class Found:
-    """Where a factored loop meets the unit circle and the negative real axis.
+    """Where a factored loop meets the unit circle and the negative real axis."""
 
-    Attributes
-    ----------
-    gain_w, real_w : arrays
-        In order.
-    rising : array of bool
-        Whether the phase rises at each of ``real_w``.
-    far : int
-        Crossings of the negative real axis with a gain below -200 dB, which are not listed.
-    turns : int
-        Rising less falling ones among those not listed where the gain is above one.
-    rate : float
-        Of the phase, at the beginning.
-    intervals : int
-        Into how many the axis was split.
-    known : array (intervals + 1, 7)
-        For each where it begins, log gain and phase there, and inside their least, then their most; the last
-        row is the end.
-    """
-
-    gain_w: Real
+    gain_w: Real  # in order
     real_w: Real
-    rising: Mask
-    far: int
-    turns: int
-    rate: float
-    intervals: int
+    rising: Mask  # whether the phase rises at each of ``real_w``
+    far: int  # crossings of the negative real axis with a gain below -200 dB, which are not looked for
+    turns: int  # rising less falling ones among those not listed where the gain is above one
+    rate: float  # of the phase, at the beginning
+    intervals: int  # into how many the axis was split
+    # (intervals + 1, 7): for each where it begins, log gain and phase there, and inside their least, then
+    # their most; the last row is the end
     known: Real
 
 
 def search(loop: Factored, low: float, high: float, listed_to: float = math.inf) -> Found:
     """Find all crossings with low < w < high; of the real axis only those up to ``listed_to``.
 
-    A crossing at w = 0 itself, where low is 0, is not listed.
-
-    Raises
-    ------
-    Doubtful
-        The loop comes so near to a line that its side could not be determined.
+    A crossing at w = 0 itself, where low is 0, is not listed. `Doubtful`: its side of a line is not told.
     """
     ends = [low, *([listed_to] if low < listed_to < high else []), high]
     return _searched(loop, ends, _search.CIRCLE, 0.0, listed_to)
@@ -100,19 +159,13 @@ def _searched(loop: Factored, ends: list[float], kind: int, level: float, listed
 def nearest(
     loop: Factored, found: Found, distances: tuple[Distance, ...], start: Sequence[Place]
 ) -> list[Place]:
-    """Smallest values of distances, each with its w.
-
-    Parameters
-    ----------
-    found : Found
-        Its intervals cover the axis but for what ``start``, a place for each distance, stands for.
+    """Smallest values of distances, each with its w, beside ``start``: a place for each that stands for what
+    the intervals of ``found`` leave out.
     """
-    out = []
+    out, known, lent = [], found.known.reshape(-1), _lent(loop)
     for d, place in zip(distances, start, strict=True):
-        best, form = np.array(place), np.array((d.a, d.b, d.c, d.e), dtype=float)
-        status = LIBRARY.functions.nearest(
-            *_row(loop), found.intervals, found.known.reshape(-1), form, best, *_lent(loop)
-        )
+        best = np.array(place)
+        status = LIBRARY.functions.nearest(*_row(loop), found.intervals, known, d.form, best, *lent)
         if status == _nearest.MEETS:
             raise Doubtful("the loop all but meets -1")
         if status != _search.DONE:

@@ -9,14 +9,14 @@ import numpy as np
 from actuator_lti.axis._search import FAR_LOG
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, out_of_sight, within
-from actuator_lti.margins.axis_parts import axis_ends, axis_parts, distances_over, merged
+from actuator_lti.margins.axis_parts import axis_ends, axis_parts, distances_over, half_turns_about, merged
+from actuator_lti.margins.axis_search import Factored
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.factored import Response, factored
-from actuator_lti.margins.factors_on_axis import Factored
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
-from actuator_lti.margins.nyquist import half_turns_about
-from actuator_lti.margins.poles import SortedPoles, sorted_poles
-from actuator_lti.margins.results import Agreement, GainMargin, PhaseMargin, StabilityMargins
+from actuator_lti.margins.poles import SortedPoles, all_sorted, sorted_poles
+from actuator_lti.margins.results import StabilityMargins
+from actuator_lti.margins.single import Agreement, GainMargin, PhaseMargin
 from actuator_lti.margins.trust import MOST_ERROR, Doubtful, error_bound, hardly_placed
 
 _METHOD = "factors of the loop, bounded over whole intervals of frequency; crossings polished by Newton"
@@ -28,14 +28,8 @@ _LEAST = math.exp(-FAR_LOG)
 def checked_margins(
     loop: RationalLoop, delay_s: float = 0.0, band_rad_s: tuple[float, float] | None = None
 ) -> StabilityMargins:
-    """All margins of a rational loop, alone or behind a delay, in double precision, see `stability_margins`.
-
-    Raises
-    ------
-    Doubtful
-        They could not be checked.
-    InputError
-        A direct feed-through of one or more behind a delay.
+    """All margins of a rational loop, alone or behind a delay; `Doubtful` where double precision cannot check
+    them.
     """
     try:
         with np.errstate(all="ignore"):
@@ -43,16 +37,14 @@ def checked_margins(
     except (InputError, NumericalError):
         raise
     except (ArithmeticError, ValueError, RuntimeError) as error:  # LinAlgError, overflow, no end of a search
-        raise Doubtful(str(error)) from error
+        raise Doubtful(f"double precision fails: {error}") from error
 
 
 def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | None) -> StabilityMargins:
     _refuse(loop, delay_s)
     response = Response(loop, delay_s / (loop.period_s or 1.0))
-    poles = sorted_poles(loop.A, loop.in_z)
-    closed = None
-    if not delay_s:
-        closed = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), loop.in_z)
+    poles, *more = all_sorted((loop.A,) if delay_s else (loop.A, _closed(loop)), loop.in_z)
+    closed = more[0] if more else None
     _trust_poles(loop, poles, closed)
     factors = factored(response, poles)
     _trust_factors(loop, poles, factors)
@@ -66,8 +58,9 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
     second = _poles_behind_delay(response, gain_x) if closed is None else closed.unstable
     if second is not None and count != second:
         raise Doubtful("poles and Nyquist count disagree")
-    listed = np.log(np.abs(real_L)) >= -FAR_LOG
-    far += int(np.count_nonzero(~listed)) + sum(value.real < 0.0 and out_of_sight(value) for value in ends)
+    listed = np.abs(np.log(np.abs(real_L))) <= FAR_LOG
+    far += int(np.count_nonzero(~listed))
+    far += sum(-math.inf < value.real < 0.0 and out_of_sight(value) for value in ends)
     if math.isfinite(listed_to) and band is None and factors.at_infinity:
         listed &= np.abs(real_L) >= floor
     figures = Figures(
@@ -93,6 +86,10 @@ def _margins(loop: RationalLoop, delay_s: float, band: tuple[float, float] | Non
     return within(result, band)
 
 
+def _closed(loop: RationalLoop) -> Real:
+    return np.asarray(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c))
+
+
 def _refuse(loop: RationalLoop, delay_s: float) -> None:
     if delay_s:
         if loop.period_s is None and abs(loop.d) >= 1.0:
@@ -104,7 +101,7 @@ def _refuse(loop: RationalLoop, delay_s: float) -> None:
             raise Doubtful("no loop")
         return
     if not loop.order or not loop.b.any() or not loop.c.any() or abs(1.0 + loop.d) <= _NEAR_ONE:
-        raise Doubtful("no dynamics, or hardly well posed")
+        raise Doubtful("the loop has no dynamics, or 1 + L(infinity) is next to zero")
 
 
 def _tail_note(
@@ -131,7 +128,7 @@ def _poles_behind_delay(response: Response, gain_x: Real) -> int | None:
     loop = response.loop
     if loop.period_s is not None:
         return None  # part of a sample: no function of z
-    free = sorted_poles(loop.A - np.outer(loop.b / (1.0 + loop.d), loop.c), False)
+    free = sorted_poles(_closed(loop), False)
     if free.doubtful or free.border:
         return None
     L, slope = loop.response_and_slope(gain_x)
@@ -156,7 +153,7 @@ def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | N
     if poles.doubtful or (closed is not None and (closed.border or closed.doubtful)):
         raise Doubtful("a pole may lie on either side of the stability boundary")
     if poles.border != poles.at_dc:
-        raise Doubtful("poles on the stability boundary")
+        raise Doubtful("open-loop poles lie on the stability boundary")
     if hardly_placed(loop, poles.values, False):
         raise Doubtful("rounding of the coefficients moves a pole across the stability boundary")
     if closed is not None and hardly_placed(loop, closed.values, True):
@@ -166,37 +163,33 @@ def _trust_poles(loop: RationalLoop, poles: SortedPoles, closed: SortedPoles | N
 def _trust_factors(loop: RationalLoop, poles: SortedPoles, factors: Factored) -> None:
     at_zero = factors.weights[factors.roots == 0.0]
     if at_zero.size and at_zero.min() != at_zero.max():
-        raise Doubtful("poles and zeros at zero frequency")
+        raise Doubtful("poles and zeros at zero frequency may cancel")
     roots = factors.roots
-    if loop.numerator is None:  # zeros at infinity come out far away
+    if loop.coefficients is None:  # zeros at infinity come out far away
         roots = poles.values - 1.0 if loop.in_z else poles.values
     size = np.abs(roots[roots != 0.0])
     if size.size and float(size.max()) > _WIDEST * float(size.min()):
-        raise Doubtful("poles and zeros over too many decades")
+        raise Doubtful(f"poles and zeros are more than {_WIDEST:g} apart")
 
 
 def _trust_crossings(loop: RationalLoop, gain_x: Real, real_x: Real, ends: tuple[complex, complex]) -> None:
     """The error bound of every crossing, and of the gain at both ends."""
     at_ends = [x for x, L in zip((0.0, loop.end), ends, strict=True) if _LEAST <= abs(L) < math.inf]
-    if loop.numerator is None and not loop.in_z:
+    if loop.coefficients is None and not loop.in_z:
         at_ends = [x for x in at_ends if x < math.inf]  # the direct feed-through is an entry: exact
     if not (error_bound(loop, np.concatenate((gain_x, real_x, at_ends))) <= MOST_ERROR).all():
-        raise Doubtful("the loop is too badly conditioned")
+        raise Doubtful(f"rounding of the entries moves L at a crossing by more than {MOST_ERROR:g} of it")
 
 
 def _gain_margins(
     response: Response, x: Real, L: Complex, ends: tuple[complex, complex]
 ) -> tuple[GainMargin, ...]:
     def at_end(value: complex, place: float) -> list[GainMargin]:
-        if not value.real < 0.0 or out_of_sight(value) or not math.isfinite(abs(value)):
+        if not value.real < 0.0 or out_of_sight(value):
             return []
         return [GainMargin(-1.0 / value.real, place)]
 
     loop = response.loop
     crossed = [GainMargin(float(1.0 / abs(v)), loop.frequency(at)) for at, v in zip(x, L, strict=True)]
-    last = (
-        ()
-        if loop.period_s is None and response.delay
-        else at_end(response.onto_axis(ends[1]), loop.frequency(loop.end))
-    )
-    return (*at_end(ends[0], 0.0), *crossed, *last)
+    last = 0j if loop.period_s is None and response.delay else response.onto_axis(ends[1])
+    return (*at_end(ends[0], 0.0), *crossed, *at_end(last, loop.frequency(loop.end)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,11 @@ class Distance:
     b: int
     c: int
     e: int
+
+    @cached_property
+    def form(self) -> Real:
+        """As the compiled search takes it."""
+        return np.array((self.a, self.b, self.c, self.e), dtype=float)
 
     def at(self, L: complex) -> float:
         """Its value; L may be infinite."""

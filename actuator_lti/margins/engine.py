@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.assemble import assembled, within
 from actuator_lti.margins.checked import checked_margins
-from actuator_lti.margins.delays.form import DelayForm, delay_form
-from actuator_lti.margins.delays.series import in_series
+from actuator_lti.margins.delays.form import DelayForm, delay_form, without_series_delays
 from actuator_lti.margins.given import Given, given_of, whole_samples
 from actuator_lti.margins.loop import loop_of
+from actuator_lti.margins.measured.data import is_measured
 from actuator_lti.margins.measured.margins import measured_margins
-from actuator_lti.margins.results import Agreement, StabilityMargins
+from actuator_lti.margins.results import StabilityMargins
+from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful
 
 
@@ -47,7 +49,7 @@ def stability_margins(
         of both, which may lie on the negative real axis and be a gain margin. The verdict is then that of the
         Nyquist curve alone. As the part goes to 0 or 1 everything goes to what whole samples give.
     band_rad_s : tuple of float, optional
-        Where margins are listed. Default: everywhere, gain margins up to 200 dB; under a delay, whose phase
+        Where margins are listed. Default: everywhere, gain margins within 200 dB; under a delay, whose phase
         crossovers never end, up to where the gain stays below -40 dB, or nearer to one where that would be
         more than 1e5 turns of the delay (``.band_rad_s`` of the result, and a note). The verdict, the
         modulus and the disk margin are those of the whole axis in any case.
@@ -79,22 +81,16 @@ def stability_margins(
         raise InputError(f"delay_s = {delay_s}: must be finite and not negative")
     if band_rad_s is not None and not 0.0 <= band_rad_s[0] < band_rad_s[1]:
         raise InputError(f"band_rad_s = {band_rad_s}: two frequencies, 0 <= low < high, in rad/s")
-    if not hasattr(system, "delays_s") and hasattr(system, "frdata"):
+    if is_measured(system):
         return measured_margins(system, delay_s, band_rad_s)
     if hasattr(system, "delays_s"):
         if system.delays_s.size or delay_s:
             form = delay_form(system, delay_s)  # refuses what is no loop
-            plain = in_series(system)
+            plain = without_series_delays(form)
             if plain is None:
                 return _inside_delays(form, band_rad_s)
-            given, inside_s = plain
-            late = _behind_delay(given, inside_s + delay_s, band_rad_s, certify)
-            return replace(late, delay_s=delay_s)
+            return replace(_behind_delay(*plain, band_rad_s, certify), delay_s=delay_s)
         system = system.to_state_space()
-    if not (hasattr(system, "num") or hasattr(system, "A")):
-        raise InputError(
-            f"{type(system).__name__}: a StateSpace, TransferFunction, DelaySystem or FrequencyResponseData"
-        )
     given = given_of(system)
     if not delay_s:
         return within(_rational(given, certify), band_rad_s)
@@ -107,14 +103,12 @@ def stability_margins(
 
 def _rational(given: Given, certify: bool) -> StabilityMargins:
     """In double precision, and by exact arithmetic where that is not sure of itself."""
+    if not certify:
+        with suppress(Doubtful):
+            return checked_margins(loop_of(given, warp=True))
     from actuator_lti.margins.exact.certified import certified_margins  # python-flint only where it is needed
 
-    if certify:
-        return certified_margins(given)
-    try:
-        return checked_margins(loop_of(given, warp=True))
-    except Doubtful:
-        return certified_margins(given)
+    return certified_margins(given)
 
 
 def _behind_delay(
@@ -129,7 +123,8 @@ def _behind_delay(
     if margins is not None and (given.period_s is not None or not certify):
         return margins
     if given.period_s is not None:
-        return _withheld(given.period_s, delay_s, "factors of the loop", doubt)
+        reason = f"part of a sample is worked out in double precision alone, and {doubt}"
+        return _withheld(given.period_s, delay_s, "factors of the loop", reason)
     from actuator_lti.margins.delays.certified import certified_delayed_margins  # python-flint if needed
     from actuator_lti.margins.delays.exact import exact_behind_delay
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import cmath
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_lti.margins.factors_on_axis import Factored, half_turn
+from actuator_lti.margins.axis_search import Factored, half_turn
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.poles import SortedPoles, eigenvalues, polynomial_roots
 from actuator_lti.margins.trust import Doubtful
@@ -25,18 +25,10 @@ _FAR_OFF = 1e-4  # relative: a crossing of the factors and one of the loop
 
 @dataclass(frozen=True)
 class Response:
-    """A rational loop behind a delay, on w of the s-plane.
+    """A rational loop behind a delay, on w of the s-plane."""
 
-    Attributes
-    ----------
-    loop : RationalLoop
-        Without the delay.
-    delay : float
-        s, or samples.
-    """
-
-    loop: RationalLoop
-    delay: float = 0.0
+    loop: RationalLoop  # without the delay
+    delay: float = 0.0  # s, or samples
 
     def x(self, w: Real) -> Real:
         """The argument of the loop."""
@@ -65,7 +57,11 @@ class Response:
 
     def at_rest(self) -> complex:
         """L at zero frequency."""
-        return complex(self.loop.response(np.zeros(1))[0].real)
+        loop = self.loop
+        if loop.coefficients is None or loop.in_z:
+            return complex(loop.response(np.zeros(1))[0].real)
+        above, below = loop.coefficients[:, -1:].astype(complex)
+        return complex((above / below)[0].real)
 
     def at_end(self) -> complex:
         """L at the end of the axis: at infinity, or at Nyquist with the whole delay."""
@@ -92,19 +88,15 @@ class Response:
         if loop.in_z:
             L, slope = loop.response_and_slope(np.array([math.pi]))
             return complex(slope[0] / L[0]) - 1j * self.delay
-        assert loop.numerator is not None
-        assert loop.denominator is not None
-        above, below = loop.numerator, loop.denominator  # in u = 1/w: x = pi - 2 u, s = j/u
+        assert loop.coefficients is not None
+        above, below = loop.coefficients  # in u = 1/w: x = pi - 2 u, s = j/u
         rate = (above[1] / above[0] - below[1] / below[0]) / 1j if above[0] else math.inf
         return -0.5 * complex(rate) - 1j * self.delay
 
     def polished(self, w: Real, gain: bool) -> tuple[Real, Complex]:
         """Newton from crossings of the factors to those of the loop; their x, and L there.
 
-        Raises
-        ------
-        Doubtful
-            The loop has none there, or one where the factors have two, or at the end of the axis.
+        `Doubtful`: the loop has none there, or one where the factors have two, or at the end of the axis.
         """
         if not w.size:
             return w, np.empty(0, dtype=complex)
@@ -125,7 +117,8 @@ class Response:
             L = self._late(x, loop.sharp_response(x))
             step = _newton_step(L, rate, gain)
             x, L = x - step, L * (1.0 - rate * step)
-        if not (np.abs(x - start) <= _FAR_OFF * start).all() or not (np.diff(x, append=loop.end) > 0.0).all():
+        in_order = (x[1:] > x[:-1]).all() and x[-1] < loop.end
+        if not (in_order and (np.abs(x - start) <= _FAR_OFF * start).all()):
             raise Doubtful("a crossing of the factors is none of the loop, or two are one")
         return x, L
 
@@ -139,17 +132,11 @@ class Response:
 def _newton_step(L: Complex, rate: Complex, gain: bool) -> Real:
     if gain:
         return np.asarray(np.log(np.abs(L)) / rate.real)
-    return np.asarray(np.angle(-L) / rate.imag)
+    return np.asarray(np.arctan2(-L.imag, -L.real) / rate.imag)
 
 
 def factored(response: Response, poles: SortedPoles) -> Factored:
-    """The factors of a loop in the s-plane, checked against it next to every one of its poles.
-
-    Raises
-    ------
-    Doubtful
-        They do not make up the loop.
-    """
+    """The factors of a loop in the s-plane; `Doubtful` where they do not make it up next to its poles."""
     loop = response.loop
     below = _in_s(loop, _exact_zero(poles, loop.in_z))
     above = _zeros(loop, below)
@@ -165,11 +152,9 @@ def factored(response: Response, poles: SortedPoles) -> Factored:
 def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
     size = np.abs(poles[poles.imag >= 0.0])
     size = size[size > 0.0]
-    w = (
-        np.concatenate((size * 1.01, [size.min() * 0.3, size.max() * 3.0]))
-        if size.size
-        else np.array([0.5, 2.0])
-    )
+    w = np.array([0.5, 2.0])
+    if size.size:
+        w = np.concatenate((size * 1.01, (0.3 * size.min(), 3.0 * size.max())))
     L = response.at(w)
     gain, phase = factors.log_value(w)
     off, level = L * np.exp(-gain - 1j * phase), np.abs(np.log(np.abs(L)))
@@ -179,8 +164,10 @@ def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
     apart = max(float(np.abs(off - 1.0).max(initial=0.0)), abs(turn - turned))
     log_gain = float(np.log(np.abs(L[k]))) - float(gain[k])
     if not off.size or not apart <= _SAME or not math.isfinite(log_gain):
-        raise Doubtful("the factors do not make up the loop")
-    return replace(factors, log_gain=log_gain, phase=turn, slack=max(_LEAST_SLACK, 10.0 * apart))
+        raise Doubtful("poles and zeros in double precision do not make up the loop")
+    return Factored(
+        factors.roots, factors.weights, factors.delay, log_gain, turn, max(_LEAST_SLACK, 10.0 * apart)
+    )
 
 
 def _exact_zero(poles: SortedPoles, in_z: bool) -> Complex:
@@ -200,8 +187,8 @@ def _in_s(loop: RationalLoop, points: Complex) -> Complex:
 
 def _zeros(loop: RationalLoop, poles: Complex) -> Complex:
     """Zeros in the s-plane; those of a state space that lie at infinity come out far away."""
-    if loop.numerator is not None:
-        return _in_s(loop, polynomial_roots(loop.numerator))
+    if loop.coefficients is not None:
+        return _in_s(loop, polynomial_roots(loop.coefficients[0]))
     size = np.abs(poles[poles != 0.0])
     shift = 1.083 * math.exp(float(np.log(size).mean())) if size.size else 1.083
     eye = np.eye(loop.order)
@@ -214,8 +201,7 @@ def _zeros(loop: RationalLoop, poles: Complex) -> Complex:
     zeros = shift + 1.0 / sigma[sigma != 0.0]
     if loop.in_z or loop.d or zeros.size < loop.order:
         return zeros
-    farthest = np.abs(
-        zeros
-    ).argmax()  # without feed-through one is at infinity, with its mirror image where two
+    # without feed-through one is at infinity, with its mirror image where two
+    farthest = np.abs(zeros).argmax()
     real = abs(zeros[farthest].imag) <= _NEARLY_REAL * abs(zeros[farthest])
     return np.delete(zeros, np.abs(zeros).argsort()[-1 if real else -2 :])

@@ -36,6 +36,11 @@ class Given:
     d: float = 0.0
     samples: int = 0
 
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """The names of what it is given by."""
+        return ("numerator", "denominator") if self.A is None else ("A", "b", "c", "d")
+
     def behind_samples(self) -> Given:
         """Coefficients over z^samples: the whole samples as poles at z = 0."""
         late = np.concatenate((self.denominator, np.zeros(self.samples)))
@@ -49,7 +54,7 @@ class Given:
         return self._moved(1.0), self._moved(-1.0)
 
     def _moved(self, way: float) -> Given:
-        names = ("numerator", "denominator") if self.A is None else ("A", "b", "c", "d")
+        names = self.entries
         entries = [np.asarray(getattr(self, name), dtype=float) for name in names]
         signs = np.split(_signs(sum(x.size for x in entries)), np.cumsum([x.size for x in entries])[:-1])
         moved: Any = {
@@ -65,18 +70,16 @@ def _signs(count: int) -> Real:
 
 
 def given_of(system: Any) -> Given:
-    """Read a SISO python-control state space or transfer function.
-
-    Raises
-    ------
-    InputError
-        More than one input or output, an improper transfer function, or a value that is not finite.
-    """
+    """Read a SISO python-control state space or transfer function, proper and finite."""
+    if not hasattr(system, "ninputs"):
+        raise InputError(
+            f"{type(system).__name__}: a StateSpace, TransferFunction, DelaySystem or FrequencyResponseData"
+        )
     if system.ninputs != 1 or system.noutputs != 1:
         raise InputError(
             f"a loop has one input and one output; this has {system.ninputs} and {system.noutputs}"
         )
-    period_s = _period(system.dt)
+    period_s = period_of(system)
     if hasattr(system, "num"):
         num, den = _trimmed(system.num[0][0]), _trimmed(system.den[0][0])
         given = Given(period_s, num, den)
@@ -85,15 +88,15 @@ def given_of(system: Any) -> Given:
         A = np.asarray(system.A, dtype=float)
         b = np.asarray(system.B, dtype=float)[:, 0]
         given = Given(period_s, A=A, b=b, c=np.asarray(system.C, dtype=float)[0], d=float(system.D[0, 0]))
-    parts = (given.numerator, given.denominator, given.A, given.b, given.c, given.d)
-    if not all(np.isfinite(part).all() for part in parts if part is not None):
+    if not all(np.isfinite(getattr(given, name)).all() for name in given.entries):
         raise InputError("the loop holds a value that is not finite")
     return given
 
 
 def _trimmed(coefficients: Any) -> Real:
     p = np.asarray(coefficients, dtype=float)
-    return p[p.nonzero()[0][0] :] if p.any() else p[:0]
+    used = p.nonzero()[0]
+    return p[used[0] :] if used.size else p[:0]
 
 
 def _refuse_coefficients(num: Real, den: Real) -> None:
@@ -106,10 +109,9 @@ def _refuse_coefficients(num: Real, den: Real) -> None:
         )
 
 
-def _period(dt: Any) -> float | None:
-    if dt is None or (dt == 0 and dt is not True):
-        return None
-    return 1.0 if dt is True else float(dt)
+def period_of(system: Any) -> float | None:
+    """Sampling period, s; 1 where it is not stated (``True``), ``None`` where continuous."""
+    return float(system.dt) if system.dt else None
 
 
 def whole_samples(samples: float) -> int | None:

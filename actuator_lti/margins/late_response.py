@@ -9,10 +9,9 @@ import numpy as np
 from scipy.optimize import brentq
 
 from actuator_lti.margins.axis_parts import axis_ends, axis_parts, distances_over
-from actuator_lti.margins.axis_search import passages
+from actuator_lti.margins.axis_search import Factored, half_turn, passages
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.factored import Response, factored
-from actuator_lti.margins.factors_on_axis import Factored, half_turn
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.margins.poles import sorted_poles
 
@@ -23,13 +22,7 @@ _NEAR = 1e-4  # relative: a crossing of the factors and one of the loop
 def nearest_behind_delay(
     loop: RationalLoop, delay_s: float, distances: tuple[Distance, ...]
 ) -> list[tuple[float, float]]:
-    """Smallest values of distances, each with its frequency.
-
-    Raises
-    ------
-    Doubtful
-        They could not be checked.
-    """
+    """Smallest values of distances, each with its frequency; `Doubtful` where they could not be checked."""
     response, factors = _factors(loop, delay_s)
     with np.errstate(all="ignore"):
         parts, _, _ = axis_parts(factors, None)
@@ -37,13 +30,7 @@ def nearest_behind_delay(
 
 
 def first_turn(loop: RationalLoop, delay_s: float, floor: float) -> float | None:
-    """Where the phase first falls to 90 deg below that at zero frequency; ``None``: not above the floor.
-
-    Raises
-    ------
-    Doubtful
-        It could not be checked.
-    """
+    """Where the phase first falls to 90 deg below that at zero frequency; ``None``: not above the floor."""
     response, factors = _factors(loop, delay_s)
     with np.errstate(all="ignore"):
         level = half_turn(factors.log_at(0.0)[1]) - 0.5 * math.pi

@@ -26,31 +26,19 @@ class RationalLoop:
     The argument of every response is ``x``: in the s-plane the angular frequency (s = j x), in the z-plane
     the angle in rad, 0 to pi (z = exp(j x)). A sampled loop that was given by coefficients is held in the
     s-plane of s = (z - 1)/(z + 1), to which its coefficients are brought exactly; x is tan(angle/2) then.
-
-    Attributes
-    ----------
-    A, b, c, d : arrays (n, n), (n,), (n,) and float
-        State space, scaled by a diagonal similarity so that rows and columns weigh the same.
-    period_s : float or None
-        Sampling period, ``None`` for a continuous loop.
-    in_z : bool
-        Whether the matrices are those of the z-plane.
-    numerator, denominator : array or None
-        Coefficients, where the loop was given by them: they are then evaluated directly.
-    in_z_size : array or None
-        Of a loop brought from z: the sizes of the coefficients that it was given by, numerator and
-        denominator, shape (2, n + 1), highest power first, in the same unit. Their rounding is the accuracy
-        of the data.
     """
 
-    A: Real
+    A: Real  # (n, n): state space, scaled by a diagonal similarity so that rows and columns weigh the same
     b: Real
     c: Real
     d: float
-    period_s: float | None
-    in_z: bool = False
-    numerator: Real | None = None
-    denominator: Real | None = None
+    period_s: float | None  # sampling period, ``None`` for a continuous loop
+    in_z: bool = False  # whether the matrices are those of the z-plane
+    # numerator and denominator, shape (2, n + 1), highest power first, where the loop was given by them: they
+    # are then evaluated directly
+    coefficients: Real | None = None
+    # of a loop brought from z: the sizes of the coefficients that it was given by, in the same unit. Their
+    # rounding is the accuracy of the data
     in_z_size: Real | None = None
 
     @property
@@ -85,7 +73,7 @@ class RationalLoop:
         """L and dL/dx = j dL/ds (continuous) or j z dL/dz (sampled), from c (x I - A)^-2 b."""
         p = self._variable(x)
         turn = 1j * self.point(x) if self.in_z else 1j
-        if self.numerator is not None and self.denominator is not None:
+        if self.coefficients is not None:
             above, below, d_above, d_below = horner(self._with_slopes, p)
             L = above / below
             return L, turn * (d_above / below - L * (d_below / below))
@@ -101,9 +89,9 @@ class RationalLoop:
         """L on the border, with the residual of the solution in extended precision."""
         wide = np.asarray(x, dtype=np.longdouble) * 1j
         p = np.expm1(wide) if self._about_one else np.exp(wide) if self.in_z else wide
-        if self.numerator is not None and self.denominator is not None:
-            above, below = (np.asarray(c, np.longdouble) for c in (self.numerator, self.denominator))
-            return (np.polyval(above, p) / np.polyval(below, p)).astype(complex)
+        if self.coefficients is not None:
+            above, below = horner(np.asarray(self.coefficients, np.longdouble), p)
+            return np.asarray((above / below).astype(complex))
         if self.order == 0:
             return np.full(p.shape, self.d, dtype=complex)
         A = np.asarray(self._state(), np.longdouble)
@@ -125,11 +113,11 @@ class RationalLoop:
         return from_matrices(A, b, c, 0.0, self.period_s)
 
     @cached_property
-    def _with_slopes(self) -> Real:
-        """Numerator, denominator and their derivatives."""
-        assert self.numerator is not None
-        rows = np.zeros((4, self.numerator.size))
-        rows[0], rows[1] = self.numerator, self.denominator
+    def _with_slopes(self) -> Complex:
+        """Numerator, denominator and their derivatives, complex as where they are asked."""
+        assert self.coefficients is not None
+        rows = np.zeros((4, self.order + 1), dtype=complex)
+        rows[:2] = self.coefficients
         rows[2:, 1:] = rows[:2, :-1] * np.arange(rows.shape[1] - 1, 0, -1)
         return rows
 
@@ -139,15 +127,15 @@ class RationalLoop:
 
     @property
     def _about_one(self) -> bool:
-        return self.in_z and self.numerator is None
+        return self.in_z and self.coefficients is None
 
     def _state(self) -> Real:
         return self.A - np.eye(self.order) if self.in_z else self.A
 
     def _values(self, p: Any) -> Any:
-        if self.numerator is not None and self.denominator is not None:
+        if self.coefficients is not None:
             with np.errstate(all="ignore"):
-                above, below = horner(self._with_slopes[:2], p)
+                above, below = horner(self._with_slopes[:2] if np.iscomplexobj(p) else self.coefficients, p)
                 return above / below
         if self.order == 0:
             return np.full(p.shape, self.d, dtype=p.dtype)
@@ -162,26 +150,20 @@ class RationalLoop:
         return matrix
 
 
-def horner(rows: Real, p: Any) -> Any:
+def horner(rows: Real | Complex, p: Any) -> Any:
     """Values of polynomials (k, n + 1), highest power first, at points; shape (k, points)."""
-    value = rows[:, :1] + 0.0 * p
-    for k in range(1, rows.shape[1]):
-        value = value * p + rows[:, k : k + 1]
+    first, *columns = rows.T[:, :, None]
+    value = first + 0.0 * p
+    for column in columns:
+        value *= p
+        value += column
     return value
 
 
 def rational_loop(system: Any) -> RationalLoop:
     """Bring a SISO python-control state space or transfer function into the form of the engine.
 
-    Parameters
-    ----------
-    system : StateSpace or TransferFunction
-        One input, one output.
-
-    Raises
-    ------
-    InputError
-        More than one input or output, an improper transfer function, or a value that is not finite.
+    `InputError`: more than one input or output, improper, or a value that is not finite.
     """
     return loop_of(given_of(system))
 
@@ -198,14 +180,17 @@ def loop_of(given: Given, warp: bool = False) -> RationalLoop:
     return loop.delayed(given.samples) if given.samples else loop
 
 
-def from_matrices(A: Real, b: Real, c: Real, d: float, period_s: float | None) -> RationalLoop:
+def from_matrices(
+    A: Real, b: Real, c: Real, d: float, period_s: float | None, coefficients: Real | None = None
+) -> RationalLoop:
     """Balance a state space; shapes (n, n), (n,), (n,)."""
     n = b.size
     whole: Real = np.empty((n + 1, n + 1))
     whole[:n, :n], whole[:n, n], whole[n, :n], whole[n, n] = A, b, c, d
     if n:
-        whole = _balanced(whole)
-    return RationalLoop(whole[:n, :n], whole[:n, n], whole[n, :n], d, period_s, period_s is not None)
+        whole = balanced(whole)
+    parts = (whole[:n, :n], whole[:n, n], whole[n, :n])
+    return RationalLoop(*parts, d, period_s, period_s is not None, coefficients)
 
 
 def from_coefficients(num: Real, den: Real, period_s: float | None, warp: bool = False) -> RationalLoop:
@@ -218,18 +203,14 @@ def from_coefficients(num: Real, den: Real, period_s: float | None, warp: bool =
             size = np.zeros((2, n + 1))
             size[0, n + 1 - num.size :], size[1] = np.abs(num / warped_den[0]), np.abs(den / warped_den[0])
             return replace(loop, period_s=period_s, in_z_size=size)
-    above = np.zeros(n + 1)
-    above[n + 1 - num.size :] = num / den[0]
-    below = den / den[0]
-    A = np.zeros((n, n))
-    if n:
-        A[0] = -below[1:]
-        A[np.arange(1, n), np.arange(n - 1)] = 1.0
+    coefficients = np.zeros((2, n + 1))
+    coefficients[0, n + 1 - num.size :], coefficients[1] = num / den[0], den / den[0]
+    (d, *above), below = coefficients[0].tolist(), coefficients[1, 1:]
+    A = np.eye(n, k=-1)
+    A[:1] = -below
     b = np.zeros(n)
     b[:1] = 1.0
-    d = float(above[0])
-    loop = from_matrices(A, b, above[1:] - d * below[1:], d, period_s)
-    return replace(loop, numerator=above, denominator=below)
+    return from_matrices(A, b, above - d * below, d, period_s, coefficients)
 
 
 def warped_coefficients(p: Real, degree: int) -> Real:
@@ -237,22 +218,17 @@ def warped_coefficients(p: Real, degree: int) -> Real:
 
     Poles and zeros near z = 1, where those of a fast sampled loop crowd, keep their relative accuracy.
     """
-    ratios = [float(c).as_integer_ratio() for c in p]
-    common = max(below for _, below in ratios)
-    total, power = [0], [1]  # lowest power first
-    for k in range(degree + 1):  # Horner in z, homogeneous: total (1 + s) + coefficient (1 - s)^k
-        at = k - (degree + 1 - len(ratios))
-        total = [a + b for a, b in zip([*total, 0], [0, *total], strict=True)]
-        if at >= 0:
-            coefficient = ratios[at][0] * (common // ratios[at][1])
-            total = total[: k + 1] if k + 1 < len(total) else total + [0] * (k + 1 - len(total))
-            total = [a + coefficient * b for a, b in zip(total, power, strict=True)]
-        power = [a - b for a, b in zip([*power, 0], [0, *power], strict=True)]
-    total = (total + [0] * (degree + 1))[: degree + 1]
-    return np.array([c / common for c in reversed(total)])
+    from flint import fmpz_poly  # only where a sampled loop is asked for
+
+    from actuator_lti.margins.exact.loop import integers, warped
+
+    (whole,), shift = integers(p)
+    about = [int(c) for c in warped(fmpz_poly(whole[::-1]), degree).coeffs()]
+    return np.array([c / (1 << shift) for c in [0] * (degree + 1 - len(about)) + about[::-1]])
 
 
-def _balanced(whole: Real) -> Real:
+def balanced(whole: Real) -> Real:
+    """Scaled by powers of two so that rows and columns weigh the same; the last ones as they are."""
     scaled, _, _, scale, _ = dgebal(whole, scale=1, permute=0)
     n = scale.size - 1
     scaled[n, n] = whole[n, n]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,26 +18,13 @@ _SAFE = 10.0
 
 @dataclass(frozen=True)
 class SortedPoles:
-    """Poles of a system by the stability boundary.
+    """Poles of a system by the stability boundary."""
 
-    Attributes
-    ----------
-    values : array (n,), complex
-        All of them.
-    unstable : int
-        How many lie strictly outside the stable region.
-    border : int
-        How many lie on the border as far as double precision can tell.
-    at_dc : int
-        How many of these lie at zero frequency.
-    doubtful : bool
-        Some pole, other than those at zero frequency, may lie on either side of the stability boundary.
-    """
-
-    values: Complex
-    unstable: int
-    border: int = 0
-    at_dc: int = 0
+    values: Complex  # (n,): all of them
+    unstable: int  # how many lie strictly outside the stable region
+    border: int = 0  # how many lie on the border as far as double precision can tell
+    at_dc: int = 0  # how many of these lie at zero frequency
+    # some pole, other than those at zero frequency, may lie on either side of the stability boundary
     doubtful: bool = False
 
 
@@ -62,33 +50,36 @@ def polynomial_roots(p: Real) -> Complex:
 
 
 def sorted_poles(A: Real, in_z: bool) -> SortedPoles:
-    """Sort the eigenvalues of A (balanced) by the stability boundary.
+    """Sort the eigenvalues of A (balanced) by the imaginary axis, or the unit circle, see `all_sorted`."""
+    return all_sorted((A,), in_z)[0]
+
+
+def all_sorted(matrices: Sequence[Real], in_z: bool) -> list[SortedPoles]:
+    """Sort the eigenvalues of matrices of one size (balanced).
 
     The error of an eigenvalue is bounded by 10 n eps (|v|* |A| |w|) / |v* w| with the left and right
     eigenvectors v and w, entry by entry. It is on the border where that bound reaches the border and is much
     smaller than its modulus (at zero frequency: than that of the next one). Where the bound reaches the
     border and is not small, the eigenvalue is simply not determined.
-
-    Parameters
-    ----------
-    A : array (n, n)
-        State matrix.
-    in_z : bool
-        The border is the unit circle, not the imaginary axis.
     """
-    if not A.size:
-        return SortedPoles(np.empty(0, dtype=complex), 0)
-    values, radius = _with_error_bounds(A)
+    if not matrices[0].size:
+        return [SortedPoles(np.empty(0, dtype=complex), 0)] * len(matrices)
+    values, radius = _with_error_bounds(matrices)
     centre = 1.0 if in_z else 0.0
     distance: Real = np.abs(values) - 1.0 if in_z else values.real
     radius[values == centre] = 0.0
-    if not (np.abs(distance) <= _SAFE * radius).any():
+    near = np.abs(distance) <= _SAFE * radius
+    return [_sorted(*each, centre) for each in zip(values, radius, distance, near, strict=True)]
+
+
+def _sorted(values: Complex, radius: Real, distance: Real, near: Mask, centre: float) -> SortedPoles:
+    if not near.any():
         return SortedPoles(values, int(np.count_nonzero(distance > 0.0)))
     size = np.abs(values - centre)
     on_border = (np.abs(distance) <= radius) & _placed(values, radius, size)
     unstable = int(np.count_nonzero((distance > 0.0) & ~on_border))
     at_dc = int(np.count_nonzero(on_border & (size <= 2.0 * radius)))
-    doubtful = bool((np.abs(distance) <= _SAFE * radius)[values != centre].any())
+    doubtful = bool(near[values != centre].any())
     return SortedPoles(values, unstable, int(np.count_nonzero(on_border)), at_dc, doubtful)
 
 
@@ -100,15 +91,16 @@ def _placed(values: Complex, radius: Real, size: Real) -> Mask:
     return placed
 
 
-def _with_error_bounds(A: Real) -> tuple[Complex, Real]:
+def _with_error_bounds(matrices: Sequence[Real]) -> tuple[Complex, Real]:
     """Eigenvalues sharpened by a Rayleigh quotient v* A w / v* w, and their bounds from v* abs(A) w."""
-    values, left, right = _eigen(A, vectors=True)
+    every, left, right = zip(*(_eigen(A, vectors=True) for A in matrices), strict=True)
+    A, values = np.array(matrices), np.array(every)
     V, W = _complex_vectors(np.array((left, right)), values.imag)
-    overlap = (V.conj() * W).sum(axis=0)
-    weight = (np.abs(V) * (np.abs(A) @ np.abs(W))).sum(axis=0)
+    overlap = (V.conj() * W).sum(axis=-2)
+    weight = (np.abs(V) * (np.abs(A) @ np.abs(W))).sum(axis=-2)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # left and right nearly apart
-        radius = 10.0 * values.size * _EPS * weight / np.abs(overlap)
-        sharper = (V.conj() * (A @ W)).sum(axis=0) / overlap
+        radius = 10.0 * values.shape[-1] * _EPS * weight / np.abs(overlap)
+        sharper = (V.conj() * (A @ W)).sum(axis=-2) / overlap
     radius = np.where(np.isnan(radius), np.inf, radius)
     apart = np.abs(sharper - values)
     good = apart <= np.minimum(10.0 * radius, 1e-3 * np.abs(values))
@@ -128,9 +120,9 @@ def _eigen(A: Real, vectors: bool) -> tuple[Complex, Real, Real]:
 
 
 def _complex_vectors(packed: Real, im: Real) -> Complex:
+    """Shape kept, (..., matrices, n, n); of a pair the real part stands in front of the imaginary one."""
     out = packed.astype(complex)
-    k = (im > 0.0).nonzero()[0]
-    if k.size:
-        pairs = packed[..., k] + 1j * packed[..., k + 1]
-        out[..., k], out[..., k + 1] = pairs, pairs.conj()
+    for of, k in zip(*(place.tolist() for place in (im > 0.0).nonzero()), strict=True):
+        out.imag[:, of, :, k] = packed[:, of, :, k + 1]
+        out[:, of, :, k + 1] = out[:, of, :, k].conj()
     return out

@@ -16,17 +16,6 @@ from actuator_lti.margins.single import (
     frequency_text,
 )
 
-__all__ = [
-    "Agreement",
-    "DelayMargin",
-    "DiskMargin",
-    "Evidence",
-    "GainMargin",
-    "PhaseMargin",
-    "StabilityMargins",
-    "Verdict",
-]
-
 _PRINTED = 8
 Verdict = Literal["stable", "unstable", "on the border", "undecided"]
 Evidence = Literal["certified", "checked", "withheld"]
@@ -60,7 +49,8 @@ class StabilityMargins:
     - ``"checked"``: in double precision; poles and Nyquist count agree, the parity of the crossovers is
       right, no pole lies within its own error of the stability boundary, and each figure has a small bound
       of its error.
-    - ``"withheld"``: 8 ulp of the entries change the answer, so the data do not determine it.
+    - ``"withheld"``: 8 ulp of the entries change the answer, so the data do not determine it; behind part
+      of a sample also what double precision cannot check. The reason says which.
 
     Attributes
     ----------

@@ -22,8 +22,19 @@ def _known(values: tuple[float, float] | None, bracket: tuple[float, float] | No
     return f", in [{within}], between {bracket[0]:.6g} and {bracket[1]:.6g} rad/s"
 
 
+class AtFrequency:
+    """What stands at a frequency, in rad/s."""
+
+    frequency_rad_s: float
+
+    @property
+    def frequency_hz(self) -> float:
+        """The frequency in Hz."""
+        return self.frequency_rad_s / (2.0 * math.pi)
+
+
 @dataclass(frozen=True)
-class GainMargin:
+class GainMargin(AtFrequency):
     """A real factor on the loop that brings a closed-loop pole to the border.
 
     Attributes
@@ -52,11 +63,6 @@ class GainMargin:
         """The ratio in dB."""
         return 20.0 * math.log10(self.ratio)
 
-    @property
-    def frequency_hz(self) -> float:
-        """The frequency in Hz."""
-        return self.frequency_rad_s / (2.0 * math.pi)
-
     def __str__(self) -> str:
         limit = "upper" if self.ratio >= 1.0 else "lower"
         known = _known(self.ratio_range, self.bracket_rad_s, "")
@@ -65,7 +71,7 @@ class GainMargin:
 
 
 @dataclass(frozen=True)
-class PhaseMargin:
+class PhaseMargin(AtFrequency):
     """A phase lag (negative: a lead) that brings a closed-loop pole to the border.
 
     Attributes
@@ -86,11 +92,6 @@ class PhaseMargin:
     bracket_rad_s: tuple[float, float] | None = None
     deg_range: tuple[float, float] | None = None
 
-    @property
-    def frequency_hz(self) -> float:
-        """The frequency in Hz."""
-        return self.frequency_rad_s / (2.0 * math.pi)
-
     def __str__(self) -> str:
         known = _known(self.deg_range, self.bracket_rad_s, " deg")
         touch = _TOUCH if self.tangent else ""
@@ -98,17 +99,10 @@ class PhaseMargin:
 
 
 @dataclass(frozen=True)
-class DelayMargin:
-    """The smallest delay in the loop that brings a closed-loop pole to the border at this crossover.
+class DelayMargin(AtFrequency):
+    """The smallest delay in the loop that brings a closed-loop pole to the border at this gain crossover.
 
-    Attributes
-    ----------
-    seconds : float
-        The delay.
-    samples : float or None
-        The same in sampling periods; ``None`` for a continuous loop.
-    frequency_rad_s : float
-        The gain crossover.
+    ``samples``: the same in sampling periods; ``None`` for a continuous loop.
     """
 
     seconds: float
@@ -121,19 +115,11 @@ class DelayMargin:
 
 
 @dataclass(frozen=True)
-class DiskMargin:
+class DiskMargin(AtFrequency):
     """Balanced disk margin (S + T, skew 0) of Seiler, Packard, Gahinet 2020.
 
-    The loop may be multiplied by any complex factor (2 + d)/(2 - d) with |d| < alpha.
-
-    Attributes
-    ----------
-    alpha : float
-        The smallest of |2 (1 + L)/(1 - L)|.
-    frequency_rad_s : float
-        Where it is reached.
-    alpha_range : tuple of float or None
-        Measured data: where it lies between the points and within the noise.
+    The loop may be multiplied by any complex factor (2 + d)/(2 - d) with |d| < alpha, which is the smallest
+    of |2 (1 + L)/(1 - L)|. ``alpha_range``: of measured data, between the points and within the noise.
     """
 
     alpha: float
@@ -162,14 +148,9 @@ class DiskMargin:
 
 @dataclass(frozen=True)
 class Agreement:
-    """Stability found twice: from closed-loop poles, and from the Nyquist count.
+    """How many closed-loop poles are unstable: by the poles themselves, and by the Nyquist count.
 
-    Attributes
-    ----------
-    unstable_poles, unstable_nyquist : int or None
-        Closed-loop poles outside the stable region by either way; ``None`` where a way does not apply.
-    border_poles : int
-        Closed-loop poles on the stability boundary itself.
+    ``None`` where a way does not apply; ``border_poles`` lie on the stability boundary itself.
     """
 
     unstable_poles: int | None
@@ -186,14 +167,9 @@ class Agreement:
     def __str__(self) -> str:
         if self.border_poles:
             return f"{self.border_poles} closed-loop pole(s) on the stability boundary"
-        if self.unstable_poles is None and self.unstable_nyquist is None:
-            return "neither poles nor a Nyquist count"
-        if self.unstable_poles is None or self.unstable_nyquist is None:
-            which, count = (
-                ("Nyquist count", self.unstable_nyquist)
-                if self.unstable_poles is None
-                else ("poles", self.unstable_poles)
-            )
-            return f"{which} only: {count} unstable"
+        ways = (("poles", self.unstable_poles), ("Nyquist count", self.unstable_nyquist))
+        only = [f"{way} only: {count} unstable" for way, count in ways if count is not None]
+        if len(only) < 2:
+            return only[0] if only else "neither poles nor a Nyquist count"
         word = "agree" if self.agree else "DISAGREE"
         return f"poles ({self.unstable_poles} unstable) and Nyquist ({self.unstable_nyquist}) {word}"

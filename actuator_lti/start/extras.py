@@ -9,20 +9,7 @@ from actuator_lti.errors import InputError
 
 
 def need(module: str, extra: str, what: str) -> ModuleType:
-    """Import a module that comes with an extra of this package.
-
-    Parameters
-    ----------
-    module : str
-    extra : str
-        Name of the extra in pyproject.toml.
-    what : str
-        What wants it, for the message.
-
-    Raises
-    ------
-    InputError
-        Where it is not installed, with the command that installs it.
+    """Import a module of an extra of pyproject.toml; the refusal says that ``what`` needs it.
 
     Examples
     --------

@@ -11,16 +11,9 @@ from typing import Any
 def on_first_use(
     package: str, names: Mapping[str, str], modules: Collection[str] = ()
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """What a package defines as ``__getattr__`` and ``__dir__``.
+    """What a package defines as ``__getattr__`` and ``__dir__``: the module that defines each public name.
 
-    Parameters
-    ----------
-    package : str
-        Its ``__name__``.
-    names : mapping of str to str
-        The module that defines each public name.
-    modules : collection of str
-        Modules of the package that are public themselves.
+    ``modules`` are modules of the package that are public themselves.
 
     Examples
     --------

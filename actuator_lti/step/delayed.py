@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import flint
 import numpy as np
+from scipy.interpolate import BarycentricInterpolator, PPoly
 from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
-from actuator_lti.margins.delays.collocation import state_matrix
-from actuator_lti.margins.delays.form import DelayForm, characteristic, delay_form
+from actuator_lti.margins.delays.form import DelayForm, delay_form
 from actuator_lti.margins.delays.response import DelayResponse
-from actuator_lti.margins.loop import Complex, Real
+from actuator_lti.margins.exact.roots import at_enough_bits
+from actuator_lti.margins.loop import Complex, Real, balanced
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.step.motion import Motion
+from actuator_lti.step.motion import BAND, Motion
 from actuator_lti.step.rational import NO_FINAL, UNSTABLE, free_motion
-from actuator_lti.step.stepped import Stepped
 from actuator_lti.systems.delay_stepper import step_of
 from actuator_lti.systems.exact_fraction import product
 from actuator_lti.systems.plain_delays import response
@@ -28,24 +29,71 @@ _PARTS = 4  # intervals of a step at whose ends the response is kept
 _ZERO = 1e-12  # of the largest response about the poles
 _MOST = 400_000
 _FORGOTTEN = 25.0  # time constants
-_NEWTON = 8
+_CIRCLE, _AROUND = 0.25, 32  # radius, of the way to what lies next, and points on it
 _BITS = 256
+
+
+@dataclass(frozen=True)
+class Stepped:
+    """The first part of the response, in polynomials: deviation from the final value, relative to it."""
+
+    e: PPoly
+
+    @classmethod
+    def through(cls, values: Real, h: float) -> Stepped:
+        """From the values at the start, at each quarter and at the end of each step, shape (steps, 5)."""
+        t = np.linspace(0.0, h, values.shape[1])
+        return cls(PPoly((values @ np.linalg.inv(np.vander(t)).T).T, h * np.arange(len(values) + 1)))
+
+    @property
+    def end(self) -> float:
+        """The end of the last step."""
+        return float(self.e.x[-1])
+
+    def curve(self, end: float, count: int) -> tuple[Real, Real]:
+        """Times up to ``end``, and e there."""
+        time = np.linspace(0.0, end, count)
+        return time, self.e(time)
+
+    def first_at_least(self, level: float) -> float | None:
+        """First time at or above a level; ``None``: not in this part."""
+        if self.e(0.0) >= level - 1.0:
+            return 0.0
+        return next(iter(self._passages(level - 1.0)), None)
+
+    def settled(self) -> float:
+        """From when on it stays within 2 %."""
+        if abs(self.e(self.end)) > BAND:
+            return self.end
+        return max([0.0, *self._passages(-BAND), *self._passages(BAND)])
+
+    def _passages(self, level: float) -> list[float]:
+        return _finite(self.e.solve(level, extrapolate=False)).tolist()
+
+    def greatest(self, least: float) -> tuple[float, float]:
+        """Largest value and its time, be it above ``least`` or not."""
+        inside = _finite(self.e.derivative().roots(extrapolate=False))
+        ends = np.nextafter(self.e.x[1:], 0.0)
+        time = np.sort(np.concatenate((self.e.x[:-1], inside, ends)))
+        value = self.e(time)
+        return float(value.max()), float(time[value.argmax()])
+
+
+def _finite(roots: Real) -> Real:
+    """Without the marks of polynomials that are the level everywhere."""
+    return np.sort(roots[np.isfinite(roots)])
 
 
 def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     """Unit step response of a system with inner delays over its final value, and that value.
 
     The first delays are stepped; after them the response is the free motion of the exact poles, which the
-    collocation of the delays starts and Newton on the characteristic matrix sharpens. The two have to agree
+    collocation of the delays starts and integrals of T about them sharpen. The two have to agree
     where they meet, to 1e-5 of the final value; otherwise stepping goes on.
-
-    Raises
-    ------
-    InputError
-        Not stable, a final value of zero, or a response that would take too many points.
     """
     form = delay_form(system)
-    poles, at_rest = sorted_poles(state_matrix(form, _POINTS), False), DelayResponse.of(form)
+    form = replace(form, whole=balanced(form.whole))
+    poles, at_rest = sorted_poles(collocated(form, _POINTS), False), DelayResponse.of(form)
     if at_rest.order > 0 or poles.unstable or poles.border > 1:
         raise InputError(UNSTABLE)
     final = 0.0 if at_rest.order else at_rest.lead
@@ -54,7 +102,7 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     while True:
         h = _grid_step(form.delays_s, head)
         values = _stepped(form, h, int(np.ceil(head / h))) / final - 1.0
-        exact, weights = _modes(form, poles.values, head)
+        exact, weights = _modes(system, poles.values, head)
         late = np.arange(len(values) * 3 // 4, len(values))
         modes = (np.exp(h * np.outer(late, exact)) @ weights).real / final
         if np.abs(modes - values[late, 0]).max() <= _MEET:
@@ -70,40 +118,53 @@ def _refuse_no_final(system: Any, final: float, poles: Complex) -> None:
         raise InputError(NO_FINAL)
 
 
-def _modes(form: DelayForm, poles: Complex, start: float) -> tuple[Complex, Complex]:
+def collocated(form: DelayForm, points: int) -> Real:
+    """State matrix of a system with its inner delays collocated (a delay in series has no poles).
+
+    A delay tau is the line dq/dt = -(1/tau) dq/dx, 0 <= x <= 1, with the input at x = 0 and the output at
+    x = 1. Eigenvalues with |s| tau well below the number of points are those of the exact delay to near
+    machine precision (Breda, Maset, Vermiglio 2005).
+    """
+    n, q, N, delays = form.states, form.delays_s.size, points, form.delays_s
+    inner = form.whole[:-1, :-1]
+    x = 0.5 * (1.0 - np.cos(np.pi * np.arange(N + 1) / N))
+    D = BarycentricInterpolator(x, np.eye(N + 1)).derivative(x)
+    M = np.zeros((n + q * N, n + q * N))
+    M[:n, :n] = inner[:n, :n]
+    ends = n + N * np.arange(1, q + 1) - 1
+    M[:n, ends] = inner[:n, n:]
+    for k in range(q):
+        rows = slice(n + k * N, n + (k + 1) * N)
+        M[rows, rows] = -D[1:, 1:] / delays[k]
+        M[rows, :n] -= np.outer(D[1:, 0], inner[n + k, :n]) / delays[k]
+        M[rows, ends] -= np.outer(D[1:, 0], inner[n + k, n:]) / delays[k]
+    return M
+
+
+def _modes(system: Any, poles: Complex, start: float) -> tuple[Complex, Complex]:
     """Poles still alive after ``start`` (s), and their weights: residues of T/s.
 
-    Only those of the upper half plane; where they are not real, a weight counts for the pair.
+    Both from the exact T on a circle about each estimate that holds no other: the mean of T z is the residue,
+    that of T z^2 over it how far the pole lies off. Only those of the upper half plane; where they are not
+    real, a weight counts for the pair.
     """
     alive = (poles.real > -_FORGOTTEN / start) & (poles.imag >= 0.0) & (poles.real < 0.0)
     exact: list[complex] = []
     weights: list[complex] = []
-    for estimate in poles[alive]:
-        pole, residue = _sharpened(form, complex(estimate))
-        if pole is None or residue == 0.0 or any(abs(pole - p) <= 1e-9 * abs(p) for p in exact):
-            continue
-        exact.append(pole)
-        weights.append(residue / pole * (1.0 if pole.imag == 0.0 else 2.0))
+    for k in np.flatnonzero(alive):
+        pole = complex(poles[k])
+        radius = _CIRCLE * min(abs(pole), float(np.abs(np.delete(poles, k) - pole).min(initial=np.inf)))
+        z = radius * np.exp(2j * np.pi * (np.arange(_AROUND) + 0.5) / _AROUND)
+        weighted = response(system, pole + z)[0, 0] * z
+        residue = complex(weighted.mean())
+        if abs(residue) <= _ZERO * float(np.abs(weighted).max()):
+            continue  # T has no pole there
+        off = complex((weighted * z).mean()) / residue
+        if pole.imag == 0.0:
+            off, residue = complex(off.real), complex(residue.real)
+        exact.append(pole + off)
+        weights.append(residue / exact[-1] * (1.0 if pole.imag == 0.0 else 2.0))
     return np.array(exact, dtype=complex), np.array(weights, dtype=complex)
-
-
-def _sharpened(form: DelayForm, pole: complex) -> tuple[complex | None, complex]:
-    """Newton with both null vectors, pole -= (u* F w)/(u* F' w); the residue of T there."""
-    start = pole
-    for _ in range(_NEWTON):
-        F, slope, row, column = characteristic(form, pole)
-        U, _, Vh = np.linalg.svd(F)
-        u, w = U[:, -1], Vh[-1].conj()
-        below = complex(u.conj() @ slope @ w)
-        step = complex(u.conj() @ F @ w) / below
-        pole -= step
-        if abs(step) <= 1e-13 * abs(pole):
-            break
-    if abs(start.imag) <= 1e-9 * abs(start) or abs(pole.imag) <= 1e-12 * abs(pole):
-        pole = complex(pole.real)
-    if abs(pole - start) > 0.1 * abs(start):
-        return None, 0j
-    return pole, complex(row @ w) * complex(u.conj() @ column) / below
 
 
 def _motion(poles: Complex, weights: Complex, start: float) -> Motion:
@@ -111,16 +172,14 @@ def _motion(poles: Complex, weights: Complex, start: float) -> Motion:
     real = poles.imag == 0.0
     every = [flint.acb(complex(p)) for p in np.concatenate((poles, poles[~real].conj()))]
     parts = np.concatenate((np.where(real, weights, 0.5 * weights), 0.5 * weights[~real].conj()))
-    bits = _BITS
-    while True:
-        with flint.ctx.workprec(bits):
-            rest = flint.acb_poly([0])
-            for k, weight in enumerate(parts):
-                rest += product(every[:k] + every[k + 1 :]) * flint.acb(complex(weight))
-            motion = free_motion(rest, every, False, start)
-        if motion is not None:
-            return motion
-        bits *= 2
+
+    def motion() -> Motion | None:
+        rest = flint.acb_poly([0])
+        for k, weight in enumerate(parts):
+            rest += product(every[:k] + every[k + 1 :]) * flint.acb(complex(weight))
+        return free_motion(rest, every, False, start)
+
+    return at_enough_bits(motion, _BITS, "a pole of the step response")
 
 
 def _grid_step(delays: Real, horizon: float) -> float:
@@ -133,47 +192,39 @@ def _grid_step(delays: Real, horizon: float) -> float:
     return h
 
 
-class _Past:
-    """Delayed signals: in each step a parabola through its start, middle and end; zero before t = 0."""
-
-    def __init__(self, steps: int, lag: Real) -> None:
-        self.start, self.middle, self.end = (np.zeros((steps + 1, lag.size)) for _ in range(3))
-        self._rows, self._whole = np.arange(lag.size), np.floor(lag + 1e-9).astype(int)
-        rest = lag - self._whole
-        self._part = np.where(np.abs(rest) < 1e-9 * lag, 0.0, rest)
-
-    def at(self, k: int, position: float) -> Real:
-        """Signals delayed, at t = (k + position) h with position 0, 1/2 or (the end of a step) 1."""
-        step, inside = k - self._whole, position - self._part
-        step, inside = np.where(inside < 0.0, step - 1, step), np.where(inside < 0.0, inside + 1.0, inside)
-        j = np.maximum(step, 0)
-        a, m, b = (table[j, self._rows] for table in (self.start, self.middle, self.end))
-        value = a + inside * (-3.0 * a + 4.0 * m - b) + inside**2 * (2.0 * a - 4.0 * m + 2.0 * b)
-        return np.where(step >= 0, value, 0.0)
-
-
 def _stepped(form: DelayForm, h: float, steps: int) -> Real:
-    """March: x exactly for delayed signals that are parabolas over a step.
+    """March: x exactly for delayed signals that are parabolas over a step, zero before t = 0.
 
     Returns y at the start, at each quarter and at the end of each step (shape (steps + 1, 5)).
     """
-    n, q = form.B1.size, form.delays_s.size
+    n, q = form.states, form.delays_s.size
     M = np.zeros((n + 3 * q + 1, n + 3 * q + 1))
-    M[:n, :n], M[:n, n : n + q], M[:n, -1] = form.A, form.B2, form.B1
-    M[n : n + q, n + q : n + 2 * q] = M[n + q : n + 2 * q, n + 2 * q : n + 3 * q] = np.eye(q)
+    M[:n, : n + q], M[:n, -1] = form.whole[:n, :-1], form.whole[:n, -1]
+    M[n : n + 2 * q, n + q : n + 3 * q] = np.eye(2 * q)
     positions = np.arange(_PARTS + 1) / _PARTS
     inside = np.stack([expm(M * (h * part))[:n] for part in positions])
-    past = _Past(steps, form.delays_s / h)
+    lag = form.delays_s / h
+    whole = np.floor(lag + 1e-9).astype(int)
+    rest = np.where(np.abs(lag - whole) < 1e-9 * lag, 0.0, lag - whole)
+    past, columns = np.zeros((steps + 1, 3, q)), np.arange(q)  # of each step the parabolas of what is delayed
+
+    def late(k: int, position: float) -> Real:
+        earlier = position < rest  # in the step before that
+        step, t = k - whole - earlier, position - rest + earlier
+        a, b, c = past[np.maximum(step, 0), :, columns].T
+        return np.where(step >= 0, a + t * (b + t * c), 0.0)
+
     x, y = np.zeros(n), np.empty((steps + 1, _PARTS + 1))
     for k in range(steps + 1):
-        z = np.stack([past.at(k, part) for part in positions])
-        a, m, b = z[0], z[_PARTS // 2], z[-1]
-        state = np.concatenate(
-            (x, a, (-3.0 * a + 4.0 * m - b) / h, (4.0 * a - 8.0 * m + 4.0 * b) / h**2, [1.0])
-        )
-        states = inside @ state
-        v = states @ form.C2.T + form.D21 + z @ form.D22.T
-        past.start[k], past.middle[k], past.end[k] = v[0], v[_PARTS // 2], v[-1]
-        y[k] = states @ form.C1 + z @ form.D12
-        x = states[-1]
-    return y + form.D11
+        z = np.stack([late(k, part) for part in positions])
+        a, b, c = _parabola(z)
+        states = inside @ np.concatenate((x, a, b / h, 2.0 * c / h**2, [1.0]))
+        out = np.hstack((states, z)) @ form.whole[n:, :-1].T + form.whole[n:, -1]
+        past[k], y[k], x = _parabola(out[:, :-1]), out[:, -1], states[-1]
+    return y
+
+
+def _parabola(values: Real) -> tuple[Real, Real, Real]:
+    """Through the start, the middle and the end of a step: coefficients of the part of it, lowest first."""
+    a, m, b = values[0], values[_PARTS // 2], values[-1]
+    return a, -3.0 * a + 4.0 * m - b, 2.0 * a - 4.0 * m + 2.0 * b

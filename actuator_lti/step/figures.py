@@ -9,10 +9,9 @@ import numpy as np
 
 from actuator_lti.margins.loop import Real, rational_loop
 from actuator_lti.margins.measured.data import refuse_measured
-from actuator_lti.step.delayed import delayed_response
+from actuator_lti.step.delayed import Stepped, delayed_response
 from actuator_lti.step.motion import OVER, Motion
 from actuator_lti.step.rational import notes, rational_motion
-from actuator_lti.step.stepped import Stepped
 
 _SHOWN = 2000
 
@@ -93,32 +92,32 @@ def step_figures(system: Any) -> StepFigures:
     refuse_measured(system)
     if hasattr(system, "delays_s"):
         if system.delays_s.size:
-            return _figures(*delayed_response(system))
+            early, later, final = delayed_response(system)
+            return _figures((early, later), final)
         system = system.to_state_space()
     loop = rational_loop(system)
     motion, final = rational_motion(system, loop)
-    return _figures(None, motion, final, loop.period_s, notes(loop))
+    return _figures((motion,), final, loop.period_s, notes(loop))
 
 
 def _figures(
-    early: Stepped | None,
-    later: Motion,
+    parts: tuple[Stepped | Motion, ...],
     final: float,
     period_s: float | None = None,
     notes: tuple[str, ...] = (),
 ) -> StepFigures:
     scale = 1.0 if period_s is None else period_s
-    ten, ninety = (_first(early, later, level) for level in (0.1, 0.9))
-    settled = _settled(early, later)
-    excess, at = _peak(early, later)
-    time, deviation = _curve(early, later, ninety, settled)
+    ten, ninety = (_first(parts, level) for level in (0.1, 0.9))
+    settled = next((at for part in parts[::-1] if (at := part.settled()) is not None), 0.0)
+    excess, peak_time = _peak(parts)
+    time, deviation = _curve(parts, ninety, settled)
     return StepFigures(
         rise_time_s=(ninety - ten) * scale,
         overshoot_percent=100.0 * excess,
         settling_time_s=settled * scale,
         final_value=final,
         peak_value=(1.0 + excess) * final,
-        peak_time_s=at * scale,
+        peak_time_s=peak_time * scale,
         period_s=period_s,
         time_s=time * scale,
         response=(1.0 + deviation) * final,
@@ -126,37 +125,28 @@ def _figures(
     )
 
 
-def _first(early: Stepped | None, later: Motion, level: float) -> float:
-    stepped = None if early is None else early.first_at_least(level)
-    return later.first_at_least(level) if stepped is None else stepped
+def _first(parts: tuple[Stepped | Motion, ...], level: float) -> float:
+    return next(time for part in parts if (time := part.first_at_least(level)) is not None)
 
 
-def _settled(early: Stepped | None, later: Motion) -> float:
-    last = later.last_outside()
-    if last is not None:
-        return last + 1.0 if later.sampled else last
-    return 0.0 if early is None else early.last_outside()
-
-
-def _peak(early: Stepped | None, later: Motion) -> tuple[float, float]:
+def _peak(parts: tuple[Stepped | Motion, ...]) -> tuple[float, float]:
     """Excess over the final value and when; 0 and infinity where there is none."""
-    best, place = (OVER, np.inf) if early is None else max((OVER, np.inf), early.greatest())
-    excess, at = later.greatest(best)
-    if excess > best:
-        best, place = excess, at
+    best, place = OVER, np.inf
+    for part in parts:
+        excess, time = part.greatest(best)
+        if excess > best:
+            best, place = excess, time
     return (best, place) if np.isfinite(place) else (0.0, place)
 
 
-def _curve(early: Stepped | None, later: Motion, ninety: float, settled: float) -> tuple[Real, Real]:
+def _curve(parts: tuple[Stepped | Motion, ...], ninety: float, settled: float) -> tuple[Real, Real]:
     """Times until well after settling, close together while it rises, and the deviation there."""
-    end = 2.0 * settled or 2.0 * ninety or (5.0 / later.slowest or 1.0)
-    end = max(end, later.start)
-    spans = [later.curve(end, _SHOWN)]
+    *early, later = parts
+    assert isinstance(later, Motion)
+    end = max(2.0 * settled or 2.0 * ninety or (5.0 / later.slowest or 1.0), later.start)
+    spans = [later.curve(end, _SHOWN), *(part.curve(later.start, _SHOWN) for part in early)]
     if later.start < (rising := min(5.0 * ninety, end)):
         spans.append(later.curve(rising, _SHOWN // 2))
-    if early is not None:
-        stepped = np.linspace(0.0, early.end, _SHOWN)
-        spans.append((stepped, early.e(stepped)))
     time, deviation = (np.concatenate(part) for part in zip(*spans, strict=True))
     once, first = np.unique(time, return_index=True)
     return once, deviation[first]

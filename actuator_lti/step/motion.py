@@ -13,9 +13,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from itertools import pairwise
 
 import flint
 import numpy as np
+from scipy.optimize import brentq
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.loop import Complex, Mask, Real
@@ -27,8 +29,7 @@ _TIE = 1e-12  # a sample this near to a level has reached it, and this near to t
 _FINE = 512.0  # parts of the shortest time constant: a span that its power series covers
 _TERMS = 8
 _LEVELS = 60
-_ROUNDED = 12  # levels that double precision does for: 4096 roundings
-_BITS = 160  # of the transitions beyond
+_BITS = 160  # of the transitions
 _VANISHED = 1e-100  # what is smaller would only slow the processor down
 _MOST = 200_000  # spans of one length
 _LONG = "the step response rings for too long: what it settles to is known, when is not"
@@ -37,15 +38,7 @@ _LONG = "the step response rings for too long: what it settles to is known, when
 class Motion:
     """Deviation e(t) from the final value, relative to it; t in s, or in samples.
 
-    Parameters
-    ----------
-    poles : sequence of acb
-        Slowest first; all stable.
-    state : sequence of acb
-        x at the start.
-    sampled : bool
-    start : float
-        Time of the start.
+    Of stable poles, the slowest first, and the state at the time ``start``.
     """
 
     def __init__(
@@ -65,26 +58,16 @@ class Motion:
         self._moves = self._levels(exact)
 
     def _levels(self, exact: flint.acb_mat) -> list[Complex]:
-        """Transitions over 1, 2, 4 ... shortest spans, until nothing is left that counts.
-
-        A rounding of the first is doubled each time: double precision does for short motions.
-        """
-        with flint.ctx.workprec(_BITS):
+        """Transitions over 1, 2, 4 ... shortest spans, until nothing is left that counts."""
+        with flint.ctx.workprec(_BITS):  # a rounding of the first is doubled each time
             move = exact if self.sampled or not self._x.size else (exact * flint.arb(self.shortest)).exp()
             moves = [_doubles(move)]
             everlasting = np.abs(self._c) @ self._largest(np.inf)
             while everlasting @ np.abs(moves[-1] @ self._x) > OVER:
                 if len(moves) == _LEVELS:
                     raise NumericalError(_LONG)
-                if len(moves) == _ROUNDED:
-                    for level in range(1, _ROUNDED):
-                        move = move * move
-                        moves[level] = _doubles(move)
-                if len(moves) < _ROUNDED:
-                    moves.append(_flushed(moves[-1] @ moves[-1]))
-                else:
-                    move = move * move
-                    moves.append(_doubles(move))
+                move = move * move
+                moves.append(_doubles(move))
         return moves
 
     def _largest(self, span: float) -> Real:
@@ -124,8 +107,8 @@ class Motion:
                 return self.start + a + root * self.shortest
         return self.start + best
 
-    def last_outside(self) -> float | None:
-        """Last time at which |e| is more than 2 %; ``None``: never from the start on."""
+    def settled(self) -> float | None:
+        """From when on |e| is no more than 2 %; ``None``: all the time."""
         band, best = BAND + self._tie, -np.inf
 
         def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
@@ -136,7 +119,7 @@ class Motion:
         for a, series in sorted(self._spans(undecided, np.abs), key=lambda span: -span[0]):
             if roots := [*_within(series - BAND * _ONE), *_within(series + BAND * _ONE)]:
                 return self.start + a + max(roots) * self.shortest
-        return self.start + best if np.isfinite(best) else None
+        return self.start + best + self.sampled if np.isfinite(best) else None
 
     def greatest(self, least: float) -> tuple[float, float]:
         """Largest e above ``least`` and its time; ``(least, inf)`` where there is none."""
@@ -148,35 +131,13 @@ class Motion:
                 k = int(e.argmax())
                 if e[k] > best or (e[k] == best and t[k] < place):
                     best, place = float(e[k]), float(t[k])
-            return most > best + _FLAT * max(best, 1.0)
+            return most > best * (1.0 + _FLAT)
 
-        self._spans(undecided, np.asarray)
-        if not self.sampled and 0.0 < place < np.inf:
-            place = self._stationary(place)
-            best = float((self._c @ self._state(place)).real)
+        for a, series in self._spans(undecided, np.asarray):
+            for top in _within(np.polyder(series)):
+                if (e := float(np.polyval(series, top))) > best:
+                    best, place = e, a + top * self.shortest
         return best, self.start + place
-
-    def _stationary(self, t: float) -> float:
-        """The top next to t, by Newton on the derivative; t itself where there is none near."""
-        first, slope, bend = t, self._c @ self._A, self._c @ self._A @ self._A
-        for _ in range(4):
-            x = self._state(t)
-            down, curved = float((slope @ x).real), float((bend @ x).real)
-            if curved >= 0.0 or abs(down / curved) > self.shortest + 1e-3 * first:
-                return first
-            t -= down / curved
-        return t
-
-    def _state(self, t: float) -> Complex:
-        whole, x = int(t / self.shortest), self._x
-        for level in range(whole.bit_length()):
-            if whole >> level & 1:
-                x = self._moves[level] @ x
-        term = x
-        for k in range(1, _TERMS):
-            term = self._A @ term * ((t - whole * self.shortest) / k)
-            x = x + term
-        return x
 
     def curve(self, end: float, count: int) -> tuple[Real, Real]:
         """Times from the start on to ``end``, at most twice ``count`` and evenly apart, and e there."""
@@ -224,20 +185,12 @@ _ONE = np.eye(_TERMS)[-1]
 
 def _within(series: Real) -> list[float]:
     """Roots in [0, 1] of a power series that is a parabola but for small terms, in order."""
-    c, b, a = series[-1], series[-2], series[-3]
-    square = b * b - 4.0 * a * c
-    if square < 0.0 or (a == 0.0 and b == 0.0):
-        return []
-    q = -0.5 * (b + np.copysign(np.sqrt(square), b))
-    starts = [-c / b] if a == 0.0 or q == 0.0 else [q / a, c / q]
-    slope, found = np.polyder(series), []
-    for t in (start for start in starts if -0.5 < start < 1.5):
-        for _ in range(4):
-            below = np.polyval(slope, t)
-            t -= np.polyval(series, t) / below if below else 0.0
-        if 0.0 <= t <= 1.0:
-            found.append(float(t))
-    return sorted(found)
+    f, top = np.poly1d(series), -series[-2] / (2.0 * series[-3]) if series[-3] else 0.0
+    return [
+        float(brentq(f, low, high, xtol=1e-15))
+        for low, high in pairwise((0.0, min(max(top, 0.0), 1.0), 1.0))
+        if f(low) * f(high) <= 0.0
+    ]
 
 
 def gain_of(p: flint.acb, sampled: bool) -> flint.arb:

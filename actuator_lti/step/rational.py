@@ -12,6 +12,7 @@ import flint
 import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.margins.exact.roots import at_enough_bits
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.step.motion import Motion, gain_of
@@ -30,7 +31,6 @@ from actuator_lti.systems.exact_fraction import (
 
 _EPS = float(np.finfo(float).eps)
 _FIRST_BITS = 192
-_MOST_BITS = 16384
 _SURE_BITS = 60
 UNSTABLE = "the system is not stable: it has no step figures"
 NO_FINAL = "the final value of the step response is zero: it has no rise, overshoot or settling"
@@ -40,35 +40,22 @@ _Poles = list[flint.acb]  # each as often as it is repeated
 
 
 def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float]:
-    """Find the motion and the final value of the unit step response of a stable rational system.
+    """The motion and the final value of the unit step response of a stable rational system.
 
-    Parameters
-    ----------
-    system : StateSpace or TransferFunction
-        One input, one output.
-    loop : RationalLoop
-        The same, balanced (which is exact); coefficients are taken from the system itself.
-
-    Raises
-    ------
-    InputError
-        Not stable, integrating, or a final value of zero.
-    NumericalError
-        The final value is lost in the rounding of the entries.
+    ``loop`` is the same, balanced (which is exact); coefficients are taken from the system itself.
     """
     whole = exact_fraction(system)
-    f, dc, bits = shown(whole, loop), 1 if loop.in_z else 0, _FIRST_BITS
-    while bits <= _MOST_BITS:
-        with flint.ctx.workprec(bits):
-            poles = _poles(loop, f, whole.whole_den / whole.den)
-            final = f.num(dc) / f.den(dc)
-            answer = _checked(double(final), loop)
-            rest = (f.num / final - f.den) / flint.fmpq_poly([-dc, 1])
-            motion = free_motion(balls(rest / f.den[f.den.degree()]), poles, loop.in_z)
-        if motion is not None:
-            return motion, answer
-        bits *= 2
-    raise NumericalError("the poles of the step response lie too close together to be separated")
+    f, dc = shown(whole, loop), 1 if loop.in_z else 0
+
+    def motion() -> Motion | None:
+        poles = _poles(loop, f, whole.whole_den / whole.den)
+        final = f.num(dc) / f.den(dc)
+        _refuse_no_final(double(final), loop)
+        rest = (f.num / final - f.den) / flint.fmpq_poly([-dc, 1])
+        return free_motion(balls(rest / f.den[f.den.degree()]), poles, loop.in_z)
+
+    found = at_enough_bits(motion, _FIRST_BITS, "a pole of the step response")
+    return found, double(f.num(dc) / f.den(dc))
 
 
 def free_motion(rest: flint.acb_poly, poles: _Poles, sampled: bool, start: float = 0.0) -> Motion | None:
@@ -114,19 +101,18 @@ def _is(p: flint.acb, value: flint.acb) -> bool:
     return bool((p - value).contains(flint.acb(0)))
 
 
-def _checked(final: float, loop: RationalLoop) -> float:
+def _refuse_no_final(final: float, loop: RationalLoop) -> None:
     if final == 0.0 or not np.isfinite(final):
         raise InputError(NO_FINAL)
     if abs(final) <= dc_noise(loop):
         raise NumericalError(NO_FINAL.replace("is zero:", "is zero within the rounding of the entries:"))
-    return final
 
 
 def notes(loop: RationalLoop) -> tuple[str, ...]:
     """Say where the last digits of the coefficients decide about the final value."""
-    if not loop.in_z or loop.numerator is None or loop.denominator is None:
+    if not loop.in_z or loop.coefficients is None:
         return ()
-    sums = [(abs(exact_sum(p)), float(np.abs(p).sum())) for p in (loop.numerator, loop.denominator)]
+    sums = [(abs(exact_sum(p)), float(np.abs(p).sum())) for p in loop.coefficients]
     moved = ULP * _EPS * sum(whole / total for total, whole in sums)
     if moved < 0.01:
         return ()

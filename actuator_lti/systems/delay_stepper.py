@@ -28,16 +28,7 @@ _SAME = 1e-9  # of a step: closer is on the node
 
 
 class DelayStepper:
-    """Walks a `DelaySystem` forward in time; nothing moved before the start.
-
-    Parameters
-    ----------
-    system : DelaySystem
-    start_s : float
-    state : ndarray
-        State at the start.
-    u : ndarray
-        Input at the start; zero before.
+    """Walks a `DelaySystem` forward in time from a state and an input; nothing moved before the start.
 
     Examples
     --------

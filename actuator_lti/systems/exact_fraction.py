@@ -76,7 +76,9 @@ def shown(f: Fraction, loop: RationalLoop) -> Fraction:
     In exact numbers such a mode is rarely cancelled: its residue is a rounding error. It is left out where it
     would move the response by less than 1e-9 of its value before the slowest of the others has settled.
     """
-    if loop.numerator is not None or loop.order < 2 or _nearest_dc(np.linalg.eigvals(loop.A), loop) > _CLOSE:
+    if loop.coefficients is not None or loop.order < 2:
+        return f
+    if _nearest_dc(np.linalg.eigvals(loop.A), loop) > _CLOSE:
         return f
     with flint.ctx.workprec(_BITS):
         every = roots(f.den)
@@ -115,7 +117,7 @@ def _middle(p: flint.acb_poly) -> flint.fmpq_poly:
 
 def near_dc(p: flint.acb, loop: RationalLoop) -> bool:
     """Whether a hidden pole of a state space counts as one at zero frequency."""
-    return loop.numerator is None and _nearest_dc(complex(p), loop) <= _NEAR_DC
+    return loop.coefficients is None and _nearest_dc(complex(p), loop) <= _NEAR_DC
 
 
 def rational(value: Any) -> flint.fmpq:
@@ -136,11 +138,11 @@ def exact_sum(values: np.ndarray) -> float:
 def dc_noise(loop: RationalLoop) -> float:
     """What the rounding of the entries may move the gain at zero frequency by."""
     x = 1.0 if loop.in_z else 0.0
-    if loop.numerator is not None and loop.denominator is not None:
+    if loop.coefficients is not None:
         if not loop.in_z:
             return 0.0  # one coefficient over another
-        below = abs(exact_sum(loop.denominator))
-        return ULP * _EPS * float(np.abs(loop.numerator).sum()) / below if below else 0.0
+        below = abs(exact_sum(loop.coefficients[1]))
+        return ULP * _EPS * float(np.abs(loop.coefficients[0]).sum()) / below if below else 0.0
     M = x * np.eye(loop.order) - loop.A
     if not loop.order or np.linalg.cond(M) > 1.0 / _LOST:
         return 0.0

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
+from actuator_lti.margins.axis_search import Factored, half_turn
 from actuator_lti.margins.delays.form import delay_form
 from actuator_lti.margins.delays.response import DelayResponse
 from actuator_lti.margins.exact.loop import exact_loop
 from actuator_lti.margins.exact.roots import half_planes
 from actuator_lti.margins.factored import Response, factored
-from actuator_lti.margins.factors_on_axis import Factored, half_turn
 from actuator_lti.margins.given import Given, given_of
 from actuator_lti.margins.loop import Real, loop_of
 from actuator_lti.margins.measured.bounds import bounds

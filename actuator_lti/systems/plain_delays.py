@@ -25,22 +25,11 @@ class PlainDelaySystem:
 
     The delays: ``z_k(t) = v_k(t - delays_k)``. Margins, bandwidths and step figures take it as they take a
     `actuator_lti.systems.delay_system.DelaySystem`.
-
-    Attributes
-    ----------
-    A, B1, B2, C1, C2, D11, D12, D21, D22 : ndarray
-        Shapes (n,n), (n,m), (n,k), (p,n), (k,n), (p,m), (p,k), (k,m), (k,k).
-    delays_s : ndarray, shape (k,)
-        Each > 0.
-    states : tuple of str
-        Empty where they have no names of their own.
-    name, source, signal : str
-        Of the system, its input, its output.
     """
 
     dt: ClassVar[float] = 0.0
 
-    A: np.ndarray
+    A: np.ndarray  # shapes (n,n), (n,m), (n,k), (p,n), (k,n), (p,m), (p,k), (k,m), (k,k)
     B1: np.ndarray
     B2: np.ndarray
     C1: np.ndarray
@@ -49,9 +38,9 @@ class PlainDelaySystem:
     D12: np.ndarray
     D21: np.ndarray
     D22: np.ndarray
-    delays_s: np.ndarray
-    states: tuple[str, ...] = ()
-    name: str = "loop"
+    delays_s: np.ndarray  # each > 0
+    states: tuple[str, ...] = ()  # empty where they have no names of their own
+    name: str = "loop"  # of the system, its input, its output
     source: str = "u"
     signal: str = "y"
 
@@ -123,13 +112,7 @@ def static(gain: np.ndarray) -> PlainDelaySystem:
 
 
 def in_series(first: PlainDelaySystem, second: PlainDelaySystem) -> PlainDelaySystem:
-    """Series connection.
-
-    Raises
-    ------
-    InputError
-        If the numbers of signals between both differ.
-    """
+    """Series connection."""
     if first.noutputs != second.ninputs:
         raise InputError(f"series: {first.noutputs} outputs into {second.ninputs} inputs")
     m, q = first.ninputs, first.noutputs
@@ -141,13 +124,7 @@ def in_series(first: PlainDelaySystem, second: PlainDelaySystem) -> PlainDelaySy
 
 
 def in_parallel(a: PlainDelaySystem, b: PlainDelaySystem) -> PlainDelaySystem:
-    """Parallel connection.
-
-    Raises
-    ------
-    InputError
-        If the numbers of signals differ.
-    """
+    """Parallel connection."""
     if (a.ninputs, a.noutputs) != (b.ninputs, b.noutputs):
         raise InputError("parallel connection: both systems need the same numbers of signals")
     source = np.vstack([np.eye(a.ninputs)] * 2)

@@ -21,26 +21,17 @@ class PlainSystem:
     """``x+ = A x + B u, y = C x + D u`` of one input and one output, every ``dt`` seconds; ``dx/dt`` for 0.
 
     Margins, bandwidths and step figures take it as they take a `control.StateSpace`.
-
-    Attributes
-    ----------
-    A, B, C, D : ndarray, shapes (n, n), (n, 1), (1, n), (1, 1)
-    dt : float
-        Sampling period in s; 0: continuous.
-    name, source, signal : str
-        Of the system, its input, its output.
-    states : tuple of str
     """
 
     ninputs: ClassVar[int] = 1
     noutputs: ClassVar[int] = 1
 
-    A: np.ndarray
+    A: np.ndarray  # shapes (n, n), (n, 1), (1, n), (1, 1)
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
-    dt: float
-    name: str = "loop"
+    dt: float  # sampling period in s; 0: continuous
+    name: str = "loop"  # of the system, its input, its output
     source: str = "u"
     signal: str = "y"
     states: tuple[str, ...] = ()

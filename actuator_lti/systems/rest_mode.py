@@ -27,20 +27,8 @@ def without_rest_mode(
     """Take out a mode at zero frequency that the output does not see, or the input does not drive.
 
     It is hidden where A v = ``at`` v and C v = 0 hold within the rounding of the entries (or the same of the
-    transposed system). Then x - v x_j, j an integrator with v_j = 1, obeys equations without x_j.
-
-    Parameters
-    ----------
-    A, B, C : ndarray, shapes (n, n), (n, 1), (1, n)
-    at : float
-        The pole at zero frequency: 1 for a sampled system, 0 for a continuous one.
-
-    Returns
-    -------
-    A, B, C : ndarray
-        Without that mode, or untouched.
-    kept : ndarray of bool, shape (n,)
-        Which states remain.
+    transposed system), ``at`` 1 for a sampled system, 0 for a continuous one. Then x - v x_j, j an integrator
+    with v_j = 1, obeys equations without x_j. Returned is also which states are kept, bool (n,).
     """
     ((A, B, C),), kept = without_common_rest_mode([(A, B, C)], at)
     return A, B, C, kept
@@ -51,17 +39,7 @@ def without_common_rest_mode(
 ) -> tuple[list[System], np.ndarray]:
     """Take out a mode that several systems on the same states, one tick after the other, all hide.
 
-    Parameters
-    ----------
-    systems : sequence of (A, B, C)
-    at : float
-    alone : bool
-        Also an integrator that moves nothing else and is not seen, or is not driven.
-
-    Returns
-    -------
-    systems : list of (A, B, C)
-    kept : ndarray of bool, shape (n,)
+    ``alone``: also an integrator that moves nothing else and is not seen, or is not driven.
     """
     for turned in (False, True):  # not seen; not driven: the same of the transposed systems
         tried = [(A.T, C.T, B.T) for A, B, C in systems] if turned else list(systems)

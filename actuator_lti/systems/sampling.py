@@ -113,19 +113,12 @@ class DelayedHold:
     """One tick of a plant behind a zero-order hold that lags by d = (q + f) Ts.
 
     ``x+ = Phi x + sum_j gains[j] u_{k-j} + Gamma_T T``: u_{k-q-1} still acts for f Ts, then u_{k-q}.
-
-    Attributes
-    ----------
-    Phi : ndarray, shape (..., n, n)
-    gains : dict of int to ndarray, shape (..., n)
-        Effect of the input computed j ticks ago; one entry (q), or two (q and q + 1) for a fractional delay.
-    Gamma_T : ndarray, shape (..., n, m)
-        Effect of the second input, held over the tick without delay.
     """
 
-    Phi: np.ndarray
+    Phi: np.ndarray  # shape (..., n, n)
+    # by ticks j: effect (..., n) of the input computed j ticks ago; one entry (q), or two (and q + 1)
     gains: dict[int, np.ndarray]
-    Gamma_T: np.ndarray
+    Gamma_T: np.ndarray  # effect of the second input, held over the tick without delay
 
     @property
     def memory(self) -> int:

@@ -24,22 +24,13 @@ Figures = Mapping[str, float | None]
 
 @dataclass(frozen=True)
 class FigureName:
-    """A figure.
-
-    Attributes
-    ----------
-    key, label, unit : str
-    group : str
-        ``"current"``, ``"velocity"``, ``"position"``, ``"drive"`` or ``"large"``.
-    better : int
-        1 where larger is better, -1 where smaller is, 0 where neither.
-    """
+    """A figure."""
 
     key: str
     label: str
     unit: str
-    group: str
-    better: int
+    group: str  # ``"current"``, ``"velocity"``, ``"position"``, ``"drive"`` or ``"large"``
+    better: int  # 1 where larger is better, -1 where smaller is, 0 where neither
 
 
 def small_signal(design: Design, result: Mapping[str, LoopFigures]) -> dict[str, float | None]:
@@ -58,18 +49,10 @@ def small_signal(design: Design, result: Mapping[str, LoopFigures]) -> dict[str,
 
 @dataclass(frozen=True)
 class LargeSignal:
-    """Large-signal figures, taken of every design at the same commands.
+    """Large-signal figures, taken of every design at the same commands."""
 
-    Attributes
-    ----------
-    frequencies_hz : tuple of float
-        Where the largest linear amplitude is given.
-    deflection_rad, duration_s : float
-        Step of full deflection.
-    loads_Nm : tuple of float
-    """
-
-    frequencies_hz: tuple[float, ...]
+    frequencies_hz: tuple[float, ...]  # where the largest linear amplitude is given
+    # Step of full deflection
     deflection_rad: float
     duration_s: float
     loads_Nm: tuple[float, ...]
@@ -103,9 +86,6 @@ class LargeSignal:
                 value = float(columns[f"nonlinear.{name}"][0])
                 figures[f"large.{name}@{load:g}"] = None if value != value else value
         return figures
-
-
-large_signal = LargeSignal
 
 
 def figure_names(all_figures: Sequence[Figures], design: Design) -> tuple[FigureName, ...]:

@@ -55,7 +55,6 @@ class Store:
 
 def address(designs: tuple[Design | None, ...], settings: object) -> str:
     """Name of what is found of designs with settings (whose ``repr`` says all of them)."""
-
     texts = [None if design is None else write_design(design) for design in designs]
     return _digest(json.dumps([texts, repr(settings), _code()]))
 

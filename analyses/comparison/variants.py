@@ -21,7 +21,6 @@ from analyses.comparison.variant_figures import (
     FigureName,
     LargeSignal,
     figure_names,
-    large_signal,
     small_signal,
 )
 from analyses.comparison.variant_store import Store, address
@@ -33,8 +32,6 @@ from analyses.validation import CHECKS, validate
 from analyses.validation.row import Row
 
 if TYPE_CHECKING:
-    from pydantic import TypeAdapter
-
     from actuator_lti.design.model import Design
     from analyses.linear.loop_figures import LoopFigures
     from analyses.specification.sensitivity import Sensitivities
@@ -63,32 +60,19 @@ class Contribution:
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """What is found of one design of a comparison: plain data, kept on disk as they are.
+    """What is found of one design of a comparison: plain data, kept on disk as they are."""
 
-    Attributes
-    ----------
-    figures : mapping of str to float or None
-        By column, such as ``"position.phase_margin"``; ``None`` where there is none.
-    verdicts : tuple of RequirementVerdict
-    changed : tuple of Changed
-    differences : mapping of str to float
-        Figure minus the base's, where they differ.
-    moved_by : mapping of str to tuple of Contribution
-        For each difference the changed keys one at a time, the strongest first; what is left over is
-        their interaction (or a key without a number).
-    checks : tuple of Row
-        Of the validator: each prediction beside what the simulator shows; empty where not asked for.
-    untested : str
-        Why the validator could not test this design.
-    """
-
+    # By column, such as ``"position.phase_margin"``; ``None`` where there is none
     figures: dict[str, float | None]
     verdicts: tuple[RequirementVerdict, ...]
     changed: tuple[Changed, ...] = ()
-    differences: dict[str, float] = field(default_factory=dict)
+    differences: dict[str, float] = field(default_factory=dict)  # figure minus the base's, where they differ
+    # For each difference the changed keys one at a time, the strongest first; what is left over is their
+    # interaction (or a key without a number)
     moved_by: dict[str, tuple[Contribution, ...]] = field(default_factory=dict)
+    # Of the validator: each prediction beside what the simulator shows; empty where not asked for
     checks: tuple[Row, ...] = ()
-    untested: str = ""
+    untested: str = ""  # why the validator could not test this design
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,36 +84,21 @@ class Compared(Found):
     @cached_property
     def loops(self) -> Mapping[str, LoopFigures]:
         """The loops, for drawing; computed when they are first asked for, as few designs are drawn."""
-
         assert self.variant.design is not None
         return all_loop_figures(assemble_loops(self.variant.design), certify=True)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """A study compared.
-
-    Attributes
-    ----------
-    study : Study
-    names : tuple of FigureName
-    base : Compared
-    variants : tuple of Compared
-    sensitivities : Sensitivities
-        Of the base.
-    refused : tuple of Variant
-        Those that have no design, with the reason.
-    whole : Comparison, optional
-        What this one is a choice of, where its variants are not all.
-    """
+    """A study compared."""
 
     study: Study
     names: tuple[FigureName, ...]
     base: Compared
     variants: tuple[Compared, ...]
-    sensitivities: Sensitivities
-    refused: tuple[Variant, ...]
-    whole: Comparison | None = None
+    sensitivities: Sensitivities  # of the base
+    refused: tuple[Variant, ...]  # those that have no design, with the reason
+    whole: Comparison | None = None  # what this one is a choice of, where its variants are not all
 
     @property
     def everything(self) -> Comparison:
@@ -203,7 +172,7 @@ def compare(
     from analyses.specification.sensitivity import sensitivities
 
     assert study.base.design is not None
-    plan = large_signal.plan(study.base.design)
+    plan = LargeSignal.plan(study.base.design)
     tested = study.validation if validation is None else validation
     good = [v for v in study.variants if v.design is not None]
     total = len(good) + 2
@@ -263,7 +232,6 @@ class _Kept:
 @cache
 def _adapter() -> TypeAdapter[Found]:
     """Turns what is found into plain data and back."""
-
     return TypeAdapter(Found)
 
 
@@ -289,7 +257,6 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
 
 def _checked(design: Design) -> tuple[tuple[Row, ...], str]:
     """The validator's checks, or why there are none."""
-
     try:
         return validate(design, CHECKS).rows, ""
     except (InputError, NumericalError) as error:
@@ -312,7 +279,6 @@ def _against(one: Found, design: Design, base: Found, origin: Design) -> Found:
 
 def changes(base: Design, other: Design) -> tuple[Changed, ...]:
     """Keys of the design file that differ; names and texts of the head do not count."""
-
     flat, flat_other = dict(_flat(design_tree(base))), dict(_flat(design_tree(other)))
     keys = [*flat, *(key for key in flat_other if key not in flat)]
     return tuple(

@@ -9,28 +9,17 @@ from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.model import Design
 from analyses.corners.asked import Asked
 from analyses.linear.loop_figures import LoopFigures
-from analyses.specification.verdicts import RequirementVerdict, tally
+from analyses.specification.requirements import RequirementVerdict, tally
 
 
 @dataclass(frozen=True)
 class Corner:
-    """The drive at one corner.
-
-    Attributes
-    ----------
-    name : str
-    words : str
-        What differs from the nominal drive.
-    design : Design
-    figures : mapping of str to LoopFigures
-        Of its sampled, sliding loops.
-    verdicts : tuple of RequirementVerdict
-    """
+    """The drive at one corner."""
 
     name: str
-    words: str
+    words: str  # what differs from the nominal drive
     design: Design
-    figures: Mapping[str, LoopFigures]
+    figures: Mapping[str, LoopFigures]  # of its sampled, sliding loops
     verdicts: tuple[RequirementVerdict, ...]
 
     @property

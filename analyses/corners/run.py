@@ -16,8 +16,8 @@ from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.corners.result import Asked, Corner, Corners
 from analyses.linear.loop_figures import all_loop_figures
+from analyses.specification.requirements import judged
 from analyses.specification.sensitivity import population_figures
-from analyses.specification.verdicts import judged
 from analyses.studies.sampling import Factor
 
 _TORQUE, _BACK_EMF = "motor.torque_constant", "motor.back_emf_constant"

@@ -25,8 +25,7 @@ from analyses.estimation.arrays import FloatArray
 from analyses.records.consistency import Finding, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
-from analyses.records.prepare import prepared
-from analyses.records.record import Record
+from analyses.records.record import Record, prepared
 
 if TYPE_CHECKING:
     from nonlinear import Trajectory
@@ -86,7 +85,6 @@ def correlate_record(
     design: Design,
     record: Record,
     *,
-    derive_velocity: bool = True,
     command: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> CorrelationResult:
@@ -100,11 +98,9 @@ def correlate_record(
         axis), of speed (``speed_reference``, at the motor; ``velocity_reference``), of current, torque or
         voltage. The outermost one that is recorded drives the model, whose loops outside it do not act. A
         ``torque`` signal is the load torque at the output, ``supply`` the bus voltage (see `supply_of`).
-        Compared are, where recorded: angle, output_angle or position, speed or velocity, current, voltage,
-        force. The force of a drive with an ideal source is its gain times the voltage.
-    derive_velocity : bool
-        Where no speed was recorded, compare with the derivative of the recorded position (4th-order
-        Butterworth at 100 Hz forward and backward, central differences).
+        Compared are, where recorded: angle, output_angle or position, speed or velocity (else the position's
+        derivative: 4th-order Butterworth at 100 Hz forward and backward, central differences), current,
+        voltage, force. The force of a drive with an ideal source is its gain times the voltage.
     command : str, optional
         The signal that drives the model instead; ``"voltage"`` is the measured voltage of the motor.
     progress : callable, optional
@@ -118,7 +114,7 @@ def correlate_record(
     design = record.drive(design)
     notes = list(record.notes)
     findings = check_record(design, record)
-    measured = measured_signals(design, record, derive_velocity, notes)
+    measured = measured_signals(design, record, True, notes)
     measured = {name: values for name, values in measured.items() if name != command}
     if not measured:
         known = ", ".join(AXIS_SIGNALS[design.axis])
@@ -199,16 +195,8 @@ def model_signals(
 ) -> tuple[dict[str, FloatArray], dict[str, float]]:
     """The model's signals at a regular record's times, and the limiters' shares of the time.
 
-    Parameters
-    ----------
-    design, record
-        As for `correlate_record`.
-    measured : mapping
-        The signals wanted; the simulation starts from what their first samples show.
-    notes : list of str, optional
-        What was done is added to it.
-    command : str, optional
-        The signal that drives the model; default the outermost one that the record holds.
+    ``measured`` are the signals wanted; the simulation starts from what their first samples show. What was
+    done is added to ``notes``.
     """
     from nonlinear import commands, simulate
 

@@ -65,20 +65,7 @@ def command_names(design: Design) -> dict[str, str]:
 def command_of(design: Design, record: Record, signal: str | None = None) -> Driven | None:
     """The command of a record: the outermost one that it holds, or the ``signal`` that is asked for.
 
-    Parameters
-    ----------
-    signal : str, optional
-        A command that the record holds, or ``"voltage"``: the motor is then driven by its measured voltage.
-
-    Returns
-    -------
-    Driven or None
-        None where the record holds no command.
-
-    Raises
-    ------
-    InputError
-        For a signal that is no command of this drive, or that the record does not hold.
+    With ``"voltage"`` the motor is driven by its measured voltage. None where the record holds no command.
     """
     design = record.drive(design)
     names = command_names(design)

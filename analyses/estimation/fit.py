@@ -17,12 +17,14 @@ COVERAGE = 1.959963984540054
 class Fixed:
     """A value (SI) that was not found, and why.
 
-    ``moves``: by how much each value that was found is too large where this one is too small by one.
+    ``moves``: by how much each value that was found is too large where this one is too small by one;
+    ``std``: its standard deviation as the records tell it, beside its own tolerance.
     """
 
     value: float
     reason: str
     moves: Mapping[str, float] = field(default_factory=dict)
+    std: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -35,17 +35,9 @@ class Means:
 
 
 def correlated_means(columns: FloatArray) -> Means:
-    """Means and their covariance.
+    """Means and their covariance, by batch means: columns of shape (n, k), n samples of k signals.
 
-    Parameters
-    ----------
-    columns : array, shape (n, k)
-        n samples of k signals.
-
-    Notes
-    -----
-    Method of batch means; the length of a batch follows the longest integrated autocorrelation time of the
-    signals.
+    The length of a batch follows the longest integrated autocorrelation time of the signals.
     """
     n = len(columns)
     tau = np.array([correlation_time(columns[:, k]) for k in range(columns.shape[1])])

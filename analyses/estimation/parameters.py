@@ -22,8 +22,10 @@ class Parameter:
     """Of the value in SI, to the unit in which it is shown."""
 
 
+UNSTATED = 0.05
+"""Relative standard deviation of a number of a design that states no tolerance."""
 TORQUE, VISCOUS, INERTIA = "N m", "N m s/rad", "kg m²"
-ON_A_LINE = {TORQUE: "N", VISCOUS: "N s/m", INERTIA: "kg", "N m/(N m)": "N/N"}
+ON_A_LINE = {TORQUE: "N", VISCOUS: "N s/m", INERTIA: "kg", "N m/(N m)": "N/N", "N m/A": "N/A", "N m/V": "N/V"}
 
 PARAMETERS = {
     "inertia": Parameter("Inertia, all at the motor", INERTIA, linear="Mass"),
@@ -47,6 +49,8 @@ PARAMETERS = {
     "play": Parameter("Play, total", "rad", "coupling.play"),
     "resistance": Parameter("Resistance R", "ohm", "motor.resistance"),
     "back_emf": Parameter("Back-EMF constant kE (kM follows)", "V s/rad", "motor.back_emf_constant"),
+    "torque_constant": Parameter("Torque constant kM", "N m/A", "motor.torque_constant", "Force constant kM"),
+    "source_gain": Parameter("Gain of the source", "N m/V", "motor.source_gain"),
     "inductance": Parameter("Inductance L", "H", "motor.inductance"),
     "voltage_offset": Parameter("Offset of the voltage", "V"),
     "delay": Parameter("Computing delay", "s", "control.computing_delay"),
@@ -82,3 +86,10 @@ def own_std(design: Design, key: str) -> float:
     if one is None or one.tolerance is None:
         return 0.0
     return float(one.tolerance.std or (one.tolerance.half_width or 0.0) / sqrt(3.0))
+
+
+def own_share(design: Design, key: str, value: float | None = None) -> float:
+    """That over the value; 5 % where no tolerance is stated."""
+    one = design.parameters.get(key)
+    size = abs(value or (float(one.value) if one is not None else 0.0))
+    return own_std(design, key) / size if size and own_std(design, key) else UNSTATED

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, UnstableError
-from actuator_lti.loops.compliance import compliance
+from actuator_lti.loops.stiffness import compliance
 from analyses.failures.cases import Case, cases_of
 from analyses.failures.result import Asked, FailureCase, Failures, Floats
 from analyses.failures.rig import Rig

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.design.model import Command, Design
+from actuator_lti.drive.angle import holding_torque_Nm
 from analyses.linear.static_threshold import StaticThreshold, static_threshold
 from nonlinear import Rows
 from nonlinear.settling.rest import first_motion_s
@@ -50,28 +51,47 @@ class Threshold:
 def threshold(design: Design, load_Nm: float) -> Threshold | None:
     """Simulate steps around the threshold; ``None`` where a forward step has none (or never moves).
 
-    Steps as they come behind profile and filter of the command, which let none through as it is.
+    Steps as they come behind profile and filter of the command, which let none through as it is. It is the
+    motor that starts, from angle zero: what dry friction holds behind a spring follows later.
     """
     design = replace(design, command=Command())
-    static = static_threshold(design, load_Nm)
+    moment = load_Nm + float(design.load.moment_Nm(0.0))
+    static = static_threshold(_motor_alone(design), moment)
     if not 0.0 < static.forward_rad < math.inf:
         return None
+    place = design.controller.position_loop
+    if (
+        place.derivative_time_s
+        or place.feedforward
+        or place.acceleration_feedforward
+        or place.friction_feedforward
+    ):
+        return Threshold(static, (), None, 0.0)  # a step's own kick moves it at once
     if static.integral_time_s is not None:
-        place = design.controller.position_loop  # a step's own kick moves it at once
-        kicks = any((place.derivative_time_s, place.feedforward, place.acceleration_feedforward,
-                     place.friction_feedforward))  # fmt: skip
-        return Threshold(static, () if kicks else _waiting(design, static), None, 0.0)
+        return Threshold(static, _waiting(design, load_Nm, static), None, 0.0)
     sizes = static.forward_rad * np.linspace(1.0 - WITHIN, 1.0 + WITHIN, COUNT)
     moved = _first_motion_s(design, load_Nm, sizes) < math.inf
     first = float(sizes[np.argmax(moved)]) if moved.any() else None
     return Threshold(static, (), first, 2.0 * WITHIN / (COUNT - 1))
 
 
-def _waiting(design: Design, static: StaticThreshold) -> tuple[Waiting, ...]:
+def _motor_alone(design: Design) -> Design:
+    """The drive at angle zero: its own torque there an offset, no friction behind the spring."""
+    friction = design.friction
+    offset = friction.offset_torque_Nm + holding_torque_Nm(design)
+    return replace(
+        design,
+        motor=design.motor.level(),
+        load=replace(design.load.level(), friction=None),
+        friction=replace(friction, offset_torque_Nm=offset),
+    )
+
+
+def _waiting(design: Design, load_Nm: float, static: StaticThreshold) -> tuple[Waiting, ...]:
     """Steps below the threshold and when each moves the output."""
     sizes = static.forward_rad * np.array(FRACTIONS)
     predicted = [static.waiting_time_s(float(size)) for size in sizes]
-    seen = _first_motion_s(design, static.load_Nm, sizes)
+    seen = _first_motion_s(design, load_Nm, sizes)
     return tuple(
         Waiting(float(size), foreseen, float(time) if math.isfinite(time) else None)
         for size, foreseen, time in zip(sizes, predicted, seen, strict=True)
@@ -79,8 +99,18 @@ def _waiting(design: Design, static: StaticThreshold) -> tuple[Waiting, ...]:
 
 
 def _first_motion_s(design: Design, load_Nm: float, sizes: np.ndarray) -> np.ndarray:
-    """First time at which each step moves the motor; ``inf`` if none does."""
+    """First time at which each step moves the motor; ``inf`` if none does. A spring carries the load already.
+
+    The sensor that the position loop has stands at zero.
+    """
     rows = Rows.of(design, len(sizes))
     rows["load"] = load_Nm
     rows.step("command", sizes)
+    if design.coupling is not None:
+        moment, behind = load_Nm + float(design.load.moment_Nm(0.0)), design.load.friction
+        offset = 0.0 if behind is None else behind.offset_torque_Nm
+        twist = design.coupling.twist_rad(offset - moment / design.ratio_behind_coupling)
+        rows["twist_start"] = twist
+        if design.controller.position_loop.sensor == "output":
+            rows["angle_start"] = design.ratio_to_coupling * twist
     return np.array([first_motion_s(rows.running(k)) for k in range(len(sizes))])

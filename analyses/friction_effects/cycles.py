@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from actuator_lti.design.model import Design
 from analyses.limit_cycles.friction import cycles_of_friction, dry_Nm
 from analyses.limit_cycles.result import Confirmation, Cycle
 from analyses.limit_cycles.run import confirm
 from analyses.limit_cycles.stick_slip import StickSlipCycle, stick_slip_cycle
-from analyses.motion.settling import Settling, noticed, settlings_of
+from analyses.motion.settling import Settling, noticed, settle, settlings_of
 from analyses.specification.drive_figures import drive_figures
+from nonlinear import Rows
 from nonlinear.bench.on_the_bench import quiet
 
 if TYPE_CHECKING:
@@ -72,24 +76,26 @@ def limit_cycles(
     load_Nm: float,
     predicted: tuple[Cycle, ...] | None = None,
     loops: Loops | None = None,
+    settlings: Iterable[Settling] | None = None,
 ) -> LimitCycles:
     """Predict limit cycles, look for them in the simulator, and wait what steps end in.
 
     The steps are those that judge the whole drive, without counts and noise (`analyses.motion.settling`).
 
-    Parameters
-    ----------
-    predicted : tuple of Cycle, optional
-        By describing function, if known already.
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
+    What is known already may be given: cycles ``predicted`` by describing function, the sampled sliding
+    loops, and what steps of the drive as it is end in, of which those at rest are not asked again.
     """
-    design = quiet(design)
+    given, design = design, quiet(design)
+    alike = np.array_equal(Rows.of(given).values, Rows.of(design).values)
     if predicted is None:
         predicted = described_cycles(design, load_Nm)
     checked = tuple(confirm(design, cycle) for cycle in predicted)
     slips = stick_slip_cycle(design, load_Nm, loops)
-    return LimitCycles(design, checked, slips, settlings_of(design, loops, (load_Nm,)))
+    known = [one for one in settlings or () if one.load_Nm == load_Nm]
+    steps = tuple(
+        one if alike or not one.hunting else settle(design, load_Nm, one.amplitude_rad) for one in known
+    )
+    return LimitCycles(design, checked, slips, steps or settlings_of(design, loops, (load_Nm,)))
 
 
 def described_cycles(design: Design, load_Nm: float) -> tuple[Cycle, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,11 +17,11 @@ from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.limit_cycles.friction import at_load, dry_Nm
 from analyses.limit_cycles.result import Cycle
+from analyses.motion.settling import Settling
+from nonlinear.bench.on_the_bench import quiet
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,10 @@ class FrictionEffects:
 
 
 def friction_effects(
-    design: Design, loops: Loops | None = None, *, progress: Progress | None = None
+    design: Design,
+    loops: Loops | None = None,
+    *,
+    settlings: Iterable[Settling] | None = None,
 ) -> FrictionEffects:
     """Find threshold, hysteresis, standing error and limit cycles at each load torque of the design.
 
@@ -76,15 +79,14 @@ def friction_effects(
     design : Design
     loops : Loops, optional
         Sampled and sliding, of this design, if they are there already.
-    progress : callable, optional
-        Called with (load torques done, in all).
+    settlings : iterable of Settling, optional
+        What steps of the drive end in, if known already (`analyses.motion.settling.settlings_of`).
 
     Raises
     ------
     InputError, NumericalError
         As `assemble_loops` and `simulate`.
     """
-
     integrator = _integrator(design)
     loads = design.validation.loads_Nm
     if not any(dry_Nm(design, load) > 0.0 for load in loads):
@@ -98,9 +100,7 @@ def friction_effects(
         scaled = tuple(at_load(cycle, design, load) for cycle in described if dry_Nm(design, load) > 0.0)
         if design.friction.points and load != most:  # a map does not grow in proportion to the load
             scaled = described_cycles(design, load)
-        points.append(_point(design, loops, load, settling, scaled))
-        if progress is not None:
-            progress(len(points), len(loads))
+        points.append(_point(design, loops, load, settling, scaled, settlings))
     return FrictionEffects(design, tuple(points), integrator)
 
 
@@ -115,10 +115,16 @@ def _integrator(design: Design) -> str:
 
 
 def _point(
-    design: Design, loops: Loops, load_Nm: float, settling_ticks: int, described: tuple[Cycle, ...]
+    design: Design,
+    loops: Loops,
+    load_Nm: float,
+    settling_ticks: int,
+    described: tuple[Cycle, ...],
+    settlings: Iterable[Settling] | None,
 ) -> FrictionPoint:
-    result = threshold(design, load_Nm)
-    loop = None if result is None else hysteresis(design, load_Nm, result.static, settling_ticks)
+    alone = quiet(design)
+    result = threshold(alone, load_Nm)
+    loop = None if result is None else hysteresis(alone, load_Nm, result.static, settling_ticks)
     dry = float(dry_torque(design, load_Nm, 1))
-    cycles = limit_cycles(design, load_Nm, described, loops)
+    cycles = limit_cycles(design, load_Nm, described, loops, settlings)
     return FrictionPoint(load_Nm, dry, result, loop, cycles)

@@ -180,43 +180,25 @@ class Asked(Settings):
 
 
 def fixed_values(design: Design, texts: Sequence[str] | None) -> dict[str, float]:
-    """``KEY=VALUE`` texts as SI values by key; a bare number is in SI.
-
-    Raises
-    ------
-    InputError
-        For a text without ``=``, an unknown key, or a value that does not fit.
-    """
-    from actuator_lti.design.access import located
-    from actuator_lti.design.fields import Structure
-    from actuator_lti.design.units import parse_quantity
+    """``KEY=VALUE`` texts as SI values by key; a bare number is in SI."""
+    from actuator_lti.design.writing import read_value
 
     result = {}
     for text in texts or ():
         key, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not value:
             raise InputError(f'--fix "{text}": KEY=VALUE is wanted, such as friction.load_coefficient=0')
-        field, _ = located(design, key)
         try:
-            result[key] = float(value)
-        except ValueError:
-            try:
-                result[key] = parse_quantity(value, field.unit(Structure.of(design)))
-            except InputError as error:
-                raise InputError(f"--fix {key} = {value}: {error.message}") from None
+            result[key] = read_value(design, key, value)
+        except InputError as error:
+            raise InputError(f"--fix {error.message}") from None
     return result
 
 
 def held_by_name(
     fixed: Mapping[str, float], names: Sequence[str], more: Mapping[str, str] | None = None
 ) -> dict[str, float]:
-    """Fixed keys by the names of a fit; ``more`` are keys that no single name has.
-
-    Raises
-    ------
-    InputError
-        For a key that none of them has.
-    """
+    """Fixed keys by the names of a fit; ``more`` are keys that no single name has."""
     known = {parameter(name).key: name for name in names if parameter(name).key} | dict(more or {})
     for key in fixed:
         if key not in known:

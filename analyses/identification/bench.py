@@ -10,19 +10,19 @@ from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.driving import command_of
+from analyses.estimation.parameters import parameter
 from analyses.identification.asked import Settings, fixed_values, held_by_name
 from analyses.identification.design_values import DesignValue, design_values
 from analyses.identification.diagnosis import diagnosed
+from analyses.identification.drive_constant import given_constant, with_given_constant
 from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
-from analyses.identification.following_error import following_item
 from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
 from analyses.identification.joint_model import NAMES, JointModel, Recipe
 from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.own_bias import without_bias
-from analyses.identification.refinement import refine_records
 from analyses.identification.residuals import ResidualTest, residual_tests
-from analyses.identification.resimulation import Resimulated, resimulate
+from analyses.identification.resimulation import Resimulated, refine_records, resimulate
 from analyses.identification.rows import is_loaded, recipe_for
 from analyses.identification.to_design import (
     INERTIAS,
@@ -34,9 +34,11 @@ from analyses.identification.to_design import (
 from analyses.identification.verdict import (
     Identified,
     Item,
+    following_item,
     held_out_item,
     inputs_item,
     kept_items,
+    offset_item,
     residual_item,
     rows_item,
     sampling_item,
@@ -45,8 +47,7 @@ from analyses.identification.verdict import (
 )
 from analyses.records.consistency import Finding, check_record
 from analyses.records.inputs import InputUse, account
-from analyses.records.prepare import prepared
-from analyses.records.record import Record
+from analyses.records.record import Record, prepared
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,12 +96,13 @@ def identify_bench(
     fixed, limit = fixed_values(design, settings.fix), settings.residual_limit / 100.0
     used = tuple(prepared(record) for record in records)
     unseen = tuple(prepared(record) for record in validation)
-    findings = {record.name: check_record(design, record) for record in (*used, *unseen)}
     start, electrical = with_fixed(design, fixed), None
     if settings.electrical:
         electrical = fit_electrical(start, used)
         told = f"voltage equation of {', '.join(record.name for record in records)}"
         start = design_with_fit(start, electrical_values(start, electrical), told)
+    judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
+    findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
     laws: tuple[LawChoice, ...] = ()
 
     def fit(records: Sequence[Record]) -> tuple[JointModel, tuple[Record, ...]]:
@@ -108,18 +110,24 @@ def identify_bench(
         model, laws = _fitted(start, records, settings, fixed)
         return _unbiased(start, _with_commands(start, model, records), records, settings)
 
-    right = diagnosed(start, used, fit, _recipe(used[0], settings))
-    model, used, simulated = right.model, right.records, right.simulated
+    recipe = _recipe(used[0], settings)
+    right = diagnosed(design, start, used, fit, recipe)
+    used = right.records
+    model = right.model if electrical else with_given_constant(start, right.model, used, recipe)
     findings |= {name: (*findings[name], *more) for name, more in right.findings.items()}
     source = f"identified from {', '.join(record.name for record in records)}"
+    given = given_constant(model)
+    if given is not None:
+        source += f" at {parameter(given).key} = {model[given]:g} {parameter(given).unit}"
     sampled = tuple(item for record in used if (item := sampling_item(record)) is not None)
-    lags = [following_item(start, *pair) for pair in zip(used, simulated, strict=bool(simulated))]
+    lags = [following_item(name, one) for name, one in right.followed.items()]
     compared = design_values(design, model, used, start)
     size = size_item(
         design, compared, kept_constants=electrical is None, loaded=any(is_loaded(record) for record in used)
     )
     kept = kept_items(model, _held(start, fixed, settings.friction), design.axis)
-    items = (*_fit_items(findings, size, model, limit), *kept, *sampled, *filter(None, lags))
+    offset = [item for item in (offset_item(design, model),) if item is not None]
+    items = (*_fit_items(findings, size, model, limit), *offset, *kept, *sampled, *lags)
     try:
         values = joint_values(start, model, inertia_to=settings.inertia_to)
         _refuse_settings(used, values.names)

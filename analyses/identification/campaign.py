@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
-from analyses.identification.points import steady_points
+from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.fit import Fit
+from analyses.identification.design_values import design_value
 from analyses.identification.richer import RicherLaws, compare_laws
-from analyses.identification.run_checks import check_runs
-from analyses.identification.steady import SteadyCriterion
+from analyses.identification.steady import SteadyCriterion, SteadyPoint, steady_points
 from analyses.identification.surface import fit_surface
 from analyses.identification.surface_fit import NAMES, SurfaceFit
-from analyses.identification.verdict import Item, residual_item, simulated_item, sizes_item
-from analyses.records.campaign_import import ImportedCampaign, SetAside
-from analyses.records.consistency import Finding
+from analyses.identification.verdict import Item, residual_item, simulated_item, size_item
+from analyses.records.campaign_file import Instruments
+from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetAside
+from analyses.records.consistency import Finding, check_record
+from analyses.records.factors import named_factor
 from analyses.records.inputs import InputUse
+
+RUN_UP_S = 0.3
+STEADY_S = 0.2
+SPEED_REACHED = 0.01
+MOST_CAMPAIGN_TICKS = 200_000
+SPEED_TOLERANCE = 0.05
+LOAD_TOLERANCE = 0.10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +72,6 @@ def identify_campaign(
     imported: ImportedCampaign,
     design: Design,
     *,
-    criterion: SteadyCriterion | None = None,
     richer: bool = True,
     fixed: Mapping[str, float] | None = None,
 ) -> CampaignResult:
@@ -72,8 +82,6 @@ def identify_campaign(
     imported : ImportedCampaign
     design : Design
         Its torque constant makes torques of currents.
-    criterion : SteadyCriterion, optional
-        When a motion counts as steady.
     richer : bool
         Whether to ask, by cross-validation, for a richer law.
     fixed : mapping, optional
@@ -89,13 +97,12 @@ def identify_campaign(
         raise InputError(
             "motor.torque_constant: the design has none, so currents cannot become torques", design.name
         )
-    criterion = SteadyCriterion() if criterion is None else criterion
-    points, restless = steady_points(imported.runs, constant, criterion)
-    checked = check_runs(design, imported.runs, points, imported.campaign.instruments)
-    aside = (*imported.set_aside, *restless, *checked.contradicting)
+    points, restless = steady_points(imported.runs, constant)
+    used, contradicting, findings = check_runs(design, imported.runs, points, imported.campaign.instruments)
+    aside = (*imported.set_aside, *restless, *contradicting)
     try:
         fit = fit_surface(
-            checked.points,
+            used,
             imported.campaign.instruments,
             constant,
             outliers=imported.campaign.outliers,
@@ -113,11 +120,78 @@ def identify_campaign(
         fit=fit,
         laws=laws,
         set_aside=aside,
-        criterion=criterion,
+        criterion=SteadyCriterion(),
         torque_constant_Nm_A=constant,
-        contradicting=checked.contradicting,
-        findings=checked.findings,
+        contradicting=tuple(contradicting),
+        findings=findings,
     )
+
+
+def check_runs(
+    design: Design,
+    runs: Sequence[ImportedRun],
+    points: Sequence[SteadyPoint],
+    instruments: Instruments,
+) -> tuple[list[SteadyPoint], list[SetAside], dict[str, tuple[Finding, ...]]]:
+    """The points that agree with what is said of their runs, those runs that do not, and all findings.
+
+    Each is held against its set speed and load, itself, and the design's limits.
+
+    The speed may be off by 5 % of its setting, the load by 10 % and twice the sensor's accuracy.
+    """
+    by_id = {run.id: run for run in runs}
+    shared = _shared_files(runs)
+    good, bad, findings = [], [], {}
+    for point in points:
+        run = by_id[point.run]
+        result = (*_settings(run, point, instruments), *check_record(design, run.record))
+        if run.id in shared:
+            text = f"the sensor's file is that of run {shared[run.id]} as well"
+            result = (*result, Finding(subject="sensor file", passed=False, text=text))
+        findings[run.id] = result
+        wrong = [one for one in result if one.passed is False]
+        if wrong:
+            bad.append(SetAside(id=run.id, reason="; ".join(f"{w.subject}: {w.text}" for w in wrong)))
+        else:
+            good.append(point)
+    return good, bad, findings
+
+
+def _shared_files(runs: Sequence[ImportedRun]) -> dict[str, str]:
+    """Runs whose sensor's file is that of another run, and that other run."""
+    seen: dict[str, str] = {}
+    out: dict[str, str] = {}
+    for run in runs:
+        if not run.sensor_sha256 or run.load_is_zero:
+            continue
+        if run.sensor_sha256 in seen:
+            out[run.id] = seen[run.sensor_sha256]
+            out[seen[run.sensor_sha256]] = run.id
+        seen.setdefault(run.sensor_sha256, run.id)
+    return out
+
+
+def _settings(run: ImportedRun, point: SteadyPoint, instruments: Instruments) -> tuple[Finding, ...]:
+    result = []
+    if run.speed_rad_s:
+        result.append(
+            _against("set speed", "speed", "rad/s", point.speed_rad_s, abs(run.speed_rad_s), SPEED_TOLERANCE)
+        )
+    if run.load_Nm and not run.load_is_zero:
+        sensor = 2.0 * instruments.torque_accuracy * instruments.torque_full_scale_Nm / abs(run.load_Nm)
+        allowed = LOAD_TOLERANCE + sensor
+        result.append(_against("set load", "load", "N m", point.load_Nm, abs(run.load_Nm), allowed))
+    return tuple(result)
+
+
+def _against(subject: str, what: str, unit: str, measured: float, wanted: float, allowed: float) -> Finding:
+    ratio = measured / wanted
+    text = f"{what} {measured:.4g} {unit}, set {wanted:.4g} {unit}"
+    if abs(ratio - 1.0) <= allowed:
+        return Finding(subject=subject, passed=True, text=text)
+    factor = named_factor(ratio)
+    told = f": {ratio:.4g} times" + (f", factor {factor}" if factor else "")
+    return Finding(subject=subject, passed=False, text=text + told)
 
 
 def _values_of(design: Design) -> dict[str, float]:
@@ -149,6 +223,42 @@ def campaign_items(
 
 
 def _size_item(design: Design, fit: SurfaceFit) -> Item:
-    before = _values_of(design)
-    ratios = {NAMES[k]: float(fit.values[k]) / before[NAMES[k]] for k in fit.told if before[NAMES[k]] > 0.0}
-    return sizes_item(ratios, {design.total_ratio: f"the reduction {design.total_ratio:g}"}, leading="C0")
+    names, before = ("dry", "viscous", "load_coefficient"), _values_of(design)
+    found = Fit(names=names, values=fit.values, covariance=fit.covariance)
+    values = (design_value(design, found, names[k], before[NAMES[k]]) for k in fit.told)
+    return size_item(design, [one for one in values if one], kept_constants=False, loaded=True)
+
+
+def steady_current_error(
+    design: Design, points: Sequence[SteadyPoint], *, progress: Callable[[int, int], None] | None = None
+) -> float | None:
+    """Relative error of the simulated steady torques kM i over all runs; None where no run can be driven.
+
+    Each run is a ramp of the output angle at the run's mean speed under its mean load, 0.3 s for running up
+    and 0.2 s for the mean. Runs that the simulated drive does not bring to within 1 % of their speed are left
+    out.
+    """
+    from nonlinear import commands, simulate
+
+    constant = design.effective_motor.torque_constant_Nm_A
+    duration = RUN_UP_S + STEADY_S
+    period = design.controller.period_s
+    if constant is None or duration / period > MOST_CAMPAIGN_TICKS:
+        return None
+    wanted, result = [], []
+    for k, point in enumerate(points, 1):
+        command = commands.ramp(point.direction * point.speed_rad_s / design.total_ratio)
+        try:
+            run = simulate(design, command, duration, point.load_Nm)
+        except (InputError, NumericalError):
+            continue
+        late = run.time_s >= RUN_UP_S
+        speed = point.direction * float(np.mean(run.motor_speed_rad_s[late]))
+        if abs(speed - point.speed_rad_s) <= SPEED_REACHED * point.speed_rad_s:
+            wanted.append(point.torque_Nm)
+            result.append(point.direction * constant * float(np.mean(run.current_A[late])))
+        if progress is not None:
+            progress(k, len(points))
+    if not wanted:
+        return None
+    return float(np.linalg.norm(np.subtract(result, wanted)) / np.linalg.norm(wanted))

@@ -69,23 +69,10 @@ def suggest_runs(
 ) -> CampaignSuggestion:
     """Suggest further (speed, load) points, one after the other, each the best after those before it.
 
-    Parameters
-    ----------
-    design : Design
-        Whose margins count: gain and phase margins of the velocity and position loop, with the friction of a
-        slow motion (describing function), at no load and at the largest one.
-    fit : SurfaceFit
-        The present estimate.
-    count : int
-        How many runs to suggest, in the range of the runs so far, in steps of an eighth.
-    criterion : {"margins", "D"}
-        ``margins``: mean relative variance of the margins (c-optimal, over all of them); ``D``: determinant
-        of the covariance of the coefficients.
-
-    Raises
-    ------
-    InputError
-        For an unknown criterion.
+    They lie in the range of the runs so far, in steps of an eighth. By ``margins`` the mean relative
+    variance of the gain and phase margins of the velocity and position loop counts (c-optimal), with the
+    friction of a slow motion (describing function), at no load and at the largest one; by ``D`` the
+    determinant of the covariance of the coefficients.
     """
     if criterion not in ("margins", "D"):
         raise InputError(f'criterion = "{criterion}": "margins" or "D"')

@@ -13,14 +13,12 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
-from analyses.estimation.parameters import own_std, parameter
+from analyses.estimation.parameters import own_share, parameter
 from analyses.identification.electrical import fit_electrical
 from analyses.identification.joint_model import JointModel, default_value
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
 
-UNSTATED = 0.05
-"""Relative standard deviation of a number of a design that states no tolerance."""
 NO_CHANCE = 1e-3
 """Level at which the design's numbers as a whole are rejected, and one of them is."""
 EXPLAINED = 0.01
@@ -74,16 +72,13 @@ def design_values(
 ) -> tuple[DesignValue, ...]:
     """Every number of a design that the records tell: friction, inertia, load friction, R, kE.
 
-    Parameters
-    ----------
-    design : Design
-        As it was asked for.
-    start : Design
-        With what was found of its motor first; its constants made torques of currents.
+    ``start`` is the design with what was found of its motor first; its constants made torques of currents.
     """
     behind = friction_behind(design)
     found = [
-        _value(design, model, name, default_value(design, name), behind.get(name.partition("_")[0], 0.0))
+        design_value(
+            design, model, name, default_value(design, name), behind.get(name.partition("_")[0], 0.0)
+        )
         for name in model.names
         if name != "offset" and not name.startswith(("map_", "gravity"))
     ]
@@ -91,8 +86,8 @@ def design_values(
     motor = design.effective_motor
     if electrical is not None:
         found += [
-            _value(design, electrical, "resistance", motor.resistance_ohm or 0.0),
-            _value(design, electrical, "back_emf", motor.back_emf_constant_Vs_rad or 0.0),
+            design_value(design, electrical, "resistance", motor.resistance_ohm or 0.0),
+            design_value(design, electrical, "back_emf", motor.back_emf_constant_Vs_rad or 0.0),
         ]
     return tuple(one for one in found if one is not None)
 
@@ -117,7 +112,10 @@ def _electrical(design: Design, records: Sequence[Record]) -> Fit | None:
         return None  # R and kE are not told apart
 
 
-def _value(design: Design, fit: Fit, name: str, before: float, behind: float = 0.0) -> DesignValue | None:
+def design_value(
+    design: Design, fit: Fit, name: str, before: float, behind: float = 0.0
+) -> DesignValue | None:
+    """One number, with what stands ``behind`` the coupling beside both; None where either is not positive."""
     before, found = before + behind, fit[name] + behind
     if before <= 0.0 or found <= 0.0:
         return None
@@ -127,7 +125,7 @@ def _value(design: Design, fit: Fit, name: str, before: float, behind: float = 0
         found=found,
         ratio=found / before,
         error=fit.std(name) / before,
-        allowed=own_std(design, parameter(name).key) / before or UNSTATED,
+        allowed=own_share(design, parameter(name).key, before),
     )
 
 

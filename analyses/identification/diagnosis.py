@@ -15,8 +15,8 @@ from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows
-from analyses.identification.simultaneous import Lag, lag_of, shifted
-from analyses.records.consistency import SURE, Finding, rate_ratio
+from analyses.identification.simultaneous import Followed, Lag, followed, lag_of, shifted
+from analyses.records.consistency import SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.record import Record
 
 LEAST_RUN = 3
@@ -27,15 +27,16 @@ Fitted = tuple[JointModel, tuple[Record, ...]]
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnosed:
-    """The model of records that were put right, these as the result simulates them, and what was found."""
+    """The model of records that were put right, how they follow their commands, and what was found."""
 
     model: JointModel
     records: tuple[Record, ...]
-    simulated: tuple[Record, ...]
+    followed: Mapping[str, Followed]
     findings: Mapping[str, tuple[Finding, ...]]
 
 
 def diagnosed(
+    design: Design,
     start: Design,
     records: Sequence[Record],
     fit: Callable[[Sequence[Record]], Fitted],
@@ -43,12 +44,8 @@ def diagnosed(
 ) -> Diagnosed:
     """Fit records, rows of clipped current left out and lags taken back where they are sure.
 
-    Parameters
-    ----------
-    fit : callable
-        The model of records, and these as the design that comes of it simulates them (none: it cannot).
-    recipe : Recipe or None
-        Of the fit.
+    ``start`` is the design with what the voltage equation gave; ``fit`` gives the model of records, and
+    these as the design that comes of it simulates them (none: it cannot).
     """
     found: dict[str, list[Finding]] = {record.name: [] for record in records}
     used = tuple(_without_flat_tops(start, record, recipe, found[record.name]) for record in records)
@@ -67,10 +64,23 @@ def diagnosed(
         before = model
         model, simulated = fit(used)
         model = _with_error_of(sure, before, model)
+    seen = {
+        one.name: followed(start, one, like)
+        for one, like in zip(used, simulated, strict=bool(simulated))
+        if not is_benchmark(one)
+    }
+    follow = {name: one for name, one in seen.items() if one is not None}
     for record, part in zip(used, model.records, strict=True):
-        doubt = rate_ratio(start, record)
-        if doubt is not None and doubt.doubt:
-            model = _with_clock(model, doubt.doubt)
+        one = follow.get(record.name)
+        clock, off = (0.0, 0.0) if one is None or one.fails else (one.clock, one.off)
+        if one is None or record.signals.keys() & {"speed", "velocity"}:
+            clock = max(clock, clock_doubt(start, record), key=abs)
+        for share, powers in (
+            (clock, {"inertia": 2.0, "viscous": 1.0}),
+            (off, {"inertia": 1.0, "viscous": 1.0}),
+            (resistance_doubt(design, record), {"": 1.0}),
+        ):
+            model = _stretched(model, share, powers)
         drift = None if is_benchmark(record) else _drift(part, model)
         if drift is not None:
             found[record.name].append(drift[0])
@@ -78,7 +88,7 @@ def diagnosed(
     return Diagnosed(
         model=model,
         records=used,
-        simulated=simulated,
+        followed=follow,
         findings={name: tuple(each) for name, each in found.items()},
     )
 
@@ -113,10 +123,10 @@ def _with_error_of(lags: Sequence[Lag], before: JointModel, model: JointModel) -
     return replace(model, covariance=model.covariance + share * np.outer(moved, moved))
 
 
-def _with_clock(model: JointModel, share: float) -> JointModel:
-    """The model with what a clock off by a share moves: a torque that is right over a stretched motion."""
-    powers = np.array([{"inertia": 2.0, "viscous": 1.0}.get(n.partition("_")[0], 0.0) for n in model.names])
-    moved = share * powers * model.values
+def _stretched(model: JointModel, share: float, powers: Mapping[str, float]) -> JointModel:
+    """The model with what a clock or a scale off by a share moves: each value by that power of it."""
+    power = np.array([powers.get(name.partition("_")[0], powers.get("", 0.0)) for name in model.names])
+    moved = share * power * model.values
     return replace(model, covariance=model.covariance + np.outer(moved, moved))
 
 

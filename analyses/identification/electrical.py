@@ -16,8 +16,7 @@ from analyses.estimation.least_squares import solve, told_apart
 from analyses.estimation.parameters import parameter
 from analyses.identification.rows import motion_of, recipe_for
 from analyses.records.differentiation import central_difference
-from analyses.records.prepare import period_of
-from analyses.records.record import Record
+from analyses.records.record import Record, period_of
 
 NAMES = ("resistance", "back_emf", "inductance", "voltage_offset")
 SHOWN = 5.0
@@ -36,15 +35,10 @@ def fit_electrical(
 ) -> ElectricalFit:
     """Fit the voltage equation to records of voltage, current and motion.
 
-    All signals pass the same filter without phase. The recorded voltage is the drive's own, which acts later
-    by the design's computing delay and half a tick; what this shift does to the values is an error of theirs.
-    The inductance is kept out where it is not five times its standard error: a record sampled too slowly, or
-    too calm, does not show it, and none is invented.
-
-    Raises
-    ------
-    InputError
-        If a record lacks a signal, or R and kE cannot be told apart.
+    All signals pass the same filter without phase. The recorded voltage is the drive's own, which acts
+    later by the design's computing delay and half a tick; what this shift does to the values is an error of
+    theirs. The inductance is kept out where it is not five times its standard error: a record sampled too
+    slowly, or too calm, does not show it, and none is invented.
     """
     control = design.controller
     late = control.computing_delay_s + 0.5 * control.period_s
@@ -103,13 +97,7 @@ def _rows(design: Design, record: Record, late_s: float) -> FloatArray:
 
 
 def electrical_values(design: Design, fit: ElectricalFit) -> Fit:
-    """R, kE, L where it is shown, and kM with kE: one constant of one motor, correlated at 1.
-
-    Raises
-    ------
-    InputError
-        For a motor given by AC constants, or an ideal source.
-    """
+    """R, kE, L where it is shown, and kM with kE: one constant of one motor, correlated at 1."""
     motor = design.motor
     if motor.constants != "dc" or motor.torque_constant_Nm_A is None:
         raise InputError('the voltage equation is identified for motors with "dc" constants', design.name)

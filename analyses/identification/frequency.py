@@ -23,17 +23,9 @@ EXCITED = 25.0
 class Lines:
     """Spectral lines of several signals at the excited frequencies.
 
-    Attributes
-    ----------
-    omega_rad_s : array, shape (lines,)
-    means : array, shape (signals, lines)
-        Complex amplitudes, the mean over all periods.
-    noise : array, shape (lines, signals, signals)
-        Covariance of these means, from the spectrum beside each line.
-    freedom : int
-        Degrees of freedom (complex) of that covariance.
-    names : tuple of str
-    periods : int
+    ``means`` are complex amplitudes over all periods, shape (signals, lines); ``noise`` is their
+    covariance, shape (lines, signals, signals), from the spectrum beside each line, with ``freedom``
+    (complex) degrees.
     """
 
     omega_rad_s: FloatArray
@@ -45,24 +37,13 @@ class Lines:
 
 
 def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Lines:
-    """The lines of a periodic excitation.
+    """The lines of a periodic excitation; the first signal shows which of them are excited.
 
-    A signal that drifts (an angle under a mean speed) loses the straight line of its mean rate first. The
-    noise of a line is what the spectrum of the whole record holds beside it, where a periodic signal has
-    nothing. (The scatter between periods would be too large: what a motion that is not periodic leaves at the
-    ends of one period comes back at the start of the next with the opposite sign, and goes out of the mean.)
-
-    Parameters
-    ----------
-    names : tuple of str
-        Signals; the first is the one that shows which lines are excited.
-    period_s : float
-        Period of the excitation; a whole number of samples. The first is left out, for the transient.
-
-    Raises
-    ------
-    InputError
-        If the period is no whole number of samples, too few periods are there, or nothing is excited.
+    The period is a whole number of samples; the first one is left out, for the transient. A signal that
+    drifts (an angle under a mean speed) loses the straight line of its mean rate first. The noise of a line
+    is what the spectrum of the whole record holds beside it, where a periodic signal has nothing. (The
+    scatter between periods would be too large: what a motion that is not periodic leaves at the ends of one
+    period comes back at the start of the next with the opposite sign, and goes out of the mean.)
     """
     samples = round(period_s / record.period_s)
     if samples < 8 or abs(samples * record.period_s - period_s) > 1e-3 * record.period_s:
@@ -129,13 +110,7 @@ def response(lines: Lines, output: str, by: str) -> tuple[ComplexArray, FloatArr
 
 
 def period_of_excitation(record: Record, name: str) -> float:
-    """The period with which a recorded command repeats itself.
-
-    Raises
-    ------
-    InputError
-        If it does not repeat itself at least five times.
-    """
+    """The period with which a recorded command repeats itself, five times or more."""
 
     values = record[name] - np.polyval(np.polyfit(record.time_s, record[name], 1), record.time_s)
     n = len(values)

@@ -39,8 +39,7 @@ from analyses.identification.verdict import RESIDUAL_LIMIT, Identified, Item, in
 from analyses.records.consistency import Finding, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
-from analyses.records.prepare import prepared
-from analyses.records.record import Record
+from analyses.records.record import Record, prepared
 
 MISFIT_LIMIT = 3.0
 MISFIT_DOUBTED = 1.5
@@ -87,25 +86,11 @@ def identify_frequency(
 ) -> FrequencyResult:
     """Identify a compliant two-mass drive.
 
-    Parameters
-    ----------
-    design : Design
-        Rotary; its coupling (or, without one, its last gear) is where the compliance is. Its inertias beside
-        the rotor's and the load's are kept.
-    record : Record
-        Of a periodic excitation: current (or force) and motor angle; the output angle too where there is one.
-        With play it must be under a torque that keeps one flank.
-    play_record : Record, optional
-        Of a torque that reverses, with the angles of both sides.
-    period_s : float, optional
-        Of the excitation; found from the command otherwise.
-    fixed : mapping, optional
-        Values by key of the design that are held.
-
-    Raises
-    ------
-    InputError
-        If a signal is missing, nothing is periodic, or no design can be made of the result.
+    The design's coupling (or, without one, its last gear) is where the compliance is; its inertias beside
+    the rotor's and the load's are kept. ``record`` is of a periodic excitation: current and motor angle,
+    the output angle too where there is one; with play, under a torque that keeps one flank. ``play_record``
+    is of a torque that reverses, with the angles of both sides. ``period_s`` is found from the command
+    otherwise.
     """
     record = prepared(record)
     play_record = None if play_record is None else prepared(play_record)

@@ -40,25 +40,11 @@ def fit_records(
 ) -> JointModel:
     """Fit one inverse dynamic model to all records.
 
-    Each record counts with the inverse of its own residual variance. What the records do not tell apart is
-    kept at the design's value, and said.
-
-    Parameters
-    ----------
-    design : Design
-        Its constants make torques of currents or voltages; its values are kept for what is not told.
-    records : sequence of Record
-    form : {"symmetric", "per-direction"}
-    recipe : Recipe, optional
-        Filtering, skipping, decimation; by default that of each record's own period.
-    fixed : mapping, optional
-        Parameters held at a value (by the names of the model).
-    gravity : bool
-        Whether a moment ``m g l sin(output angle + offset)`` is to be found.
-    knots_rad_s : sequence of float, optional
-        Speeds (from 0) of a friction map in the place of dry and viscous friction.
-    weights : sequence of float, optional
-        Of the records; by default each counts with the inverse of its own residual.
+    Each record counts with the inverse of its own residual variance, or by its ``weights``. What the records
+    do not tell apart is kept at the design's value, and said; the design's constants make torques of currents
+    or voltages. ``fixed`` holds values by the names of the model, ``gravity`` looks for a moment ``m g l
+    sin(output angle + offset)``, ``knots_rad_s`` (from 0) are speeds of a friction map in the place of dry
+    and viscous friction. The recipe is by default that of each record's own period.
 
     Raises
     ------
@@ -119,13 +105,18 @@ def _fitted(
     if negative:
         again = {name: default_value(design, name) for name in negative}
         model = _fitted(design, blocks, form, {**held, **again}, given)
-        said = {
-            name: Fixed(
-                value=again[name], reason="would come out negative: not determined, the design's value kept"
+        others = w[:, [names.index(name) for name in model.names]]
+        said: dict[str, Fixed] = {}
+        for name, kept_at in again.items():
+            moves = np.linalg.lstsq(others, w[:, names.index(name)], rcond=None)[0]
+            said[name] = Fixed(
+                value=kept_at,
+                reason="would come out negative: not determined, the design's value kept",
+                moves=dict(zip(model.names, moves.tolist(), strict=True)),
+                std=abs(kept_at - float(solution.values[free.index(name)])),
             )
-            for name in negative
-        }
-        return replace(model, fixed={**model.fixed, **said})
+        covariance = model.covariance + _of_fixed(design, model.names, said)
+        return replace(model, fixed={**model.fixed, **said}, covariance=covariance)
     return _model(design, blocks, free, fixed, form, solution, weights)
 
 
@@ -135,11 +126,12 @@ def _kept(one: NotTold) -> str:
 
 
 def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed]) -> FloatArray:
-    """What the design's own tolerances of the values kept add to the covariance of those that were found."""
+    """What the errors of the values kept add to the covariance of those that were found."""
     added = np.zeros((len(free), len(free)))
     for name, one in fixed.items():
         moves = np.array([one.moves.get(other, 0.0) for other in free])
-        added += own_std(design, parameter(name).key) ** 2 * np.outer(moves, moves)
+        variance = own_std(design, parameter(name).key) ** 2 + one.std**2
+        added += variance * np.outer(moves, moves)
     return added
 
 

@@ -133,21 +133,11 @@ class JointModel(Fit):
     and, where there are such, ``+ load_coefficient |M| sign(velocity) - M / N``; in SI at the motor. With
     ``knots_rad_s`` the torques ``map_k`` at these speeds take the place of viscous and dry.
 
-    Attributes
-    ----------
-    white_errors : array
-        As if the residual were white, as published for EMPS.
-    covariance : array
-        With the correlation of the residual in time, and with the scatter between records where there are
-        several; ``between`` is that scatter alone, by name, as a standard deviation of one record.
-    relative_residual : float
-        Norm of the residual over norm of the drive signal, after decimation, all records.
-    weights : tuple of float
-        Of the records.
-    alone : tuple of Fit
-        Each record fitted alone, where there are several.
-    bias : mapping
-        What was taken off each value as the fit's own bias; ``bias_told`` says how, or why not.
+    ``white_errors`` are those as if the residual were white, as published for EMPS; ``covariance`` holds its
+    correlation in time, and the scatter between records where there are several, which ``between`` has alone
+    (by name, a standard deviation of one record). ``relative_residual``: norm of the residual over that of
+    the drive signal, after decimation. ``alone`` are the records fitted one by one; ``bias`` was taken
+    off each value as the fit's own, ``bias_told`` says how, or why not.
     """
 
     form: FrictionForm
@@ -162,6 +152,14 @@ class JointModel(Fit):
     weights: tuple[float, ...] = ()
     bias: Mapping[str, float] = field(default_factory=dict)
     bias_told: str = ""
+
+    def turned(self, w: FloatArray, names: Sequence[str]) -> FloatArray:
+        """What turns with the direction of the motion, of rows by ``names``.
+
+        A drive that stands still turns its friction at no time that the motion tells.
+        """
+        dry = [k for k, name in enumerate(names) if name.startswith(("dry", "map_", "load_coefficient"))]
+        return np.asarray(w[:, dry] @ np.array([self[names[k]] for k in dry]))
 
     @property
     def residual(self) -> FloatArray:

@@ -37,22 +37,13 @@ class TwoSides:
 def two_sides(
     design: Design, record: Record, place: str, motion: Motion, moment: FloatArray, recipe: Recipe
 ) -> TwoSides:
-    """Motor's and load's motion of a record.
+    """Motor's and load's motion of a record, from the motion at the motor as if the coupling were rigid.
 
-    The load turns back at another instant than the motor: its friction and inertia act by its own speed. That
-    is taken from the output's encoder where one is recorded whose noise is small; else the load follows from
-    the motor's motion and the design's coupling, ``J_l dW/dt = k (th/N_c - phi) + c (w/N_c - W) - T_f,load +
-    M/N_r``. Where the output alone is recorded, the motor's motion is that and the twist. Play is in what is
-    recorded only.
-
-    Parameters
-    ----------
-    place : str
-        The signal that ``motion`` comes from.
-    motion : Motion
-        At the motor shaft, as if the coupling were rigid.
-    moment : array
-        At the output, by the design and the record.
+    The load turns back at another instant than the motor: its friction and inertia act by its own speed.
+    That is taken from the output's encoder where one is recorded whose noise is small; else the load
+    follows from the motor's motion and the design's coupling, ``J_l dW/dt = k (th/N_c - phi) + c (w/N_c -
+    W) - T_f,load + M/N_r``. Where the output alone is recorded, the motor's motion is that and the twist.
+    Play is in what is recorded only. ``moment`` is that at the output, ``place`` the signal of the motion.
     """
     behind = design.ratio_behind_coupling
     if place in ("output_angle", "position", "velocity"):

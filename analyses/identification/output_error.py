@@ -60,13 +60,6 @@ def fit_output(
 
     Least squares by a dogleg in a box (scipy), from the design's own values; the derivative is by central
     differences of 0.1 % of each value.
-
-    Raises
-    ------
-    InputError
-        For outputs of different shape, or a starting value of zero without a scale.
-    NumericalError
-        If the output does not depend on a parameter.
     """
     start = np.array([parameter_value(design, path) for path in paths])
     scale = np.array([_scale(design, path, value) for path, value in zip(paths, start, strict=True)])
@@ -122,19 +115,9 @@ def refine_by_output_error(
     ends: Sequence[int] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> OutputErrorResult:
-    """Refine parameters so that the simulated output fits the measured one, as `fit_output`.
+    """Refine values by key so that the simulated output fits the measured one, as `fit_output`.
 
-    Parameters
-    ----------
-    design : Design
-        Holds the starting values (an inverse-model estimate).
-    paths : tuple of str
-        Dotted keys to refine.
-    simulate_output : callable
-        Gives the output for a design, sampled as ``measured``; see `analyses.correlation.closed_loop`.
-    measured : array, shape (n,)
-    ends : sequence of int, optional
-        Where each record ends in it.
+    ``ends`` tell where each record ends in it.
     """
     found = fit_output(design, paths, simulate_output, measured, progress)
     norm = float(np.linalg.norm(measured))

@@ -17,10 +17,10 @@ from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of
 from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit, default_value
+from analyses.identification.resimulation import simulated_part
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
 from analyses.records.record import Record
 
-MOST_TICKS = 2_000_000
 LARGEST_BIAS = 0.2
 COMMAND_ROUNDS = 6
 ROUNDS = 3
@@ -39,25 +39,12 @@ def without_bias(
 
     Sampling between the controller's ticks, filtered speeds at reversals, play and rest are met by the
     simulated records as by the measured ones; what the fit makes of them is known there (bias correction by
-    indirect inference; Gourieroux, Monfort, Renault, 1993). It is taken off, and found again with the design
-    that then comes of it. What the simulated records leave of a residual has no chance in it: the errors are
-    those of the difference of the two residuals, with its own autocorrelation. A record without a command is
-    simulated with one that moves the drive as recorded; of a long one the first part is. That of the EMPS
-    benchmark, with published figures, is left as it is.
-
-    Parameters
-    ----------
-    start : Design
-        That the model was fitted with.
-    make : callable
-        The design that comes of a model; it is simulated.
-    recipe : Recipe or None
-        Of the fit.
-
-    Returns
-    -------
-    JointModel, tuple of Record
-        With the records as they were simulated; none where they could not be.
+    indirect inference; Gourieroux, Monfort, Renault, 1993). It is taken off, and found again with the
+    design that then comes of it. What the simulated records leave of a residual has no chance in it: the
+    errors are those of the difference of the two residuals, with its own autocorrelation. A record without
+    a command is simulated with one that moves the drive as recorded; of a long one the first part is. That
+    of the EMPS benchmark, with published figures, is left as it is. ``make`` gives the design that comes of
+    a model. With the model go the records as they were simulated; none where they could not be.
     """
     less = model
     simulated: tuple[Record, ...] = ()
@@ -94,15 +81,18 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     bias = np.array([found.get(name, 0.0) for name in model.names])
     wild = [n for n, b, s in zip(model.names, bias, _sizes(model), strict=True) if abs(b) > LARGEST_BIAS * s]
     if wild:
-        told = f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}"
-        return replace(model, bias_told=told)
+        told = (
+            f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}; the intervals hold it"
+        )
+        return replace(model, bias_told=told, covariance=model.covariance + np.outer(bias, bias))
     parts = tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
     blocks = [(g * part.w, g * part.noise) for g, part in zip(model.weights, parts, strict=True)]
+    moved = _by_direction(model, again)
     singles = zip(model.alone, again.alone, blocks, strict=False)
     less = replace(
         model,
         values=model.values - bias,
-        covariance=covariance_of(blocks),
+        covariance=covariance_of(blocks) + np.outer(moved, moved),
         records=parts,
         alone=tuple(_alone(*each, made, model) for each in singles),
         bias={name: float(b) for name, b in zip(model.names, bias, strict=True)},
@@ -120,6 +110,19 @@ def _with_noise(measured: RecordFit, simulated: RecordFit) -> RecordFit:
     own, model = (picked(part.own_residual, part.keep, both) for part in (measured, simulated))
     compared = np.concatenate([both, np.zeros(len(measured.keep) - count, dtype=bool)])[measured.keep]
     return replace(measured, noise=own - model, compared=compared)
+
+
+def _by_direction(model: JointModel, again: JointModel) -> FloatArray:
+    """What the values move by where the simulated records turn back at other instants than the measured."""
+    tables, turned = [], []
+    for weight, own, other in zip(model.weights, model.records, again.records, strict=True):
+        both = own.keep[: len(other.keep)] & other.keep[: len(own.keep)]
+        w, like = (picked(part.w, part.keep, both) for part in (own, other))
+        tables.append(weight * w)
+        turned.append(weight * (model.turned(w, model.names) - model.turned(like, again.names)))
+    table = np.concatenate(tables)
+    size = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
+    return np.asarray(np.linalg.lstsq(table / size, np.concatenate(turned), rcond=None)[0] / size)
 
 
 def _alone(
@@ -146,7 +149,7 @@ def _cannot(design: Design, records: Sequence[Record]) -> str:
 
 def _driven(design: Design, record: Record) -> Record:
     """The record, or its first part; without a command it gets one that moves the drive as recorded."""
-    record = record.slice(0, max(int(MOST_TICKS * design.controller.period_s / record.period_s), 2))
+    record = simulated_part(design, record)
     if command_of(design, record) is not None:
         return record
     name = "position_reference" if design.axis == "linear" else "reference"

@@ -82,22 +82,10 @@ def plan_motions(
     """Choose motions, one after the other, until every interval is expected to be as small as asked.
 
     The next one is that which lowers the sum of the squared intervals, each over what was asked, most
-    (A-optimal). Intervals follow from the rows that a fit makes of the simulated motion, and from noise that
-    went the same way: the covariance is the fit's own.
-
-    Parameters
-    ----------
-    within : float
-        Half of each 95 % interval, over the value.
-    noise : float
-        White, of the recorded current (V: voltage, of a drive without one) at 1 kHz, rms.
-    measured : JointModel, optional
-        What records tell that are there already; the plan adds to it.
-
-    Raises
-    ------
-    InputError
-        For a drive without a position loop, or without noise: any motion then tells everything.
+    (A-optimal). Intervals follow from the rows that a fit makes of the simulated motion, and from noise
+    that went the same way: the covariance is the fit's own. ``within`` is half of each 95 % interval, over
+    the value; ``noise`` is white, of the recorded current (V: voltage, of a drive without one) at 1 kHz,
+    rms; ``measured`` is what records tell that are there already.
     """
     if design.controller.position is None:
         raise InputError("a plan of motions needs a position loop", where=design.name)

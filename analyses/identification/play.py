@@ -64,22 +64,14 @@ def find_play(
         Motor angle over the reduction, less the load's angle.
     inertial_Nm : array, shape (n,)
         What the load's inertia (less its outer load and the coupling's damping) needs.
-    load_speed_rad_s : array, shape (n,)
     stiffness_Nm_rad : float
         From a frequency response on one flank.
     viscous_Nms_rad : float
         First value of the load's viscous friction.
     guard_samples : int
         Rows left out on both sides of a loss of contact: what a filter smears over it.
-    resolution_rad : float
-        Of the twist.
     smooth_samples : float
         Rows worth one independent one after filtering.
-
-    Raises
-    ------
-    InputError
-        If the torque does not reverse, or too few rows are in contact.
     """
     k = stiffness_Nm_rad
     friction = np.column_stack([load_speed_rad_s, np.sign(load_speed_rad_s)])

@@ -1,4 +1,4 @@
-"""The design as it was written, read again and held against the records or the campaign that it came from."""
+"""Records simulated: the signal that tells most, refinement by it, and the design as written against it."""
 
 from __future__ import annotations
 
@@ -8,19 +8,69 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, NumericalError
-from analyses.correlation.closed_loop import correlate_record
+from actuator_lti.errors import InputError
+from analyses.correlation.closed_loop import correlate_record, measured_signals, model_signals
+from analyses.correlation.driving import command_of
+from analyses.estimation.arrays import FloatArray
 from analyses.identification.joint_model import FrictionForm, default_value
-from analyses.identification.points import SteadyPoint
-from analyses.identification.refinement import has_command, output_name
+from analyses.identification.output_error import OutputErrorResult, refine_by_output_error
 from analyses.identification.rows import record_rows
 from analyses.records.record import Record
 
+DRIVE_SIGNALS = ("force", "current", "voltage")
+MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")
+
+
+def output_name(design: Design, record: Record) -> str:
+    """The signal that says most about the drive: the drive signal of a closed loop, else the motion.
+
+    Under a command of the position or the speed the loop holds the motion, and the drive signal tells; a
+    commanded current or voltage is held itself, and the motion tells.
+    """
+    command = command_of(design, record)
+    if command is None:
+        raise InputError("no command: a refinement by simulation needs it", where=record.name)
+    there = measured_signals(design, record)
+    closed = command.stage not in ("current", "voltage")
+    order = (*DRIVE_SIGNALS, *MOTION_SIGNALS) if closed else (*MOTION_SIGNALS, *DRIVE_SIGNALS)
+    for name in order:
+        if name in there and np.any(there[name]):
+            return name
+    raise InputError("nothing recorded that a simulation could be fitted to", where=record.name)
+
+
+def refine_records(
+    design: Design,
+    records: Sequence[Record],
+    paths: tuple[str, ...],
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> OutputErrorResult:
+    """Refine values by simulating every record with its own command, load and supply.
+
+    Each record's output is divided by its size, so that all count alike.
+    """
+    names = [output_name(design, record) for record in records]
+    measured = [measured_signals(design, record, derive=True) for record in records]
+    sizes = [_size(one[name]) for one, name in zip(measured, names, strict=True)]
+    wanted = [one[name] / size for one, name, size in zip(measured, names, sizes, strict=True)]
+
+    def output(tried: Design) -> FloatArray:
+        parts = [
+            model_signals(tried, record, one)[0][name] / size
+            for record, one, name, size in zip(records, measured, names, sizes, strict=True)
+        ]
+        return np.concatenate(parts)
+
+    ends = np.cumsum([len(one) for one in wanted]).tolist()
+    return refine_by_output_error(design, paths, output, np.concatenate(wanted), ends=ends, progress=progress)
+
+
+def _size(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
 MOST_TICKS = 2_000_000
-RUN_UP_S = 0.3
-STEADY_S = 0.2
-SPEED_REACHED = 0.01
-MOST_CAMPAIGN_TICKS = 200_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +93,7 @@ def resimulate(design: Design, records: Sequence[Record], form: FrictionForm) ->
 
 
 def _one(design: Design, record: Record, form: FrictionForm) -> Resimulated:
-    if not has_command(design, record):
+    if command_of(design, record) is None:
         return _needed(design, record, form)
     try:
         return _simulated(design, record)
@@ -52,11 +102,17 @@ def _one(design: Design, record: Record, form: FrictionForm) -> Resimulated:
         return replace(result, how=f"{result.how} ({error.message})")
 
 
+def simulated_part(design: Design, record: Record) -> Record:
+    """The record; of a long one the first part."""
+    return record.slice(0, max(int(MOST_TICKS * design.controller.period_s / record.period_s), 2))
+
+
 def _simulated(design: Design, record: Record) -> Resimulated:
     name = output_name(design, record)
-    rows = int(MOST_TICKS * design.controller.period_s / record.period_s)
-    part = record if len(record) <= rows else record.slice(0, max(rows, 2))
-    how = f"{name}, simulated" if part is record else f"{name}, its first {len(part)} rows simulated"
+    part = simulated_part(design, record)
+    how = (
+        f"{name}, simulated" if len(part) == len(record) else f"{name}, its first {len(part)} rows simulated"
+    )
     result = correlate_record(design, part)[name]
     return Resimulated(record=record.name, signal=name, relative_error=result.relative_error, how=how)
 
@@ -70,38 +126,3 @@ def _needed(design: Design, record: Record, form: FrictionForm) -> Resimulated:
     return Resimulated(
         record=record.name, signal="drive", relative_error=error, how="torque needed for its motion"
     )
-
-
-def steady_current_error(
-    design: Design, points: Sequence[SteadyPoint], *, progress: Callable[[int, int], None] | None = None
-) -> float | None:
-    """Relative error of the simulated steady torques kM i over all runs; None where no run can be driven.
-
-    Each run is a ramp of the output angle at the run's mean speed under its mean load, 0.3 s for running up
-    and 0.2 s for the mean. Runs that the simulated drive does not bring to within 1 % of their speed are left
-    out.
-    """
-    from nonlinear import commands, simulate
-
-    constant = design.effective_motor.torque_constant_Nm_A
-    duration = RUN_UP_S + STEADY_S
-    period = design.controller.period_s
-    if constant is None or duration / period > MOST_CAMPAIGN_TICKS:
-        return None
-    wanted, result = [], []
-    for k, point in enumerate(points, 1):
-        command = commands.ramp(point.direction * point.speed_rad_s / design.total_ratio)
-        try:
-            run = simulate(design, command, duration, point.load_Nm)
-        except (InputError, NumericalError):
-            continue
-        late = run.time_s >= RUN_UP_S
-        speed = point.direction * float(np.mean(run.motor_speed_rad_s[late]))
-        if abs(speed - point.speed_rad_s) <= SPEED_REACHED * point.speed_rad_s:
-            wanted.append(point.torque_Nm)
-            result.append(point.direction * constant * float(np.mean(run.current_A[late])))
-        if progress is not None:
-            progress(k, len(points))
-    if not wanted:
-        return None
-    return float(np.linalg.norm(np.subtract(result, wanted)) / np.linalg.norm(wanted))

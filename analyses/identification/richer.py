@@ -9,7 +9,7 @@ from math import nan
 import numpy as np
 
 from analyses.estimation.arrays import BoolArray, FloatArray, IntArray
-from analyses.identification.outliers import with_shared
+from analyses.identification.shared_errors import with_shared
 from analyses.identification.surface_fit import SurfaceFit
 
 Terms = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]

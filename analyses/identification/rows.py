@@ -23,8 +23,7 @@ from analyses.identification.load_side import TwoSides, two_sides
 from analyses.identification.sampled_current import mean_current
 from analyses.records.consistency import place_of
 from analyses.records.differentiation import Motion, decimated
-from analyses.records.prepare import period_of, prepared
-from analyses.records.record import Record
+from analyses.records.record import Record, period_of, prepared
 
 REST_SHARE = 0.005
 REST_TIME_S = 0.03
@@ -83,14 +82,7 @@ def is_loaded(record: Record) -> bool:
 
 
 def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool]:
-    """The drive torque (force) of a record: values, signal, in words, and whether kE w is still to be taken
-    off.
-
-    Raises
-    ------
-    InputError
-        If the record holds no drive signal that the design makes a torque of.
-    """
+    """The drive torque (force) of a record: values, signal, words, and whether kE w is still to come off."""
     motor, signals = record.drive(design).effective_motor, record.signals
     constant, gain, ohm = motor.torque_constant_Nm_A, motor.source_gain_Nm_V, motor.resistance_ohm
     if "force" in signals and design.axis == "linear":
@@ -180,18 +172,11 @@ def record_rows(
     moment: FloatArray | None = None,
     knots_rad_s: Sequence[float] | None = None,
 ) -> Rows:
-    """Make the rows of one record.
+    """Make the rows of one record, less what its own settings add (an inertia at the output).
 
-    What the record's own settings add (an inertia at the output) is taken off the drive torque.
-
-    Parameters
-    ----------
-    gravity : bool
-        Adds columns for a moment ``a sin(phi) + b cos(phi)`` at the output.
-    knots_rad_s : sequence of float, optional
-        Speeds of a friction map, which takes the place of the form's dry and viscous friction.
-    moment : array, optional
-        That moment after decimation, as found so far, for the load's share of the friction.
+    ``gravity`` adds columns for a moment ``a sin(phi) + b cos(phi)`` at the output; ``moment`` is that
+    moment after decimation as found so far, for the load's share of the friction. Speeds of a friction map
+    take the place of the form's dry and viscous friction.
     """
     record, shared = prepared(record), design
     design = record.drive(shared)

@@ -11,17 +11,22 @@ from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
 from analyses.identification.asked import Asked, fixed_values, held_by_name
 from analyses.identification.bench import BenchResult, identify_bench
-from analyses.identification.campaign import CampaignResult, campaign_items, identify_campaign
+from analyses.identification.campaign import (
+    CampaignResult,
+    campaign_items,
+    identify_campaign,
+    steady_current_error,
+)
 from analyses.identification.campaign_design import CampaignSuggestion, suggest_runs
-from analyses.identification.contributions import Contribution, contributions
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
 from analyses.identification.measured_response import ResponseResult, identify_response
 from analyses.identification.plan import Plan, plan_motions
-from analyses.identification.resimulation import steady_current_error
-from analyses.identification.surface_fit import NAMES
+from analyses.identification.surface_fit import NAMES, Contribution, contributions
 from analyses.identification.to_design import design_with_fit, with_fixed
 from analyses.identification.verdict import Identified
-from analyses.records import import_campaign, load_campaign, open_record, open_records
+from analyses.records.campaign_file import load_campaign
+from analyses.records.campaign_import import import_campaign
+from analyses.records.open_record import open_record, open_records
 from analyses.records.record import Record, named_apart
 
 Progress = Callable[[int, int], None]
@@ -41,13 +46,7 @@ class CampaignAnswer(Identified):
 def identify(
     design: Design, asked: Asked, *, progress: Progress | None = None
 ) -> BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan:
-    """Identify a drive from its records, and hold the design that comes of it against them.
-
-    Raises
-    ------
-    InputError
-        Where a file cannot be read, or no design can be made of it.
-    """
+    """Identify a drive from its records, and hold the design that comes of it against them."""
     if asked.plan:
         return _planned(design, asked, progress)
     of = (

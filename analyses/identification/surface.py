@@ -11,10 +11,15 @@ from actuator_lti.errors import InputError, NumericalError
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fixed
 from analyses.estimation.least_squares import told_apart
-from analyses.identification.outliers import find_outliers
-from analyses.identification.points import SteadyPoint
+from analyses.identification.shared_errors import (
+    SharedError,
+    effects_of,
+    find_outliers,
+    half_widths,
+    shared_errors,
+)
+from analyses.identification.steady import SteadyPoint
 from analyses.identification.surface_fit import NAMES, Outlier, SurfaceFit
-from analyses.identification.systematic import SharedError, effects_of, half_widths, shared_errors
 from analyses.records.campaign_file import Instruments
 
 ITERATIONS = 6
@@ -31,32 +36,12 @@ def fit_surface(
 ) -> SurfaceFit:
     """Fit the surface by generalised least squares with errors in all variables.
 
-    The weight of a run comes from the covariance of its means of torque, speed and load, moved to the torque
-    by the slopes of the surface (effective variance, iterated), plus the scatter between runs where they do
-    not agree within their noise (Mandel and Paule). The shared errors of the instruments enter the covariance
-    as they act: on all runs together.
-
-    Parameters
-    ----------
-    points : sequence of SteadyPoint
-        At least five.
-    instruments : Instruments
-        Bounds of the shared errors.
-    torque_constant_Nm_A : float
-        The kM that made the torques.
-    outliers : {"keep", "set-aside"}
-        Whether runs that are named as outliers stay in the fit.
-    fixed : mapping, optional
-        Coefficients that are held at a value, by name.
-    kept : mapping, optional
-        Values that those coefficients keep which the runs do not tell apart; without it that is an error.
-
-    Raises
-    ------
-    InputError
-        Too few runs.
-    NumericalError
-        The runs do not tell the coefficients apart.
+    The weight of a run comes from the covariance of its means of torque, speed and load, moved to the
+    torque by the slopes of the surface (effective variance, iterated), plus the scatter between runs where
+    they do not agree within their noise (Mandel and Paule). The shared errors of the instruments enter the
+    covariance as they act: on all runs together. ``torque_constant_Nm_A`` made the torques; ``fixed``
+    coefficients are held, ``kept`` are values that those keep which the runs do not tell apart (without
+    them: an error).
     """
     used = tuple(points)
     held = _held(used, dict(fixed or {}), kept)

@@ -36,11 +36,6 @@ def joint_values(design: Design, model: JointModel, *, inertia_to: str = INERTIA
 
     The model's inertia is all of it, at the motor. ``inertia_to`` gets what the design's other inertias
     leave of it: ``motor.rotor_inertia``, or ``load.inertia`` (at the output shaft).
-
-    Raises
-    ------
-    InputError
-        If the design's other inertias alone exceed the identified one.
     """
     slopes: dict[str, dict[str, float]] = {}
     values: dict[str, float] = {}
@@ -112,30 +107,11 @@ def with_fixed(design: Design, asked: Mapping[str, float]) -> Design:
     return with_values(design, dict(asked)) if asked else design
 
 
-def design_with_fit(design: Design, fit: Fit, source: str, grade: str = "D") -> Design:
+def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
     """A design with identified values, normal tolerances of their standard errors, and correlations.
 
     Margins and Monte Carlo then inherit them. Correlations below 0.005 are left out; old ones between the
     same keys are replaced.
-
-    Parameters
-    ----------
-    design : Design
-        Everything else comes from it.
-    fit : Fit
-        By keys of the design.
-    source, grade : str
-        Of these values.
-
-    Returns
-    -------
-    Design
-        ``write_design`` makes a file of it.
-
-    Raises
-    ------
-    InputError
-        For a value that no drive can have: the record does not tell that parameter.
     """
     values = {p: _short(float(v)) for p, v in zip(fit.names, fit.values, strict=True)}
     if "friction.viscous_reverse" in fit.names and design.friction.offset_torque_Nm:
@@ -153,7 +129,7 @@ def design_with_fit(design: Design, fit: Fit, source: str, grade: str = "D") -> 
     parameters = dict(changed.parameters)
     for path, std in zip(fit.names, fit.standard_errors, strict=True):
         tolerance = _tolerance(path, parameters[path].value, _short(float(std)))
-        parameters[path] = replace(parameters[path], source=source, grade=grade, tolerance=tolerance)
+        parameters[path] = replace(parameters[path], source=source, grade="D", tolerance=tolerance)
     kept = [c for c in design.correlations if not {c.first, c.second} <= set(fit.names)]
     return replace(
         changed,

@@ -88,27 +88,9 @@ def fit_two_mass(
 
     Each line's residual ``th - G torque`` is divided by its own standard deviation, which the spectrum
     beside it gives (errors in variables; Pintelon and Schoukens, System Identification, 2nd ed., section
-    9.11).
-
-    Parameters
-    ----------
-    lines : Lines
-        Of the motor torque, the motor angle and, where recorded, the load's angle.
-    start : mapping
-        Starting values by the names of ``NAMES``.
-    reduction : float
-        N_c, up to the coupling.
-    fixed : mapping, optional
-        Parameters that are held.
-    reaction : float, optional
-        Torque on the motor by that in the coupling; 1/N_c by default.
-
-    Raises
-    ------
-    InputError
-        For a start that is not positive.
-    NumericalError
-        If the fit does not converge or the lines do not tell a parameter.
+    9.11). The lines are of the motor torque, the motor angle and, where recorded, the load's angle;
+    ``start`` has the names of ``NAMES``, ``reduction`` is N_c, up to the coupling, ``reaction`` the torque
+    on the motor by that in the coupling, 1/N_c by default.
     """
     from scipy.optimize import least_squares
 
@@ -198,14 +180,12 @@ def _whitened(
     return np.asarray(np.linalg.solve(root, rest[:, :, None])[:, :, 0].ravel())
 
 
-def start_of(
-    lines: Lines, reduction: float, *, torque: str = "torque", motor: str = "angle"
-) -> dict[str, float]:
+def start_of(lines: Lines, reduction: float, *, torque: str = "torque") -> dict[str, float]:
     """Starting values from the response itself: its lowest and highest part, its valley and its peak.
 
     Below the antiresonance the whole inertia moves, above the resonance the motor's alone.
     """
-    k, j = lines.names.index(motor), lines.names.index(torque)
+    k, j = lines.names.index("angle"), lines.names.index(torque)
     inertia = np.abs(lines.means[j] / (lines.omega_rad_s**2 * lines.means[k]))
     order = np.argsort(lines.omega_rad_s)
     inertia, omega = inertia[order], lines.omega_rad_s[order]

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.stats import chi2
 
 from actuator_lti.design.model import Design
 from analyses.estimation.fit import Fit
-from analyses.estimation.parameters import parameter
-from analyses.identification.design_values import DesignValue, cause, told
-from analyses.records.consistency import Finding
+from analyses.estimation.parameters import UNSTATED, own_std, parameter
+from analyses.identification.design_values import NO_CHANCE, DesignValue, cause, told
+from analyses.identification.simultaneous import Followed
+from analyses.records.consistency import RATE_TOLERANCE, Finding
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
 
@@ -21,8 +23,6 @@ LARGEST_FACTOR = 3.0
 MOST_DRY_UNLOADED = 2.0
 """Dry friction over the design's, where a load adds to it and none is recorded."""
 LARGEST_OF_ANY = 10.0
-COMMON = ("inertia", "dry", "viscous")
-"""Values that a wrong scale of the drive signal moves alike."""
 LARGEST_LINE_ERROR = 0.5
 ROWS_EACH = 10
 HELD_OUT_FACTOR = 1.5
@@ -139,65 +139,58 @@ def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: 
     ``kept_constants``: torques are the current times the design's own constant; ``loaded``: a record holds
     the load.
     """
-    ratios = {one.name: one.ratio for one in values if one.name.partition("_")[0] in COMMON}
-    made = sizes_item(ratios, {design.total_ratio: f"the reduction {design.total_ratio:g}"}, "inertia")
     explained = cause(values)
-    reasons = ["" if explained is None else told(*explained), made.reason]
-    if "all identified" in made.reason:
-        reasons.reverse()
+    reasons = [told(*explained)] if explained else []
     feels = design.friction.load_coefficient > 0.0 and not loaded
-    most_dry = MOST_DRY_UNLOADED if feels else LARGEST_FACTOR
     for one in values:
-        label = parameter(one.name, design.axis).label
-        off = f"{label} is {one.ratio:.3g} times the design's"
-        if one.name.partition("_")[0] == "back" and kept_constants and not one.agrees:
-            reasons.append(
-                f"{off}, so kM and all torques are as far off: --electrical takes it from the record"
-            )
-        elif not 1.0 / LARGEST_OF_ANY <= one.ratio <= LARGEST_OF_ANY and not one.agrees:
-            factor = named_factor(one.ratio)
+        kind = one.name.partition("_")[0]
+        off = f"{parameter(one.name, design.axis).label} is {one.ratio:.3g} times the design's"
+        most = LARGEST_FACTOR if kind == "inertia" else LARGEST_OF_ANY
+        if one.agrees:
+            continue
+        if kind == "back" and kept_constants:
+            told_how = "so kM and all torques are as far off: --electrical takes it from the record"
+            reasons.append(f"{off}, {told_how}")
+        elif not 1.0 / most <= one.ratio <= most:
+            factor = named_factor(one.ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
             reasons.append(off + (f": factor {factor}" if factor else ""))
-        elif one.name.startswith("dry") and one.ratio > most_dry and not one.agrees:
+        elif kind == "dry" and one.ratio > (MOST_DRY_UNLOADED if feels else LARGEST_FACTOR):
             load = (one.found - one.design) / max(design.friction.load_coefficient, 1e-300)
-            reasons.append(f"{off}" + (f": as under a load of {load:.3g} N m, not recorded" if feels else ""))
-    reason = next(filter(None, reasons), "")
-    return replace(made, passed=False, reason=reason) if reason else made
-
-
-def sizes_item(ratios: Mapping[str, float], more: Mapping[float, str], leading: str) -> Item:
-    """Identified values over those that the design had.
-
-    Parameters
-    ----------
-    more : mapping
-        Further factors that may explain a common ratio.
-    leading : str
-        The value that may not be off by more than a factor of three on its own.
-    """
-    common = _common(ratios, more)
-    own = ratios.get(leading, 1.0)
-    reason = ""
-    if common:
-        reason = f"all identified values are about {common[0]:.4g} times the design's: factor {common[1]}"
-    elif not 1.0 / LARGEST_FACTOR <= own <= LARGEST_FACTOR:
-        factor = named_factor(own) if own else None
-        told = f": factor {factor}" if factor else ""
-        reason = f"{leading} is {own:.3g} times the design's{told}"
+            reasons.append(off + (f": as under a load of {load:.3g} N m, not recorded" if feels else ""))
     return Item(
         id="size",
         label="Identified values are of the design's size",
-        passed=(not reason) if ratios else None,
-        reason=reason,
+        passed=not reasons if values else None,
+        reason=next(iter(reasons), ""),
     )
 
 
-def _common(ratios: Mapping[str, float], more: Mapping[float, str]) -> tuple[float, str] | None:
-    """A named factor that two or more ratios share."""
-    result = {name: named_factor(ratio, more) for name, ratio in ratios.items()}
-    names = {one for one in result.values() if one}
-    if len(ratios) >= 2 and len(names) == 1 and all(result.values()):
-        product = 1.0
-        for ratio in ratios.values():
-            product *= ratio
-        return product ** (1.0 / len(ratios)), names.pop()
-    return None
+def offset_item(design: Design, fit: Fit) -> Item | None:
+    """A constant torque that is not the design's, beyond chance with both errors; the values hold."""
+    key = "friction.offset_torque"
+    if "offset" not in fit.names:
+        return None
+    own = design.friction.offset_torque_Nm
+    more, allowed = fit["offset"] - own, own_std(design, key) or UNSTATED * abs(own)
+    std = float(np.hypot(fit.std("offset"), allowed))
+    if chi2.sf((more / max(std, 1e-300)) ** 2, 1) > NO_CHANCE:
+        return None
+    unit, stated = parameter("offset", design.axis).unit, key in design.parameters
+    beside = f"beside the design's {own:.3g} {unit}" if stated else "that the design does not state"
+    told = f"{more:+.3g} {unit} {beside}: a load not recorded, or an offset of the current"
+    label = "Constant torque is the design's" if design.axis == "rotary" else "Constant force is the design's"
+    return Item(id="offset", label=label, passed=None, reason=told)
+
+
+def following_item(record: str, followed: Followed) -> Item:
+    """Whether the recorded following error is that of the design's loops at this motion."""
+    label = f"{record}: following error is that of the design's loops"
+    clock, off = followed.clock, followed.off
+    reason = (
+        f"the recorded position is {1.0 + off:.4g} times that which the loops follow the command with: "
+        "counts a revolution, the reduction, or a unit"
+        if abs(off) > RATE_TOLERANCE
+        else f"the following error is {followed.ratio:.4g} times that of the design's loops at this motion: "
+        f"a clock about {100.0 * clock:+.2g} % off, a command logged early or late, or another gain"
+    )
+    return share_item(f"following-{record}", label, max(abs(clock), abs(off)), RATE_TOLERANCE, reason)

@@ -18,6 +18,7 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from analyses.large_signal.grid import tone
+from analyses.large_signal.tones_run import TANH_TOLERANCE
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS, Rows
 from nonlinear.runs.reduced import BatchResult
@@ -68,20 +69,11 @@ def sweep_from_rest(
     amplitude_rad: npt.ArrayLike,
     settle_ticks: int,
     *,
-    load_Nm: float = 0.0,
     described: bool = True,
 ) -> RestSweep:
-    """Command sines from rest and compare with the describing function of dry friction.
+    """Command sines from rest and compare with the describing function of dry friction, where ``described``.
 
-    Parameters
-    ----------
-    frequency_hz : array_like, shape (K,)
-    amplitude_rad : array_like
-        Of the command at the output, one for all or one a frequency.
-    settle_ticks : int
-        Before the two windows.
-    described : bool
-        Whether there is dry friction to be described.
+    The amplitude is that of the command at the output, one for all or one a frequency, shape (K,).
     """
     tick_s, n = design.controller.period_s, design.controller.position_loop.every
     asked = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
@@ -93,7 +85,7 @@ def sweep_from_rest(
     )
     amplitude = np.broadcast_to(np.asarray(amplitude_rad, dtype=float), asked.shape).copy()
     rows = Rows.of(design, asked.size)
-    rows["load"] = load_Nm
+    rows["tanh_tolerance"] = TANH_TOLERANCE
     rows["ticks"] = settle_ticks + 2 * ticks + np.ceil(4 * ticks / cycles)
     rows.window(ticks, cycles)
     rows.sine("command", amplitude, hertz)
@@ -103,12 +95,12 @@ def sweep_from_rest(
     moving = np.abs(measured) > NO_MOTION
     expected = np.full(asked.size, np.nan, complex)
     for k in np.flatnonzero(moving & described):
-        expected[k] = _linear(design, hertz[k : k + 1], load_Nm, float(speed[k]))[0]
+        expected[k] = _linear(design, hertz[k : k + 1], float(speed[k]))[0]
     return RestSweep(
         frequency_hz=hertz,
         amplitude_rad=amplitude,
         measured=measured,
-        sliding=_linear(design, hertz, load_Nm, None),
+        sliding=_linear(design, hertz, None),
         described=expected,
         speed_rad_s=speed,
         stick_fraction=result.window_stick_fraction,
@@ -125,7 +117,7 @@ def _acting(result: BatchResult, k: int) -> str:
     return name if used[name] > 0.0 else ""
 
 
-def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: float | None) -> Complexes:
+def _linear(design: Design, frequency_hz: Floats, speed_rad_s: float | None) -> Complexes:
     """Command to output at frequencies; sliding, or described at a speed amplitude.
 
     The output is looked at in every tick, as the simulator does; at the instants of the position loop the
@@ -134,7 +126,7 @@ def _linear(design: Design, frequency_hz: Floats, load_Nm: float, speed_rad_s: f
     from actuator_lti.loops.sampled import reference_to_output
 
     point = "sliding" if speed_rad_s is None else "describing-function"
-    at = Operating(point=point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_rad_s)  # type: ignore[arg-type]
+    at = Operating(point=point, speed_amplitude_rad_s=speed_rad_s)  # type: ignore[arg-type]
     omega, mean = 2.0 * np.pi * frequency_hz, command_mean(design)
     response = response_at(reference_to_output(wire(design, at)), omega)
     return response if mean is None else response * mean.response(omega)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from math import ceil, log
 
 import numpy as np
 
@@ -17,14 +18,15 @@ from actuator_lti.loops import Loops
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.limiters import onset
 from analyses.large_signal.classify import limiter_fractions
-from analyses.large_signal.grid import frequency_range_hz, tone
-from analyses.large_signal.steady_start import linear_steady_state
+from analyses.large_signal.grid import MOST_TICKS, tones, work_ticks
+from analyses.large_signal.steady_start import DECAY, linear_steady_state
 from analyses.large_signal.tones_run import run_tones
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS
 
-FREQUENCIES, ROUNDS = 14, 9
+FREQUENCIES, LEAST, ROUNDS = 12, 3, 9
 TRIED = (0.3, 3.0)  # times the linear limit
+SETTLED = 1e4  # what begins at rest is that much smaller by the window: a limit is closed in to 0.5 %
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,8 @@ class LimitShift:
         Relative width of the last interval of the bisection.
     command_gain : ndarray, shape (f,), or float
         Of mean and filter of the command, which the amplitudes are behind.
+    coarser : bool
+        Whether there are fewer frequencies than asked for, as those would take more than `MOST_TICKS`.
     """
 
     frequency_hz: np.ndarray
@@ -52,6 +56,7 @@ class LimitShift:
     simulated_limiter: tuple[str, ...]
     resolution: float
     command_gain: np.ndarray | float = 1.0
+    coarser: bool = False
 
     @property
     def ratio(self) -> np.ndarray:
@@ -64,15 +69,18 @@ def limit_shift(design: Design, loops: Loops, count: int = FREQUENCIES) -> Limit
 
     Every run begins in the linear steady state just below the limit and is judged by its last window, so that
     no start-up counts.  The command is taken as it comes behind its profile and filter.  ``None`` where the
-    loop is unstable, or nothing limits.
+    loop is unstable, or nothing limits.  There are fewer than ``count`` frequencies, down to `LEAST`, where
+    those would take more than `MOST_TICKS`.
     """
     given, design = loops, replace(design, command=Command())
     if loops.design.command != design.command:
         loops = loops_at(replace(loops.design, command=design.command), loops.operating)
-    low, high = frequency_range_hz(design, loops)
-    chosen = tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
+    work = (ROUNDS + 2) * work_ticks(design, loops, count)
+    within = min(count, max(int(count * MOST_TICKS / work), LEAST))
+    chosen = tones(design, loops, within)
     omega = np.array([t.omega_rad_s for t in chosen])
     border, start = onset(loops, omega), linear_steady_state(loops, omega)
+    brief = replace(start, settling_ticks=ceil(start.settling_ticks * log(SETTLED) / DECAY))
     limited = np.flatnonzero(np.isfinite(border.amplitude_rad))
     if not (start.stable and limited.size):
         return None
@@ -81,7 +89,8 @@ def limit_shift(design: Design, loops: Loops, count: int = FREQUENCIES) -> Limit
 
     def acting(amplitude: np.ndarray) -> np.ndarray:
         begin = np.minimum(amplitude, 0.99 * linear)
-        return limiter_fractions(run_tones(design, chosen, limited, amplitude, start, begin, harmonics=1))
+        seen = run_tones(design, chosen, limited, amplitude, brief, begin, harmonics=1)
+        return limiter_fractions(seen)
 
     simulated[limited], names[limited] = _bisect(acting, linear, [border.active[k] for k in limited])
     return LimitShift(
@@ -92,6 +101,7 @@ def limit_shift(design: Design, loops: Loops, count: int = FREQUENCIES) -> Limit
         tuple(names),
         (TRIED[1] / TRIED[0]) ** (0.5**ROUNDS) - 1.0,
         _command_gain(given, loops, omega),
+        within < count,
     )
 
 

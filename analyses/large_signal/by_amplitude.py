@@ -8,25 +8,24 @@ not be the linear one.  A finding with figures, no check.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, nan
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from analyses.large_signal.settling_ticks import full_range, settling_ticks_of
+from analyses.large_signal.tones_run import TANH_TOLERANCE
 from analyses.validation.places import Bench
-from nonlinear import LIMITERS, Rows
+from nonlinear import LIMITERS
 from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm
-from nonlinear.runs.reduced import BatchResult
 
-Floats = npt.NDArray[np.float64]
 SIZES = {"small": 0.02, "medium": 0.2, "large": 1.0}  # of full deflection, speed, current
 ALIVE = 0.02  # of the full range of the signal
-LASTING = 0.97  # from window to window
-CYCLES, VALUES, CLOSE = 8, 12, 0.03
+LASTING = 0.985  # over `CYCLES`
+CYCLES, CLOSE, FURTHEST = 4, 0.03, 4.0
+VALUES, MOST_TICKS = 12, 150_000  # asked about a margin, and of their runs; else fewer
 MOST_SETTLING = 2000  # ticks
 
 
@@ -52,6 +51,8 @@ class AmplitudeMargin:
         Limit that acts longest while the oscillation lasts, just past the value; empty where none does.
     output : float
         Amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value.
+    coarser : bool
+        Whether fewer than `VALUES` were asked, nearer to the linear margin: those take over `MOST_TICKS`.
     """
 
     loop: str
@@ -66,6 +67,7 @@ class AmplitudeMargin:
     limiter: str = ""
     output: float = nan
     axis: str = "rotary"
+    coarser: bool = False
 
 
 def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
@@ -91,24 +93,36 @@ def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
 def _released(
     bench: Bench, name: str, kind: str, linear: float, hertz: float, size: str, friction_on: bool
 ) -> AmplitudeMargin:
-    """Close in on the first value at which an oscillation lasts."""
+    """Where an oscillation lasts, and what limits it there."""
     release = _Release(bench, name, kind, hertz, SIZES[size], friction_on)
-    low = 1.0 if kind == "gain" else 0.0
-    grid = np.geomspace(max(linear / 3.0, 1.05) if kind == "gain" else linear / 20.0, 4.0 * linear, VALUES)
-    values = np.concatenate([[low], grid])
+    value, seen = _first(release, _asked(kind, linear, coarser=release.coarser))
+    found = (linear, value, FURTHEST * linear, bench.setup(name).period_s, *seen, bench.design.axis)
+    return AmplitudeMargin(name, kind, size, SIZES[size], friction_on, *found, coarser=release.coarser)
+
+
+def _first(release: _Release, asked: Sequence[float]) -> tuple[float | None, tuple[str, float]]:
+    """The first value at which an oscillation lasts, closed in from the one before; none beyond is asked."""
+    low, seen = -1.0, ("", nan)
     value: float | None = None
-    while True:
-        lasts = np.flatnonzero(release.lasts(values))
-        if not lasts.size:
+    for one in asked:
+        if (lasting := release.lasting(one)) is not None:
+            value, seen = one, lasting
             break
-        k = int(lasts[0])
-        value = float(values[k])
-        if k == 0 or values[k] - values[k - 1] <= CLOSE * value:
-            break
-        values = np.linspace(values[k - 1], values[k], VALUES + 1)[1:]
-    seen = ("", nan) if value is None else release.seen(value)
-    found = (linear, value, 4.0 * linear, bench.setup(name).period_s, *seen)
-    return AmplitudeMargin(name, kind, size, SIZES[size], friction_on, *found, bench.design.axis)
+        low = one
+    while low >= 0.0 and value is not None and value - low > CLOSE * value:
+        middle = 0.5 * (low + value)
+        lasting = release.lasting(middle)
+        low, value, seen = (middle, value, seen) if lasting is None else (low, middle, lasting)
+    return value, seen
+
+
+def _asked(kind: str, linear: float, *, coarser: bool) -> list[float]:
+    """The drive as it is, then values from well below the linear margin to well beyond it."""
+    if coarser:
+        near = [linear * (1.0 + CLOSE) ** power for power in (-1, 0, 1, 3, 7, 15, 31)]
+        return [0.0, linear / 4.0, *near, FURTHEST * linear]
+    least = max(linear / 3.0, 1.05) if kind == "gain" else linear / 20.0
+    return [1.0 if kind == "gain" else 0.0, *np.geomspace(least, FURTHEST * linear, VALUES).tolist()]
 
 
 class _Release:
@@ -123,39 +137,39 @@ class _Release:
         self.setup = replace(bench.setup(name), bias=still, limits_on=True, held=False)
         tick_s = design.controller.period_s
         settling = min(settling_ticks_of(closed, self.setup.hold_ticks, design.name), MOST_SETTLING)
-        cycles = ceil(CYCLES / (hertz * tick_s))
-        self.wait = ceil(1.3 * _travel_s(design, name, part) / tick_s) + max(cycles, settling)
-        self.window = cycles
+        travel, cycle = ceil(1.3 * _travel_s(design, name, part) / tick_s), 1.0 / (hertz * tick_s)
+        whole = travel + max(ceil(CYCLES * cycle), settling) + 2 * ceil(CYCLES * cycle)
+        self.coarser = kind == "delay" and VALUES * whole > MOST_TICKS
+        self.cycles = CYCLES // 2 if self.coarser else CYCLES  # of thousands of ticks each, then
+        self.window, self.lasts = ceil(self.cycles * cycle), LASTING ** (self.cycles / CYCLES)
+        self.wait = travel + max(self.window, settling)
 
-    def rows(self, values: Floats) -> Rows:
-        """One run a gain, or a delay in samples."""
-        gains, delays = (values, 0.0) if self.kind == "gain" else (1.0, values)
-        rows = self.setup.rows(gains, delays)
+    def lasting(self, value: float) -> tuple[str, float] | None:
+        """What limits the oscillation at a gain, or a delay in samples, and its amplitude at the output.
+
+        None where it does not last from the last window but one to the last.
+        """
+        gain, delay = (value, 0.0) if self.kind == "gain" else (1.0, value)
+        rows = self.setup.rows(np.array([gain]), np.array([delay]))
         start = {"position": "angle_start", "velocity": "speed_start", "current": "current_start"}
         outer = self.setup.outer
         scale = -self.setup.design.total_ratio if outer == "position" else 1.0
         rows[start[outer]] = scale * self.part * self.sizes[outer]
         rows["ticks"] = self.wait + 2 * self.window
-        rows.window(self.window, CYCLES, 0)
-        return rows
-
-    def lasts(self, values: Floats) -> npt.NDArray[np.bool_]:
-        """At which values the oscillation lasts from the last window but one to the last."""
-        result = self.rows(values).run()
-        spans = [np.subtract(*result.span(self.setup.before, k)[::-1]) for k in (0, 1)]
+        rows["tanh_tolerance"] = TANH_TOLERANCE
+        rows.window(self.window, self.cycles, 0)
+        result = rows.run()
+        last, before = (float(np.ptp(result.span(self.setup.before, k))) for k in (0, 1))
         full = {
             "u": self.setup.design.limits.voltage_V,
             "i_ref": self.sizes["current"],
             "w_ref": self.sizes["velocity"],
         }[self.setup.point]
-        return np.asarray(~result.ok | ((spans[0] > ALIVE * full) & (spans[0] >= LASTING * spans[1])))
-
-    def seen(self, value: float) -> tuple[str, float]:
-        """What limits the oscillation at a value, and its amplitude at the output."""
-        result: BatchResult = self.rows(np.array([value])).run()
+        if result.ok[0] and not (last > ALIVE * full and last >= self.lasts * before):
+            return None
         shares = [float(result.window_limit_fraction(name)[0]) for name in LIMITERS]
-        low, high = result.span("output_angle_rad")
-        return LIMITERS[int(np.argmax(shares))] if max(shares) > 0.0 else "", 0.5 * float(high[0] - low[0])
+        swing = 0.5 * float(np.ptp(result.span("output_angle_rad")))
+        return LIMITERS[int(np.argmax(shares))] if max(shares) > 0.0 else "", swing
 
 
 def _travel_s(design: Design, stage: str, part: float) -> float:

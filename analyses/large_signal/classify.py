@@ -63,18 +63,11 @@ def causes(
 ) -> np.ndarray:
     """Name what keeps each run from being linear (`CAUSE_RULE`); index into `CAUSES`.
 
-    Parameters
-    ----------
-    linear : ndarray of complex
-        Linear response from command to output at each run's frequency.
-    amplitude_rad : ndarray
-        Command amplitude of each run.
-    rubs : ndarray of bool
-        Whether it is dry friction that keeps a run from being linear.
+    ``linear`` is the response from command to output at each run's frequency; ``rubs`` says where it is dry
+    friction that keeps a run from being linear.
     """
     fractions = limiter_fractions(result)
-    limited = fractions.max(axis=1) > 0.0
-    stuck = result.window_stick_fraction >= STICK_FRACTION
+    limited, stuck = fractions.max(axis=1) > 0.0, result.window_stick_fraction >= STICK_FRACTION
     choices = [
         CAUSES.index(LIMITERS[0]) + np.argmax(fractions, axis=1),
         np.full(len(limited), CAUSES.index("stiction")),
@@ -82,6 +75,12 @@ def causes(
     ]
     conditions = [limited, stuck, not_linear(result, linear, amplitude_rad)]
     return np.select(conditions, choices, CAUSES.index("none"))
+
+
+def unexplained(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -> np.ndarray:
+    """Which runs are off the linear one although no limit acts and the drive does not stick."""
+    acts = (limiter_fractions(result).max(axis=1) > 0.0) | (result.window_stick_fraction >= STICK_FRACTION)
+    return ~acts & not_linear(result, linear, amplitude_rad)
 
 
 def not_linear(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -> np.ndarray:

@@ -13,7 +13,6 @@ it and goes on integrating.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 from math import asin, inf, isfinite, pi, sqrt
@@ -159,27 +158,12 @@ def saturation_ratio(gain: float) -> float:
     return 1.0 if gain >= 1.0 else float(brentq(lambda a: saturation_gain(a) - gain, 1.0, 4.0 / gain))
 
 
-def conditional_stability(
-    design: Design, loops: Loops, settle_ticks: int, margins: Mapping[str, ExactMargins] | None = None
-) -> Conditional:
+def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Conditional:
     """Look for conditional stability: by margins, by describing functions, and by steps in time.
 
-    Parameters
-    ----------
-    design : Design
-    loops : Loops
-        Sampled, sliding.
-    settle_ticks : int
-        In which the linear drive settles.
-    margins : mapping of str to ExactMargins, optional
-        Those already known, by break point.
+    ``loops`` are sampled and sliding; in ``settle_ticks`` the linear drive settles.
     """
-    known = dict(margins or {})
-    margins = {
-        point: known.get(point) or exact_margins(loops, point)
-        for point in points_of(design)
-        if point != "output"
-    }
+    margins = {point: exact_margins(loops, point) for point in points_of(design) if point != "output"}
     result = [
         _prediction(loops, point, margins[point].gain_lower, limit, limiter)
         for point, limit, limiter in _limits(design)

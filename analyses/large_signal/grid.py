@@ -9,11 +9,13 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops
+from analyses.large_signal.steady_start import linear_steady_state
 from analyses.linear.responses import response_at
 
 LEAST_UPDATES = 96  # updates of the position loop in a window: peaks are seen to 1 - cos(pi/96) = 0.05 %
 DECADES_BELOW, FACTOR_ABOVE = 1.6, 8.0
 HIGHEST = 0.8  # of the Nyquist frequency of the position loop
+MOST_TICKS = 4_000_000  # of a map, its repetitions apart; where more work is needed the grid is coarser
 FRICTION_RANGE, PLAIN_RANGE, LARGEST_RANGE = 2.0, 200.0, 2e4
 
 
@@ -65,6 +67,16 @@ def tones(design: Design, loops: Loops, count: int) -> tuple[Tone, ...]:
     """Give tones, spread evenly on a logarithmic scale around the bandwidth."""
     low, high = frequency_range_hz(design, loops)
     return tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
+
+
+def work_ticks(design: Design, loops: Loops, count: int) -> int:
+    """Ticks that one sine at each of so many tones takes, until it has settled and in two windows.
+
+    A tick of smoothed friction, which is integrated in steps, counts as three.
+    """
+    settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
+    each = 3 if design.friction.law == "tanh" else 1
+    return each * sum(settling + 2 * tone.ticks for tone in tones(design, loops, count))
 
 
 def amplitudes(design: Design, count: int, smallest_rad: float | None) -> np.ndarray:

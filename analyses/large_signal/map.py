@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,8 +12,16 @@ from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
-from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, not_linear, waveforms
-from analyses.large_signal.grid import amplitudes, frequency_range_hz, tones
+from analyses.large_signal.classify import (
+    CAUSES,
+    WAVEFORMS,
+    causes,
+    limiter_fractions,
+    not_linear,
+    unexplained,
+    waveforms,
+)
+from analyses.large_signal.grid import MOST_TICKS, amplitudes, frequency_range_hz, tones, work_ticks
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones_run import run_tones
 from analyses.linear.static_threshold import static_threshold
@@ -22,11 +30,9 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-Progress = Callable[[int, int], None]
-AMPLITUDES, FREQUENCIES = 25, 40
+AMPLITUDES, FREQUENCIES = 17, 28
 BELOW_ONSET = 0.95
 LONG = 0.1  # periods of the highest tone
-MOST_TICKS = 20_000_000  # of a map, its repetitions apart; a drive that settles slowly has a coarser grid
 
 
 @dataclass(frozen=True)
@@ -113,10 +119,9 @@ class AmplitudeMap:
             }
         )
 
-    def share(self, names: tuple[str, ...], kinds: tuple[str, ...] = CAUSES) -> float:
-        """Fraction of the points with one of these causes (or waveforms, with ``kinds=WAVEFORMS``)."""
-        table = self.waveform if kinds is WAVEFORMS else self.cause
-        return float(np.isin(table, [kinds.index(name) for name in names]).mean())
+    def share(self, *names: str) -> float:
+        """Fraction of the points with one of these causes."""
+        return float(np.isin(self.cause, [CAUSES.index(name) for name in names]).mean())
 
 
 def amplitude_map(
@@ -126,21 +131,11 @@ def amplitude_map(
     load_Nm: float = 0.0,
     friction_on: bool = True,
     counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
-    progress: Progress | None = None,
 ) -> AmplitudeMap:
     """Simulate sines over amplitude and frequency and say what each shows.
 
-    Parameters
-    ----------
-    design : Design
-    loops : Loops
-        Sampled, sliding, of this design.
-    load_Nm : float
-        Load torque.
-    counts : (int, int)
-        Amplitudes and frequencies; fewer where they would take more than `MOST_TICKS`.
-    progress : callable, optional
-        Called with (runs done, runs in all).
+    ``loops`` are sampled and sliding, of this design; ``counts`` are fewer where they would take more than
+    `MOST_TICKS`.
     """
     asked, counts = counts, _within(design, loops, counts)
     frequencies = tones(design, loops, counts[1])
@@ -154,10 +149,10 @@ def amplitude_map(
     begin = np.minimum(amplitude, BELOW_ONSET * border.amplitude_rad[which])
     result = run_tones(
         design, frequencies, which, amplitude, start, begin,
-        load_Nm=load_Nm, friction_on=friction_on, insist=True, progress=progress,
+        load_Nm=load_Nm, friction_on=friction_on, insist=True,
     )  # fmt: skip
     rubs = np.zeros(len(which), dtype=bool)
-    off = np.flatnonzero(friction_on & not_linear(result, start.output[which], amplitude))
+    off = np.flatnonzero(friction_on & unexplained(result, start.output[which], amplitude))
     if len(off):  # the same runs without dry friction: is it that?
         free = run_tones(
             design, frequencies, which[off], amplitude[off], start, begin[off],
@@ -185,10 +180,7 @@ def amplitude_map(
 
 def _within(design: Design, loops: Loops, counts: tuple[int, int]) -> tuple[int, int]:
     """The grid asked for, or one of the same shape whose first run takes at most `MOST_TICKS`."""
-    frequencies = tones(design, loops, counts[1])
-    settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
-    work = counts[0] * sum(settling + 2 * tone.ticks for tone in frequencies)
-    part = min(np.sqrt(MOST_TICKS / work), 1.0)
+    part = min(np.sqrt(MOST_TICKS / (counts[0] * work_ticks(design, loops, counts[1]))), 1.0)
     return max(int(part * counts[0]), 2), max(int(part * counts[1]), 2)
 
 

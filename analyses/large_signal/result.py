@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from actuator_lti.loops import Loops
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,6 @@ def large_signals(
     loops: Loops | None = None,
     *,
     counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
-    progress: Progress | None = None,
 ) -> LargeSignals:
     """Look at large signals from every side (model.md section 5).
 
@@ -63,25 +59,14 @@ def large_signals(
         Sampled and sliding, of this design, if they are there already.
     counts : (int, int)
         Amplitudes and frequencies of the map.
-    progress : callable, optional
-        Called with (steps done, steps in all).
 
     Raises
     ------
     InputError, NumericalError
         As `assemble_loops` and `simulate`.
     """
-
-    def step(done: int) -> None:
-        if progress is not None:
-            progress(done, 3)
-
     loops = assemble_loops(design) if loops is None else loops
     map_ = amplitude_map(design, loops, counts=counts)
-    step(1)
     rubs = any(design.friction.dry_Nm(0.0, direction) > 0.0 for direction in (1, -1))
     shift = limit_shift(design, loops) if rubs else None
-    step(2)
-    teeth = sawtooth(design)
-    step(3)
-    return LargeSignals(design, map_, shift, amplitude_bode(design, loops, map_), teeth)
+    return LargeSignals(design, map_, shift, amplitude_bode(design, loops, map_), sawtooth(design))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,11 +12,12 @@ from analyses.large_signal.grid import Tone
 from analyses.large_signal.steady_start import LinearSteadyState, triangle_start
 from nonlinear import Rows
 from nonlinear.runs.reduced import BatchResult
+from nonlinear.runs.running import Running
 
-Progress = Callable[[int, int], None]
 HARMONICS = 3
 BEYOND = 1.1  # of the amplitude of the linear start: only what is limited can end in a triangle
 LONGER, MORE_WINDOWS, MORE_TICKS = 4, 12, 24_000
+TANH_TOLERANCE = 1e-5  # of the smoothing speed, a tick: far below what a fundamental is looked at for
 
 
 def run_tones(
@@ -31,20 +32,11 @@ def run_tones(
     friction_on: bool = True,
     harmonics: int = HARMONICS,
     insist: bool = False,
-    progress: Progress | None = None,
 ) -> BatchResult:
-    """Simulate one sine a run from its linear steady state.
+    """Simulate one sine a run, tone ``which[r]``, from the linear steady state at ``start_amplitude_rad``.
 
-    Parameters
-    ----------
-    which : ndarray of int, shape (n,)
-        Tone of each run.
-    amplitude_rad : ndarray, shape (n,)
-        Command amplitude at the output shaft.
-    start_amplitude_rad : ndarray, shape (n,)
-        Amplitude of the linear state that the run starts from (at most the onset of limiting).
-    insist : bool
-        Repeat what has not settled, with a start-up four times as long and several periods more.
+    That is at most the onset of limiting; both amplitudes are the command's, at the output shaft.  ``insist``
+    goes on with what has not settled, for four times the start-up and several periods more.
     """
     rows = Rows.of(design, len(which), friction_on=friction_on)
     windows = np.array([t.ticks for t in tones])[which]
@@ -53,14 +45,16 @@ def run_tones(
     rows.window(windows, cycles, harmonics)
     start.put(rows, which, start_amplitude_rad)
     triangle_start(design, rows, amplitude_rad, amplitude_rad > BEYOND * start_amplitude_rad)
-    rows["load"] = load_Nm
+    rows["load"], rows["tanh_tolerance"] = load_Nm, TANH_TOLERANCE
     rows["ticks"] = start.settling_ticks + 2 * windows
-    result = rows.run(progress=progress)
-    return _again(rows, result, start.settling_ticks) if insist else result
+    if not insist:
+        return rows.run()
+    drives = [rows.running(k) for k in range(len(rows))]
+    return _gone_on(rows, drives, rows.run(drives=drives), start.settling_ticks)
 
 
-def _again(rows: Rows, result: BatchResult, settling_ticks: int) -> BatchResult:
-    """Repeat the runs that are not steady with a longer start-up."""
+def _gone_on(rows: Rows, drives: Sequence[Running], result: BatchResult, settling_ticks: int) -> BatchResult:
+    """Go on with the runs that are not steady."""
     moving = result.window_stick_fraction < 1.0
     late = np.flatnonzero(result.ok & moving & (result.unsteadiness("output_angle_rad") > STEADY))
     if not len(late):
@@ -69,4 +63,4 @@ def _again(rows: Rows, result: BatchResult, settling_ticks: int) -> BatchResult:
     longer["ticks"] += LONGER * settling_ticks + np.ceil(
         np.minimum(MORE_WINDOWS * longer["window"], MORE_TICKS)
     )
-    return result.with_part(late, longer.run())
+    return result.with_part(late, longer.run(drives=[drives[int(k)] for k in late]))

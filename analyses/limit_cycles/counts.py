@@ -31,7 +31,7 @@ from nonlinear.bench.on_the_bench import without_counts
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
-    from analyses.limit_cycles.result import Confirmation
+    from analyses.limit_cycles.result import Cause, Confirmation
 
 Floats = npt.NDArray[np.float64]
 WITHIN = 0.05  # of its value: a gain that is off by less counts as linear
@@ -106,13 +106,7 @@ def linear_ratio() -> float:
 
 
 def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, ...]:
-    """Look at every encoder of a position drive whose counts a loop sees.
-
-    Parameters
-    ----------
-    settle_ticks : int
-        In which the linear position loop settles.
-    """
+    """Look at every encoder whose counts a loop sees, of a position drive that settles in so many ticks."""
     from analyses.limit_cycles.describing import counts_matter
 
     there: list[Sensor] = []
@@ -124,10 +118,10 @@ def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, 
 
 
 def _one(design: Design, loops: Loops, sensor: Sensor, settle_ticks: int) -> Counts:
-    from analyses.limit_cycles.describing import cycles_of_quantisation
+    from analyses.limit_cycles.describing import cycle_of_counts
     from analyses.limit_cycles.run import confirm
 
-    cause = "motor-quantisation" if sensor == "motor" else "quantisation"
+    cause: Cause = "motor-quantisation" if sensor == "motor" else "quantisation"
     quantum = (design.angle_quantum_rad if sensor == "motor" else design.output_quantum_rad) or 0.0
     other: Sensor = "output" if sensor == "motor" else "motor"
     alone, ideal = without_counts(design, other), without_counts(design)
@@ -142,7 +136,7 @@ def _one(design: Design, loops: Loops, sensor: Sensor, settle_ticks: int) -> Cou
         speed_step_rad_s=_speed_step(design, sensor, quantum),
         ripple_rad_s=ripple,
         ripple_at_rad_s=at,
-        cycles=tuple(confirm(design, one) for one in cycles_of_quantisation(design) if one.cause == cause),
+        cycles=tuple(confirm(design, one) for one in cycle_of_counts(design, cause)),
         linear_rad=linear_ratio() * quantum,
         linear_seen_rad=float(TRIED[good][0]) * linear_ratio() * quantum if good.any() else None,
         off=off,

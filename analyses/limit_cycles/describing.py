@@ -66,15 +66,9 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
 def kept_up(
     mode: Callable[[float, Mode | None], Mode | None], grid: npt.NDArray[np.float64]
 ) -> Iterator[tuple[float, Mode, bool]]:
-    """Where along a grid the least damped oscillation keeps its size.
+    """Where along a grid the least damped oscillation, that of a value from one near it, keeps its size.
 
     Gives value, oscillation, and whether it dies out beyond: an amplitude at which it attracts.
-
-    Parameters
-    ----------
-    mode : callable
-        The oscillation at a value, from one near it.
-    grid : ndarray
     """
     last: Mode | None = None
     for k, value in enumerate(map(float, grid)):
@@ -179,7 +173,7 @@ def output_of(design: Design, state: dict[str, complex]) -> complex:
 
 def cycles_of_quantisation(design: Design) -> tuple[Cycle, ...]:
     """The cycles about the edge of a count of each sensor, friction left out."""
-    return (*_of_counts(design, "quantisation"), *_of_counts(design, "motor-quantisation"))
+    return (*cycle_of_counts(design, "quantisation"), *cycle_of_counts(design, "motor-quantisation"))
 
 
 def quantum_of(design: Design, cause: Cause) -> float | None:
@@ -198,7 +192,7 @@ def counts_matter(design: Design, cause: Cause) -> bool:
     return by_speed and control.velocity is not None and control.velocity.sensor == "motor"
 
 
-def _of_counts(design: Design, cause: Cause) -> tuple[Cycle, ...]:
+def cycle_of_counts(design: Design, cause: Cause) -> tuple[Cycle, ...]:
     """The cycle of one sensor: where the loop needs the gain ``2 q/(pi A)`` of its counts to keep it up."""
     q = quantum_of(design, cause)
     if q is None or not counts_matter(design, cause):
@@ -237,19 +231,31 @@ def _border_at_output(free: Design) -> tuple[float, Mode] | None:
 
 
 def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
-    """Gain of the speed made of the motor's angle that brings the loop to its border."""
+    """Gain of the speed made of the motor's angle that brings the loop to its border.
+
+    It is met once in a tick, so every entry of a tick's matrix has it to the first power.
+    """
+    plain, double = (TickProgram(wire(_louder(free, gain), Operating()), "position") for gain in (1.0, 2.0))
+    ticks = [(plain.tick(k).A, double.tick(k).A) for k in range(plain.ticks)]
 
     def mode(log_gain: float, _: Mode | None) -> Mode | None:
-        velocity = free.controller.velocity
-        assert velocity is not None
-        gain = Filter(kind="biquad", on="speed", b=(exp(log_gain),), a=(0.0,))
-        louder = replace(velocity, filters=(*velocity.filters, gain))
-        return mode_at(replace(free, controller=replace(free.controller, velocity=louder)), Operating())
+        A = np.eye(len(plain.states))
+        for one, two in ticks:
+            A = (one + (exp(log_gain) - 1.0) * (two - one)) @ A
+        return _oscillation(A, plain.states, free)
 
     found = next(kept_up(mode, np.log(np.geomspace(1.0, MOST_GAIN, GAINS))), None)
     if found is None or found[2]:  # unstable from the first
         return None
     return exp(found[0]), found[1]
+
+
+def _louder(free: Design, gain: float) -> Design:
+    """The drive with a gain on the measured speed."""
+    velocity = free.controller.velocity
+    assert velocity is not None
+    filters = (*velocity.filters, Filter(kind="biquad", on="speed", b=(gain,), a=(0.0,)))
+    return replace(free, controller=replace(free.controller, velocity=replace(velocity, filters=filters)))
 
 
 def _oscillation(

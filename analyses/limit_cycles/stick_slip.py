@@ -90,15 +90,8 @@ class _Slip:
 def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None) -> StickSlipCycle | None:
     """Find the symmetric stick-slip cycle of a drive whose speed controller integrates.
 
-    Parameters
-    ----------
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
-
-    Returns
-    -------
-    StickSlipCycle or None
-        ``None`` where there is none: every slip stops short of the other side, or ends at a smaller error.
+    ``None`` where there is none: every slip stops short of the other side, or ends at a smaller error.
+    ``loops`` are sampled and sliding, of this design, if they are there already.
     """
     from scipy.optimize import brentq
 

@@ -22,21 +22,11 @@ from nonlinear.native import LIBRARY
 
 @dataclass(frozen=True)
 class CodeCheck:
-    """What the compiled code shows of the predictions.
+    """What the compiled code shows of the predictions."""
 
-    Attributes
-    ----------
-    entries : tuple of Row
-        Predictions that are judged, with what the compiled code shows.
-    compiler : str
-        Command and options; empty where nothing was run.
-    reason : str
-        Why nothing was measured; empty where it was.
-    """
-
-    entries: tuple[Row, ...] = ()
-    compiler: str = ""
-    reason: str = ""
+    entries: tuple[Row, ...] = ()  # predictions that are judged, with what the compiled code shows
+    compiler: str = ""  # command and options; empty where nothing was run
+    reason: str = ""  # why nothing was measured; empty where it was
 
     @property
     def failed(self) -> tuple[Row, ...]:
@@ -52,14 +42,7 @@ class CodeCheck:
 def check_code(design: Design) -> CodeCheck:
     """Measure the small-signal predictions of a design on the emitted C.
 
-    Parameters
-    ----------
-    design : Design
-
-    Returns
-    -------
-    CodeCheck
-        With a reason in place of entries where there is no C compiler, or the design cannot be tested.
+    A reason stands in place of entries where there is no C compiler, or the design cannot be tested.
     """
     command = compiler.system_compiler()
     if command is None or not sys.platform.startswith(("linux", "darwin")):

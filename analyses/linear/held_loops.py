@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 from actuator_lti.design.model import Design
 from actuator_lti.drive.angle import pushes_away
 from actuator_lti.drive.operating import RotorState
-from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
 
 if TYPE_CHECKING:
@@ -39,19 +38,8 @@ def held_loop(loops: Loops, name: str) -> Loop | None:
 
 def other_loops(loops: Loops, design: Design, *, rotor: RotorState = "free") -> Loops:
     """The loops of another design, or with another rotor, in the same form at the same operating point."""
-    at = loops.operating
-    return assemble_loops(
-        design,
-        form=loops.form,
-        operating_point=at.point,
-        load_Nm=at.load_Nm,
-        speed_amplitude_rad_s=at.speed_amplitude_rad_s,
-        direction=at.direction,
-        rotor=rotor,
-        inner_loops=loops.inner_loops,
-        speed_rad_s=at.speed_rad_s,
-        angle_rad=at.angle_rad,
-    )
+    at = replace(loops.operating, rotor=rotor, torques_held=False)
+    return loops_at(design, at, loops.form, loops.inner_loops)
 
 
 def by_itself(name: str) -> str:

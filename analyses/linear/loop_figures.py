@@ -108,19 +108,10 @@ def loop_figures(
     certify: bool = False,
     mean: CommandMean | None = None,
 ) -> LoopFigures:
-    """Compute all figures of a loop.
+    """Compute all figures of a loop; ``certify``: its margins by exact arithmetic, see `stability_margins`.
 
-    Parameters
-    ----------
-    loop : Loop
-    response : PlainSystem or python-control system, optional
-        Taken instead of the closed loop for bandwidth and step.
-    bandwidth, step : bool
-        Whether these are wanted; the step of a continuous loop with delays takes its time.
-    certify : bool
-        Whether the margins are to be known by exact arithmetic, see `stability_margins`.
-    mean : CommandMean, optional
-        Of the command, before the response.
+    Bandwidth and step (that of a continuous loop with delays takes its time) are those of ``response``, else
+    of the closed loop, behind the ``mean`` of the command.
 
     Raises
     ------
@@ -193,20 +184,11 @@ def all_loop_figures(
     certify: bool = False,
     locked: bool | None = None,
 ) -> dict[str, LoopFigures]:
-    """Compute the figures of every loop that the design has, innermost first, by name.
+    """Compute the figures of every loop that the design has, innermost first, by name; see `loop_figures`.
 
-    Parameters
-    ----------
-    loops : Loops
-    step : bool
-        Whether step figures are wanted.
-    refused : list of str, optional
-        Where given, a loop whose margins cannot be found is left out and the reason added here.
-    certify : bool
-        Whether the margins are to be known by exact arithmetic.
-    locked : bool, optional
-        Whether the current loop is wanted with the rotor locked as well; where left out, if a requirement
-        is on it. Without such a requirement it may fail alone, inside `analyses.isolation.isolated`.
+    A loop whose margins cannot be found is left out, and the reason added to ``refused`` where that is given.
+    ``locked``: the current loop with the rotor locked as well; where left out, if a requirement is on it.
+    Without such a requirement it may fail alone, inside `analyses.isolation.isolated`.
 
     Raises
     ------

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.files.tree import Tree
 from analyses.isolation import attempt
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
@@ -33,19 +34,10 @@ MOST_STATES = 160  # of a periodic loop's fundamental: its certificate takes the
 
 @dataclass(frozen=True)
 class BreakPoint:
-    """A loop seen at one point with all others closed.
+    """A loop seen at one point with all others closed."""
 
-    Attributes
-    ----------
-    figures : LoopFigures or None
-        ``None`` where they cannot be found; ``reason`` says why.
-    exact : ExactMargins or None
-        Where the loop is periodically time-varying.
-    reason : str
-    """
-
-    figures: LoopFigures | None
-    exact: ExactMargins | None
+    figures: LoopFigures | None  # ``None`` where they cannot be found; ``reason`` says why
+    exact: ExactMargins | None  # where the loop is periodically time-varying
     reason: str = ""
 
     @property
@@ -58,24 +50,12 @@ class BreakPoint:
 
 @dataclass(frozen=True)
 class OperatingPointFigures:
-    """The loops at one slope of the friction.
+    """The loops at one slope of the friction."""
 
-    Attributes
-    ----------
-    kind : str
-        As `actuator_lti.assemble_loops` names it.
-    label : str
-    load_Nm : float or None
-        ``None`` where it makes no difference.
-    slope_Nms_rad : float
-        Slope of the friction torque over the motor speed.
-    figures : mapping of str to LoopFigures
-    """
-
-    kind: OperatingPoint
+    kind: OperatingPoint  # as `actuator_lti.assemble_loops` names it
     label: str
-    load_Nm: float | None
-    slope_Nms_rad: float
+    load_Nm: float | None  # ``None`` where it makes no difference
+    slope_Nms_rad: float  # slope of the friction torque over the motor speed
     figures: Mapping[str, LoopFigures]
     load_unit: str = "N m"
 
@@ -141,19 +121,7 @@ class LoopSurvey:
         return frame
 
 
-class SurveyRow(TypedDict):
-    """A row of `LoopSurvey.to_pandas`."""
-
-    stable: bool | None
-    gain_margin_db: float | None
-    phase_margin_deg: float | None
-    delay_margin_s: float | None
-    modulus_margin: float | None
-    bandwidth_rad_s: float | None
-    evidence: str
-
-
-def _row(figures: LoopFigures) -> SurveyRow:
+def _row(figures: LoopFigures) -> Tree:
     """The figures of one loop, by name with unit."""
     margins, bandwidth = figures.margins, figures.bandwidth
     return {
@@ -198,7 +166,6 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     for form in () if design.controller.sampled_only else FORMS[1:]:
         other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
         forms |= {} if other is None else {form: other}
-    step(1)
     step(2)
     break_points = attempt("loops at the break points", lambda: _break_points(loops), {})
     step(3)
@@ -246,14 +213,8 @@ def operating_points(
 ) -> tuple[OperatingPointFigures, ...]:
     """Measure the loops at each operating point that the drive has: sliding, driving, driven, gap, rest.
 
-    Parameters
-    ----------
-    refused : list of str
-        Gets the loops whose margins are not found, and why.
-    described : bool
-        Whether friction described at small speeds is wanted as well.
-    certify : bool
-        Whether the margins are to be known by exact arithmetic.
+    ``refused`` gets the loops whose margins are not found, and why; ``described``: friction described at
+    small speeds as well; ``certify``: margins by exact arithmetic.
     """
     from actuator_lti.drive.operating import friction_slope
     from actuator_lti.loops import assemble_loops

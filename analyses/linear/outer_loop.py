@@ -7,47 +7,39 @@ added to the command with the sign ``s`` (-1: negative feedback), the loop is br
 
 In the sampled form the command is held over ``k`` updates of the drive's outermost loop, and the outer loop
 reads ``y`` at these instants; both are exact.  A continuous G becomes the sampled system that takes ``y`` as
-held over its period.
+held over its period. Read from a JSON file: coefficients or matrices, sampling, sign, names.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from math import isfinite
+from os import PathLike
+from typing import Any
 
+import control
 import numpy as np
 
 from actuator_lti.errors import InputError
+from actuator_lti.files.reading import read_json, shown_path
 from actuator_lti.loops.result import Loop, Loops
-
-if TYPE_CHECKING:
-    import control
 
 _SAME_TIME = 1e-9
 
 
 @dataclass(frozen=True)
 class OuterLoop:
-    """A linear system around a drive.
+    """A linear system around a drive."""
 
-    Attributes
-    ----------
-    name, input, output : str
-        What it is, what it reads, what it gives.
-    system : control.StateSpace
-        One input, one output; ``dt`` 0 where continuous.
-    sampling_period_s : float or None
-        How often a continuous system is read, its output held in between; ``None`` where it is not said.
-    sign : {-1, 1}
-        With which the output is added to the command.
-    """
-
+    # What it is, what it reads, what it gives
     name: str
     input: str
     output: str
-    system: control.StateSpace
+    system: control.StateSpace  # one input, one output; ``dt`` 0 where continuous
+    # How often a continuous system is read, its output held in between; ``None`` where it is not said
     sampling_period_s: float | None = None
-    sign: int = -1
+    sign: int = -1  # with which the output is added to the command
 
     @property
     def continuous(self) -> bool:
@@ -57,11 +49,6 @@ class OuterLoop:
 
 def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
     """The loop of an outer system around a drive, broken at the drive's command.
-
-    Parameters
-    ----------
-    loops : Loops
-    outer : OuterLoop
 
     Raises
     ------
@@ -77,8 +64,6 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
     >>> loop_around(assemble_loops("ilr33-amber"), OuterLoop("roll rate", "fin", "command", airframe, 1e-3))
     Loop(roll rate, broken at command, in rad, every 1 ms)
     """
-    import control
-
     drive = loops.reference_to_output
     if drive is None:
         raise InputError("--around: these loops have no response to a command", where=loops.design.name)
@@ -105,8 +90,6 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
 
 
 def _sensitivity(open_loop: Any) -> Any:
-    import control
-
     if isinstance(open_loop, control.StateSpace):
         return control.ss([], [], [], [[1.0]], open_loop.dt).feedback(open_loop)
     return type(open_loop).from_system(control.ss([], [], [], [[1.0]])).feedback(open_loop)
@@ -120,8 +103,6 @@ def _unit(loops: Loops) -> str:
 
 def _sampled(outer: OuterLoop, drive_s: float) -> tuple[control.StateSpace, float]:
     """The outer system at its instants, and their period."""
-    import control
-
     period = outer.sampling_period_s if outer.continuous else float(outer.system.dt)
     if period is None:
         message = "sampling_period: missing; allowed: a time in s, as the drive is sampled (or --form ideal)"
@@ -140,8 +121,6 @@ def _sampled(outer: OuterLoop, drive_s: float) -> tuple[control.StateSpace, floa
 
 def held(system: control.StateSpace, times: int) -> control.StateSpace:
     """A sampled system at every ``times``-th instant, its input held in between."""
-    import control
-
     if times == 1:
         return system
     A, B = np.asarray(system.A), np.asarray(system.B)
@@ -149,3 +128,97 @@ def held(system: control.StateSpace, times: int) -> control.StateSpace:
     for _ in range(times):
         total, power = A @ total + B, A @ power
     return control.ss(power, total, system.C, system.D, times * system.dt)
+
+
+COEFFICIENTS, MATRICES = ("num", "den"), ("A", "B", "C", "D")
+_TIMES = ("dt", "sampling_period")
+_WORDS = {"name": "outer loop", "input": "output of the drive", "output": "command of the drive"}
+_ALLOWED = "num and den, or A, B, C and D; dt, sampling_period, sign, name, input, output"
+MOST_STATES = 200
+
+
+def read_outer_loop(path: str | PathLike[str]) -> OuterLoop:
+    """Read an outer loop from a JSON file: one object with these keys.
+
+    ``num`` and ``den`` (coefficients, highest power first), or ``A``, ``B``, ``C``, ``D`` (lists of rows);
+    ``dt`` in s, 0 for a continuous system; ``sampling_period`` in s of a continuous one that a sampled drive
+    is closed around; ``sign`` -1 (usual) or 1; ``name``, ``input``, ``output``.
+
+    Raises
+    ------
+    InputError
+        For anything else, naming file, key and what is allowed.
+    """
+    return outer_loop(read_json(path, "JSON file of an outer loop"), shown_path(path))
+
+
+def outer_loop(table: Any, where: str) -> OuterLoop:
+    """An outer loop from the object of a file, see `read_outer_loop`."""
+    if not isinstance(table, dict):
+        raise InputError(f"an outer loop is one object; allowed keys: {_ALLOWED}", where=where)
+    for key, value in table.items():
+        if key not in _KEYS:
+            raise InputError(f"{key}: no such key; allowed: {_ALLOWED}", where=where)
+        allowed, fits = _KEYS[key]
+        if not fits(value):
+            raise InputError(f"{key}: allowed: {allowed}", where=where)
+    dt, sampling = (None if table.get(key) is None else float(table[key]) for key in _TIMES)
+    if dt is None:
+        raise InputError("dt: missing; allowed: the sampling period in s, or 0 for continuous", where=where)
+    if sampling == 0.0 or (sampling is not None and dt > 0.0):
+        message = "sampling_period: allowed: a time > 0 in s, for a continuous system (dt = 0)"
+        raise InputError(message, where=where)
+    words = {key: table.get(key, usual) for key, usual in _WORDS.items()}
+    system, sign = _system(table, dt, where), int(table.get("sign", -1))
+    return OuterLoop(system=system, sampling_period_s=sampling, sign=sign, **words)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(map(_is_number, value))
+
+
+def _is_matrix(value: Any) -> bool:
+    return (
+        isinstance(value, list)
+        and bool(value)
+        and all(map(_is_list, value))
+        and len(set(map(len, value))) == 1
+    )
+
+
+def _is_time(value: Any) -> bool:
+    return value is None or (_is_number(value) and 0.0 <= value < 1e6)
+
+
+_KEYS: dict[str, tuple[str, Callable[[Any], bool]]] = {
+    **dict.fromkeys(COEFFICIENTS, ("a list of numbers, all finite", _is_list)),
+    **dict.fromkeys(MATRICES, ("a list of rows of as many numbers each, all finite", _is_matrix)),
+    **dict.fromkeys(_TIMES, ("a time in s, at least 0", _is_time)),
+    **dict.fromkeys(_WORDS, ("a text", lambda value: isinstance(value, str) and bool(value.strip()))),
+    "sign": ("-1 (negative feedback) or 1", lambda value: _is_number(value) and value in (-1, 1)),
+}
+
+
+def _system(table: Mapping[str, Any], dt: float, where: str) -> control.StateSpace:
+    given = {key for key in (*COEFFICIENTS, *MATRICES) if key in table}
+    if given == set(COEFFICIENTS):
+        num, den = (np.trim_zeros(np.array(table[key], dtype=float), "f") for key in COEFFICIENTS)
+        if den.size == 0 or num.size == 0:
+            raise InputError("num, den: all zero; allowed: one coefficient that is not", where=where)
+        if num.size > den.size:
+            raise InputError("num: of a higher degree than den; allowed: a proper system", where=where)
+        if den.size - 1 > MOST_STATES:
+            raise InputError(f"den: more than {MOST_STATES} poles; allowed: fewer", where=where)
+        return control.ss(control.tf(num, den, dt))
+    if given != set(MATRICES):
+        raise InputError(f"allowed: {_ALLOWED}", where=where)
+    A, B, C, D = (np.array(table[key], dtype=float) for key in MATRICES)
+    n = A.shape[0]
+    if A.shape != (n, n) or B.shape != (n, 1) or C.shape != (1, n) or D.shape != (1, 1) or n > MOST_STATES:
+        message = f"A, B, C, D: allowed: n by n, n by 1, 1 by n and 1 by 1, n at most {MOST_STATES}"
+        raise InputError(message, where=where)
+    return control.ss(A, B, C, D, dt)

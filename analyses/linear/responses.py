@@ -22,19 +22,11 @@ LARGE = 60  # states: a triangular form pays from here on
 
 @dataclass(frozen=True)
 class Curve:
-    """A frequency response.
-
-    Attributes
-    ----------
-    omega_rad_s : ndarray, shape (K,)
-    values : ndarray of complex, shape (K,)
-    phase_deg : ndarray, shape (K,)
-        Unwrapped per factor, so that it does not depend on the grid.
-    """
+    """A frequency response at K frequencies."""
 
     omega_rad_s: np.ndarray
     values: np.ndarray
-    phase_deg: np.ndarray
+    phase_deg: np.ndarray  # unwrapped per factor, so that it does not depend on the grid
 
     @property
     def frequency_hz(self) -> np.ndarray:
@@ -49,16 +41,8 @@ class Curve:
 
 
 def curve(system: Any, omega_rad_s: np.ndarray) -> Curve:
-    """Evaluate a system over frequency.
+    """Evaluate a system over frequencies, positive and at most Nyquist for a sampled one.
 
-    Parameters
-    ----------
-    system : python-control system or DelaySystem
-    omega_rad_s : ndarray, shape (K,)
-        Positive; at most Nyquist for a sampled system.
-
-    Notes
-    -----
     Where the phase cannot be followed (an undamped spring: a zero or pole on the axis), it is that of the
     points, made continuous from one to the next.
     """
@@ -146,18 +130,7 @@ def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:
 
 
 def sampled_step(system: Any, samples: int) -> np.ndarray:
-    """Give the first samples of the unit step response of a sampled system, for a figure.
-
-    Parameters
-    ----------
-    system : python-control system
-        One input, one output, sampled.
-    samples : int
-
-    Returns
-    -------
-    ndarray, shape (samples,)
-    """
+    """Give the first samples of the unit step response of a sampled system, for a figure."""
     from actuator_lti.margins.loop import rational_loop
 
     loop = rational_loop(system)
@@ -171,15 +144,7 @@ def sampled_step(system: Any, samples: int) -> np.ndarray:
 def nyquist_curve(system: Any, omega_rad_s: np.ndarray, frame: float) -> tuple[np.ndarray, np.ndarray]:
     """Sample L(jw) closely enough for a figure of that half width around -1; NaN where it leaves the frame.
 
-    Parameters
-    ----------
-    frame : float
-        Half width of the frame around -1.
-
-    Returns
-    -------
-    omega_rad_s : ndarray, shape (K,)
-    values : ndarray of complex, shape (K,)
+    Gives the frequencies, rad/s, and the values.
     """
     omega, values = omega_rad_s, response_at(system, omega_rad_s)
     for _ in range(HALVED):

@@ -11,29 +11,20 @@ from actuator_lti.drive.facts import breakaway_torque_Nm, stall_torque_Nm, torqu
 
 @dataclass(frozen=True)
 class StaticThreshold:
-    """Smallest step that moves the output at once, by the proportional parts of the controllers.
-
-    Attributes
-    ----------
-    load_Nm : float
-    torque_gain_Nm_rad : float
-        Motor torque per position error at the output, rotor at rest, before any integrator has acted.
-    forward_rad, backward_rad : float
-        Command (peak, output side) that overcomes breakaway in each direction; 0 where the load already
-        does, ``inf`` where the drive is not strong enough.
-    integral_time_s : float or None
-        Integral time of the velocity controller, else of the position controller: with one any smaller
-        command moves the output later, see `waiting_time_s`; ``None`` where nothing integrates and the
-        threshold is final.
-    outer_integral_time_s : float or None
-        That of the position controller, where the velocity controller integrates too.
-    """
+    """Smallest step that moves the output at once, by the proportional parts of the controllers."""
 
     load_Nm: float
+    # Motor torque per position error at the output, rotor at rest, before any integrator has acted
     torque_gain_Nm_rad: float
+    # Command (peak, output side) that overcomes breakaway in each direction; 0 where the load already does,
+    # ``inf`` where the drive is not strong enough
     forward_rad: float
     backward_rad: float
+    # Integral time of the velocity controller, else of the position controller: with one any smaller command
+    # moves the output later, see `waiting_time_s`; ``None`` where nothing integrates and the threshold is
+    # final
     integral_time_s: float | None
+    # That of the position controller, where the velocity controller integrates too
     outer_integral_time_s: float | None = None
 
     @property

@@ -17,39 +17,23 @@ from actuator_lti.margins.measured.data import MeasuredResponse, measured_respon
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """A measured open loop and the model's at the same frequencies.
+    """A measured open loop and the model's at the same frequencies."""
 
-    Attributes
-    ----------
-    name, loop, of : str
-        The file; which loop; L, T or S that was measured.
-    frequency_hz : array (m,)
-    measured, model : array (m,), complex
-        Open loops.
-    radius : array (m,)
-        Of the circle about each measured value that holds the true one in 99 % of all cases.
-    source : str
-        Where the radius comes from.
-    margins : StabilityMargins or None
-        Of the measured loop, each with its range; None where the points are too coarse, see ``note``.
-    beyond : int
-        Points above half the sampling frequency, left out.
-    left_out : int
-        Rows of the file without numbers.
-    """
-
+    # The file; which loop; L, T or S that was measured
     name: str
     loop: str
     of: str
     frequency_hz: FloatArray
+    # Open loops
     measured: np.ndarray
     model: np.ndarray
-    radius: FloatArray
-    source: str
+    radius: FloatArray  # of the circle about each measured value that holds the true one in 99 % of all cases
+    source: str  # where the radius comes from
+    # Of the measured loop, each with its range; None where the points are too coarse, see ``note``
     margins: StabilityMargins | None
     note: str
-    beyond: int
-    left_out: int
+    beyond: int  # points above half the sampling frequency, left out
+    left_out: int  # rows of the file without numbers
 
     @property
     def difference_db(self) -> FloatArray:
@@ -77,17 +61,11 @@ def measured_if_asked(loops: Loops, source: Any, place: str, averages: int | Non
 
 
 def measured_over(loops: Loops, source: Any, place: str = "", averages: int | None = None) -> Measured:
-    """Lay a measured response over the loop that it was measured of.
+    """Lay a measured response (a path, or python-control's data) over the loop that it was measured of.
 
-    Parameters
-    ----------
-    loops : Loops
-    source : path or control.FrequencyResponseData
-    place : str
-        A loop or a break point, and what of it was measured behind a colon: ``"velocity"`` (its open loop),
-        ``"position:T"`` (closed), ``"i_ref:S"`` (sensitivity). Empty: the open outermost loop.
-    averages : int, optional
-        Of the coherence.
+    ``place``: a loop or a break point, and what of it was measured behind a colon: ``"velocity"`` (its open
+    loop), ``"position:T"`` (closed), ``"i_ref:S"`` (sensitivity); empty: the open outermost loop.
+    ``averages``: those behind the coherence.
 
     Raises
     ------

@@ -19,30 +19,17 @@ from analyses.specification.weakest import Spread, spread
 
 @dataclass(frozen=True, kw_only=True)
 class Margins:
-    """The loops of a design, and whether it does.
-
-    Attributes
-    ----------
-    design : Design
-    asked : Asked
-    loops : mapping of str to LoopFigures
-        By name, innermost first.
-    requirements : tuple of RequirementVerdict
-        Of the sampled loops with sliding friction, whatever is asked.
-    around : mapping of str to LoopFigures
-        The loop that is closed around the drive, broken at the drive's command.
-    operating_points : tuple of OperatingPointFigures
-    measured : Measured or None
-        A measured response over one of the loops.
-    """
+    """The loops of a design, and whether it does."""
 
     design: Design
     asked: Asked
-    loops: Mapping[str, LoopFigures]
+    loops: Mapping[str, LoopFigures]  # by name, innermost first
+    # Of the sampled loops with sliding friction, whatever is asked
     requirements: tuple[RequirementVerdict, ...]
+    # The loop that is closed around the drive, broken at the drive's command
     around: Mapping[str, LoopFigures]
     operating_points: tuple[OperatingPointFigures, ...]
-    measured: Measured | None = None
+    measured: Measured | None = None  # a measured response over one of the loops
 
     @property
     def spread(self) -> Mapping[str, Mapping[str, Spread]]:
@@ -100,8 +87,7 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
 
 def _around(loops: Loops, file: Path, *, step: bool) -> dict[str, LoopFigures]:
     """The figures of the loop of the file, by its name."""
-    from analyses.linear.outer_loop import loop_around
-    from analyses.linear.outer_loop_file import read_outer_loop
+    from analyses.linear.outer_loop import loop_around, read_outer_loop
 
     outer = read_outer_loop(file)
     return {outer.name: loop_figures(loop_around(loops, outer), step=step, certify=True)}

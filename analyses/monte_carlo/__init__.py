@@ -5,27 +5,15 @@ from typing import TYPE_CHECKING
 from actuator_lti.start.on_first_use import on_first_use
 
 if TYPE_CHECKING:
-    from analyses.monte_carlo.asked import Asked
-    from analyses.monte_carlo.result import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
-    from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo, sample_folder
-    from analyses.monte_carlo.task import SampleTask, StepCheck, replay
+    from analyses.monte_carlo.result import MonteCarloResult, Odds
+    from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo
+    from analyses.monte_carlo.stepping import StepCheck
+    from analyses.monte_carlo.task import SampleTask, replay
 
 __all__ = [
-    "Asked",
-    "ColumnStatistics",
-    "Driver",
-    "MonteCarloResult",
-    "MonteCarloSettings",
-    "Odds",
-    "SampleTask",
-    "StepCheck",
-    "WorstCase",
-    "monte_carlo",
-    "replay",
-    "sample_folder",
-]
+    "MonteCarloResult", "MonteCarloSettings", "Odds", "SampleTask", "StepCheck", "monte_carlo", "replay",
+]  # fmt: skip
 
-_ROOMS = {"Asked": "asked", "SampleTask": "task", "StepCheck": "stepping", "replay": "task"}
-_ROOMS |= dict.fromkeys(("ColumnStatistics", "Driver", "MonteCarloResult", "Odds", "WorstCase"), "result")
-_ROOMS |= dict.fromkeys(("MonteCarloSettings", "monte_carlo", "sample_folder"), "run")
+_ROOMS = {"StepCheck": "stepping", "MonteCarloResult": "result", "Odds": "result"}
+_ROOMS |= {"MonteCarloSettings": "run", "monte_carlo": "run", "SampleTask": "task", "replay": "task"}
 __getattr__, __dir__ = on_first_use(__name__, {name: f"{__name__}.{room}" for name, room in _ROOMS.items()})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:
+    from actuator_lti.batch.figures import LinearFigures
     from actuator_lti.design.model import Design, Requirement
 
 Columns = Mapping[str, np.ndarray]
@@ -20,15 +21,10 @@ Columns = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Judged:
-    """One requirement over many designs.
+    """One requirement over many designs; arrays of shape (count,).
 
-    Attributes
-    ----------
-    value : ndarray, shape (count,)
-        The figure that is limited, the worst of the loops; NaN where there is none.
-    distance : ndarray, shape (count,)
-        To the limit, positive where met; -inf where a loop is unstable or the figure is missing.
-    passed : ndarray of bool, shape (count,)
+    ``value`` is the figure that is limited, the worst of the loops, NaN where there is none; ``distance``
+    that to the limit, positive where met, -inf where a loop is unstable or the figure is missing.
     """
 
     value: np.ndarray
@@ -44,6 +40,15 @@ def loops_of(design: Design) -> tuple[str, ...]:
 def drive_column(quantity: str, load_Nm: float | None) -> str:
     """Name of the column of a static figure at a load torque."""
     return f"drive.{quantity}@{load_Nm or 0.0:g}"
+
+
+def loop_columns(linear: LinearFigures, quantities: Iterable[str] = LOOP_QUANTITIES) -> dict[str, np.ndarray]:
+    """Columns of the loops of many designs: whether each is stable (1 or 0), and figures of it."""
+    columns: dict[str, np.ndarray] = {}
+    for loop in linear.loops:
+        columns[f"{loop}.stable"] = linear.stable(loop).astype(float)
+        columns |= {f"{loop}.{quantity}": linear.quantity(quantity, loop) for quantity in quantities}
+    return columns
 
 
 def by_loop(design: Design) -> list[Requirement]:

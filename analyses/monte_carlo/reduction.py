@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analyses.monte_carlo.judging import by_loop, in_populations, judge
-from analyses.monte_carlo.sketch import Sketch
+from analyses.monte_carlo.statistics import Sketch
 from analyses.studies.engine import Chunk
 
 if TYPE_CHECKING:
@@ -51,16 +51,7 @@ class Tally:
 
 @dataclass(frozen=True)
 class Reduction:
-    """Of some samples.
-
-    Attributes
-    ----------
-    count, together : int
-        Samples, and those that meet every requirement.
-    columns : mapping of str to Sketch
-    tallies : tuple of Tally
-        In the order of `judged`.
-    """
+    """Of some samples; ``together`` meet every requirement, tallies are in the order of `judged`."""
 
     count: int = 0
     together: int = 0
@@ -134,11 +125,11 @@ class Reducing:
         """See `SampleTask.sample`."""
         return self.task.sample()
 
-    def evaluate(self, first: int, count: int) -> Reduction:
-        """What samples first to first + count - 1 come to."""
-        made = Reduction()
-        draws = self.task.sampler.draw(first, count)  # at once: far on it takes long
-        for start in range(0, count, BLOCK):
+    def __call__(self, chunk: Chunk) -> Reduction:
+        """What the samples of a chunk come to."""
+        made, first = Reduction(), chunk[0]
+        draws = self.task.sampler.draw(*chunk)  # at once: far on it takes long
+        for start in range(0, len(draws), BLOCK):
             block = self.task.columns(first + start, draws[start : start + BLOCK])
             made = made.merged(reduced(self.task, block))
         return made

@@ -24,12 +24,7 @@ _LEAST = 1e-9  # of an eigenvalue of a correlation matrix: below, the direction 
 class Group:
     """Parameters that are correlated: columns of a draw, and the axes of their ellipsoid in scores.
 
-    Attributes
-    ----------
-    columns : tuple of int
-    axes : ndarray, shape (len(columns), rank)
-        ``s = axes e`` with ``|e| <= radius``.
-    radius : float
+    ``s = axes e`` with ``|e| <= radius``; axes of shape (len(columns), rank).
     """
 
     columns: tuple[int, ...]

@@ -9,100 +9,60 @@ from pathlib import Path
 
 from actuator_lti.asked.verdict import Tally, Verdict
 from analyses.monte_carlo.statistics import ColumnStatistics
-from analyses.specification.verdicts import RequirementVerdict, tally
-
-__all__ = ["ColumnStatistics", "Driver", "MonteCarloResult", "Odds", "WorstCase"]
+from analyses.specification.requirements import RequirementVerdict, tally
 
 
 @dataclass(frozen=True)
 class Odds:
-    """How often a requirement is met within the tolerances.
+    """How often a requirement is met within the tolerances."""
 
-    Attributes
-    ----------
-    id, label, unit : str
-        Of the requirement; ``"all"`` for all of them together.
-    passed, count : int
-    probability, low, high : float
-        Share of passes with its 95 % interval (Clopper and Pearson; on the safe side for Sobol points).
-    minimum, maximum : float or None
-        The limit.
-    nominal, worst : float or None
-        Value of the nominal design, and the worst of all samples.
-    worst_sample : int or None
-        Its number.
-    columns : tuple of str
-        Columns that the requirement looks at.
-    """
-
+    # Of the requirement; ``"all"`` for all of them together
     id: str
     label: str
     unit: str
     passed: int
     count: int
+    # Share of passes with its 95 % interval (Clopper and Pearson; on the safe side for Sobol points)
     probability: float
     low: float
     high: float
+    # The limit
     minimum: float | None = None
     maximum: float | None = None
+    # Value of the nominal design, and the worst of all samples
     nominal: float | None = None
     worst: float | None = None
-    worst_sample: int | None = None
-    columns: tuple[str, ...] = ()
+    worst_sample: int | None = None  # its number
+    columns: tuple[str, ...] = ()  # columns that the requirement looks at
 
 
 @dataclass(frozen=True)
 class WorstCase:
-    """The worst design for a requirement that sampling and then an optimiser found in the tolerance box.
-
-    Attributes
-    ----------
-    requirement : str
-    unit : str
-    sampled, sample : float, int
-        Worst of all samples, and its number.
-    value : float or None
-        After the optimiser; ``None`` where a loop is unstable there.
-    distance : float or None
-        To the limit, positive where it is still met; ``None`` where unstable.
-    passed : bool
-    parameters : mapping of str to float
-        SI values of the worst design.
-    evaluations : int
-        Designs that the optimiser looked at.
-    file : Path or None
-        Design file of it.
-    """
+    """The worst design for a requirement that sampling and then an optimiser found in the tolerance box."""
 
     requirement: str
     unit: str
+    # Worst of all samples, and its number
     sampled: float | None
     sample: int
-    value: float | None
-    distance: float | None
+    value: float | None  # after the optimiser; ``None`` where a loop is unstable there
+    distance: float | None  # to the limit, positive where it is still met; ``None`` where unstable
     passed: bool
-    parameters: Mapping[str, float]
-    evaluations: int
-    file: Path | None = None
+    parameters: Mapping[str, float]  # SI values of the worst design
+    evaluations: int  # designs that the optimiser looked at
+    file: Path | None = None  # design file of it
 
 
 @dataclass(frozen=True)
 class Driver:
-    """What one tolerance alone does to a figure.
-
-    Attributes
-    ----------
-    column, path : str
-    low_value, high_value : float
-        Ends of the parameter's range (three standard deviations of a normal one), SI.
-    low, high : float or None
-        The figure there, in its unit; ``None`` where there is none.
-    """
+    """What one tolerance alone does to a figure."""
 
     column: str
     path: str
+    # Ends of the parameter's range (three standard deviations of a normal one), SI
     low_value: float
     high_value: float
+    # The figure there, in its unit; ``None`` where there is none
     low: float | None
     high: float | None
 
@@ -116,45 +76,26 @@ class Driver:
 
 @dataclass(frozen=True)
 class MonteCarloResult:
-    """A finished study.
-
-    Attributes
-    ----------
-    design_name, design_hash : str
-    samples, seed : int
-    paths : tuple of str
-        Parameters that varied.
-    columns : mapping of str to ColumnStatistics
-    odds : tuple of Odds
-        One a requirement, in the order of the design file; then all together (id ``"all"``).
-    worst : tuple of WorstCase
-    folder : Path
-        Every sample as Parquet, up to `KEPT`; the worst designs.
-    nominal : mapping of str to float
-        The figures of the nominal design, by column.
-    left_out : tuple of RequirementVerdict
-        Requirements that are not judged, not proven, as each takes a computation of one design.
-    at_least : float or None
-        Probability of meeting a requirement, with 95 % confidence, that is enough; without it every sample
-        and the worst case have to.
-    notes : tuple of str
-    drivers : tuple of Driver
-        For each figure that a requirement looks at, every tolerance alone, the one that moves it most first.
-    """
+    """A finished study."""
 
     design_name: str
     design_hash: str
     samples: int
     seed: int
-    paths: tuple[str, ...]
+    paths: tuple[str, ...]  # parameters that varied
     columns: Mapping[str, ColumnStatistics]
+    # One a requirement, in the order of the design file; then all together (id ``"all"``)
     odds: tuple[Odds, ...]
     worst: tuple[WorstCase, ...]
-    folder: Path
-    nominal: Mapping[str, float]
+    folder: Path  # every sample as Parquet, up to `KEPT`; the worst designs
+    nominal: Mapping[str, float]  # the figures of the nominal design, by column
+    # Requirements that are not judged, not proven, as each takes a computation of one design
     left_out: tuple[RequirementVerdict, ...] = ()
+    # Probability of meeting a requirement, with 95 % confidence, that is enough; without it every sample and
+    # the worst case have to
     at_least: float | None = None
     notes: tuple[str, ...] = ()
+    # For each figure that a requirement looks at, every tolerance alone, the one that moves it most first
     drivers: tuple[Driver, ...] = ()
 
     @property

@@ -7,6 +7,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,13 +24,12 @@ from actuator_lti.start.extras import need
 from analyses.monte_carlo.judging import by_loop, in_populations, judge, label, source_columns
 from analyses.monte_carlo.reduction import BLOCK, Reducing, Reduction, Tally, judged, reduced, unpacked
 from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
-from analyses.monte_carlo.sketch import MOST
-from analyses.monte_carlo.statistics import clopper_pearson, column_statistics
+from analyses.monte_carlo.statistics import MOST, clopper_pearson, column_statistics
 from analyses.monte_carlo.stepping import StepCheck
 from analyses.monte_carlo.store import CHUNK, Store
 from analyses.monte_carlo.task import SampleTask
 from analyses.monte_carlo.worst import worst_case
-from analyses.specification.verdicts import RequirementVerdict
+from analyses.specification.requirements import RequirementVerdict
 from analyses.studies.engine import Chunk, Engine
 from analyses.studies.sampling import Table, sampler_of
 
@@ -40,35 +40,22 @@ Progress = Callable[[int, int], None]
 KEPT = 1_000_000  # samples that are kept as Parquet, about 200 MB
 PARTS = 1024  # of a study whose samples are not kept: what a part comes to is a few MB
 NOTED_S = 30.0
+SIZE = itemgetter(1)  # of a chunk: how many samples it has
 
 
 @dataclass(frozen=True)
 class MonteCarloSettings:
-    """What a study is to do.
-
-    Attributes
-    ----------
-    samples, seed : int
-    operating_point, load_Nm
-        Of the linear loops.
-    step : StepCheck or None
-        A nonlinear step of every sample.
-    table : Table or None
-        Samples from an identification instead of tolerances.
-    worst_cases : bool
-        Look for the worst design of every requirement.
-    chunk : int
-        Samples a file.
-    """
+    """What a study is to do."""
 
     samples: int = 10_000
     seed: int = 0
+    # Of the linear loops
     operating_point: OperatingPoint = "sliding"
     load_Nm: float = 0.0
-    step: StepCheck | None = None
-    table: Table | None = None
-    worst_cases: bool = True
-    chunk: int = CHUNK
+    step: StepCheck | None = None  # a nonlinear step of every sample
+    table: Table | None = None  # samples from an identification instead of tolerances
+    worst_cases: bool = True  # look for the worst design of every requirement
+    chunk: int = CHUNK  # samples a file
 
     def __post_init__(self) -> None:
         SAMPLES.check(self.samples)
@@ -82,7 +69,6 @@ class MonteCarloSettings:
 
 def sample_folder(design: Design, settings: MonteCarloSettings, folder: Path) -> Path:
     """Folder of a study inside another: the same study always gets the same one, another never."""
-
     identity = _task(design, settings).identity()
     digest = hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
     return folder / f"samples-{digest[:12]}"
@@ -112,8 +98,6 @@ def monte_carlo(
     ----------
     design : Design
         With tolerances on some values.
-    folder : path
-    settings : MonteCarloSettings, optional
     engine : Engine, optional
         Where to compute; by default threads of this process.
     progress : callable, optional
@@ -190,7 +174,7 @@ def _kept(
     task: SampleTask, store: Store, samples: int, engine: Engine, progress: Progress | None
 ) -> Reduction:
     """Keep every sample, then reduce them."""
-    engine.run(task, store.missing(samples), store.write, progress)
+    engine.map(task, store.missing(samples), store.write, progress, SIZE)
     whole = Reduction()
     for block in store.blocks(samples):
         whole = whole.merged(reduced(task, block))
@@ -220,7 +204,7 @@ def _reduced(
     parts = [(first, min(part, samples - first)) for first in range(0, samples, part)]
     known = set(done)
     try:
-        engine.run(Reducing(task), [one for one in parts if one not in known], take, progress)
+        engine.map(Reducing(task), [one for one in parts if one not in known], take, progress, SIZE)
     finally:
         if done:
             note()

@@ -17,20 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StepCheck:
-    """A step command at the output shaft, from rest.
+    """A step command at the output shaft, from rest."""
 
-    Attributes
-    ----------
-    amplitude_rad : float
-        Linear axis: m.
-    duration_s : float
-    load_Nm : float
-        Load torque, constant.
-    """
-
-    amplitude_rad: float
+    amplitude_rad: float  # linear axis: m
     duration_s: float = 0.5
-    load_Nm: float = 0.0
+    load_Nm: float = 0.0  # load torque, constant
 
     def __post_init__(self) -> None:
         if not (0 < self.amplitude_rad < np.inf and 0 < self.duration_s <= 100.0):

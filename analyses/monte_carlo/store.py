@@ -24,16 +24,7 @@ CHUNK = 4096
 
 @dataclass(frozen=True)
 class Store:
-    """A folder of chunks.
-
-    Attributes
-    ----------
-    folder : Path
-    chunk : int
-        Numbers a file.
-    manifest : bytes
-        Says of what study the folder is; written before the first chunk.
-    """
+    """A folder of chunks of so many numbers; ``manifest``, written before the first, says of what study."""
 
     folder: Path
     chunk: int
@@ -41,17 +32,9 @@ class Store:
 
     @classmethod
     def open(cls, folder: Path, identity: Mapping[str, Any], chunk: int = CHUNK) -> Store:
-        """Open a folder for a study, new or begun before.
+        """Open a folder for a study, new or begun before; one that holds another study is refused.
 
-        Parameters
-        ----------
-        identity : mapping
-            Everything that decides the numbers (hashes, seed, settings), plain JSON.
-
-        Raises
-        ------
-        InputError
-            If the folder holds another study.
+        ``identity`` is everything that decides the numbers (hashes, seed, settings), plain JSON.
         """
         path = folder / "manifest.json"
         wanted = {"schema": SCHEMA, "version": VERSION, "identity": dict(identity)}

@@ -20,9 +20,9 @@ from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.design import design_hash, with_values
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
-from analyses.monte_carlo.judging import drive_column, loops_of
+from analyses.monte_carlo.judging import drive_column, loop_columns, loops_of
 from analyses.monte_carlo.stepping import StepCheck, step_columns, step_units
-from analyses.studies.engine import Arrays
+from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version
 from analyses.studies.sampling import Sampler, as_values
 
@@ -34,17 +34,7 @@ if TYPE_CHECKING:
 class SampleTask:
     """Figures of numbered samples of a design; goes to workers as it is.
 
-    Attributes
-    ----------
-    design : Design
-    sampler : Sampler
-    operating_point : str
-    load_Nm : float
-        For the linear loops.
-    time_figures : bool
-        Step figures of the linear loops.
-    step : StepCheck or None
-        A nonlinear step of every sample.
+    ``load_Nm`` and ``time_figures`` (of their steps) are of the linear loops; ``step`` is a nonlinear one.
     """
 
     design: Design
@@ -60,9 +50,9 @@ class SampleTask:
             if path not in known:
                 raise InputError(f"{path}: cannot vary in a Monte Carlo study")
 
-    def evaluate(self, first: int, count: int) -> Arrays:
-        """All columns of samples first to first + count - 1."""
-        return self.columns(first, self.sampler.draw(first, count))
+    def __call__(self, chunk: Chunk) -> Arrays:
+        """All columns of the samples from the first of a chunk on."""
+        return self.columns(chunk[0], self.sampler.draw(*chunk))
 
     def columns(self, first: int, draws: np.ndarray) -> Arrays:
         """All columns of samples from the first on, for their parameter values."""
@@ -72,7 +62,7 @@ class SampleTask:
 
     def sample(self) -> bytes:
         """The first sample, to be computed alike wherever the study is (`analyses.studies.proof`)."""
-        return b"".join(values.tobytes() for values in self.evaluate(0, 1).values())
+        return b"".join(values.tobytes() for values in self((0, 1)).values())
 
     def figures(self, draws: np.ndarray) -> Arrays:
         """Columns of figures for rows of parameter values (SI, in the order of ``sampler.paths``)."""
@@ -84,11 +74,7 @@ class SampleTask:
             time_figures=self.time_figures,
             held=True,
         )
-        columns: Arrays = {}
-        for loop in linear.loops:
-            columns[f"{loop}.stable"] = linear.stable(loop).astype(float)
-            for quantity in self._quantities:
-                columns[f"{loop}.{quantity}"] = linear.quantity(quantity, loop)
+        columns = loop_columns(linear, self._quantities)
         for quantity, load in self._drive_wanted:
             columns[drive_column(quantity, load)] = drive_figures(population, quantity, load)
         if self.step is not None:
@@ -119,7 +105,6 @@ class SampleTask:
 
     def identity(self) -> Tree:
         """Everything that decides the numbers, as plain JSON."""
-
         table = self.sampler.table
         return {
             "design": design_hash(self.design),
@@ -150,7 +135,6 @@ def replay(design: Design, sampler: Sampler, number: int) -> Design:
     >>> replay(design, sampler_of(design, seed=3), 17).load.inertia_kgm2 == design.load.inertia_kgm2
     False
     """
-
     values = sampler.draw(number, 1)[0]
     changes = {path: float(v) for path, v in zip(sampler.paths, values, strict=True)}
     return with_values(design, changes, check=False)

@@ -43,13 +43,7 @@ def distances(task: SampleTask, requirement: Requirement, points: np.ndarray) ->
 
 
 def worst_case(task: SampleTask, requirement: Requirement, worst_samples: np.ndarray) -> WorstCase:
-    """Make the worst samples worse.
-
-    Parameters
-    ----------
-    worst_samples : ndarray of int
-        Numbers of the worst samples, worst first.
-    """
+    """Make the worst samples (by their numbers, worst first) worse."""
     from scipy.optimize import differential_evolution, minimize
 
     region = Region(task.sampler)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import degrees, inf, radians
 from typing import TYPE_CHECKING
@@ -78,6 +78,8 @@ def settlings_of(
     """What steps of the drive as it is end in, small to full, without load and at every named one.
 
     One is as large as a predicted stick-slip cycle: larger steps may slide to rest where it goes on for ever.
+    The largest is asked first. One that does not come to rest fails the drive, whatever smaller steps do, and
+    they are not asked at this load; where a requirement accepts a swing all are, as the largest counts.
 
     Parameters
     ----------
@@ -86,14 +88,30 @@ def settlings_of(
     loads_Nm : iterable of float, optional
         Other loads.
     """
-    asked, full = design.validation, design.validation.full_deflection_rad
-    sizes = [full * share for share in sorted({SMALL, *asked.amplitude_fractions})]
-    return tuple(
-        settle(design, load, size)
-        for load in dict.fromkeys((0.0, *asked.loads_Nm) if loads_Nm is None else loads_Nm)
-        for slip in [stick_slip_cycle(design, load, loops)]
-        for size in (*sizes, *([] if slip is None else [slip.output_amplitude_rad]))
-    )
+    settings = design.validation
+    sizes = {settings.full_deflection_rad * share for share in (SMALL, *settings.amplitude_fractions)}
+    found: list[Settling] = []
+    for load in dict.fromkeys((0.0, *settings.loads_Nm) if loads_Nm is None else loads_Nm):
+        slip = stick_slip_cycle(design, load, loops)
+        whole = sizes if slip is None else {*sizes, slip.output_amplitude_rad}
+        asked = _until_known(design, load, sorted(whole, reverse=True))
+        found += reversed(list(asked))
+    return tuple(found)
+
+
+def _until_known(design: Design, load_Nm: float, sizes_rad: Iterable[float]) -> Iterator[Settling]:
+    """Steps in this order, up to the one after which the verdict of the load is known."""
+    for size in sizes_rad:
+        one = settle(design, load_Nm, size)
+        yield one
+        if accepted(design) is None and verdict_of(design, noticed(design, [one])) is Verdict.NOT_MET:
+            return
+
+
+FROM_THE_LARGEST = (
+    "The largest step of a load is asked first; where the drive does not come to rest after one, smaller "
+    "ones are not asked, unless a requirement accepts a swing."
+)
 
 
 def noticed(design: Design, settlings: Iterable[Settling]) -> Settling | None:
@@ -105,12 +123,6 @@ def noticed(design: Design, settlings: Iterable[Settling]) -> Settling | None:
     hunting = [one for one in settlings if one.hunting and one.swing_rad >= least]
     order = (Verdict.MET, Verdict.NOT_PROVEN, Verdict.NOT_MET)
     return max(hunting, key=lambda one: (order.index(verdict_of(design, one)), one.swing_rad), default=None)
-
-
-def largest_swing(settlings: Iterable[Settling]) -> Settling | None:
-    """The one of those that do not come to rest that moves most, known ends first; None: all do."""
-    hunting = (one for one in settlings if one.hunting)
-    return max(hunting, key=lambda one: (one.limit_cycle_rad is not None, one.swing_rad), default=None)
 
 
 def accepted(design: Design) -> Requirement | None:
@@ -148,12 +160,19 @@ def judged_by(design: Design) -> str:
     return "" if asked is None else f"at most ±{asked.maximum:g} {asked.unit} by requirement {asked.id}"
 
 
+def told(design: Design, swing: Settling, factor: float, unit: str) -> str:
+    """`words` of a drive that does not come to rest, and by what that is accepted where it is."""
+    said = words(swing.rest, factor, unit)
+    accepts = verdict_of(design, swing) is Verdict.MET
+    return f"{said}; accepted: {judged_by(design)}" if accepts else said
+
+
 def ending_of(design: Design, swing: Settling) -> str:
     """Say after which step a drive does not come to rest, and what it does then."""
     scale, unit, load = (1e3, "mm", "N") if design.axis == "linear" else (degrees(1.0), "deg", "N m")
     under = f" under {swing.load_Nm:g} {load}" if swing.load_Nm else ""
     step = f"after a step of {scale * swing.amplitude_rad:.3g} {unit}{under}"
-    return f"{step}: {words(swing.rest, scale, unit)}"
+    return f"{step}: {told(design, swing, scale, unit)}"
 
 
 def words(rest: Rest, factor: float, unit: str) -> str:

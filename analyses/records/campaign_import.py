@@ -4,26 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
 from actuator_lti.errors import InputError
 from analyses.records.campaign_file import Campaign, RunEntry
 from analyses.records.clocks import ClockJoin, join_records
-from analyses.records.csv_stream import MAX_ROWS, read_csv_record
 from analyses.records.inputs import InputUse, account
-from analyses.records.json_reader import load_json
-from analyses.records.mat_reader import read_mat_record
-from analyses.records.parquet_reader import load_parquet
+from analyses.records.readers import read_record
 from analyses.records.record import InputColumn, Record, RowCounts
-from analyses.records.spec import RecordSpec
-from analyses.records.table_record import record_of_columns
 
 USED = {"current": "torque kM i", "speed": "steady speed", "torque": "load", "angle": "check of the speed"}
 """What a campaign uses its signals for."""
-TABLES = {".parquet": load_parquet, ".pq": load_parquet, ".json": load_json}
-"""What gives the columns of a file by name, and its SHA-256, by its ending."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,7 +91,7 @@ def _over(one: InputUse, known: InputUse | None) -> InputUse:
 
 
 def import_campaign(
-    campaign: Campaign, *, max_rows: int = MAX_ROWS, progress: Callable[[int, int], None] | None = None
+    campaign: Campaign, *, progress: Callable[[int, int], None] | None = None
 ) -> ImportedCampaign:
     """Read every run that the campaign lists.
 
@@ -113,7 +105,7 @@ def import_campaign(
     runs, aside = [], []
     for k, entry in enumerate(campaign.runs):
         try:
-            runs.append(import_run(campaign, entry, max_rows))
+            runs.append(import_run(campaign, entry))
         except InputError as error:
             aside.append(SetAside(id=entry.id, reason=str(error)))
         if progress is not None:
@@ -125,27 +117,17 @@ def import_campaign(
     return ImportedCampaign(campaign=campaign, runs=tuple(runs), set_aside=tuple(aside))
 
 
-def import_run(campaign: Campaign, entry: RunEntry, max_rows: int = MAX_ROWS) -> ImportedRun:
+def import_run(campaign: Campaign, entry: RunEntry) -> ImportedRun:
     """Read one run's files and put them on the drive's clock."""
-    drive = read_record(entry.drive, campaign.drive, max_rows)
+    drive = read_record(entry.drive, campaign.drive)
     sensor = None
     if entry.sensor is not None:
         if campaign.sensor is None:
             raise InputError(
                 f"run {entry.id} has a sensor file, but there is no [sensor]", where=campaign.origin
             )
-        sensor = read_record(entry.sensor, campaign.sensor, max_rows)
+        sensor = read_record(entry.sensor, campaign.sensor)
     return assemble_run(campaign, entry, drive, sensor)
-
-
-def read_record(path: Path, spec: RecordSpec, max_rows: int = MAX_ROWS) -> Record:
-    """A record of either kind, by the file's ending."""
-    if path.suffix.lower() == ".mat":
-        return read_mat_record(path, spec)
-    if (load := TABLES.get(path.suffix.lower())) is not None:
-        vectors, digest = load(path)
-        return record_of_columns(vectors, spec, path, digest)
-    return read_csv_record(path, spec, max_rows=max_rows)
 
 
 def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Record | None) -> ImportedRun:

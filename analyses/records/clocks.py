@@ -11,7 +11,6 @@ from actuator_lti.errors import InputError
 from analyses.estimation.arrays import FloatArray
 from analyses.records.campaign_file import Method
 from analyses.records.correlate_clocks import Fit, fit_by_correlation
-from analyses.records.events import motion_events
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
 
@@ -49,33 +48,20 @@ def join_records(
     method: Method = "correlation",
     offset_s: float | None = None,
 ) -> tuple[Record, ClockJoin]:
-    """Put the signals of a second recorder on the time of the first.
+    """Put the signals of a second recorder on the time of the first, whose times are kept.
 
-    Parameters
-    ----------
-    first, second : Record
-        The master (its times are kept) and the other one.
-    first_signal, second_signal : str
-        The signals that show the shared happening, such as the motor's speed and the clutch's torque. Only
-        their magnitude is used, and their scale does not matter.
-    method : {"correlation", "event", "given"}
-        ``event``: the moment when the magnitude first passes half of its plateau, and the last moment when it
-        falls below again, which gives the ratio of the clock rates too. ``correlation``: the offset at which
-        the magnitudes fit best (FFT), refined together with the rate by least squares. ``given``:
-        ``offset_s``.
-    offset_s : float, optional
-        For ``given``: the first clock's time at the second clock's zero.
+    Of the signals that show the shared happening, such as the motor's speed and the clutch's torque, only
+    the magnitude is used, and their scale does not matter. By ``event``: the moment when the magnitude
+    first passes half of its plateau, and the last moment when it falls below again, which gives the ratio
+    of the clock rates too. By ``correlation``: the offset at which the magnitudes fit best (FFT), refined
+    together with the rate by least squares. As ``given``: ``offset_s``, the first clock's time at the
+    second clock's zero.
 
     Returns
     -------
     Record, ClockJoin
         The first record with the second one's signals added (linear interpolation), cut to the time both
         cover; and how it was done.
-
-    Raises
-    ------
-    InputError
-        No shared event is found, the correlation is below 0.5, or the records do not overlap.
     """
     if method == "given":
         if offset_s is None:
@@ -115,13 +101,7 @@ def _joined(first: Record, second: Record, join: ClockJoin) -> Record:
 
 
 def _check_durations(t_a: FloatArray, a: FloatArray, t_b: FloatArray, b: FloatArray, where: str) -> None:
-    """Refuse two records in which one motion lasts differently long: no clock is off by so much.
-
-    Raises
-    ------
-    InputError
-        With the ratio, and the factor that explains it where there is one.
-    """
+    """Refuse two records in which one motion lasts differently long: no clock is off by so much."""
     events_a, events_b = motion_events(t_a, a), motion_events(t_b, b)
     if events_a is None or events_b is None or events_a.stop_s is None or events_b.stop_s is None:
         return
@@ -156,3 +136,45 @@ def _by_event(t_a: FloatArray, a: FloatArray, t_b: FloatArray, b: FloatArray, wh
     offset = events_a.start_s - rate * events_b.start_s
     moved = np.interp(t_a, offset + rate * t_b, b)
     return Fit(offset, std, rate, rate_std, float(np.corrcoef(a, moved)[0, 1]))
+
+
+@dataclass(frozen=True)
+class MotionEvents:
+    """Start of a motion, and its end where the record shows it."""
+
+    start_s: float
+    stop_s: float | None
+
+
+def motion_events(time_s: FloatArray, magnitude: FloatArray) -> MotionEvents | None:
+    """First rise through half of the plateau, and last fall below it, by linear interpolation.
+
+    The plateau is the 95 % point of the magnitude, its floor the 1 % point. None where there is no rise: a
+    flat signal, or one that is up from the beginning.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> t = np.arange(0.0, 10.0, 0.1)
+    >>> e = motion_events(t, np.clip(t - 2.0, 0.0, 1.0))
+    >>> round(e.start_s, 6), e.stop_s
+    (2.5, None)
+    """
+    floor, plateau = np.quantile(magnitude, [0.01, 0.95])
+    level = 0.5 * (floor + plateau)
+    noise = 1.4826 * float(np.median(np.abs(np.diff(magnitude)))) / np.sqrt(2.0)
+    if plateau - floor <= max(6.0 * noise, 1e-12 * abs(plateau)):
+        return None
+    up = magnitude >= level
+    if up[0]:
+        return None
+    rise = int(np.argmax(up))
+    fall = len(up) - 1 - int(np.argmax(up[::-1]))
+    start = _crossing(time_s, magnitude, rise - 1, level)
+    stop = None if fall == len(up) - 1 else _crossing(time_s, magnitude, fall, level)
+    return MotionEvents(start, stop)
+
+
+def _crossing(time_s: FloatArray, values: FloatArray, k: int, level: float) -> float:
+    share = (level - values[k]) / (values[k + 1] - values[k])
+    return float(time_s[k] + share * (time_s[k + 1] - time_s[k]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import inf, isfinite
 
@@ -11,6 +11,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.estimation.least_squares import solve
+from analyses.estimation.parameters import own_share
 from analyses.records.factors import explaining, named_factor
 from analyses.records.record import Record
 
@@ -21,12 +22,15 @@ SURE = 4.0
 TICK_TOLERANCE = 1e-3
 ALIKE = 0.9
 OVER = 1.2
-ELECTRICAL_FACTOR = 2.0
 SMOOTH_HZ = 20.0
 IN_MOTION = 0.05
-CLOSELY = 0.95
-"""Cosine above which a command is followed within 18 deg: no loop has another gain there than about one."""
-LARGEST_GAIN = 1.5
+LEAST_ROWS = 10
+"""Smoothed and thinned, of a comparison."""
+STEADY = 0.1
+"""Relative difference of steps of the position beside a row that is missing or filled in."""
+COPPER_1_K = 3.93e-3
+WINDING_K = (-75.0, 160.0)
+"""From 20 deg C, the coldest and hottest winding: -55 to 180 deg C, class H."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,18 +53,15 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     checks: tuple[Callable[[Design, Record], Finding | None], ...] = (
         _rate,
         _clock,
+        _steps,
         _reduction,
         _electrical,
         _command,
-        _kind_of_current,
-        _current_limit,
-        _speed_limit,
-        _voltage_limit,
         _supply,
-        _load,
     )
     design = record.drive(design)
-    return tuple(result for check in checks if (result := check(design, record)) is not None)
+    found = (*(check(design, record) for check in checks), *_limits(design, record))
+    return tuple(result for result in found if result is not None)
 
 
 def place_of(design: Design, record: Record) -> tuple[str, FloatArray] | None:
@@ -140,21 +141,37 @@ def rate_ratio(design: Design, record: Record) -> RateRatio | None:
     moves = _moving(rate, speed)
     found, alike = _ratio(speed[moves], rate[moves])
     low, high = -inf, inf
-    if abs(alike) >= ALIKE and found > 0.0 and len(rate) > 60:
+    x, y = (_thinned(record, values) for values in (rate, speed))
+    if abs(alike) >= ALIKE and found > 0.0 and len(x) >= LEAST_ROWS:
         bent = np.gradient(np.gradient(rate)) / 12.0  # what a straight line between two samples leaves out
         between = sum(abs(_ratio(off[moves], rate[moves])[0]) for off in (0.5 * (last - first), bent))
-        step = max(1, round(0.25 / (SMOOTH_HZ * record.period_s)))  # the filter leaves no more
-        x, y = rate[::step], speed[::step]
-        (a, a_error), (b, b_error) = _regressed(y, x), _regressed(x, y)
-        ends = [a + side * a_error for side in (-SURE, SURE)]
-        ends += [1.0 / (b + side * b_error) for side in (-SURE, SURE)]
-        low, high = min(ends) - between, max(ends) + between
+        low, high = _bounds(y, x, np.gradient(x), np.gradient(y))
+        low, high = low - between, high + between
     return RateRatio(found=found, alike=alike, low=low, high=high, rate=rate, moves=moves)
 
 
-def _regressed(y: FloatArray, x: FloatArray) -> tuple[float, float]:
-    """Slope of y over x and its error; x's own slope beside it takes up a delay between the two."""
-    w = np.column_stack([x, np.gradient(x)])
+def _thinned(record: Record, values: FloatArray) -> FloatArray:
+    """As many rows of a smoothed signal as the filter leaves."""
+    return values[:: max(1, round(0.25 / (SMOOTH_HZ * record.period_s)))]
+
+
+def _bounds(y: FloatArray, x: FloatArray, beside_x: FloatArray, beside_y: FloatArray) -> tuple[float, float]:
+    """What y may be over x with noise in either: each regressed on the other, `SURE` errors wide (Frisch).
+
+    Another signal stands beside the regressor: its own slope takes up a delay between the two.
+    """
+    a, a_error = _regressed(y, x, beside_x)
+    b, b_error = _regressed(x, y, beside_y)
+    if abs(b) <= SURE * b_error:
+        return -inf, inf
+    ends = [a + side * a_error for side in (-SURE, SURE)]
+    ends += [1.0 / (b + side * b_error) for side in (-SURE, SURE)]
+    return min(ends), max(ends)
+
+
+def _regressed(y: FloatArray, x: FloatArray, beside: FloatArray) -> tuple[float, float]:
+    """Slope of y over x and its error."""
+    w = np.column_stack([x, beside])
     size = np.linalg.norm(w, axis=0)
     result = solve(w / size, y)
     return float(result.values[0] / size[0]), float(np.sqrt(result.correlated[0, 0]) / size[0])
@@ -182,6 +199,16 @@ def _rate(design: Design, record: Record) -> Finding | None:
     return Finding(subject=subject, passed=False, text=f"{said}: factor {factor}" if factor else clock)
 
 
+def clock_doubt(design: Design, record: Record) -> float:
+    """The share by which a record's clock may be off: of its speed, or of its period from whole ticks."""
+    rate = rate_ratio(design, record)
+    if rate is not None:
+        return rate.doubt
+    ticks = record.period_s / design.controller.period_s
+    off = ticks / max(round(ticks), 1) - 1.0
+    return off if TICK_TOLERANCE < abs(off) <= RATE_TOLERANCE and record.averaged == 1 else 0.0
+
+
 def _clock(design: Design, record: Record) -> Finding | None:
     """Where no speed is recorded beside the position, only the tick tells of a clock that is off."""
     rate = "velocity" if design.axis == "linear" else "speed"
@@ -196,7 +223,46 @@ def _clock(design: Design, record: Record) -> Finding | None:
         whole = f"{round(ticks)} ticks; a clock that is off by a whole number of them is not seen here"
         return Finding(subject=subject, passed=True, text=whole)
     text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off; nothing else here tells"
+    text += ": the intervals hold it" if clock_doubt(design, record) else ""
     return Finding(subject=subject, passed=None, text=text)
+
+
+def _steps(design: Design, record: Record) -> Finding | None:
+    """Rows that are missing though the time goes on, or filled in with the row before.
+
+    Between steps of the position that are alike, two on either side, one is that of two rows or more; or one
+    is nothing and the next that of two. Steps of less than ten counts of an encoder, or within noise, tell
+    nothing.
+    """
+    place = place_of(design, record)
+    if place is None or record.averaged > 1 or len(record) < LEAST_ROWS:
+        return None
+    step = np.diff(place[1]) / np.diff(record.time_s)
+    rows = np.lib.stride_tricks.sliding_window_view(step, 6)
+    count = np.min(np.abs(step), where=step != 0.0, initial=inf)
+    missing, places = _times_its_neighbours(rows, 2, [0, 1, 3, 4], count)
+    filled, _ = _times_its_neighbours(rows, 3, [0, 1, 4, 5], count)
+    lost = float(np.sum(np.round(missing[missing > 1.5]) - 1.0))
+    copied = int(np.count_nonzero((rows[:, 2] == 0.0) & (filled > 1.5)))
+    if not places:
+        return None
+    told = [f"{lost:.0f} rows are missing where the time goes on"] if lost else []
+    told += [f"{copied} rows repeat the one before"] if copied else []
+    words = f"{' and '.join(told) or 'none is of two rows'}, of {places} places where the motion tells"
+    words += ": take the record again, or give the times at which rows were taken" if told else ""
+    return Finding(subject=f"steps of the {place[0]} from row to row", passed=not told, text=words)
+
+
+def _times_its_neighbours(
+    rows: FloatArray, at: int, beside: list[int], count: float
+) -> tuple[FloatArray, int]:
+    """A step of each row over those beside it, 0 where these are not alike; how many are."""
+    others = rows[:, beside]
+    mean = others.mean(axis=1)
+    alike = np.all(np.abs(others - mean[:, None]) < STEADY * np.abs(mean)[:, None], axis=1)
+    noise = 1.4826 * float(np.median(np.abs(rows[:, at] - mean)))  # of a normal deviation
+    alike &= (STEADY * np.abs(mean) > count) & (0.5 * np.abs(mean) > SURE * noise)
+    return np.divide(rows[:, at], mean, out=np.zeros(len(mean)), where=alike), int(np.count_nonzero(alike))
 
 
 def _other(record: Record, name: str, rate: FloatArray, moves: BoolArray) -> str:
@@ -243,43 +309,81 @@ def _twist_share(design: Design, record: Record) -> float:
     return twist / behind / max(float(np.std(own)), 1e-300)
 
 
-def _electrical(design: Design, record: Record) -> Finding | None:
+def electrical_parts(design: Design, record: Record) -> dict[str, tuple[float, float]]:
+    """What R i and kE w count in a recorded voltage, each by its least and largest ratio to the design's.
+
+    Where the record does not tell one from the other, their sum; empty without voltage, current and motion.
+    """
     motor = design.effective_motor
-    if motor.resistance_ohm is None or motor.back_emf_constant_Vs_rad is None:
-        return None
-    if not {"voltage", "current", "speed"} <= set(record.signals):
-        return None
-    u, i, w = (_smooth(record, record[name]) for name in ("voltage", "current", "speed"))
+    ohm, back = motor.resistance_ohm, motor.back_emf_constant_Vs_rad
+    place = place_of(design, record)
+    if ohm is None or back is None or not {"voltage", "current"} <= set(record.signals):
+        return {}
+    if "speed" in record.signals:
+        speed = record["speed"]
+    elif place is not None:
+        speed = np.gradient(place[1], record.time_s)
+    else:
+        return {}
+    u, i, w = (_smooth(record, values) for values in (record["voltage"], record["current"], speed))
     if motor.inductance_H is not None:  # of a direct drive as large as the rest
         u = u - motor.inductance_H * np.gradient(i, record.period_s)
-    u, i, w = (_inner(values) for values in (u, i, w))
-    table = np.column_stack([motor.resistance_ohm * i, motor.back_emf_constant_Vs_rad * w])
-    size = np.linalg.norm(table, axis=0)
-    if not np.all(size > 0.03 * np.linalg.norm(u)) or np.linalg.cond(table / size) > 100.0:
-        return _electrical_size(u, table)
-    result = np.linalg.lstsq(table, u, rcond=None)[0]
-    parts = []
-    for name, ratio in zip(("R i", "kE w"), result, strict=True):
-        if not 1.0 / ELECTRICAL_FACTOR < ratio < ELECTRICAL_FACTOR:
-            factor = named_factor(1.0 / ratio) if ratio else None
-            parts.append(f"{name} counts {ratio:.3g} times" + (f": factor {factor}" if factor else ""))
-    told = "; ".join(parts) or f"R counts {result[0]:.3g} times, kE {result[1]:.3g} times"
-    return Finding(subject="voltage against R i + kE w", passed=not parts, text=told)
+    u, i, w = (_thinned(record, _inner(values)) for values in (u, i, w))
+    parts = np.column_stack([ohm * i, back * w])
+    size, total = np.linalg.norm(parts, axis=0), parts.sum(axis=1)
+    if len(u) < LEAST_ROWS or not np.any(total):
+        return {}
+    if np.all(size > 0.03 * np.linalg.norm(u)) and np.linalg.cond(parts / size) < 100.0:
+        r, e = parts.T
+        return {"R i": _bounds(u, r, e, e), "kE w": _bounds(u, e, r, r)}
+    return {"R i + kE w": _bounds(u, total, np.gradient(total), np.gradient(u))}
 
 
-def _electrical_size(u: FloatArray, table: FloatArray) -> Finding | None:
-    """Where the record does not tell R from kE: whether their sum is of the size of the voltage."""
-    ratio, alike = _ratio(table.sum(axis=1), u)
-    if not abs(alike) > 0.5:
+def _electrical(design: Design, record: Record) -> Finding | None:
+    """Voltage, current and motion through R, L and kE, at the accuracy of the signals and of the design."""
+    told = [_counted(design, name, *ends) for name, ends in electrical_parts(design, record).items()]
+    if not told:
         return None
-    passed = 1.0 / 3.0 < ratio < 3.0
-    factor = None if passed else named_factor(ratio)
-    text = f"R i + kE w is {ratio:.3g} times the voltage" + (f": factor {factor}" if factor else "")
+    each = [one for one, _ in told]
+    passed = False if False in each else None if None in each else True
+    text = "; ".join(words for _, words in told)
     return Finding(subject="voltage against R i + kE w", passed=passed, text=text)
 
 
+def resistance_doubt(design: Design, record: Record) -> float:
+    """The share by which a current may be too small, where R counts other than the design's tolerance allows.
+
+    A warmer winding or a wrong scale of the current: the record cannot tell.
+    """
+    low, high = electrical_parts(design, record).get("R i", (1.0, 1.0))
+    agrees = not isfinite(low) or _counted(design, "R i", low, high)[0] is True
+    return 0.0 if agrees else 0.5 * (low + high) - 1.0
+
+
+def _counted(design: Design, name: str, low: float, high: float) -> tuple[bool | None, str]:
+    """Whether a part of the voltage counts once, within what its data and the design's tolerance leave."""
+    if not isfinite(low):
+        return None, f"{name} is not determined"
+    key = "motor.back_emf_constant" if name == "kE w" else "motor.resistance"
+    allowed = SURE * own_share(design, key)
+    text = f"{name} counts {low:.3g} to {high:.3g} times"
+    if low <= 1.0 + allowed and high >= 1.0 - allowed:
+        return True, f"{name} is {low:.3g} to {high:.3g} times as the design has it"
+    ratio = 0.5 * (low + high)
+    kelvin, factor = (ratio - 1.0) / COPPER_1_K, named_factor(1.0 / ratio) if ratio else None
+    warm = name == "R i" and WINDING_K[0] < kelvin < WINDING_K[1]
+    if warm:
+        text += (
+            f": a winding {kelvin:+.0f} K from the design's, or a current {1.0 / ratio:.3g} times the real"
+        )
+    return (None if warm else False), text + (f": factor {factor}" if factor else "")
+
+
 def _command(design: Design, record: Record) -> Finding | None:
-    """A command that is followed at all is followed about one to one, unless a factor is wrong."""
+    """A command that is followed at all is followed about one to one, unless a factor is wrong.
+
+    Whether it is followed as the design's loops follow it, the simulation of the record tells.
+    """
     followed = (
         ("position_reference", "position"),
         ("reference", "output_angle"),
@@ -305,10 +409,8 @@ def _command(design: Design, record: Record) -> Finding | None:
                 subject=f"{answer} against its command", passed=None, text=f"cosine {alike:.2f}: not followed"
             )
         factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
-        follows = abs(alike) > CLOSELY and not 1.0 / LARGEST_GAIN < ratio < LARGEST_GAIN
-        wrong = follows or (factor is not None and not 0.5 < ratio < 1.5)
-        why = f"factor {factor}" if factor else "the reduction, or the scale of one of them"
-        text = f"{answer} is {ratio:.4g} times {command}" + (f": {why}" if wrong else "")
+        wrong = factor is not None and not 0.5 < ratio < 1.5
+        text = f"{answer} is {ratio:.4g} times {command}" + (f": factor {factor}" if wrong else "")
         return Finding(subject=f"{answer} against its command", passed=not wrong, text=text)
     return None
 
@@ -327,39 +429,6 @@ def _within(subject: str, record: Record, what: str, limit: float, unit: str) ->
     return Finding(subject=subject, passed=passed, text=text)
 
 
-def _kind_of_current(design: Design, record: Record) -> Finding | None:
-    """What a current is whose scale nothing else in the record tells."""
-    if "current" not in record.signals or "voltage" in record.signals:
-        return None
-    if record.signals.keys() & {"force", "torque_reference", "current_reference"}:
-        return None
-    text = (
-        "without a voltage, a current or torque command nothing in this record tells its scale (rms read as "
-        "DC: 0.82 times): inertia and friction come out in proportion to it"
-    )
-    return Finding(subject="scale of the current", passed=None, text=text)
-
-
-def _current_limit(design: Design, record: Record) -> Finding | None:
-    motor, limits = design.effective_motor, design.limits
-    limit = limits.peak_current_A if design.controller.current is not None else inf
-    if not isfinite(limit) and motor.resistance_ohm is not None:
-        limit = 2.0 * limits.voltage_V / motor.resistance_ohm
-    return _within("current against its limit", record, "current", limit, "A")
-
-
-def _speed_limit(design: Design, record: Record) -> Finding | None:
-    name, unit = ("velocity", "m/s") if design.axis == "linear" else ("speed", "rad/s")
-    kE = design.effective_motor.back_emf_constant_Vs_rad
-    limit = min(design.limits.speed_rad_s, inf if kE is None else design.limits.voltage_V / kE)
-    return _within(f"{name} against its limit", record, name, limit, unit)
-
-
-def _voltage_limit(design: Design, record: Record) -> Finding | None:
-    limit = float(np.max(record["supply"])) if "supply" in record.signals else design.limits.voltage_V
-    return _within("voltage against the supply", record, "voltage", limit, "V")
-
-
 def _supply(design: Design, record: Record) -> Finding | None:
     if "supply" not in record.signals:
         return None
@@ -371,6 +440,18 @@ def _supply(design: Design, record: Record) -> Finding | None:
     return Finding(subject="supply", passed=passed, text=text)
 
 
-def _load(design: Design, record: Record) -> Finding | None:
-    name, unit = ("load_force", "N") if design.axis == "linear" else ("torque", "N m")
-    return _within("load", record, name, design.load.moment_max_Nm, unit)
+def _limits(design: Design, record: Record) -> Iterator[Finding | None]:
+    """Current, speed, voltage and load against what the design allows."""
+    motor, limits, linear = design.effective_motor, design.limits, design.axis == "linear"
+    current = limits.peak_current_A if design.controller.current is not None else inf
+    if not isfinite(current) and motor.resistance_ohm is not None:
+        current = 2.0 * limits.voltage_V / motor.resistance_ohm
+    yield _within("current against its limit", record, "current", current, "A")
+    name, unit = ("velocity", "m/s") if linear else ("speed", "rad/s")
+    back = motor.back_emf_constant_Vs_rad
+    speed = min(limits.speed_rad_s, inf if back is None else limits.voltage_V / back)
+    yield _within(f"{name} against its limit", record, name, speed, unit)
+    voltage = float(np.max(record["supply"])) if "supply" in record.signals else limits.voltage_V
+    yield _within("voltage against the supply", record, "voltage", voltage, "V")
+    name, unit = ("load_force", "N") if linear else ("torque", "N m")
+    yield _within("load", record, name, design.load.moment_max_Nm, unit)

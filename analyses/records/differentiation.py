@@ -53,14 +53,8 @@ def filtered_motion(
 ) -> Motion:
     """Butterworth forward and backward, then central differences over three or seven points twice.
 
-    The signal is extended by 3 * order samples at both ends (odd extension), the usual padding of a
-    filter of this order.
-
-    Raises
-    ------
-    InputError
-        If the cut-off is not between zero and half the sampling frequency or so low that the filter's
-        coefficients cancel to their last digit, or the record is too short.
+    The signal is extended by 3 * order samples at both ends (odd extension), the usual padding of a filter
+    of this order. A cut-off so low that the filter's coefficients cancel is refused.
     """
     from scipy.signal import butter, filtfilt
 

@@ -29,12 +29,7 @@ _PLAIN = {
 def named_factor(ratio: float, more: Mapping[float, str] | None = None) -> str | None:
     """The name of a factor within 3 % (1.2 % below 2) of a ratio or of its inverse; None where none is near.
 
-    Parameters
-    ----------
-    ratio : float
-        Recorded over expected; its sign is told too.
-    more : mapping, optional
-        Further factors of the case at hand, such as the reduction.
+    The ratio is recorded over expected, its sign is told too; ``more`` are factors of the case at hand.
 
     Examples
     --------

@@ -85,12 +85,7 @@ def spec_of_names(
 ) -> tuple[RecordSpec | None, Mapping[str, str]]:
     """The layout that column names such as ``time_s`` and ``Motor speed [rpm]`` tell.
 
-    Returns
-    -------
-    RecordSpec or None
-        None without a time or without any signal that is known.
-    mapping
-        For each column that is not read: why.
+    None without a time or without any signal that is known; and for each column that is not read: why.
     """
     layout = CsvFormat() if layout is None else layout
     time: str | None = None

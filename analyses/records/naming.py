@@ -160,7 +160,7 @@ def signal_of(base: str, unit: str) -> Signal | None:
     return None
 
 
-def canonical(name: str, unit: str, where: str = "") -> str:
+def canonical(name: str, unit: str) -> str:
     """The name by which the analyses know a signal of a record file.
 
     Raises
@@ -175,8 +175,8 @@ def canonical(name: str, unit: str, where: str = "") -> str:
     by_name = [signal for signal in SIGNALS if base == signal.name or base in signal.also]
     if by_name:
         wanted = " or ".join(dict.fromkeys(signal.unit for signal in by_name))
-        raise InputError(f'{where}signals.{name}.unit = "{unit}": must be a unit like {wanted}')
+        raise InputError(f'signals.{name}.unit = "{unit}": must be a unit like {wanted}')
     names = [signal.name for signal in SIGNALS]
     near = get_close_matches(base, [*names, *(a for s in SIGNALS for a in s.also)], 1, 0.6)
     hint = f'; did you mean "{near[0]}"?' if near else ""
-    raise InputError(f"{where}signals.{name}: no signal that is known{hint} There are: {', '.join(names)}")
+    raise InputError(f"signals.{name}: no signal that is known{hint} There are: {', '.join(names)}")

@@ -14,16 +14,32 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import MatContent
 from actuator_lti.files.reading import open_regular, shown_path
 from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
-from analyses.records.campaign_import import TABLES, read_record
 from analyses.records.csv_rows import STAMP
-from analyses.records.csv_stream import MAX_ROWS
 from analyses.records.inputs import spec_of_names
-from analyses.records.mat_reader import columns_of, load_mat, names_in
 from analyses.records.naming import is_unit
-from analyses.records.published import EMPS_SPEC, ODRIVE_SPEC
+from analyses.records.readers import TABLES, columns_of, load_mat, names_in, read_record
 from analyses.records.record import Record
-from analyses.records.spec import CsvFormat, RecordSpec
+from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.toml_tables import Table, read_toml
+
+EMPS_SPEC = RecordSpec(
+    time=TimeColumn(column="t"),
+    signals=(
+        SignalColumn(name="position", column="qm", unit="m"),
+        SignalColumn(name="position_reference", column="qg", unit="m"),
+        SignalColumn(name="voltage", column="vir", unit="V"),
+    ),
+)
+ODRIVE_SPEC = RecordSpec(
+    format=CsvFormat(comment="%", row_end=";", names=("timestep", "voltage", "position", "velocity")),
+    time=TimeColumn(column="timestep", tick_s=1.0 / 8000.0, minimum=1.0),
+    signals=(
+        SignalColumn(name="voltage", column="voltage", unit="V"),
+        SignalColumn(name="angle", column="position", unit="turn"),
+        SignalColumn(name="speed", column="velocity", unit="turn/s"),
+    ),
+)
+
 
 HEAD_BYTES = 1 << 16
 EMPS_COLUMNS = {"t", "qm", "qg", "vir", "gtau"}
@@ -34,15 +50,15 @@ UNKNOWN = (
 )
 
 
-def open_record(path: str | Path, *, max_rows: int = MAX_ROWS) -> Record:
+def open_record(path: str | Path) -> Record:
     """As `open_records`, of a file that holds one record."""
-    records = open_records(path, max_rows=max_rows)
+    records = open_records(path)
     if len(records) != 1:
         raise InputError(f"lists {len(records)} records; allowed here: one", where=str(path))
     return records[0]
 
 
-def open_records(path: str | Path, *, max_rows: int = MAX_ROWS) -> list[Record]:
+def open_records(path: str | Path) -> list[Record]:
     """Read the records whose layout is told by a record file, or the one of a file by its column names.
 
     Known without a record file: CSV (comma, semicolon or tab; decimal point or comma; units in the names or
@@ -51,20 +67,8 @@ def open_records(path: str | Path, *, max_rows: int = MAX_ROWS) -> list[Record]:
     ``current_A``, ``load_Nm`` (what ``simulate`` writes); a MATLAB matrix beside a list of such names; the
     ODrive recorder's CSV; and the MATLAB file of the EMPS benchmark.
 
-    A record file is TOML::
-
-        file = "log.csv"                               # beside the record file; or a list of files
-        separator = ";"
-        decimal = ","
-        time = { column = "t", unit = "ms" }
-        signals.reference = { column = "cmd", unit = "deg" }
-        signals.current = { column = "I", unit = "mA", value = "rms" }
-        signals.voltage = { column = "u - pulses", unit = "V", offset = 0.1, scale = 2.0 }
-        resample_tolerance = "2 %"                     # of the range, where steps are missing or uneven
-        missing = "interpolate"                        # signals at several rates; default "drop" the row
-        settings.control.position.gain = "90 1/s"      # of the drive, other than the design's
-
-    Several records stand in ``[[record]]`` tables, each with what is its own beside what all share.
+    A record file is TOML: ``docs/records.md`` says what it may hold. Several records stand in ``[[record]]``
+    tables, each with what is its own beside what all share.
 
     Raises
     ------
@@ -74,20 +78,20 @@ def open_records(path: str | Path, *, max_rows: int = MAX_ROWS) -> list[Record]:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix == ".toml":
-        return _described(path, max_rows)
+        return _described(path)
     if not suffix and not path.exists():  # as designs are named
         raise InputError(f"is no file; allowed: {RECORDS}", where=str(path))
     if path.is_file() and path.stat().st_size == 0:
         raise InputError("is empty; allowed: a line of names, then rows of numbers", where=str(path))
     spec, why = _spec_of_file(path, suffix)
-    record = read_record(path, spec, max_rows)
+    record = read_record(path, spec)
     inputs = tuple(
         one if one.signal else replace(one, note=why.get(one.column, one.note)) for one in record.inputs
     )
     return [replace(_with_gain(record), name=shown_path(path.name), inputs=inputs)]
 
 
-def _described(path: Path, max_rows: int) -> list[Record]:
+def _described(path: Path) -> list[Record]:
     root = Table(read_toml(path), "", str(path))
     refuse_design(root)
     if not {"file", "record"} & set(root):
@@ -106,7 +110,7 @@ def _described(path: Path, max_rows: int) -> list[Record]:
             {k: v for k, v in own.data.items() if k not in ("file", "settings")}, own.origin, own.path
         )
         for file in (path.parent / name for name in names):
-            record = read_record(file, spec, max_rows)
+            record = read_record(file, spec)
             notes = (*record.notes, *(f"set: {key} = {value}" for key, value in settings.items()))
             result.append(replace(record, name=shown_path(file.name), settings=settings, notes=notes))
     return result

@@ -1,4 +1,4 @@
-"""A record: signals in SI over time, with an account of every row of the file."""
+"""A record: signals in SI over time, an account of every row of the file; made ready for an analysis."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import BoolArray, FloatArray
+from analyses.estimation.arrays import BoolArray, FloatArray, longest
 
 RESAMPLE_TOLERANCE = 0.05
 """Largest error of a resampled signal that is accepted without being told to, as a share of its range."""
@@ -83,13 +83,7 @@ class Record:
     settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
     def drive(self, design: Design) -> Design:
-        """The design as it was set for this record.
-
-        Raises
-        ------
-        InputError
-            For a setting that is no key of the design, or that contradicts its others.
-        """
+        """The design as it was set for this record."""
         if not self.settings:
             return design
         try:
@@ -127,13 +121,8 @@ class Record:
         """The record on a regular grid by linear interpolation, with the fact and its error noted.
 
         The error is estimated from the record itself: how far a straight line over as many samples as the
-        longest gap holds is from the samples between (95 % of all places), a quarter of that for a grid that
-        is only out of step.
-
-        Raises
-        ------
-        InputError
-            If the error exceeds ``resample_tolerance`` of the range of a signal.
+        longest gap holds is from the samples between (95 % of all places), a quarter of that for a grid
+        that is only out of step. Above ``resample_tolerance`` of the range of a signal it is refused.
         """
         period = self.period_s
         grid = np.arange(self.time_s[0], self.time_s[-1] + 1e-6 * period, period)
@@ -178,3 +167,25 @@ def named_apart(records: Sequence[Record], taken: Sequence[str] = ()) -> list[Re
         seen.append(name)
         out.append(record if name == record.name else replace(record, name=name))
     return out
+
+
+def prepared(record: Record) -> Record:
+    """A record on a regular grid, cut to its longest stretch with the drive enabled, both noted."""
+    record = record if record.is_regular else record.resampled()
+    if "enable" not in record.signals:
+        return record
+    start, stop = longest(record["enable"] > 0.5)
+    if start == stop:
+        raise InputError("the drive is never enabled", where=record.name)
+    if stop - start == len(record):
+        return record
+    note = (
+        f"enabled from {record.time_s[start]:.4g} s to {record.time_s[stop - 1]:.4g} s: "
+        f"{stop - start} of {len(record)} rows used"
+    )
+    return replace(record.slice(start, stop), notes=(*record.notes, note))
+
+
+def period_of(record: Record) -> float:
+    """The period, rounded to a whole number of ns past the rounding of the record's times."""
+    return float(round(float(np.mean(np.diff(record.time_s))) * 1e9) * 1e-9)

@@ -7,7 +7,10 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from actuator_lti.design.units import compatible, parse_unit
 from actuator_lti.errors import InputError
+from analyses.estimation.arrays import FloatArray
+from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import RESAMPLE_TOLERANCE
 
 Policy = Literal["error", "drop"]
@@ -26,29 +29,11 @@ TO_LINE = 3.0**0.5
 class CsvFormat:
     """The text layout of a file.
 
-    Parameters
-    ----------
-    separator : str
-        One character, or ``"whitespace"`` for any run of blanks and tabs.
-    decimal : str
-        ``"."`` or ``","``.
-    comment : str
-        Lines that begin with it are counted and passed over; empty for none.
-    row_end : str
-        Text that closes each row before the line end, such as ``";"``; empty for none.
-    header : bool or None
-        Whether the first line that is no comment holds the column names; None: it does
-        when no ``names`` are given.
-    names : tuple of str
-        The column names of a file without a header.
-    skip_lines : int
-        Lines to pass over at the start.
-    encoding : str
-        Of the header only; the numbers are plain ASCII.
-    matrix : str
-        Of a MATLAB file: the matrix whose columns are ``names`` (or named by a list of texts in the file).
-    stamps : bool
-        Whether the time is written as ISO 8601 time stamps; they are read as seconds from the first one.
+    ``separator`` is one character or ``"whitespace"`` (any run of blanks and tabs), ``comment`` begins lines
+    that are counted and passed over, ``row_end`` closes each row before the line end. ``header``: whether the
+    first line holds the column names (None: where no ``names`` are given); ``encoding`` is that of the header
+    only. ``matrix`` is that of a MATLAB file whose columns are ``names``, or named by a list of texts in the
+    file. With ``stamps`` the time is written as ISO 8601 stamps, read as seconds from the first.
     """
 
     separator: str = ","
@@ -158,7 +143,7 @@ class RecordSpec:
 
     ``bad_rows``: what to do with a row that is no row of numbers (default: refuse the file, with line,
     column and reason). ``missing``: what to do with an empty or NaN value (default: drop the row;
-    ``interpolate`` for signals logged at several rates, see `analyses.records.gaps`).
+    ``interpolate`` for signals logged at several rates, see `analyses.records.table_record`).
     ``disorder``: what to do when the time does not increase (default: refuse). Dropped rows are counted
     by reason. ``resample_tolerance``: see `Record.resampled`.
     """
@@ -185,3 +170,47 @@ class RecordSpec:
         """The columns to be read of a file that has those: the time's first, then those of each signal."""
         time = () if self.time.column is None else (self.time.column,)
         return (*time, *(column for one in self.signals for _, column in one.terms(there)))
+
+
+@dataclass(frozen=True)
+class Converter:
+    """``(raw + offset) * factor``, and the SI unit of the result."""
+
+    offset: float
+    factor: float
+    si_unit: str
+
+    def __call__(self, raw: FloatArray) -> FloatArray:
+        return (raw + self.offset) * self.factor
+
+
+def unit_factor(unit: str, known: str | None, what: str) -> float:
+    """Factor from ``unit`` to SI; refused where its dimension is not that of ``known``."""
+    try:
+        result = parse_unit(unit)
+        wanted = parse_unit(known) if known is not None else None
+    except ValueError as error:
+        raise InputError(f'{what}.unit = "{unit}": {error}') from None
+    if wanted is not None and not compatible(result, wanted):
+        raise InputError(f'{what}.unit = "{unit}": must be a unit like {known}')
+    return result.factor
+
+
+def converter(signal: SignalColumn) -> Converter:
+    """The conversion of one signal.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> rpm = converter(SignalColumn(name="speed", column="n", unit="rpm"))
+    >>> rpm(np.array([9000.0])).round(3).tolist(), rpm.si_unit
+    ([942.478], 'rad/s')
+    """
+    known = KNOWN_UNITS.get(signal.name)
+    factor = unit_factor(signal.unit, known, f"signals.{signal.name}")
+    forms = AC_FORMS.get(known or "")
+    if forms is None and signal.value != "dc":
+        raise InputError(f'signals.{signal.name}.value = "{signal.value}": only of a current or a voltage')
+    factor *= 1.0 if forms is None else forms[signal.value]
+    factor *= TO_LINE if signal.between == "phase" else 1.0
+    return Converter(signal.offset, signal.scale * factor, known or f"SI of {signal.unit}")

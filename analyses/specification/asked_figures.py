@@ -89,15 +89,14 @@ class AskedFigures:
         worst = min((quantity.better * value for value in found if value is not None), default=inf)
         return quantity.better * worst
 
-
-def asked_figure(figures: AskedFigures, name: str) -> tuple[float | None, str]:
-    """A figure in its unit and, where there is none, why."""
-    quantity = ANALYSIS_QUANTITIES[name]
-    try:
-        if quantity.cornered:
-            return figures.at_corners(QUANTITIES[quantity.cornered]), ""
-        value = quantity.read(figures, figures.design.axis)
-    except InputError as error:
-        return None, error.message
-    said = "" if value is not None else "the design does not state what this needs"
-    return value, figures.limit_cycle_said if name == "limit_cycle" else said
+    def figure(self, name: str) -> tuple[float | None, str]:
+        """A figure in its unit and, where there is none, why."""
+        quantity = ANALYSIS_QUANTITIES[name]
+        try:
+            if quantity.cornered:
+                return self.at_corners(QUANTITIES[quantity.cornered]), ""
+            value = quantity.read(self, self.design.axis)
+        except InputError as error:
+            return None, error.message
+        said = "" if value is not None else "the design does not state what this needs"
+        return value, self.limit_cycle_said if name == "limit_cycle" else said

@@ -18,31 +18,17 @@ STEADY_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Capability:
-    """What the drive can do at one load torque; output side unless a name says motor.
+    """What the drive can do at one load torque; output side unless a name says motor."""
 
-    Attributes
-    ----------
-    figures : DriveFigures
-        In closed form.
-    simulated_rate_rad_s : float or None
-        Steady rate when the command runs away from the output; ``None`` where the rate has no bound, or was
-        not reached in the time that a run may take.
-    simulated_acceleration_rad_s2 : float or None
-        Largest mean acceleration over a stretch of the start, from rest.
-    simulated_current_A : float or None
-        Mean motor current at the steady rate.
-    current_ratio : float or None
-        That current over the continuous current.
-    duty : float or None
-        Share of the time in which that current may flow (`thermal_duty`).
-    """
-
-    figures: DriveFigures
+    figures: DriveFigures  # in closed form
+    # Steady rate when the command runs away from the output; ``None`` where the rate has no bound, or was not
+    # reached in the time that a run may take
     simulated_rate_rad_s: float | None
+    # Largest mean acceleration over a stretch of the start, from rest
     simulated_acceleration_rad_s2: float | None
-    simulated_current_A: float | None
-    current_ratio: float | None
-    duty: float | None
+    simulated_current_A: float | None  # mean motor current at the steady rate
+    current_ratio: float | None  # that current over the continuous current
+    duty: float | None  # share of the time in which that current may flow (`thermal_duty`)
 
 
 def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:

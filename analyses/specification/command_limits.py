@@ -12,32 +12,21 @@ from actuator_lti.drive.profile import profile_onset_rad
 from actuator_lti.loops import assemble_loops
 from analyses.large_signal.grid import tone
 from analyses.large_signal.steady_start import linear_steady_state
+from analyses.large_signal.tones_run import run_tones
 
 
 @dataclass(frozen=True)
 class CommandLimits:
-    """A sine of full deflection behind rate and acceleration limit of the command.
+    """A sine of full deflection behind rate and acceleration limit of the command."""
 
-    Attributes
-    ----------
-    frequency_hz, tone_hz : float
-        Asked for, and simulated: a whole number of ticks is a period.
-    onset_rad : float
-        Peak command from which on one of the two acts, output side.
-    amplitude_rad : float
-        Of the sine: full deflection.
-    gain_db : float or None
-        Simulated fundamental of the output over the command; ``None`` where neither acts at full deflection.
-    share : float
-        Of the time that one of them acts.
-    """
-
+    # Asked for, and simulated: a whole number of ticks is a period
     frequency_hz: float
     tone_hz: float
-    onset_rad: float
-    amplitude_rad: float
+    onset_rad: float  # peak command from which on one of the two acts, output side
+    amplitude_rad: float  # of the sine: full deflection
+    # Simulated fundamental of the output over the command; ``None`` where neither acts at full deflection
     gain_db: float | None
-    share: float
+    share: float  # of the time that one of them acts
 
     def words(self, scale: float, unit: str) -> str:
         """The same in a sentence, amplitudes times a scale."""
@@ -56,12 +45,8 @@ class CommandLimits:
 def command_limits(design: Design, frequency_hz: float) -> CommandLimits | None:
     """Simulate a sine of full deflection where rate or acceleration of the command limit it.
 
-    ``None`` where the command has neither, or the drive no position loop.
-
-    Parameters
-    ----------
-    frequency_hz : float
-        Such as the bandwidth of the response to the command.
+    ``None`` where the command has neither, or the drive no position loop. The frequency is such as the
+    bandwidth of the response to the command.
     """
     full = design.validation.full_deflection_rad
     onset = float(profile_onset_rad(design, np.array([2.0 * pi * frequency_hz]))[0])
@@ -69,8 +54,6 @@ def command_limits(design: Design, frequency_hz: float) -> CommandLimits | None:
         return None
     if onset >= full:
         return CommandLimits(frequency_hz, frequency_hz, onset, full, None, 0.0)
-    from analyses.large_signal.tones_run import run_tones
-
     chosen = tone(frequency_hz, design)
     start = linear_steady_state(assemble_loops(design), np.array([chosen.omega_rad_s]))
     amplitude, nothing = np.array([full]), np.zeros(1)

@@ -11,39 +11,22 @@ from actuator_lti.drive.facts import RATE_LIMITS, capability
 
 @dataclass(frozen=True)
 class DriveFigures:
-    """Figures of the whole drive at one load torque; output side in rad (linear axis: m).
+    """Figures of the whole drive at one load torque; output side in rad (linear axis: m)."""
 
-    Attributes
-    ----------
-    load_Nm : float
-        Load torque at the output shaft.
-    output_rate_rad_s : float
-        Largest steady speed of the output within the speed, voltage and peak current limits; 0 if it
-        cannot move; ``inf`` without any limit.
-    rate_limit : str
-        What sets it: ``"speed limit"``, ``"voltage"``, ``"force"`` or ``"nothing"``.
-    motor_current_A : float or None
-        Current needed at that speed; ``None`` without a motor current (ideal source) or where the speed has
-        no bound.
-    acceleration_rad_s2 : float
-        Largest acceleration of the output from rest, within the acceleration limit; 0 if it cannot move.
-    """
-
-    load_Nm: float
+    load_Nm: float  # load torque at the output shaft
+    # Largest steady speed of the output within the speed, voltage and peak current limits; 0 if it cannot
+    # move; ``inf`` without any limit
     output_rate_rad_s: float
-    rate_limit: str
+    rate_limit: str  # what sets it: ``"speed limit"``, ``"voltage"``, ``"force"`` or ``"nothing"``
+    # Current needed at that speed; ``None`` without a motor current (ideal source) or where the speed has no
+    # bound
     motor_current_A: float | None
+    # Largest acceleration of the output from rest, within the acceleration limit; 0 if it cannot move
     acceleration_rad_s2: float
 
 
 def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
-    """Rate, current and acceleration of a drive at a load torque.
-
-    Parameters
-    ----------
-    design : Design
-    load_Nm : float
-        Load torque at the output shaft, N m (linear axis: N), either sign.
+    """Rate, current and acceleration of a drive at a load at the output, N m (linear axis: N), either sign.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Standard manoeuvres, simulated: what speed, torque and current they take."""
+"""Standard manoeuvres, simulated: what speed, torque and current they take; the plane that bounds them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.steady import motor_torque_Nm
+from actuator_lti.design.plant import no_load_speed
+from actuator_lti.drive.facts import stall_torque_Nm
+from actuator_lti.drive.steady import (
+    motor_torque_Nm,
+    steady_torque_Nm,
+    voltage_limit_torque_Nm,
+)
 from analyses.large_signal.grid import tone
 from nonlinear import commands, simulate
 from nonlinear.commands import Command
@@ -20,38 +26,24 @@ LONGEST_TICKS = 60_000
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """One manoeuvre at one load torque.
-
-    Attributes
-    ----------
-    name : str
-    load_Nm : float
-    speed_rad_s, torque_Nm : ndarray
-        Motor speed and motor torque along it, thinned for drawing.
-    rms_current_A, peak_current_A : float or None
-        ``None`` for an ideal source, which has no current.
-    rms_torque_Nm, peak_torque_Nm : float
-        Of the motor.
-    duty : float or None
-        Share of the time in which the manoeuvre may run, resting in between, for the rms current to stay at
-        the continuous current: ``(I_cont/I_rms)^2``, at most 1.
-    limits : mapping of str to float
-        Fraction of the time in which each limit acts, where it does.
-    periodic : bool
-        Whether it repeats: only then rms and duty say what can be kept up.
-    """
+    """One manoeuvre at one load torque."""
 
     name: str
     load_Nm: float
+    # Motor speed and motor torque along it, thinned for drawing
     speed_rad_s: np.ndarray
     torque_Nm: np.ndarray
+    # ``None`` for an ideal source, which has no current
     rms_current_A: float | None
     peak_current_A: float | None
+    # Of the motor
     rms_torque_Nm: float
     peak_torque_Nm: float
+    # Share of the time in which the manoeuvre may run, resting in between, for the rms current to stay at the
+    # continuous current: ``(I_cont/I_rms)^2``, at most 1
     duty: float | None
-    limits: dict[str, float]
-    periodic: bool
+    limits: dict[str, float]  # fraction of the time in which each limit acts, where it does
+    periodic: bool  # whether it repeats: only then rms and duty say what can be kept up
 
 
 def thermal_duty(design: Design, rms_current_A: float | None) -> float | None:
@@ -78,12 +70,7 @@ def manoeuvres(
 ) -> tuple[Manoeuvre, ...]:
     """Simulate a step, a sine below the top rate, and a sawtooth at it, all at full deflection.
 
-    Parameters
-    ----------
-    rate_rad_s, acceleration_rad_s2 : float
-        Largest rate and acceleration of the output (`analyses.specification.drive_figures`).
-    settling_s : float
-        How long the linear loop takes to settle.
+    Rate and acceleration: the largest of the output; ``settling_s``: of the linear loop.
     """
     full = design.validation.full_deflection_rad
     result = []
@@ -154,3 +141,59 @@ def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
     way = np.concatenate([[0.0], way])
     places = np.searchsorted(way, np.linspace(0.0, way[-1], POINTS))
     return np.unique(np.minimum(places, len(way) - 1))
+
+
+PLANE_POINTS = 41
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line in the plane: motor speed (rad/s) and motor torque (N m)."""
+
+    name: str
+    speed_rad_s: np.ndarray
+    torque_Nm: np.ndarray
+
+
+@dataclass(frozen=True)
+class TorqueSpeedPlane:
+    """Motor side, first quadrant."""
+
+    bounds: tuple[Curve, ...]  # voltage line, peak current, continuous current, speed limit; those that exist
+    demands: tuple[Curve, ...]  # friction (and load, where it passes) in steady motion at each load torque
+
+
+def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPlane:
+    """Draw up the plane up to a little above the top speed.
+
+    Sources: equation (1) in steady motion, ``u = R i + kE w``; equation (9).
+    """
+    motor, limits = design.effective_motor, design.limits
+    top = top_speed_rad_s if 0.0 < top_speed_rad_s < math.inf else 1.0
+    speed = np.linspace(0.0, 1.25 * top, PLANE_POINTS)
+    bounds = []
+
+    def level(name: str, torque: float) -> None:
+        if math.isfinite(torque):
+            bounds.append(Curve(name, speed[[0, -1]], np.full(2, torque)))
+
+    if motor.source_gain_Nm_V is not None:
+        level("drive signal at its limit", stall_torque_Nm(design))
+    else:
+        if math.isfinite(limits.voltage_V):
+            line = np.linspace(0.0, no_load_speed(design), PLANE_POINTS)
+            bounds.append(Curve("voltage limit", line, voltage_limit_torque_Nm(design, line)))
+        if design.controller.current is not None:
+            level("peak current", motor_torque_Nm(design, limits.peak_current_A, math.nan))
+        level("continuous current", motor_torque_Nm(design, limits.continuous_current_A, math.nan))
+    if design.controller.velocity is not None and math.isfinite(limits.speed_rad_s):
+        high = max((float(curve.torque_Nm.max()) for curve in bounds), default=1.0)
+        bounds.append(Curve("speed limit", np.full(2, limits.speed_rad_s), np.array([0.0, high])))
+    demands = tuple(_demand(design, load, speed) for load in design.validation.loads_Nm)
+    return TorqueSpeedPlane(tuple(bounds), demands)
+
+
+def _demand(design: Design, load_Nm: float, speed: np.ndarray) -> Curve:
+    """Torque for steady motion forward."""
+    unit = "N" if design.axis == "linear" else "N m"
+    return Curve(f"steady motion at {load_Nm:g} {unit}", speed, steady_torque_Nm(design, load_Nm, speed))

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_lti.asked.quantities import CUSTOMARY, LOOP_QUANTITIES, judged_loops, reserve
+from actuator_lti.asked.quantities import CUSTOMARY, LOOP_QUANTITIES, reserve
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import parameter_value
 from actuator_lti.errors import InputError
-from analyses.monte_carlo.judging import in_populations
+from analyses.monte_carlo.judging import by_loop, in_populations, judge, loop_columns
 from analyses.specification.weakest import View, limit_of, views
 from analyses.tuning.objects import allowed_range
 from analyses.tuning.problem import GAINS
@@ -124,19 +124,11 @@ def _harmless(move: Move, others: Iterable[View], design: Design) -> bool:
 
 
 def _requirements_kept(design: Design, path: str, both: np.ndarray) -> bool:
-    asked = [
-        one for one in design.requirements if one.quantity in LOOP_QUANTITIES and in_populations(one, design)
-    ]
     found = linear_figures(Population(design, {path: both}, 2), time_figures=True, held=True)
-    for item in asked:
-        for loop in judged_loops(item.loop, found.loops):
-            if loop not in found.loops:
-                continue
-            values = found.quantity(item.quantity, loop)
-            values = np.abs(values) if LOOP_QUANTITIES[item.quantity].absolute else values
-            met = (values >= (-inf if item.minimum is None else item.minimum)) & (
-                values <= (inf if item.maximum is None else item.maximum)
-            )
-            if met[0] and not met[1]:
+    columns = loop_columns(found)
+    for item in by_loop(design):
+        if item.quantity in LOOP_QUANTITIES and item.loop in found.loops and in_populations(item, design):
+            before, after = judge(item, design, columns).passed
+            if before and not after:
                 return False
     return True

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
 from math import inf
 from typing import TYPE_CHECKING
 
-from actuator_lti.design.model import Design
+from actuator_lti.asked.drive_figure import drive_figure
+from actuator_lti.asked.quantities import LOOPS, QUANTITIES, judged_loops
+from actuator_lti.asked.verdict import Role, Tally, Verdict
+from actuator_lti.design.asked import ResponseTo
+from actuator_lti.design.model import Design, Requirement, Waiver
+from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
+from analyses.linear.held_loops import by_itself
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures
-from analyses.specification.verdicts import RequirementVerdict, distance, judged, tally, which_response
 
 if TYPE_CHECKING:
     from analyses.specification.asked_figures import AskedFigures
-
-__all__ = ["RequirementVerdict", "distance", "evaluate_requirements", "tally", "which_response"]
 
 
 def evaluate_requirements(
@@ -36,11 +41,17 @@ def evaluate_requirements(
     """
     if figures is None:
         figures = all_loop_figures(assemble_loops(design))
-    asked = _AskedOnce(design)
+
+    @cache
+    def asked() -> AskedFigures:
+        from analyses.specification.asked_figures import AskedFigures
+
+        return AskedFigures(design)
+
     return tuple(
         _with_limits(design, verdict)
         for requirement in design.requirements
-        for verdict in judged(design, requirement, figures, asked)
+        for verdict in judged(design, requirement, figures, lambda name: asked().figure(name))
     )
 
 
@@ -54,16 +65,162 @@ def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerd
     return replace(verdict, reason="; ".join(filter(None, (verdict.reason, said_of(design, verdict.value)))))
 
 
-class _AskedOnce:
-    """Figures of analyses, run where a requirement names one; imported then."""
+Asked = Callable[[str], tuple[float | None, str]]
+"""From the name of a quantity to what an analysis found, or why there is nothing."""
 
-    def __init__(self, design: Design) -> None:
-        self.design = design
-        self.figures: AskedFigures | None = None
 
-    def __call__(self, name: str) -> tuple[float | None, str]:
-        from analyses.specification.asked_figures import AskedFigures, asked_figure
+@dataclass(frozen=True, kw_only=True)
+class RequirementVerdict:
+    """One requirement at one place."""
 
-        if self.figures is None:
-            self.figures = AskedFigures(self.design)
-        return asked_figure(self.figures, name)
+    id: str  # of the requirement, with ``/loop`` where it holds for every loop
+    requirement: Requirement
+    loop: str | None  # the loop that was judged; ``None`` for the whole drive
+    value: float | None  # what was found, in ``requirement.unit``; ``inf`` where there is no such bound
+    distance: float | None  # to the limit in ``requirement.unit``, positive on the good side
+    verdict: Verdict  # not proven where it cannot be judged; ``reason`` says why
+    reason: str = ""  # what has to be known to read it
+    waiver: Waiver | None = None  # of what is not proven
+    rotor: str = ""  # of a current loop: whether its rotor is ``"free"`` or ``"locked"``
+
+    @property
+    def passes(self) -> bool:
+        """Whether it is met, or waived."""
+        return self.verdict.passes(waived=self.waiver is not None)
+
+    @property
+    def role(self) -> Role:
+        """The colour of it."""
+        return self.verdict.role(waived=self.waiver is not None)
+
+
+def tally(verdicts: Iterable[RequirementVerdict]) -> Tally:
+    """Count verdicts: the one count that every headline and exit status comes from."""
+    every = list(verdicts)
+    return Tally.of((one.verdict for one in every), (one.waiver is not None for one in every))
+
+
+def judged(
+    design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures], asked: Asked
+) -> list[RequirementVerdict]:
+    """Judge one requirement wherever it holds; ``asked`` finds what only an analysis finds."""
+    verdicts = _judged(design, requirement, figures, asked)
+    waiver = design.waiver_of
+    return [replace(one, waiver=waiver(one.id)) if one.verdict == "not proven" else one for one in verdicts]
+
+
+def _judged(
+    design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures], asked: Asked
+) -> list[RequirementVerdict]:
+    """Judge one requirement wherever it holds, waivers apart."""
+    quantity = QUANTITIES.get(requirement.quantity)
+    if quantity is None:
+        raise InputError(
+            f"requirement {requirement.id}: quantity = {requirement.quantity!r}: allowed are "
+            f"{', '.join(QUANTITIES)}",
+            where=design.origin or None,
+        )
+    if quantity.scope == "analysis":
+        value, reason = asked(quantity.name)
+        return [_verdict(requirement, requirement.id, None, value, reason)]
+    if quantity.scope == "drive":
+        result = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
+        value = None if math.isnan(result) else result
+        reason = "" if value is not None else "the design has no such figure"
+        return [_verdict(requirement, requirement.id, None, value, reason)]
+    named = requirement.loop not in (None, "every")
+    verdicts = [
+        _judge_loop(
+            design, requirement, requirement.id if named else f"{requirement.id}/{name}", name, figures
+        )
+        for name in judged_loops(requirement.loop, figures)
+    ]
+    current = figures.get("current")
+    rotor = requirement.rotor or (current.rotor if current else "")
+    return [replace(one, rotor=rotor) if one.loop == "current" else one for one in verdicts]
+
+
+def _judge_loop(
+    design: Design, requirement: Requirement, id: str, name: str, figures: Mapping[str, LoopFigures]
+) -> RequirementVerdict:
+    """Judge one requirement on one loop; an unstable loop meets none."""
+    if name not in LOOPS:
+        raise InputError(
+            f"requirement {requirement.id}: loop = {name!r}: allowed are {', '.join(LOOPS)}, every",
+            where=design.origin or None,
+        )
+    if name not in figures:
+        return _verdict(requirement, id, name, None, f"the design has no {name} loop")
+    result = figures[name].asked(requirement)
+    if result.margins.stable is None:
+        return _verdict(requirement, id, name, None, "stability is not certain, so no figure is given")
+    if not result.stable:
+        reason = f"the {name} loop is {result.margins.verdict}"
+        return RequirementVerdict(
+            id=id, requirement=requirement, loop=name, value=None, distance=None, verdict=Verdict.NOT_MET,
+            reason=reason,
+        )  # fmt: skip
+    value = QUANTITIES[requirement.quantity].read(result)
+    reason = which_response(requirement.quantity, name, requirement.to or "command")
+    if value is None:
+        reason = "not found in the band of this loop"
+    if figures[name].held is not None and requirement.rotor != "locked":
+        reason = ", ".join(filter(None, (reason, by_itself(name))))
+    return _verdict(requirement, id, name, value, reason)
+
+
+def which_response(quantity: str, loop: str, to: ResponseTo = "command") -> str:
+    """Which of several responses a figure is taken of, in words; empty for a figure that they share.
+
+    Bandwidth, resonance and step of the position loop are those of the response to the user's command,
+    with profile, filter and feed-forward, or to the reference behind profile and filter; of an inner loop,
+    those of the feedback loop.
+
+    Examples
+    --------
+    >>> which_response("bandwidth", "position"), which_response("phase_margin", "position")
+    ('of the response to the command: mean of its profile, filter and feed-forward included', '')
+    """
+    if not QUANTITIES[quantity].of_response:
+        return ""
+    if loop != "position":
+        return "of the feedback loop"
+    if to == "reference":
+        return "of the response to the reference, behind profile and filter of the command"
+    return "of the response to the command: mean of its profile, filter and feed-forward included"
+
+
+def _verdict(
+    requirement: Requirement, id: str, loop: str | None, value: float | None, reason: str
+) -> RequirementVerdict:
+    """Compare a value with the limits."""
+    if value is None or math.isnan(value):
+        return RequirementVerdict(
+            id=id, requirement=requirement, loop=loop, value=None, distance=None,
+            verdict=Verdict.NOT_PROVEN, reason=reason,
+        )  # fmt: skip
+    room = distance(requirement, value)
+    if math.isinf(value):
+        reason = "nothing limits it" if value > 0 else reason
+    return RequirementVerdict(
+        id=id,
+        requirement=requirement,
+        loop=loop,
+        value=value,
+        distance=room,
+        verdict=Verdict.of(room >= 0.0),
+        reason=reason,
+    )
+
+
+def distance(requirement: Requirement, value: float) -> float:
+    """Give the distance of a value to the nearer limit, in its unit, positive on the good side.
+
+    Examples
+    --------
+    >>> distance(Requirement(id="a", quantity="gain_margin", unit="dB", minimum=6.0), 9.4)
+    3.4000000000000004
+    """
+    below = math.inf if requirement.minimum is None else value - requirement.minimum
+    above = math.inf if requirement.maximum is None else requirement.maximum - value
+    return min(below, above)

@@ -27,25 +27,16 @@ SWING = 0.1
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """One parameter and one figure.
+    """One parameter and one figure."""
 
-    Attributes
-    ----------
-    path, figure : str
-        Dotted key; column such as ``"position.phase_margin"``.
-    per_percent : float
-        Change of the figure per +1 % of the parameter (central difference of 0.1 %).
-    low_value, high_value : float
-        Ends of the parameter, SI.
-    low, high : float
-        The figure there; NaN where it does not exist.
-    """
-
+    # Dotted key; column such as ``"position.phase_margin"``
     path: str
     figure: str
-    per_percent: float
+    per_percent: float  # change of the figure per +1 % of the parameter (central difference of 0.1 %)
+    # Ends of the parameter, SI
     low_value: float
     high_value: float
+    # The figure there; NaN where it does not exist
     low: float
     high: float
 
@@ -57,16 +48,9 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Every figure against every parameter.
+    """Every figure against every parameter."""
 
-    Attributes
-    ----------
-    base : mapping of str to float
-        Figures of the nominal design.
-    entries : tuple of Sensitivity
-    """
-
-    base: Mapping[str, float]
+    base: Mapping[str, float]  # figures of the nominal design
     entries: tuple[Sensitivity, ...]
 
     def tornado(self, figure: str) -> tuple[Sensitivity, ...]:
@@ -80,13 +64,9 @@ class Sensitivities:
 
 
 def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensitivities:
-    """Sensitivities of margins, bandwidths and static figures to the parameters of a design.
+    """Sensitivities of margins, bandwidths and static figures to parameters of a design, by dotted keys.
 
-    Parameters
-    ----------
-    design : Design
-    paths : sequence of str, optional
-        Dotted keys; by default every number of the plant and the controller that is not zero.
+    By default to every number of the plant and the controller that is not zero.
 
     Examples
     --------
@@ -97,7 +77,6 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
     >>> round(result.tornado("position.bandwidth")[0].per_percent, 2)
     0.38
     """
-
     chosen = tuple(p for p in (paths or variable_paths(design)) if _moves(design, p))
     nominal = {path: parameter_value(design, path) for path in chosen}
     ends = {path: _ends(design, path, nominal[path]) for path in chosen}
@@ -126,7 +105,6 @@ def _rise(low: float, high: float) -> float:
 
 def _moves(design: Design, path: str) -> bool:
     """Whether a parameter is a finite number that is not zero."""
-
     value = parameter_value(design, path)
     return value != 0.0 and bool(np.isfinite(value)) and not path.startswith("friction.breakaway")
 

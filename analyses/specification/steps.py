@@ -8,39 +8,30 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.design.model import Design
+from analyses.large_signal.tones_run import TANH_TOLERANCE
 from nonlinear import LIMITERS, Rows
 
 SMALLEST = 0.01  # of full deflection: the small-signal step, beside the design's own fractions
 BAND = 0.02
+SETTLINGS = 2.0  # after travel and swing; in one the slowest mode falls to 1e-9
 LONGEST_TICKS = 60_000
 
 
 @dataclass(frozen=True)
 class StepTime:
-    """A step of the command, output side; ``None`` where a level was not reached in time.
+    """A step of the command, output side; ``None`` where a level was not reached in time."""
 
-    Attributes
-    ----------
-    load_Nm, fraction, amplitude_rad : float
-        Fraction of full deflection, and the step itself.
-    rise_time_s, overshoot_percent, settling_time_s : float or None
-        10 to 90 %; beyond the target; into 2 % for good.
-    peak_rate_rad_s : float
-        Largest rate of the output.
-    peak_current_A : float or None
-    limits : mapping of str to float
-        Fraction of the time in which each limit acts, where it does.
-    """
-
+    # Fraction of full deflection, and the step itself
     load_Nm: float
     fraction: float
     amplitude_rad: float
+    # 10 to 90 %; beyond the target; into 2 % for good
     rise_time_s: float | None
     overshoot_percent: float
     settling_time_s: float | None
-    peak_rate_rad_s: float
+    peak_rate_rad_s: float  # largest rate of the output
     peak_current_A: float | None
-    limits: dict[str, float]
+    limits: dict[str, float]  # fraction of the time simulated in which each limit acts, where it does
 
 
 def step_times(
@@ -53,12 +44,12 @@ def step_times(
     sizes = np.tile(np.array(fractions) * full, len(loads))
     rows = Rows.of(design, len(sizes))
     rows.step("command", sizes)
-    rows["load"] = np.repeat(loads, len(fractions))
+    rows["load"], rows["tanh_tolerance"] = np.repeat(loads, len(fractions)), TANH_TOLERANCE
     rows.step_figures(sizes, BAND)
     rows.extremes()
     travel = sizes / rate_rad_s if 0.0 < rate_rad_s < math.inf else np.zeros(len(sizes))
     swing = np.sqrt(sizes / acceleration_rad_s2) if 0.0 < acceleration_rad_s2 < math.inf else travel
-    wait = np.minimum(np.ceil((3.0 * travel + 12.0 * swing + 8.0 * settling_s) / Ts), LONGEST_TICKS)
+    wait = np.minimum(np.ceil((3.0 * travel + 12.0 * swing + SETTLINGS * settling_s) / Ts), LONGEST_TICKS)
     rows["ticks"] = wait
     result = rows.run()
     speeds, currents = result.extreme("motor_speed_rad_s"), result.extreme("current_A")

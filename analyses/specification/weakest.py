@@ -25,63 +25,32 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class View:
-    """The margins of a loop from one side.
+    """The margins of a loop from one side."""
 
-    Attributes
-    ----------
-    place : str
-        Which operating point or corner, or that all loops are closed; empty for the loop as it is judged.
-    loop : str
-        Its name; empty at a break point.
-    rotor : str
-        Of a current loop: ``"free"`` or ``"locked"``.
-    stable : bool or None
-    figures : mapping of str to float
-        By the names of `CUSTOMARY`; ``inf`` where nothing limits.
-    cut : str
-        The break point, with all other loops closed.
-    kind, load_Nm : str, float
-        The operating point.
-    design : Design, optional
-        Where it is not the nominal one: that of a corner.
-    found : LoopFigures, optional
-        The loop as it is there.
-    """
-
+    # Which operating point or corner, or that all loops are closed; empty for the loop as it is judged
     place: str
-    loop: str
-    rotor: str
+    loop: str  # its name; empty at a break point
+    rotor: str  # of a current loop: ``"free"`` or ``"locked"``
     stable: bool | None
-    figures: Mapping[str, float]
-    cut: str = ""
+    figures: Mapping[str, float]  # by the names of `CUSTOMARY`; ``inf`` where nothing limits
+    cut: str = ""  # the break point, with all other loops closed
+    # The operating point
     kind: OperatingPoint = "sliding"
     load_Nm: float = 0.0
-    design: Design | None = None
-    found: LoopFigures | None = None
+    design: Design | None = None  # where it is not the nominal one: that of a corner
+    found: LoopFigures | None = None  # the loop as it is there
 
 
 @dataclass(frozen=True)
 class WeakPoint:
-    """One margin in one view.
-
-    Attributes
-    ----------
-    view : View
-    quantity : str
-        Empty where the loop is not stable.
-    value, limit : float
-    required : bool
-        Whether the limit is a requirement's; else it is the customary one.
-    reserve : float
-        Share of the limit, as distance of L from -1, that is left; negative beyond it.
-    """
+    """One margin in one view."""
 
     view: View
-    quantity: str
+    quantity: str  # empty where the loop is not stable
     value: float
     limit: float
-    required: bool
-    reserve: float
+    required: bool  # whether the limit is a requirement's; else it is the customary one
+    reserve: float  # share of the limit, as distance of L from -1, that is left; negative beyond it
 
 
 def weakest(survey: LoopSurvey, corners: Corners | None = None) -> WeakPoint | None:

@@ -10,8 +10,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, UnstableError
-from actuator_lti.loops.compliance import compliance
-from actuator_lti.loops.stiffness import LOST_MOTION_SHARE, lost_motion_rad, stiffness_at
+from actuator_lti.loops.stiffness import LOST_MOTION_SHARE, compliance, lost_motion_rad, stiffness_at
 from analyses.stiffness.result import AtRest, Check, LostMotion
 from nonlinear import commands, simulate, tangent
 from nonlinear.bench.loop_setup import LoopSetup

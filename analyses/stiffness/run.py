@@ -1,14 +1,17 @@
-"""The whole stiffness analysis of a design."""
+"""The stiffness of a design, dynamic and static: the inverse of the response from M_ext to the output."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from actuator_lti.design.model import Design
-from analyses.stiffness.curves import stiffness_curves
+from actuator_lti.design.model import Design, Motor
+from actuator_lti.loops.stiffness import compliance, frequencies_hz, static_stiffness, stiffness_at
 from analyses.stiffness.injected import check_stiffness, lost_motion, stiffness_at_rest
-from analyses.stiffness.result import Stiffness
+from analyses.stiffness.result import State, Stiffness, StiffnessCurve
 
+STATES: tuple[State, ...] = ("powered", "shorted", "open")
 CHECKED_HZ = (2.0, 10.0, 50.0)
 REST_HZ = (2.0, 20.0)
 REST_FRACTIONS = (0.01, 0.1, 1.0)  # of the largest moment
@@ -40,3 +43,32 @@ def stiffness(design: Design, *, simulated: bool = True) -> Stiffness:
         stiffness_at_rest(design, asked) if largest > 0.0 else (),
         "no position loop holds the output" if simulated and not checks else "",
     )
+
+
+def unpowered(design: Design, winding: State) -> Design:
+    """The design without its loops: the winding ``shorted`` (u = 0) or ``open`` (i = 0)."""
+    bare = replace(design, controller=replace(design.controller, position=None, velocity=None, current=None))
+    if winding == "shorted" and design.motor.has_electrical_dynamics:
+        return bare
+    idle = Motor(rotor_inertia_kgm2=design.motor.rotor_inertia_kgm2, source_gain_Nm_V=1.0)
+    return replace(bare, motor=idle, supply=None, temperature=None)
+
+
+def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
+    """Powered and unpowered stiffness, friction sliding (its share by load as where the motor drives).
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> [f"{curve.state} {curve.static_Nm_rad:.0f}" for curve in stiffness_curves(load_design("fin"))]
+    ['powered 1324', 'shorted 30', 'open 30']
+    """
+    curves = []
+    for state in STATES:
+        if state == "shorted" and not design.motor.has_electrical_dynamics:
+            continue
+        response = compliance(design if state == "powered" else unpowered(design, state))
+        frequency = frequencies_hz(response)
+        K = stiffness_at(response, frequency)
+        curves.append(StiffnessCurve(state, frequency, K, static_stiffness(response)))
+    return tuple(curves)

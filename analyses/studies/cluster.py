@@ -44,13 +44,7 @@ def _is_loopback(host: str) -> bool:
 
 
 def connected(address: str, tls: Path | None) -> Client:
-    """Connect to a running scheduler.
-
-    Raises
-    ------
-    InputError
-        If the address is none, or a certificate cannot be used.
-    """
+    """Connect to a running scheduler; an address that is none, or a certificate of no use, is refused."""
     import ssl
 
     import distributed
@@ -129,27 +123,27 @@ def quiet() -> Iterator[None]:
 
 
 def submit(
-    client: Any, call: Callable[[Any, Any], Any], held: Any, todo: list[Any], sink: Callable[[Any, Any], None]
+    client: Any, work: Callable[[Any], Any], todo: list[Any], sink: Callable[[Any, Any], None]
 ) -> None:
     """Compute on a Dask cluster, with a few parts a worker under way; a lost worker's parts run again."""
     import distributed
 
     client.wait_for_workers(1, timeout=30)
-    packages = packages_of(held)
+    packages = packages_of(work)
     here = prove(packages)
     for address, there in client.run(prove, packages, on_error="return").items():
         if not isinstance(there, OSError):  # gone: who takes its place proves itself before its first part
             hold_against(here, there, address)
-    here = prove(packages, held)
+    here = prove(packages, work)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Sending large graph")  # a table of samples goes once
-        sent = client.submit(_the_same, held, pure=False, retries=_RETRIES)  # lost with a worker, made again
+        sent = client.submit(_the_same, work, pure=False, retries=_RETRIES)  # lost with a worker, made again
     width = max(2, sum(client.nthreads().values())) * IN_FLIGHT
     waiting = iter(todo)
     parts: dict[str, Any] = {}
 
     def start(part: Any) -> Any:
-        future = client.submit(_answered, call, sent, here, part, pure=False, retries=_RETRIES)
+        future = client.submit(_answered, sent, here, part, pure=False, retries=_RETRIES)
         parts[future.key] = part
         return future
 
@@ -169,19 +163,17 @@ def submit(
             running.add(start(following))
 
 
-def _the_same(held: Any) -> Any:
-    return held
+def _the_same(work: Any) -> Any:
+    return work
 
 
-def _answered(
-    call: Callable[[Any, Any], Any], held: Any, proof: Proof, part: Any
-) -> tuple[Any, Exception | None]:
+def _answered(work: Callable[[Any], Any], proof: Proof, part: Any) -> tuple[Any, Exception | None]:
     """The result or the error of a part: tried again is only what a dying worker took along.
 
     A worker proves itself before its first part, also one that has joined late.
     """
     try:
-        prove_once(proof, packages_of(held), held)
-        return call(held, part), None
+        prove_once(proof, packages_of(work), work)
+        return work(part), None
     except Exception as error:  # noqa: BLE001 - raised again where it was asked for
         return None, error

@@ -1,21 +1,20 @@
 """Work that falls into parts, computed here, on a local Dask cluster, or on one that is already there.
 
-Parts are chunks of a numbered study (`Engine.run`) or any items (`Engine.map`). What comes of a part must not
-depend on where it is computed; results come in any order and are given to a sink one by one, so that memory
-holds only a few, whatever their number.
+Parts are chunks of a numbered study, or any items. What comes of a part must not depend on where it is
+computed; results come in any order and are given to a sink one by one, so that memory holds only a few,
+whatever their number.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -30,31 +29,16 @@ Chunk = tuple[int, int]
 Arrays = dict[str, np.ndarray]
 Progress = Callable[[int, int], None]
 Item = TypeVar("Item")
-Part = TypeVar("Part", covariant=True)
 Result = TypeVar("Result")
-
-
-class Task(Protocol[Part]):
-    """What is evaluated for numbers first to first + count - 1."""
-
-    def evaluate(self, first: int, count: int) -> Part:
-        """What they come to: columns by name, each of shape (count,), say."""
 
 
 @dataclass(frozen=True)
 class Engine:
     """Where parts are computed.
 
-    Attributes
-    ----------
-    workers : int or None
-        Processes of a local Dask cluster; ``None`` for none.
-    scheduler : str or None
-        Address of a running Dask scheduler, such as ``tls://host:8786``.
-    tls : Path or None
-        Folder with ca.pem, cert.pem and key.pem for that scheduler.
-    threads : int or None
-        Threads in this process when neither is given; all processors by default.
+    A local Dask cluster of ``workers`` processes; a running ``scheduler``, such as ``tls://host:8786``, with
+    ``tls``, a folder with ca.pem, cert.pem and key.pem; else ``threads`` of this process (default: all
+    processors).
     """
 
     workers: int | None = None
@@ -89,14 +73,13 @@ class Engine:
         """Whether parts go to other processes."""
         return self.workers is not None or self.scheduler is not None
 
-    def run(
-        self,
-        task: Task[Result],
-        chunks: Iterable[Chunk],
-        sink: Callable[[Chunk, Result], None],
-        progress: Progress | None = None,
-    ) -> None:
-        """Evaluate every chunk once and give each result to the sink, in any order.
+    def map(
+        self, work: Callable[[Item], Result], items: Iterable[Item], sink: Callable[[Item, Result], None],
+        progress: Progress | None = None, size: Callable[[Item], int] = lambda _: 1,
+    ) -> None:  # fmt: skip
+        """Apply a function of a module, or a task that is called like one, to every item once.
+
+        Results go to the sink in any order; progress counts the sizes of the items.
 
         Raises
         ------
@@ -105,50 +88,25 @@ class Engine:
         InputError
             If a worker computes otherwise than this process (`analyses.studies.proof`).
         """
-        todo = list(chunks)
-        counted = _Counted(progress, sum(count for _, count in todo))
-
-        def take(chunk: Chunk, part: Result) -> None:
-            sink(chunk, part)
-            counted.add(chunk[1])
-
-        self._each(_evaluate, task, todo, take)
-
-    def map(
-        self,
-        work: Callable[[Item], Result],
-        items: Sequence[Item],
-        sink: Callable[[Item, Result], None],
-        progress: Progress | None = None,
-    ) -> None:
-        """Apply a function of a module to every item once, each result to the sink, in any order.
-
-        Raises
-        ------
-        NumericalError
-            As `run`; whatever the work raises goes its way.
-        """
-        counted = _Counted(progress, len(items))
-
-        def take(item: Item, result: Result) -> None:
-            sink(item, result)
-            counted.add(1)
-
-        self._each(_applied, work, list(items), take)
-
-    def _each(
-        self, call: Callable[[Any, Any], Any], held: Any, todo: list[Any], sink: Callable[[Any, Any], None]
-    ) -> None:
-        """Give ``call(held, part)`` of every part to the sink."""
+        todo = list(items)
         if not todo:
             return
+        done, total = 0, sum(map(size, todo))
+
+        def take(item: Item, result: Result) -> None:
+            nonlocal done
+            sink(item, result)
+            done += size(item)
+            if progress is not None:
+                progress(done, total)
+
         if not self.distributed:
-            _threads(partial(call, held), todo, sink, self.threads or os.cpu_count() or 1)
+            _threads(work, todo, take, self.threads or os.cpu_count() or 1)
             return
         finished = False
         try:
             with self._client() as client:
-                cluster.submit(client, call, held, todo, sink)
+                cluster.submit(client, work, todo, take)
                 finished = True
         except (OSError, TimeoutError, CancelledError) as error:
             if isinstance(error, InputError):
@@ -179,20 +137,6 @@ class Engine:
             yield client
 
 
-@dataclass
-class _Counted:
-    """Reports how much is done."""
-
-    progress: Progress | None
-    total: int
-    done: int = 0
-
-    def add(self, count: int) -> None:
-        self.done += count
-        if self.progress is not None:
-            self.progress(self.done, self.total)
-
-
 def _threads(
     call: Callable[[Any], Any], todo: list[Any], sink: Callable[[Any, Any], None], threads: int
 ) -> None:
@@ -209,11 +153,3 @@ def _threads(
                     running[pool.submit(call, part)] = part
     finally:
         pool.shutdown(wait=False, cancel_futures=True)  # who holds a part that never ends can end it now
-
-
-def _evaluate(task: Task[Result], chunk: Chunk) -> Result:
-    return task.evaluate(*chunk)
-
-
-def _applied(work: Callable[[Any], Any], item: Any) -> Any:
-    return work(item)

@@ -27,14 +27,9 @@ _proven: set[str] = set()  # proofs of clients that this worker has met
 
 
 def prove(packages: Sequence[str] = CODE, study: Any = None) -> Proof:
-    """What this process computes with, by name: code, libraries, arithmetic, and hashes of computed samples.
+    """What this process computes with, by name: code of packages, libraries, arithmetic, hashes of samples.
 
-    Parameters
-    ----------
-    packages : sequence of str
-        Whose code counts.
-    study : object, optional
-        Where it has a method ``sample``, the bytes that this returns count, too.
+    Where the study has a method ``sample``, the bytes that this returns count, too.
     """
     import scipy
 
@@ -51,13 +46,7 @@ def prove(packages: Sequence[str] = CODE, study: Any = None) -> Proof:
 
 
 def hold_against(here: Proof, there: Any, worker: str) -> None:
-    """Refuse a worker that computes otherwise.
-
-    Raises
-    ------
-    InputError
-        One line: the worker, what differs, how to start it.
-    """
+    """Refuse a worker that computes otherwise, in one line: what differs, and how to start it."""
     if not isinstance(there, Mapping):
         said = " ".join(repr(there).split())[:200]
         raise InputError(f"worker {worker} is refused: it does not say what it computes with ({said})")
@@ -72,13 +61,7 @@ def hold_against(here: Proof, there: Any, worker: str) -> None:
 
 
 def prove_once(wanted: Proof, packages: Sequence[str], study: Any) -> None:
-    """On a worker: hold its own proof against that of a client, before its first part of a study.
-
-    Raises
-    ------
-    InputError
-        Where it computes otherwise.
-    """
+    """On a worker: hold its own proof against that of a client, before its first part of a study."""
     known = _hash([repr(sorted(wanted.items())).encode()])
     if known not in _proven:
         hold_against(wanted, prove(packages, study), f"process {os.getpid()} on {socket.gethostname()}")

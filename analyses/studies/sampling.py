@@ -36,16 +36,7 @@ BOX_SIGMA = 3.0  # half width of the tolerance box of a normal distribution, in 
 
 @dataclass(frozen=True)
 class Factor:
-    """One parameter with its distribution.
-
-    Attributes
-    ----------
-    path : str
-        Dotted key of the design file.
-    nominal : float
-        SI value.
-    tolerance : Tolerance
-    """
+    """One parameter (dotted key, SI value) with its distribution."""
 
     path: str
     nominal: float
@@ -78,15 +69,7 @@ def _width(value: float | None) -> float:
 
 @dataclass(frozen=True)
 class Table:
-    """Samples from an identification: rows drawn with equal chance, all columns of a row together.
-
-    Attributes
-    ----------
-    paths : tuple of str
-    rows : ndarray, shape (rows, len(paths))
-        SI values.
-    origin : str
-    """
+    """Samples from an identification: rows (SI) drawn with equal chance, all columns of a row together."""
 
     paths: tuple[str, ...]
     rows: np.ndarray
@@ -95,17 +78,9 @@ class Table:
 
 @dataclass(frozen=True)
 class Sampler:
-    """Samples of the toleranced parameters of a design.
+    """Samples of the toleranced parameters of a design; ``seed`` is any integer from 0 on.
 
-    Attributes
-    ----------
-    factors : tuple of Factor
-    correlation : ndarray, shape (len(factors), len(factors))
-        Of the normal scores (Gaussian copula).
-    table : Table or None
-        Drawn by a further coordinate.
-    seed : int
-        Any integer from 0 on.
+    ``correlation`` is that of the normal scores (Gaussian copula); a table is drawn by a further coordinate.
     """
 
     factors: tuple[Factor, ...]
@@ -193,15 +168,10 @@ class Sampler:
 
 
 def semidefinite_root(matrix: np.ndarray) -> np.ndarray:
-    """Lower triangular L with ``L L' = matrix``, for a matrix that may be singular.
+    """Lower triangular L with ``L L' = matrix``, which may be singular; an indefinite one is refused.
 
     Two parameters that are one (correlation 1 or -1) have a zero on the diagonal of L, so that the second
     follows the first exactly.
-
-    Raises
-    ------
-    InputError
-        If the matrix is not positive semidefinite.
 
     Examples
     --------
@@ -237,10 +207,7 @@ def correlation_of(design: Design, names: Sequence[str]) -> np.ndarray:
 def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> Sampler:
     """The sampler of a design's tolerances and correlations; columns of a table replace tolerances.
 
-    Raises
-    ------
-    InputError
-        If nothing has a tolerance, or a correlation names a key that has none.
+    Refused where nothing has a tolerance, or a correlation names a key that has none.
 
     Examples
     --------
@@ -277,13 +244,7 @@ def _check_range(factor: Factor, where: str | None) -> None:
 
 
 def read_table(path: str | Path, known: Sequence[str]) -> Table:
-    """Read samples of parameters (one row a sample, columns by dotted key, SI) from CSV or Parquet.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a column is no key of the design, or a value is not finite.
-    """
+    """Read samples of parameters (one row a sample, columns by dotted key, SI) from CSV or Parquet."""
     need("pandas", "tables", "--from-samples")
     need("pyarrow", "tables", "--from-samples")
     import pandas as pd

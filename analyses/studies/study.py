@@ -63,19 +63,10 @@ LONGEST_NAME = 200
 
 @dataclass(frozen=True)
 class Variant:
-    """One design of a study.
+    """One design of a study; ``design`` is ``None`` where it was refused, then ``error`` says why.
 
-    Attributes
-    ----------
-    name : str
-        As written; any text, never used as a path.
-    slug : str
-        The name as part of a file name, unique in the study.
-    design : Design or None
-        ``None`` where it was refused; then ``error`` says why.
-    overrides : mapping of str to object
-        Dotted keys as written.
-    error : str
+    The name is as written, any text, never used as a path; ``slug`` is its form in file names, unique in
+    the study; ``overrides`` are dotted keys as written.
     """
 
     name: str
@@ -95,19 +86,7 @@ class MonteCarloPlan:
 
 @dataclass(frozen=True)
 class Study:
-    """A base design and its variants.
-
-    Attributes
-    ----------
-    name, title, description, origin : str
-    base : Variant
-        With the study's own requirements.
-    variants : tuple of Variant
-        In the order of the file: variants, sweeps, grids.
-    validation : bool
-        Whether the nonlinear validation is wanted.
-    monte_carlo : MonteCarloPlan or None
-    """
+    """A base design, with the study's own requirements, and its variants in the order of the file."""
 
     name: str
     title: str
@@ -135,19 +114,10 @@ def is_study(path: str | Path) -> bool:
 
 
 def load_study(path: str | Path, *, keep_going: bool = False) -> Study:
-    """Read a study file.
+    """Read a study file: TOML, at most 1 MiB and 10000 variants (`actuator_lti.bounds`).
 
-    Parameters
-    ----------
-    path : path
-        TOML, at most 1 MiB and 10000 variants (`actuator_lti.bounds`).
-    keep_going : bool
-        Keep a variant that its design's checks refuse, with its error, instead of refusing the study.
-
-    Raises
-    ------
-    InputError
-        One line: file, key, value and what is allowed.
+    With ``keep_going`` a variant that its design's checks refuse is kept, with its error; without, and for
+    all else, an `InputError` says file, key, value and what is allowed.
     """
     tree = read_toml(path, "study file")
     return study_from_tree(tree, shown_path(path), Path(path).parent, keep_going=keep_going)

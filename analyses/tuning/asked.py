@@ -15,28 +15,19 @@ Aim = Literal["least-change", "reserve"]
 
 @dataclass(frozen=True)
 class TuningSettings:
-    """What tuning is to do.
+    """What tuning is to do."""
 
-    Attributes
-    ----------
-    requirements : tuple of Requirement
-        In place of those of the design on the same figure of the same loop.
-    rounded : bool
-        Round the gains to the steps of the motion controller's objects, where the drive is that controller.
-    curve, check : bool
-        Whether the trade-off curve and the nonlinear check are wanted.
-    aim : {"least-change", "reserve"}
-        The least change of the design that meets every requirement, or the largest common distance to all
-        (up to 30 % of each limit).
-    place : tuple of str
-        What may be added where gains alone do not meet the requirements: `ELEMENTS`.
-    """
-
+    # In place of those of the design on the same figure of the same loop
     requirements: tuple[Requirement, ...] = ()
+    # Round the gains to the steps of the motion controller's objects, where the drive is that controller
     rounded: bool = True
+    # Whether the trade-off curve and the nonlinear check are wanted
     curve: bool = True
     check: bool = True
+    # The least change of the design that meets every requirement, or the largest common distance to all (up
+    # to 30 % of each limit)
     aim: Aim = "least-change"
+    # What may be added where gains alone do not meet the requirements: `ELEMENTS`
     place: tuple[str, ...] = ()
 
 

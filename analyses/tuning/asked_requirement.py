@@ -18,12 +18,7 @@ _FORM = re.compile(r"\s*([a-z]+)\.([a-z_0-9]+)\s*(>=|<=)\s*(.+?)\s*")
 
 
 def read_requirement(words: str, design: Design) -> Requirement:
-    """Read a requirement on a loop.
-
-    Raises
-    ------
-    InputError
-        With what is allowed.
+    """Read a requirement on a loop; what makes no sense is refused with what is allowed.
 
     Examples
     --------
@@ -32,7 +27,6 @@ def read_requirement(words: str, design: Design) -> Requirement:
     >>> result.id, result.minimum, result.unit
     ('position-bandwidth-wanted', 30.0, 'Hz')
     """
-
     match = _FORM.fullmatch(words)
     if match is None:
         raise InputError(

@@ -13,13 +13,13 @@ from actuator_lti.design import with_values
 from actuator_lti.loops import assemble_loops
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.stepping import StepCheck, step_columns
-from analyses.specification.verdicts import judged
+from analyses.specification.requirements import judged
 from analyses.tuning.problem import Problem
 from analyses.tuning.result import NonlinearCheck
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
-    from analyses.specification.verdicts import RequirementVerdict
+    from analyses.specification.requirements import RequirementVerdict
     from analyses.tuning.result import BindingRequirement
 
 _SMALL = 0.05
@@ -30,15 +30,8 @@ def confirm(
 ) -> tuple[RequirementVerdict, ...]:
     """Judge the tuned design, and each requirement's worst corner, by certified margins.
 
-    The search asks the many-designs figures; this asks what ``margins`` asks.
-
-    Parameters
-    ----------
-    tuned : Design
-    requirements : tuple of Requirement
-        On loops.
-    binding : tuple of BindingRequirement
-        The same at their worst corners.
+    The search asks the many-designs figures; this asks what ``margins`` asks. ``binding`` holds the same
+    requirements at their worst corners.
     """
     timed = any(QUANTITIES[item.quantity].timed for item in requirements)
     rows: dict[tuple[tuple[str, float], ...], list[Requirement]] = {(): list(requirements)}

@@ -3,9 +3,9 @@
 Minimise the change (`analyses.tuning.placing.change`: squares of ln ratios of gains, of shares fed forward)
 with every requirement met at every corner of the working set: sequential quadratic programming from the
 design itself, and from gains with reserve (`solve`) where that finds nothing. As margins have kinks (another
-crossover becomes the worst), what it finds is then compared with points drawn from shells of smaller
-changes, and each value is taken back towards home by itself. What is returned meets every corner, or is the
-best compromise.
+crossover becomes the worst) and what is allowed may fall apart, differential evolution (Storn and Price 1997)
+then searches the box that holds all that is nearer, and the descent begins again from what it finds; each
+value is taken back towards home by itself. What is returned meets every corner, or is the best compromise.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from __future__ import annotations
 import numpy as np
 
 from analyses.tuning.problem import Problem
-from analyses.tuning.program import Program, Spent
-from analyses.tuning.solve import ROUNDS, Solution, solve, violated
+from analyses.tuning.solve import ROUNDS, Program, Solution, Spent, solve, violated
 
 MET = 1e-6  # relative distance that a requirement keeps, above the rounding of a margin
-DRAWN = 256
-WIDEST = 3.0  # radius of the shells while nothing is known to do: a factor 20 in one gain
+GENERATIONS = 60
+MEMBERS = 8  # of a generation, for each value
+WIDEST = 3.0  # a factor 20, for a value that costs nothing wherever it is
 WAY = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.2, 0.4, 0.7])
 BACK = np.linspace(0.0, 1.0, 17)[1:]
 
@@ -26,11 +26,7 @@ BACK = np.linspace(0.0, 1.0, 17)[1:]
 def least_change(problem: Problem, *, give_up: bool = False) -> Solution:
     """The nearest gains that meet every requirement at every corner; the best compromise where none do.
 
-    Parameters
-    ----------
-    problem : Problem
-    give_up : bool
-        Whether to stop where already the nominal design misses a limit.
+    With ``give_up`` it stops where already the nominal design misses a limit.
     """
     corners = problem.all_corners
     result = problem.distances(problem.present[None, :], corners)[0]
@@ -70,20 +66,14 @@ def _nearest(
     problem: Problem, start: np.ndarray | None, firm: np.ndarray | None, working: np.ndarray
 ) -> np.ndarray | None:
     """Nearest gains to home that meet the working set; those of `firm` are known to. None without any."""
-    rng = np.random.default_rng(1)
     begins = [row for row in (problem.present, start, firm) if row is not None]
     best = _nearer(problem, firm, np.vstack([_descend(problem, row, working) for row in begins]), working)
-    for _ in range(4):
-        before = np.inf if best is None else float(problem.change(best[None, :])[0])
-        drawn = _nearer(problem, best, _shells(problem, best, rng), working)
-        if drawn is not best and drawn is not None:
-            drawn = _nearer(problem, drawn, _descend(problem, drawn, working), working)
-        if drawn is None:
-            return None
-        best = _taken_back(problem, drawn, working)
-        if problem.change(best[None, :])[0] > 0.999 * before or problem.spent:
-            break
-    return best
+    if best is None:
+        return None
+    drawn = _evolved(problem, best, working)
+    best = _nearer(problem, best, np.vstack([drawn, _descend(problem, drawn, working)]), working)
+    assert best is not None
+    return _taken_back(problem, best, working)
 
 
 def _descend(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.ndarray:
@@ -125,18 +115,28 @@ def _nearer(
     return result
 
 
-def _shells(problem: Problem, best: np.ndarray | None, rng: np.random.Generator) -> np.ndarray:
-    """Points on shells about home, as many near as far; what costs nothing is drawn near where it is."""
-    home = problem.coordinates(problem.present)
-    here = home if best is None else problem.coordinates(best)
-    size = len(home)
-    free = np.array([item.home is None for item in problem.variables])
-    radius = WIDEST if best is None else float(np.sqrt(problem.change(best[None, :])[0]))
-    aim = rng.standard_normal((DRAWN, size))
-    aim /= np.linalg.norm(np.where(free, 0.0, aim), axis=1, keepdims=True) + 1e-300
-    reach = radius * rng.uniform(size=(DRAWN, 1))
-    rows = np.where(free, here + rng.uniform(-0.7, 0.7, (DRAWN, size)), home + reach * aim)
-    return np.clip(problem.values(rows), problem.lower, problem.upper)
+def _evolved(problem: Problem, best: np.ndarray, working: np.ndarray) -> np.ndarray:
+    """What evolution finds in the box about home that holds every gain whose change is smaller."""
+    from scipy.optimize import NonlinearConstraint, differential_evolution
+
+    low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
+    here, free = problem.coordinates(best), [item.home is None for item in problem.variables]
+    centre = np.where(free, here, problem.coordinates(problem.present))
+    reach = np.where(free, WIDEST, np.sqrt(problem.change(best[None, :])[0]))
+    box = np.clip([centre - reach, centre + reach], low, high)
+
+    def limits(x: np.ndarray) -> np.ndarray:
+        rows = problem.values(np.atleast_2d(x.T))
+        made = (problem.distances(rows, working).reshape(len(rows), -1) - MET).T
+        return made if x.ndim > 1 else made[:, 0]
+
+    result = differential_evolution(
+        lambda x: problem.change(problem.values(x.T)), [*zip(*box, strict=True)], x0=np.clip(here, *box),
+        constraints=NonlinearConstraint(limits, 0.0, np.inf), maxiter=GENERATIONS, popsize=MEMBERS,
+        tol=1e-8, polish=False, vectorized=True, updating="deferred", rng=np.random.default_rng(1),
+        callback=lambda x, convergence: problem.spent,
+    )  # fmt: skip
+    return np.clip(problem.values(result.x), problem.lower, problem.upper)
 
 
 def _taken_back(problem: Problem, gains: np.ndarray, working: np.ndarray) -> np.ndarray:

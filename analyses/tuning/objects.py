@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 def object_of(design: Design, path: str) -> KnownObject | None:
     """The object that holds a gain; None where the drive is not that motion controller."""
-
     if not design.objects.named:
         return None
     return next((known for known in OBJECTS.values() if path in known.paths), None)
@@ -25,7 +24,6 @@ def object_of(design: Design, path: str) -> KnownObject | None:
 
 def step_of_gain(design: Design, path: str) -> float | None:
     """SI value of one step of the object that holds a gain."""
-
     known = object_of(design, path)
     return None if known is None else step_of(known, design.objects.velocity_gain_factor)
 

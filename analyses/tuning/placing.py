@@ -30,30 +30,15 @@ SHALLOW = 0.999  # a notch above this depth does nothing
 
 @dataclass(frozen=True)
 class Variable:
-    """One number that tuning may choose.
-
-    Attributes
-    ----------
-    path : str
-        Dotted key.
-    start : float
-        Where the search starts, SI.
-    low, high : float
-        Allowed values, SI.
-    home : float or None
-        Value that costs nothing; None where every value does.
-    linear : bool
-        Whether it counts by itself (a share that may be 0), and not by its logarithm.
-    per : str
-        Path of a variable that it is measured against (the width of a notch against its frequency).
-    """
+    """One number that tuning may choose, its values in SI."""
 
     path: str
     start: float
     low: float
     high: float
-    home: float | None
-    linear: bool = False
+    home: float | None  # value that costs nothing; None where every value does
+    linear: bool = False  # whether it counts by itself (a share that may be 0), and not by its logarithm
+    # Path of a variable that it is measured against (the width of a notch against its frequency)
     per: str = ""
 
 
@@ -73,13 +58,7 @@ def subsets(allowed: tuple[Element, ...]) -> Iterator[tuple[Element, ...]]:
 
 
 def checked(design: Design, wanted: tuple[str, ...]) -> tuple[Element, ...]:
-    """What may be placed in a design.
-
-    Raises
-    ------
-    InputError
-        For a word that is none of `ELEMENTS`, or an element that the drive has no place for.
-    """
+    """What may be placed in a design; an unknown word, or what the drive has no place for, is refused."""
     for word in wanted:
         if word not in ELEMENTS:
             raise InputError(f"place = {word!r}: allowed: {', '.join(ELEMENTS)}")
@@ -171,14 +150,7 @@ def idle(design: Design, placed: Placed) -> Design:
 def change(variables: tuple[Variable, ...], values: np.ndarray) -> np.ndarray:
     """How far values are from home: squares of ln ratios, of shares, and of widths over their frequency.
 
-    Parameters
-    ----------
-    values : ndarray, shape (candidates, variables)
-        SI.
-
-    Returns
-    -------
-    ndarray, shape (candidates,)
+    Of rows in SI, shape (candidates, variables); shape (candidates,).
     """
     places = {v.path: k for k, v in enumerate(variables)}
     total = np.zeros(len(values))

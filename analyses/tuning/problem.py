@@ -14,11 +14,12 @@ from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, paths_of, tolerances
 from actuator_lti.errors import InputError
-from analyses.monte_carlo.judging import in_populations, judge
+from analyses.monte_carlo.judging import in_populations, judge, loop_columns
 from analyses.studies.sampling import Factor, correlation_of, semidefinite_root
 from analyses.tuning.placing import Variable, change
 
 if TYPE_CHECKING:
+    from actuator_lti.batch.figures import LinearFigures
     from actuator_lti.design.model import Design, Requirement
 
 GAINS = (
@@ -39,17 +40,7 @@ MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor
 class Problem:
     """Requirements on the loops of a design, over the corners of its tolerances.
 
-    Attributes
-    ----------
-    design : Design
-    requirements : tuple of Requirement
-        Those on loops.
-    variables : tuple of Variable
-        What is varied.
-    most : int
-        Designs that a search may look at.
-    evaluations : int
-        Designs looked at so far.
+    ``most`` designs may be looked at by a search, ``evaluations`` were so far.
     """
 
     design: Design
@@ -108,7 +99,6 @@ class Problem:
     @cached_property
     def toleranced(self) -> tuple[Factor, ...]:
         """All toleranced parameters that are no gain."""
-
         known = set(variable_paths(self.design)) - set(self.paths)
         return tuple(Factor(p, v, t) for p, v, t in tolerances(self.design) if p in known)
 
@@ -122,7 +112,7 @@ class Problem:
         points = np.tile(nominal, (2 * len(nominal) + 1, 1))
         for k in range(len(nominal)):
             points[2 * k + 1 : 2 * k + 3, k] = ends[k]
-        result = np.minimum(self._distances(self.start[None, :], points, self.toleranced)[0], PLENTY)
+        result = np.minimum(self.exact_distances(self.start[None, :], points, self.toleranced)[0], PLENTY)
         moved = np.abs(result[1:] - result[0]).max(axis=1).reshape(-1, 2).max(axis=1)
         chosen = sorted(np.argsort(-moved, kind="stable")[:MOST_FACTORS])
         return tuple(self.toleranced[k] for k in chosen)
@@ -148,43 +138,42 @@ class Problem:
         return np.vstack([nominal, np.unique(nominal + moved * half_range, axis=0)])
 
     def distances(self, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
+        """`exact_distances` as far as the search looks."""
+        return np.minimum(self.exact_distances(gains, corners), PLENTY)
+
+    def exact_distances(
+        self, gains: np.ndarray, corners: np.ndarray, factors: tuple[Factor, ...] | None = None
+    ) -> np.ndarray:
         """Distance of every requirement over its size, shape (candidates, corners, requirements).
 
-        Unstable designs get a number below -3 that falls with the distance of the poles from the circle.
+        Unstable designs get a number below -3 that falls with the distance of the poles from the circle; inf
+        where nothing bounds the figure. ``factors`` are those of the corners, where not those of the problem.
         """
-        return np.minimum(self._distances(gains, corners, self.factors), PLENTY)
-
-    def exact_distances(self, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
-        """The same where they are far from the limit too; inf where nothing bounds the figure."""
-        return self._distances(gains, corners, self.factors)
-
-    def _distances(self, gains: np.ndarray, corners: np.ndarray, factors: tuple[Factor, ...]) -> np.ndarray:
-        count, many = len(gains), len(corners)
-        values = {p: np.repeat(gains[:, k], many) for k, p in enumerate(self.paths)}
-        values |= {f.path: np.tile(corners[:, k], count) for k, f in enumerate(factors)}
-        population = Population(self.design, values, count * many)
-        self.evaluations += population.count
         timed = any(QUANTITIES[r.quantity].timed for r in self.requirements)
-        linear = linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
-        columns = {f"{loop}.{q}": linear.quantity(q, loop) for loop in linear.loops for q in LOOP_QUANTITIES}
-        columns |= {f"{loop}.stable": linear.stable(loop).astype(float) for loop in linear.loops}
-        out = np.empty((population.count, len(self.requirements)))
+        linear = self._looked_at(gains, corners, self.factors if factors is None else factors, timed)
+        columns = loop_columns(linear)
+        out = np.empty((len(gains) * len(corners), len(self.requirements)))
         radius = np.max([linear.pole_radius(loop) for loop in linear.loops], axis=0)
         for k, requirement in enumerate(self.requirements):
             result = judge(requirement, self.design, columns).distance / size_of(requirement)
             out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * np.maximum(radius - 1.0, 0.0), result)
-        return out.reshape(count, many, len(self.requirements))
+        return out.reshape(len(gains), len(corners), len(self.requirements))
 
     def figure(self, quantity: str, loop: str, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
         """One figure of one loop, shape (candidates, corners)."""
+        linear = self._looked_at(gains, corners, self.factors, QUANTITIES[quantity].timed)
+        return linear.quantity(quantity, loop).reshape(len(gains), len(corners))
+
+    def _looked_at(
+        self, gains: np.ndarray, corners: np.ndarray, factors: tuple[Factor, ...], timed: bool
+    ) -> LinearFigures:
+        """Linear figures of every candidate at every corner, and the search's account of them."""
         count, many = len(gains), len(corners)
         values = {p: np.repeat(gains[:, k], many) for k, p in enumerate(self.paths)}
-        values |= {f.path: np.tile(corners[:, k], count) for k, f in enumerate(self.factors)}
+        values |= {f.path: np.tile(corners[:, k], count) for k, f in enumerate(factors)}
+        self.evaluations += count * many
         population = Population(self.design, values, count * many)
-        self.evaluations += population.count
-        timed = QUANTITIES[quantity].timed
-        linear = linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
-        return linear.quantity(quantity, loop).reshape(count, many)
+        return linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
 
 
 def size_of(requirement: Requirement) -> float:
@@ -219,14 +208,8 @@ def problem_of(
 ) -> Problem:
     """Set the problem up: which gains the design has, where they may lie.
 
-    Parameters
-    ----------
-    start : mapping of str to float
-        Gains where the search starts (by rules), SI; another gain of the design starts where it is.
-    placed : tuple of Variable
-        Of added elements.
-    most : int
-        Designs that a search may look at.
+    The search starts from ``start`` (by rules, SI); another gain of the design starts where it is. ``placed``
+    are the variables of added elements.
     """
     from analyses.tuning.objects import allowed_range
 

@@ -8,66 +8,40 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
-    from analyses.specification.verdicts import RequirementVerdict
+    from analyses.specification.requirements import RequirementVerdict
     from analyses.tuning.asked import Aim
 
 
 @dataclass(frozen=True)
 class BindingRequirement:
-    """One requirement at its worst corner.
-
-    Attributes
-    ----------
-    id, label, unit : str
-    value, limit, distance : float
-        Worst over the corners; distance positive where met.
-    relative : float
-        Distance over the limit's size: what tuning makes as even as it can.
-    binds : bool
-        Whether it is among those that allow nothing better.
-    corner : mapping of str to float
-        SI values of the worst corner; empty for the nominal design.
-    """
+    """One requirement at its worst corner."""
 
     id: str
     label: str
     unit: str
+    # Worst over the corners; distance positive where met
     value: float | None
     limit: float
     distance: float | None
-    relative: float
-    binds: bool
-    corner: Mapping[str, float]
+    relative: float  # distance over the limit's size: what tuning makes as even as it can
+    binds: bool  # whether it is among those that allow nothing better
+    corner: Mapping[str, float]  # SI values of the worst corner; empty for the nominal design
 
 
 @dataclass(frozen=True)
 class GainSetting:
-    """One gain.
-
-    Attributes
-    ----------
-    path, unit : str
-    before, by_rule : float or None
-        SI; None for a value of an added element, and for one that no rule gives.
-    tuned : float
-        SI.
-    object : str
-        Label of the motion controller's object; empty where the design has none.
-    steps : int or None
-        What is written into the object.
-    rounded : float
-        SI value of that, or the tuned one; this is what the tuned design has.
-    """
+    """One gain."""
 
     path: str
     unit: str
+    # SI; None for a value of an added element, and for one that no rule gives
     before: float | None
     by_rule: float | None
-    tuned: float
-    object: str
+    tuned: float  # SI
+    object: str  # label of the motion controller's object; empty where the design has none
     object_unit: str
-    steps: int | None
-    rounded: float
+    steps: int | None  # what is written into the object
+    rounded: float  # SI value of that, or the tuned one; this is what the tuned design has
 
 
 @dataclass(frozen=True)
@@ -98,45 +72,23 @@ class NonlinearCheck:
 
 @dataclass(frozen=True)
 class TuningResult:
-    """A tuned design.
+    """A tuned design."""
 
-    Attributes
-    ----------
-    feasible : bool
-        Whether every requirement on the loops is met at every corner, with the rounded gains.
-    before, design : Design
-        As it came, and with the rounded gains.
-    gains : tuple of GainSetting
-    requirements : tuple of BindingRequirement
-    steps : tuple of str
-        How the start gains were found.
-    corners : int
-        Corners of the tolerance box that were checked (the nominal design counts).
-    checks : tuple of NonlinearCheck
-    trade_off : tuple of TradeOffPoint
-    evaluations : int
-        Designs looked at.
-    notes : tuple of str
-    aim : {"least-change", "reserve"}
-    placed : tuple of str
-        Elements that were added, because gains alone do not meet the requirements.
-    confirmed : tuple of RequirementVerdict
-        The requirements on loops by certified margins: the tuned design, and each worst corner of one.
-    """
-
-    feasible: bool
+    feasible: bool  # whether every requirement on the loops is met at every corner, with the rounded gains
+    # As it came, and with the rounded gains
     before: Design
     design: Design
     gains: tuple[GainSetting, ...]
     requirements: tuple[BindingRequirement, ...]
-    steps: tuple[str, ...]
-    corners: int
+    steps: tuple[str, ...]  # how the start gains were found
+    corners: int  # corners of the tolerance box that were checked (the nominal design counts)
     checks: tuple[NonlinearCheck, ...]
     trade_off: tuple[TradeOffPoint, ...]
-    evaluations: int
+    evaluations: int  # designs looked at
     notes: tuple[str, ...]
     aim: Aim = "least-change"
-    placed: tuple[str, ...] = ()
+    placed: tuple[str, ...] = ()  # elements that were added, because gains alone do not meet the requirements
+    # The requirements on loops by certified margins: the tuned design, and each worst corner of one
     confirmed: tuple[RequirementVerdict, ...] = ()
 
     @property

@@ -103,18 +103,10 @@ def pi_for_crossover(response: complex, omega_rad_s: float, phase_margin_deg: fl
 
 @dataclass(frozen=True)
 class RuleGains:
-    """Gains by rules, and how they were found.
+    """Gains by rules, and how they were found."""
 
-    Attributes
-    ----------
-    values : mapping of str to float
-        SI by dotted key.
-    steps : tuple of str
-        One line a loop.
-    """
-
-    values: Mapping[str, float]
-    steps: tuple[str, ...]
+    values: Mapping[str, float]  # SI by dotted key
+    steps: tuple[str, ...]  # one line a loop
 
 
 def rule_gains(design: Design) -> RuleGains:

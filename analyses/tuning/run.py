@@ -18,15 +18,14 @@ from analyses.tuning.least import least_change
 from analyses.tuning.objects import neighbours, object_of, step_of_gain
 from analyses.tuning.placing import Placed, checked, place, subsets
 from analyses.tuning.problem import MOST_DESIGNS, Problem, limit_of, loop_requirements, problem_of, size_of
-from analyses.tuning.program import RESERVE
 from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult
 from analyses.tuning.rules import RuleGains, rule_gains
-from analyses.tuning.solve import Solution, solve
+from analyses.tuning.solve import RESERVE, Solution, solve
 from analyses.tuning.trade_off import trade_off
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement
-    from analyses.specification.verdicts import RequirementVerdict
+    from analyses.specification.requirements import RequirementVerdict
 
 Progress = Callable[[int, int], None]
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding
@@ -45,8 +44,6 @@ def tune(
 
     Parameters
     ----------
-    design : Design
-    settings : TuningSettings, optional
     progress : callable, optional
         Called with (stages done, stages in all).
 

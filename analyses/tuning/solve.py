@@ -9,28 +9,26 @@ reserve those nearest to the rules are taken: margins beyond it are not worth a 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from analyses.tuning.problem import Problem
-from analyses.tuning.program import RESERVE, TIE, maximise
 
 ROUNDS = 6
+STEP = 1e-4  # of a coordinate (ln of a gain), central differences
+TIE = 2e-3  # what a deviation from the rules by a factor e costs
+RESERVE = 0.3  # relative distance to a limit that is enough
+Functions = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Gains and how far they stay from every limit.
+    """Gains (SI) and how far they stay from every limit.
 
-    Attributes
-    ----------
-    gains : ndarray
-        SI.
-    slack : float
-        Smallest relative distance over all corners and requirements; negative where one is missed.
-    working : ndarray
-        Corners that mattered.
+    ``slack`` is the smallest relative distance over all corners and requirements, negative where one is
+    missed; ``working`` are the corners that mattered.
     """
 
     gains: np.ndarray
@@ -41,11 +39,7 @@ class Solution:
 def solve(problem: Problem, *, give_up: bool = False) -> Solution:
     """Maximise the smallest relative distance to the limits over all corners.
 
-    Parameters
-    ----------
-    problem : Problem
-    give_up : bool
-        Whether to stop where already the nominal design misses a limit.
+    With ``give_up`` it stops where already the nominal design misses a limit.
     """
     corners = problem.all_corners
     working = corners[:1]
@@ -110,3 +104,83 @@ def _climb(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.ndarr
         return problem.distances(problem.values(x), working).reshape(len(x), -1)
 
     return maximise(problem, start, limits)
+
+
+class Spent(Exception):
+    """A search has looked at as many designs as it may."""
+
+
+@dataclass
+class Program:
+    """Functions of the coordinates with their central differences, all from one compiled batch.
+
+    ``goals`` and ``limits`` (if any): (candidates, coordinates) -> (candidates, functions).
+    """
+
+    problem: Problem
+    goals: Functions
+    limits: Functions | None = None
+    seen: list[tuple[np.ndarray, float]] = field(default_factory=list, repr=False)
+    _last: tuple[bytes, np.ndarray, np.ndarray, int] | None = field(default=None, repr=False)
+
+    def model(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+        """Values, slopes of all functions at coordinates, and how many of them are goals."""
+        key, size = x.tobytes(), len(x)
+        if self.problem.spent:
+            raise Spent
+        if self._last is None or self._last[0] != key:
+            moves = np.vstack([np.zeros(size), STEP * np.eye(size), -STEP * np.eye(size)])
+            values = self.goals(x + moves)
+            aims = values.shape[1]
+            if self.limits is not None:
+                values = np.concatenate([values, self.limits(x + moves)], axis=1)
+            slopes = (values[1 : size + 1] - values[size + 1 :]) / (2 * STEP)
+            self._last = (key, values[0], slopes.T, aims)
+            self.seen.append((x.copy(), float(values[0].min())))
+        return self._last[1:]
+
+    @property
+    def best(self) -> np.ndarray:
+        """Coordinates seen so far whose smallest value is largest."""
+        return max(self.seen, key=lambda each: each[1])[0]
+
+
+def maximise(
+    problem: Problem,
+    start: np.ndarray,
+    limits: Functions,
+    free: Functions | None = None,
+    iterations: int = 80,
+) -> np.ndarray:
+    """Maximise the smallest of some functions of the gains, from a start; all gains in SI.
+
+    ``limits`` and ``free``: (candidates, coordinates) -> (candidates, functions). Without ``free`` the
+    smallest limit is made as large as can be, up to the reserve of 30 %; with it the limits are constraints,
+    and the smallest of ``free`` is maximised.
+    """
+    from scipy.optimize import minimize
+
+    program = Program(problem, limits) if free is None else Program(problem, free, limits)
+    most = RESERVE if free is None else None
+    low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
+    x0, rules = np.clip(problem.coordinates(start), low, high), problem.coordinates(problem.start)
+    if problem.spent:
+        return problem.values(x0)
+    values, _, aims = program.model(x0)
+    first, raised = float(values[:aims].min()), np.arange(len(values)) < aims
+    met = {  # goals less t, then limits, of y = [coordinates, t]
+        "type": "ineq",
+        "fun": lambda y: program.model(y[:-1])[0] - np.where(raised, y[-1], 0.0),
+        "jac": lambda y: np.column_stack([program.model(y[:-1])[1], np.where(raised, -1.0, 0.0)]),
+    }
+    try:
+        result = minimize(
+            lambda y: float(TIE * np.sum((y[:-1] - rules) ** 2) - y[-1]),
+            np.append(x0, first if most is None else min(first, most)),
+            jac=lambda y: np.append(2 * TIE * (y[:-1] - rules), -1.0),
+            method="SLSQP", bounds=[*zip(low, high, strict=True), (None, most)],
+            constraints=met, options={"maxiter": iterations, "ftol": 1e-9},
+        ).x[:-1]  # fmt: skip
+    except Spent:
+        result = program.best
+    return problem.values(np.clip(result, low, high))

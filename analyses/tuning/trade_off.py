@@ -6,8 +6,8 @@ import numpy as np
 
 from analyses.monte_carlo.judging import loops_of
 from analyses.tuning.problem import Problem
-from analyses.tuning.program import maximise
 from analyses.tuning.result import TradeOffPoint
+from analyses.tuning.solve import maximise
 
 POINTS = 6
 _SPAN = (0.6, 1.6)
@@ -17,12 +17,7 @@ _MET = -1e-3
 def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple[TradeOffPoint, ...]:
     """Largest smallest phase margin (all loops, worst corner) for position bandwidths around the tuned one.
 
-    Parameters
-    ----------
-    gains : ndarray
-        Where to start from, SI.
-    working : ndarray
-        Corners that are looked at; the result holds for them.
+    From gains in SI; the result holds for the corners that are looked at, ``working``.
     """
     others = [
         k for k, r in enumerate(problem.requirements)

@@ -164,7 +164,7 @@ def _agreed(run: Callable[[float], Numbers | None], setup: LoopSetup, enough: fl
 
 def _step(setup: LoopSetup, samples: int, size: float) -> Floats | None:
     """What comes back, negated, from a step at the place; None after an event."""
-    rows = setup.row()
+    rows = setup.rows()
     rows.step(setup.point, size, -1.0)
     drive = rows.running()
     piece = drive.advance(samples * setup.hold_ticks, setup.hold_ticks)
@@ -226,7 +226,7 @@ def _beside(bench: Bench, place: Place, gain: float, w: float) -> MarginRun:
 
 def _at_gain(setup: LoopSetup, gain: float) -> Rows:
     """The loop with its gain multiplied at the place, on the same operating motion."""
-    rows = setup.row()
+    rows = setup.rows()
     calm = rows.running()
     calm.run(1)
     write_probe(Probe(point=setup.point, gain=gain), rows.values[0])  # type: ignore[arg-type]

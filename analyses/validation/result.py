@@ -14,7 +14,7 @@ from analyses.large_signal.by_amplitude import AmplitudeMargin
 from analyses.large_signal.conditional import Conditional
 from analyses.limit_cycles.counts import Counts
 from analyses.linear.loop_figures import LoopFigures
-from analyses.motion.settling import Settling, ending_of, judged_by, noticed, verdict_of, waiver_of_rest
+from analyses.motion.settling import Settling, ending_of, noticed, verdict_of, waiver_of_rest
 from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.in_time import MarginShown, StepShown
 from analyses.validation.row import Row
@@ -115,7 +115,7 @@ class Validation:
             return ""
         ends, known = ending_of(self.design, self.hunting), self.rest
         if known is Verdict.MET:
-            return f"{ends}; accepted: {judged_by(self.design)}"
+            return ends
         says = "does not come" if known is Verdict.NOT_MET else "is not known to come"
         return f"the drive {says} to rest {ends}"
 

@@ -32,7 +32,7 @@ class Settings:
     own: bool = True
     findings: tuple[Finding, ...] = FINDINGS
     rest_frequencies: int = 16
-    map_counts: tuple[int, int] = (25, 40)
+    map_counts: tuple[int, int] = (17, 28)
 
 
 QUICK = Settings(findings=())

@@ -191,7 +191,7 @@ class _Crossing:
 
 
 def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
-    """The crossing nearest to a gain and an angle: where the gain of a pole there is real, by secants."""
+    """The crossing nearest to a gain and an angle, by Newton's method: there the gain of a pole is real."""
     if angle < LEAST_ANGLE:
         return _crossing_at_rest(t, gain)
 
@@ -201,45 +201,49 @@ def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
         return complex(gains[int(np.argmin(np.abs(gains - gain)))]) if gains.size else complex(np.nan)
 
     step = NEAR * min(angle, 1.0)
-    before, last = angle - step, at(angle - step)
     for _ in range(NEWTON_STEPS):
         now = at(angle)
-        slope = (now - last).imag / (angle - before)
-        if abs(angle - pi) < LEAST_ANGLE or slope == 0.0 or not np.isfinite(slope):
+        slope = (now - at(angle - step)) / step
+        if abs(angle - pi) < LEAST_ANGLE or slope.imag == 0.0 or not np.isfinite(slope):
             break
-        move = -now.imag / slope
+        move = -now.imag / slope.imag
         if abs(move) < 1e-14 * angle:
             break
-        before, last, angle = angle, now, angle + float(np.clip(move, -0.5 * angle, 0.5 * (pi - angle)))
+        angle += float(np.clip(move, -0.5 * angle, 0.5 * (pi - angle)))
     if not np.isfinite(now) or abs(now.imag) > RESOLVED * abs(now):
         return None
     z = complex(np.exp(1j * angle))
-    change = 1j * z / ((now - at(angle - step)) / step)  # of the pole with the gain
+    change = 1j * z / slope  # of the pole with the gain
     return _Crossing(now.real, angle, now.real * (z.conjugate() * change).real)
 
 
 def _crossing_at_rest(t: Tangent, gain: float) -> _Crossing | None:
-    """The gain at which a real pole passes 1, beside modes at rest that no gain moves, by secants."""
+    """The gain at which a real pole passes 1, beside modes at rest that no gain moves, by Newton's method.
 
-    def at(log_gain: float) -> tuple[float, float]:
+    The product of all (pole - 1) is zero there, and smooth where another slow pole lies beside the one that
+    passes; its slope over the product of the others is that of the pole.
+    """
+
+    def at(log_gain: float) -> tuple[Complexes, Floats]:
         poles, errors = t.poles_at(float(np.exp(log_gain)))
-        k = int(np.argmin(np.abs(poles - 1.0)))
-        return float(poles[k].real) - 1.0, float(errors[k])
+        return poles - 1.0, errors
 
-    before = float(np.log(gain))
-    (last, _), now = at(before), before + BESIDE
+    now = float(np.log(gain))
     for _ in range(NEWTON_STEPS):
-        size, _ = at(now)
-        if size == last:
-            break
-        before, last, now = now, size, now - size * (now - before) / (size - last)
-        if not abs(now) < MOST_LOG:
+        from_rest, errors = at(now)
+        inside, outside = (float(np.prod(at(now + side)[0]).real) for side in (-BESIDE, BESIDE))
+        slope = (outside - inside) / (2.0 * BESIDE)
+        if not slope and np.min(np.abs(from_rest)) <= ROUNDING:
+            return _Crossing(gain, 0.0, 0.0)  # the gain moves it by less than rounding
+        move = -float(np.prod(from_rest).real) / slope if slope else np.inf
+        if not abs(now + move) < MOST_LOG:
             return None
-        if abs(now - before) < 1e-14:
+        now += move
+        if abs(move) < 1e-14:
             break
-    (inside, blur), (outside, _) = at(now - BESIDE), at(now + BESIDE)
-    slope = (outside - inside) / (2.0 * BESIDE)
-    return _Crossing(float(np.exp(now)), 0.0, slope, blur / max(abs(slope), 1e-300))
+    passing = int(np.argmin(np.abs(from_rest)))
+    rate = slope / float(np.prod(np.delete(from_rest, passing)).real)
+    return _Crossing(float(np.exp(now)), 0.0, rate, float(errors[passing]) / max(abs(rate), 1e-300))
 
 
 def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int | None) -> Row:
@@ -251,6 +255,10 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
     found = _crossing(t, ratio, angle)
     if found is None:
         return place.judged(name, ratio, None, place.within, scale, "1", "no closed-loop pole crosses there")
+    if not found.outward:
+        words = "the gain moves the pole at z = 1 by less than rounding"
+        row = place.judged(name, ratio, None, place.within, scale, "1", words)
+        return replace(row, verdict=Verdict.NOT_PROVEN)
     if found.error is None:
         within = place.within_at(found.angle / t.B.shape[1])
     else:

@@ -131,7 +131,7 @@ class _Work:
                 "margins by amplitude", bool(stable), lambda: tuple(margins_by_amplitude(self.bench)), ()
             ),
             conditional=self._asked("conditional stability", whole, self._conditional, None),
-            settlings=self._asked("rest after a step", whole, self._settlings, ()),
+            settlings=self._asked("rest after a step", whole, lambda: self._settled, ()),
             rest_sweep=self._asked("motion from rest", whole, self._rest, None),
             counts=self._asked("motion from rest", whole, self._counts, ()),
             large_signals=self._asked("large signals", whole, self._large, None),
@@ -242,7 +242,8 @@ class _Work:
         dry = design.friction.dry_Nm(0.0) > 0.0
         return sweep_from_rest(design, asked, amplitude, self._settle(), described=dry)
 
-    def _settlings(self) -> tuple[Settling, ...]:
+    @cached_property
+    def _settled(self) -> tuple[Settling, ...]:
         return settlings_of(self.design, self._loops)
 
     def _conditional(self) -> Conditional:
@@ -257,7 +258,7 @@ class _Work:
     def _friction(self) -> Any:
         from analyses.friction_effects import friction_effects
 
-        return friction_effects(self.design, self._loops)
+        return friction_effects(self.design, self._loops, settlings=self._settled)
 
     def _specification(self) -> Any:
         from analyses.specification import specification

@@ -18,8 +18,7 @@ from examples.virtual_bench import (
     write_bench,
     write_record,
 )
-from reports.cli.drive import load_drive
-from reports.cli.targets import refuse_existing
+from reports.cli.options import load_drive, refuse_existing
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

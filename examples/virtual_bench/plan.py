@@ -8,8 +8,9 @@ from math import isfinite, pi
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import no_load_speed
 from actuator_lti.drive.facts import circuit_resistance_ohm, resonance_rad_s
-from actuator_lti.drive.steady import motor_torque_Nm, no_load_speed_rad_s, steady_torque_Nm
+from actuator_lti.drive.steady import motor_torque_Nm, steady_torque_Nm
 from actuator_lti.errors import InputError
 from analyses.identification.two_mass import angle_responses
 from examples.virtual_bench.two_mass import TwoMassPlan
@@ -72,7 +73,7 @@ def _continuous(design: Design) -> float:
 
 
 def _largest_speed(design: Design) -> float:
-    return float(min(design.limits.speed_rad_s, no_load_speed_rad_s(design)))
+    return float(min(design.limits.speed_rad_s, no_load_speed(design)))
 
 
 def _moment(design: Design, current_A: float, speed_rad_s: float) -> float:

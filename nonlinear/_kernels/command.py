@@ -11,7 +11,7 @@ from nonlinear._kernels.regulator import clamp
 
 
 @kernel
-def closing_speed(distance, a, T):  # type: ignore[no-untyped-def]
+def closing_speed(distance, a, T):
     """Speed at which a distance is covered in whole samples T while the speed falls by a T in each."""
     d = abs(distance)
     if a == math.inf:
@@ -22,7 +22,7 @@ def closing_speed(distance, a, T):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def profile(p, s, wanted):  # type: ignore[no-untyped-def]
+def profile(p, s, wanted):
     """Follow the command with limited first and second derivative; exact where it keeps both limits itself.
 
     The profile aims at the command's own speed, plus what closes the gap in the fewest samples without
@@ -42,7 +42,7 @@ def profile(p, s, wanted):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def average(p, s, x):  # type: ignore[no-untyped-def]
+def average(p, s, x):
     """Mean of the last n values: what an acceleration limit a becomes has a jerk of at most 2 a/(n T)."""
     n, at = int(p[layout.PROFILE_SAMPLES]), int(p[layout.AT_AVERAGE])
     place = int(s[layout.S_AVERAGE_PLACE])
@@ -60,7 +60,7 @@ def average(p, s, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def shape(p, s, wanted):  # type: ignore[no-untyped-def]
+def shape(p, s, wanted):
     """The command behind profile and filter, at the outermost stage's period; notes the profile's flag."""
     r = wanted
     s[layout.S_FLAGS_PROFILE] = 0.0

@@ -24,7 +24,7 @@ from nonlinear._kernels.regulator import clamp, pi, regulator, velocity_regulato
 
 
 @kernel
-def overload(p, s, i):  # type: ignore[no-untyped-def]
+def overload(p, s, i):
     """The overload (I2t) state, and the current limit of this tick."""
     x, share = s[layout.S_OVERLOAD], i / p[layout.CONTINUOUS_CURRENT]
     x += p[layout.OVERLOAD_RATE] * (share * share - x)
@@ -38,7 +38,7 @@ def overload(p, s, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def outer(p, s, io, th):  # type: ignore[no-untyped-def]
+def outer(p, s, io, th):
     """Update the outermost stage."""
     if p[layout.RARE_COMMAND] > 0.0:
         outer_rare(p, s, io, th)
@@ -51,7 +51,7 @@ def outer(p, s, io, th):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def torque_path(p, s, e, limit):  # type: ignore[no-untyped-def]
+def torque_path(p, s, e, limit):
     """Velocity controller with feed-forward: clamp with the anti-windup, filters, clamp again."""
     out, integral, hit = velocity_regulator(p, s, e, limit)
     s[layout.S_VELOCITY_INTEGRATOR] = integral
@@ -69,7 +69,7 @@ def torque_path(p, s, e, limit):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def own_inner(p, s, io, th, command, measured, extra, limit):  # type: ignore[no-untyped-def]
+def own_inner(p, s, io, th, command, measured, extra, limit):
     """A law of one's own of the velocity or the current: its output, before and behind the clamp."""
     angle = counted(th, p[layout.OWN_COUNTS])
     output = counted(io[layout.IN_OUTPUT], p[layout.OWN_OUTPUT_COUNTS])
@@ -78,7 +78,7 @@ def own_inner(p, s, io, th, command, measured, extra, limit):  # type: ignore[no
 
 
 @kernel
-def own_velocity(p, s, io, th, measured, limit):  # type: ignore[no-untyped-def]
+def own_velocity(p, s, io, th, measured, limit):
     """Velocity stage with a law of one's own: its output behind clamp and slope limit."""
     extra = s[layout.S_TORQUE_FEEDFORWARD]
     v, out = own_inner(p, s, io, th, s[layout.S_SPEED_REFERENCE], measured, extra, limit)
@@ -92,14 +92,14 @@ def own_velocity(p, s, io, th, measured, limit):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def measure_first(p, s, io, w, th):  # type: ignore[no-untyped-def]
+def measure_first(p, s, io, w, th):
     """Measure the speed before the outermost stage, which takes it too."""
     if p[layout.HAS_VELOCITY] <= 0.0 or s[layout.S_UNTIL_VELOCITY] <= 0.0:
         s[layout.S_MEASURED_SPEED] = measured_speed(p, s, io, w, th) if p[layout.RARE_SPEED] > 0.0 else w
 
 
 @kernel
-def velocity(p, s, io, w, th):  # type: ignore[no-untyped-def]
+def velocity(p, s, io, w, th):
     """Update the velocity stage."""
     measured = w
     if p[layout.OWN_MEASURES] > 0.0:
@@ -129,7 +129,7 @@ def velocity(p, s, io, w, th):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def current_rare(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
+def current_rare(p, s, io, i, w, th):
     """Current controller with feed-forward, another anti-windup or an overload limit; its output."""
     wanted = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
     fed = p[layout.BACK_EMF_FEEDFORWARD] != 0.0 and p[layout.OWN_MEASURES] <= 0.0
@@ -155,7 +155,7 @@ def current_rare(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def current(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
+def current(p, s, io, i, w, th):
     """Update the current stage: every tick."""
     if p[layout.RARE_CURRENT] > 0.0:
         out = current_rare(p, s, io, i, w, th)
@@ -169,7 +169,7 @@ def current(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def control(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
+def control(p, s, io, i, w, th):
     """One tick of the controller; leaves the voltage in the state."""
     if p[layout.OVERLOAD] > 0.0:
         overload(p, s, i)
@@ -189,7 +189,7 @@ def control(p, s, io, i, w, th):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def control_tick(p, s, io):  # type: ignore[no-untyped-def]
+def control_tick(p, s, io):
     """The controller alone, on what ``io[IN_CURRENT]`` and the next four inputs hold; returns the voltage."""
     if p[layout.SUPPLY] > 0.0:
         s[layout.S_VOLTAGE_LIMIT] = io[layout.IN_BUS]

@@ -34,7 +34,7 @@ LARGEST = 1e300
 
 
 @kernel
-def elastic_motion(p, s, part, held, M, extra):  # type: ignore[no-untyped-def]
+def elastic_motion(p, s, part, held, M, extra):
     """Advance the plant by one held segment; returns a status of ``layout``.
 
     ``part`` 0 is the first f of the tick, 1 the rest; ``held`` the voltage (or a source's input), ``M`` the
@@ -53,7 +53,7 @@ def elastic_motion(p, s, part, held, M, extra):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_torques(p, s):  # type: ignore[no-untyped-def]
+def put_torques(p, s):
     """Held torques on both sides in the present mode."""
     x = at.ES_INPUT
     source = p[layout.SOURCE_GAIN] * s[x + at.IN_U]
@@ -63,7 +63,7 @@ def put_torques(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def speed_of_change(p, s):  # type: ignore[no-untyped-def]
+def speed_of_change(p, s):
     """Norm of x' in the units of energy; it bounds every derivative of a guard."""
     di, dw, dW, dd = elastic_slopes(p, s)
     weight = int(s[at.ES_MODE]) + at.MODE_WEIGHT
@@ -72,7 +72,7 @@ def speed_of_change(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def stride(p, s, number):  # type: ignore[no-untyped-def]
+def stride(p, s, number):
     """Take one precomputed step if no guard can cross in it: 0, 1 the segments, 2 + j the step Ts/2^j."""
     m = int(s[at.ES_MODE])
     o = m + at.MODE_CHORD + 3 + int(p[at.EL_LEVELS]) + number * at.STEP_SIZE
@@ -106,7 +106,7 @@ def stride(p, s, number):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_state(p, s, i, w, W, d, turned):  # type: ignore[no-untyped-def]
+def put_state(p, s, i, w, W, d, turned):
     """Write the state; the load's angle is what the motor's angle and the twist leave, or stays at rest."""
     s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST] = i, w, W, d
     s[layout.S_ANGLE] += turned
@@ -117,7 +117,7 @@ def put_state(p, s, i, w, W, d, turned):  # type: ignore[no-untyped-def]
 
 @seldom
 @kernel
-def walk(p, s, whole):  # type: ignore[no-untyped-def]
+def walk(p, s, whole):
     """Advance with every event located."""
     levels, energy = int(p[at.EL_LEVELS]), p[layout.WITH_ENERGY] > 0.0
     shortest = math.ldexp(p[layout.PERIOD], -levels)
@@ -158,13 +158,13 @@ def walk(p, s, whole):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def ends_rest(event):  # type: ignore[no-untyped-def]
+def ends_rest(event):
     """Whether an event is a breakaway of either side."""
     return event == at.MOTOR_UP or event == at.MOTOR_DOWN or event == at.LOAD_UP or event == at.LOAD_DOWN
 
 
 @kernel
-def first_event(p, s, h):  # type: ignore[no-untyped-def]
+def first_event(p, s, h):
     """Time and number of the first event of the interval whose series is filled; h and 0 if none."""
     best, event = h, at.NO_EVENT
     m, n = int(s[at.ES_MODE]), int(p[at.EL_TERMS])

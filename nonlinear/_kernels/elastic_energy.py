@@ -20,7 +20,7 @@ NODES, WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 
 
 @kernel
-def add_energies(p, s, h):  # type: ignore[no-untyped-def]
+def add_energies(p, s, h):
     """Add the energies over the first h of the interval whose series is filled."""
     for j in range(NODES.shape[0]):
         i, w, W, d, _turned = series_state(p, s, h * NODES[j])
@@ -28,7 +28,7 @@ def add_energies(p, s, h):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_powers(p, s, weight, i, w, W, d):  # type: ignore[no-untyped-def]
+def add_powers(p, s, weight, i, w, W, d):
     """Add weight times the power of every line in one state."""
     e = layout.S_ENERGY
     u = s[at.ES_INPUT + at.IN_U]
@@ -59,7 +59,7 @@ def add_powers(p, s, weight, i, w, W, d):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_motor_friction(p, s, weight, w, torque):  # type: ignore[no-untyped-def]
+def add_motor_friction(p, s, weight, w, torque):
     """Motor friction; a self-locking stage keeps what it does not hand on to the coupling."""
     e, direction, place = layout.S_ENERGY, s[layout.S_DIRECTION], map_place(p, s)
     level, slope = p[place + at.MAP_LEVEL], p[place + at.MAP_SLOPE]

@@ -15,14 +15,14 @@ from nonlinear._kernels.elastic_series import rounding_of
 
 
 @kernel
-def contact_side(s):  # type: ignore[no-untyped-def]
+def contact_side(s):
     """1 or -1 while the coupling transmits torque on that side, else 0."""
     code = s[at.ES_CONTACT]
     return code if abs(code) == 1.0 else 0.0
 
 
 @kernel
-def spring_of(p, s, side):  # type: ignore[no-untyped-def]
+def spring_of(p, s, side):
     """Stiffness of the piece that holds, and where its line passes zero: T_s = k (delta - rest)."""
     bend = s[at.ES_BEND]
     place = at.EL_SPRING + int(abs(bend)) * at.SPRING_SIZE
@@ -31,7 +31,7 @@ def spring_of(p, s, side):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def spring_expression(p, s, side):  # type: ignore[no-untyped-def]
+def spring_expression(p, s, side):
     """side T_s as if in contact: side (k (delta - rest) + c delta')."""
     rate = s[layout.S_SPEED] / p[layout.RATIO_TO_COUPLING] - s[at.ES_LOAD_SPEED]
     k, rest = spring_of(p, s, side)
@@ -39,21 +39,21 @@ def spring_expression(p, s, side):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def coupling_torque(p, s):  # type: ignore[no-untyped-def]
+def coupling_torque(p, s):
     """T_s in this state, at the coupling's shaft."""
     side = contact_side(s)
     return side * spring_expression(p, s, side)
 
 
 @kernel
-def map_place(p, s):  # type: ignore[no-untyped-def]
+def map_place(p, s):
     """Place of the segment of the friction map that holds."""
     side = 0 if s[layout.S_DIRECTION] >= 0.0 else at.MAP_SIDE
     return at.EL_MAP + side + int(s[at.ES_SEGMENT]) * at.MAP_SEGMENT
 
 
 @kernel
-def mode_number(p, s):  # type: ignore[no-untyped-def]
+def mode_number(p, s):
     """Number of the mode in the block of parameters."""
     motor = 0
     if s[layout.S_DIRECTION] > 0.0:
@@ -67,7 +67,7 @@ def mode_number(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def enter_mode(p, s):  # type: ignore[no-untyped-def]
+def enter_mode(p, s):
     """Write what follows from the discrete state: place of the mode, constant torques, guards."""
     mode = at.EL_MODES + mode_number(p, s) * int(p[at.EL_MODE_SIZE])
     s[at.ES_MODE] = float(mode)
@@ -91,7 +91,7 @@ def enter_mode(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def new_guard(s, event):  # type: ignore[no-untyped-def]
+def new_guard(s, event):
     """Append an empty guard; returns its place."""
     count = int(s[at.ES_GUARDS])
     g = at.ES_GUARD + count * at.GUARD_SIZE
@@ -103,14 +103,14 @@ def new_guard(s, event):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def twist_guard(s, sign, side, twist, event):  # type: ignore[no-untyped-def]
+def twist_guard(s, sign, side, twist, event):
     """sign (side delta - twist) > 0."""
     g = new_guard(s, event)
     s[g + at.G_D], s[g + at.G_ONE] = sign * side, -sign * twist
 
 
 @kernel
-def spring_guard(p, s, sign, side, event):  # type: ignore[no-untyped-def]
+def spring_guard(p, s, sign, side, event):
     """sign side (k (delta - rest) + c delta') > 0."""
     g = new_guard(s, event)
     k, rest = spring_of(p, s, side)
@@ -120,7 +120,7 @@ def spring_guard(p, s, sign, side, event):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def bend_guards(p, s):  # type: ignore[no-untyped-def]
+def bend_guards(p, s):
     """The twist stays on its piece of the spring, on either side; with play zero lies in the gap."""
     last, bend = int(p[at.EL_SPRINGS]) - 1, int(s[at.ES_BEND])
     code, one_sided = s[at.ES_CONTACT], p[layout.HALF_PLAY] > 0.0
@@ -134,7 +134,7 @@ def bend_guards(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def contact_guards(p, s):  # type: ignore[no-untyped-def]
+def contact_guards(p, s):
     """Guards of contact, of the gap, and of the time between parting and the gap."""
     code, half = s[at.ES_CONTACT], p[layout.HALF_PLAY]
     if code == at.GAP:
@@ -155,7 +155,7 @@ def contact_guards(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def motor_guards(p, s):  # type: ignore[no-untyped-def]
+def motor_guards(p, s):
     """Slip: the speed stays on its segment.  Rest: the drive torque stays within the breakaway level."""
     direction = s[layout.S_DIRECTION]
     if direction == 0.0:
@@ -172,7 +172,7 @@ def motor_guards(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def motor_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
+def motor_rest_guard(p, s, sign, event):
     """ratio (T0 + CM' |T_s|) - sign (kM i - offset - T_s/N_c + ...) > 0, with w = 0 in T_s."""
     g = new_guard(s, event)
     ratio, CM = p[layout.BREAKAWAY], p[at.EL_LOAD_COEFFICIENT]
@@ -193,7 +193,7 @@ def motor_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def load_guards(p, s):  # type: ignore[no-untyped-def]
+def load_guards(p, s):
     """Slip: W keeps its sign.  Rest: |T_s + M_ext/N_r - offset_l| within its breakaway level."""
     direction = s[at.ES_LOAD]
     if direction != 0.0:
@@ -205,7 +205,7 @@ def load_guards(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def load_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
+def load_rest_guard(p, s, sign, event):
     """ratio_l C0_l - sign (T_s + M_ext/N_r - offset_l) > 0, with W = 0 in T_s."""
     g = new_guard(s, event)
     side = contact_side(s)
@@ -218,7 +218,7 @@ def load_rest_guard(p, s, sign, event):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_curvature(p, s, mode, g):  # type: ignore[no-untyped-def]
+def put_curvature(p, s, mode, g):
     """Bound of |g''| over the norm of x': the norm of G A dual to that of the energy."""
     gi, gw, gv, gd = s[g + at.G_I], s[g + at.G_W], s[g + at.G_V], s[g + at.G_D]
     row_i = gi * p[mode + at.A_II] + gw * p[mode + at.A_WI]
@@ -237,7 +237,7 @@ def put_curvature(p, s, mode, g):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def guard_offset(s, g):  # type: ignore[no-untyped-def]
+def guard_offset(s, g):
     """The part of a guard that does not depend on the state."""
     value = s[g + at.G_ONE]
     value += s[g + at.G_U] * s[at.ES_INPUT + at.IN_U]
@@ -247,14 +247,14 @@ def guard_offset(s, g):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def guard_state(s, g):  # type: ignore[no-untyped-def]
+def guard_state(s, g):
     """The part of a guard that is linear in (i, w, W, delta)."""
     value = s[g + at.G_I] * s[layout.S_CURRENT] + s[g + at.G_W] * s[layout.S_SPEED]
     return value + (s[g + at.G_V] * s[at.ES_LOAD_SPEED] + s[g + at.G_D] * s[at.ES_TWIST])
 
 
 @kernel
-def fails(p, s, event):  # type: ignore[no-untyped-def]
+def fails(p, s, event):
     """Whether the guard of an event is broken by more than the rounding of a short interval."""
     h = math.ldexp(p[layout.PERIOD], -int(p[at.EL_LEVELS]))
     for j in range(int(s[at.ES_GUARDS])):
@@ -266,7 +266,7 @@ def fails(p, s, event):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def elastic_slopes(p, s):  # type: ignore[no-untyped-def]
+def elastic_slopes(p, s):
     """(i', w', W', delta') in the present mode under the inputs that were held last."""
     m = int(s[at.ES_MODE])
     i, w, W, d = s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST]
@@ -279,7 +279,7 @@ def elastic_slopes(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def start_segment(p, s, direction):  # type: ignore[no-untyped-def]
+def start_segment(p, s, direction):
     """The motor slips in a direction at its present speed: find the segment of its map."""
     s[layout.S_DIRECTION], s[at.ES_SEGMENT] = direction, 0.0
     side = 0 if direction >= 0.0 else 1
@@ -290,7 +290,7 @@ def start_segment(p, s, direction):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def elastic_start(p, s):  # type: ignore[no-untyped-def]
+def elastic_start(p, s):
     """Set load side, twist and discrete state at t_0; the motor's own state stands in ``s``."""
     s[at.ES_TWIST], s[at.ES_LOAD_SPEED] = p[layout.TWIST_START], p[layout.LOAD_SPEED_START]
     s[at.ES_LOAD_ANGLE] = s[layout.S_ANGLE] / p[layout.RATIO_TO_COUPLING] - s[at.ES_TWIST]
@@ -299,7 +299,7 @@ def elastic_start(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def find_mode(p, s):  # type: ignore[no-untyped-def]
+def find_mode(p, s):
     """The discrete state that belongs to speeds and twist: at t_0, and after a change of parameters."""
     w, W = s[layout.S_SPEED], s[at.ES_LOAD_SPEED]
     start_segment(p, s, 1.0 if p[at.EL_SMOOTH] > 0.0 or w > 0.0 else (-1.0 if w < 0.0 else 0.0))
@@ -310,7 +310,7 @@ def find_mode(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def start_contact(p, s):  # type: ignore[no-untyped-def]
+def start_contact(p, s):
     """Piece of the spring and contact as the state says."""
     s[at.ES_BEND], s[at.ES_CONTACT] = 0.0, at.GAP
     for j in range(1, int(p[at.EL_SPRINGS])):
@@ -326,7 +326,7 @@ def start_contact(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_output(p, s):  # type: ignore[no-untyped-def]
+def put_output(p, s):
     """Angle and speed of the output shaft; of a rigid drive, those of the motor."""
     if p[layout.RIGID] > 0.0:
         s[layout.S_OUTPUT] = s[layout.S_ANGLE] / p[layout.RATIO]
@@ -337,7 +337,7 @@ def put_output(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def change_contact(p, s, event):  # type: ignore[no-untyped-def]
+def change_contact(p, s, event):
     """The coupling meets, parts, its torque changes sign, or its spring bends."""
     code = s[at.ES_CONTACT]
     if event == at.BEND_PLUS or event == at.BEND_MINUS:
@@ -357,7 +357,7 @@ def change_contact(p, s, event):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def land_motor(p, s):  # type: ignore[no-untyped-def]
+def land_motor(p, s):
     """The motor's speed has come to zero: rest if the drive torque is within its level, else reversal."""
     direction = s[layout.S_DIRECTION]
     s[layout.S_SPEED], s[layout.S_DIRECTION], s[at.ES_SEGMENT] = 0.0, 0.0, 0.0
@@ -367,7 +367,7 @@ def land_motor(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def land_load(p, s):  # type: ignore[no-untyped-def]
+def land_load(p, s):
     """The load's speed has come to zero: the same with its own level."""
     direction = s[at.ES_LOAD]
     s[at.ES_LOAD_SPEED], s[at.ES_LOAD] = 0.0, 0.0
@@ -377,7 +377,7 @@ def land_load(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def change_mode(p, s, event):  # type: ignore[no-untyped-def]
+def change_mode(p, s, event):
     """What an event does to the discrete state; only the speed that stops is set, to exactly 0."""
     if event <= at.BEND_MINUS:
         change_contact(p, s, event)

@@ -27,7 +27,7 @@ LARGEST_POWER = 700.0  # of e in double precision
 
 
 @kernel
-def prepare_elastic_sizes(p):  # type: ignore[no-untyped-def]
+def prepare_elastic_sizes(p):
     """Shares of torque, friction segments, how often the period is halved, and the length of the row.
 
     ``p`` reaches at least to ``elastic_layout.EL_LEAST``.
@@ -48,7 +48,7 @@ def prepare_elastic_sizes(p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prepare_elastic(p, s):  # type: ignore[no-untyped-def]
+def prepare_elastic(p, s):
     """Fill the modes, after `prepare_elastic_sizes` and `prepare`; ``s`` lends its work space."""
     for number in range(mode_count(p)):
         m = at.EL_MODES + number * int(p[at.EL_MODE_SIZE])
@@ -58,7 +58,7 @@ def prepare_elastic(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_shares(p):  # type: ignore[no-untyped-def]
+def put_shares(p):
     """How torques pass the gears, and whether anything happens at zero speed of either side."""
     behind = p[layout.RATIO] / p[layout.RATIO_TO_COUPLING]
     rigid, back = p[layout.RIGID] > 0.0, p[layout.BACK_DRIVABLE]
@@ -78,7 +78,7 @@ def put_shares(p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_springs(p):  # type: ignore[no-untyped-def]
+def put_springs(p):
     """The pieces of the spring: stiffness, twist at which its line passes zero, twist at which it begins."""
     k, torque, begins, place = p[layout.STIFFNESS], 0.0, p[layout.HALF_PLAY], at.EL_SPRING
     p[place + at.SPRING_STIFFNESS], p[place + at.SPRING_HALF], p[place + at.SPRING_TWIST] = k, begins, begins
@@ -94,7 +94,7 @@ def put_springs(p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_segments(p, side):  # type: ignore[no-untyped-def]
+def put_segments(p, side):
     """The motor's friction for w > 0 (side 0) or w < 0 as lines T = level + slope |w|: begins, level, slope.
 
     Without a map one line, C0 and Cv; the last slope of a map continues.
@@ -115,7 +115,7 @@ def put_segments(p, side):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def mode_count(p):  # type: ignore[no-untyped-def]
+def mode_count(p):
     """Number of modes: motor at rest or on a segment of either side, gap or contact on either side with a
     piece of the spring, load at rest or not.
     """
@@ -124,7 +124,7 @@ def mode_count(p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def motor_of(p, motor):  # type: ignore[no-untyped-def]
+def motor_of(p, motor):
     """Direction of the motor (0 at rest) and slope of its friction, by number: rest, forward, reverse."""
     forward = int(p[at.EL_SEGMENTS])
     if motor == 0:
@@ -135,7 +135,7 @@ def motor_of(p, motor):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_mode(p, number, m):  # type: ignore[no-untyped-def]
+def put_mode(p, number, m):
     """Coefficients and weights of a mode at ``p[m]``, numbered as in `elastic_modes.mode_number`."""
     for j in range(at.MODE_CHORD):
         p[m + j] = 0.0
@@ -160,7 +160,7 @@ def put_mode(p, number, m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_electrical(p, m, direction):  # type: ignore[no-untyped-def]
+def put_electrical(p, m, direction):
     """The current of a motor that has one."""
     if p[layout.SOURCE] > 0.0:
         return
@@ -172,7 +172,7 @@ def put_electrical(p, m, direction):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_motor(p, m, slope, share, k, c):  # type: ignore[no-untyped-def]
+def put_motor(p, m, slope, share, k, c):
     """The slipping motor under its friction and the coupling."""
     J = p[layout.MOTOR_INERTIA]
     p[m + at.B_W] = 1.0 / J
@@ -181,7 +181,7 @@ def put_motor(p, m, slope, share, k, c):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_load_side(p, m, motor_slips, load_slips, share, k, c):  # type: ignore[no-untyped-def]
+def put_load_side(p, m, motor_slips, load_slips, share, k, c):
     """Twist and load speed."""
     N_c, J = p[layout.RATIO_TO_COUPLING], p[layout.LOAD_INERTIA]
     if motor_slips:
@@ -195,7 +195,7 @@ def put_load_side(p, m, motor_slips, load_slips, share, k, c):  # type: ignore[n
 
 
 @kernel
-def put_weights(p, m, k):  # type: ignore[no-untyped-def]
+def put_weights(p, m, k):
     """Square roots of L, J_m, J_l, k: in these units a passive plant does not grow.
 
     A state that acts on no other (the twist in the gap, the absent current) weighs nothing.
@@ -209,7 +209,7 @@ def put_weights(p, m, k):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def terms_of(product):  # type: ignore[no-untyped-def]
+def terms_of(product):
     """Terms of the Taylor series over an interval on which the norm of A h is ``product``."""
     terms, rest = 1, product
     while rest > 1e-18 and terms < at.MAX_TERMS:
@@ -219,7 +219,7 @@ def terms_of(product):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_bounds(p, m, growth):  # type: ignore[no-untyped-def]
+def put_bounds(p, m, growth):
     """Growth of the energy's norm over the shortest interval, and the chord bounds h^2/8 exp(growth h)."""
     levels = int(p[at.EL_LEVELS])
     h = math.ldexp(p[layout.PERIOD], -levels)
@@ -230,7 +230,7 @@ def put_bounds(p, m, growth):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_steps(p, m, s, work):  # type: ignore[no-untyped-def]
+def put_steps(p, m, s, work):
     """Transitions over both held segments, and over Ts/2^j from the shortest up."""
     levels = int(p[at.EL_LEVELS])
     o = m + at.MODE_CHORD + 3 + levels

@@ -17,7 +17,7 @@ ROUNDING = 2e-15
 
 
 @kernel
-def fill_series(p, s):  # type: ignore[no-untyped-def]
+def fill_series(p, s):
     """Taylor coefficients of (i, w, W, delta) from the present state under the held inputs."""
     m = int(s[at.ES_MODE])
     u, torque, load = (
@@ -44,7 +44,7 @@ def fill_series(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def series_state(p, s, t):  # type: ignore[no-untyped-def]
+def series_state(p, s, t):
     """(i, w, W, delta) at t, and the angle that the motor has turned."""
     n = int(p[at.EL_TERMS])
     x = at.ES_SERIES + 4 * n
@@ -61,7 +61,7 @@ def series_state(p, s, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fill_polynomial(p, s, g, offset, h):  # type: ignore[no-untyped-def]
+def fill_polynomial(p, s, g, offset, h):
     """Coefficients of a guard over [0, h]; returns the rounding that its value may carry there."""
     for k in range(int(p[at.EL_TERMS]) + 1):
         x = at.ES_SERIES + 4 * k
@@ -72,7 +72,7 @@ def fill_polynomial(p, s, g, offset, h):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def rounding_of(p, s, g, offset, h):  # type: ignore[no-untyped-def]
+def rounding_of(p, s, g, offset, h):
     """Rounding of a guard over [0, h]: of its terms, and of the terms of its first derivative."""
     m, x = int(s[at.ES_MODE]), at.ES_INPUT
     i, w, W, d = (
@@ -93,7 +93,7 @@ def rounding_of(p, s, g, offset, h):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def value_at(s, n, t):  # type: ignore[no-untyped-def]
+def value_at(s, n, t):
     """The guard's polynomial of degree n."""
     value = s[at.ES_POLYNOMIAL + n]
     for j in range(n):
@@ -102,7 +102,7 @@ def value_at(s, n, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def slope_at(s, n, t):  # type: ignore[no-untyped-def]
+def slope_at(s, n, t):
     """Its derivative."""
     value = n * s[at.ES_POLYNOMIAL + n]
     for j in range(n - 1):
@@ -111,7 +111,7 @@ def slope_at(s, n, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def curvature_bound(s, n, h):  # type: ignore[no-untyped-def]
+def curvature_bound(s, n, h):
     """Bound of the second derivative over [0, h]."""
     total = 0.0
     for j in range(n - 1):
@@ -121,7 +121,7 @@ def curvature_bound(s, n, h):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def shift(s, n, x):  # type: ignore[no-untyped-def]
+def shift(s, n, x):
     """Move the origin of the polynomial to x."""
     for i in range(n):
         for j in range(n - i):
@@ -130,7 +130,7 @@ def shift(s, n, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_fall(s, n, h, tolerance):  # type: ignore[no-untyped-def]
+def first_fall(s, n, h, tolerance):
     """First time in [0, h] at which the polynomial comes down to zero; it is used up.
 
     A start at or below zero counts only if it does not become positive first: `AT_ONCE` if it goes further
@@ -162,7 +162,7 @@ def first_fall(s, n, h, tolerance):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def refine_fall(s, n, end):  # type: ignore[no-untyped-def]
+def refine_fall(s, n, end):
     """Root in [0, end], where the polynomial falls through zero once: Newton inside bisection."""
     low, high = 0.0, end
     t = 0.5 * end

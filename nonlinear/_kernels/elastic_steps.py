@@ -25,7 +25,7 @@ COLUMNS = (0, 1, 0, 1, 2, 3, 1, 2, 3, 1, 2)
 
 
 @kernel
-def put_first_order(p, m, h, s, a):  # type: ignore[no-untyped-def]
+def put_first_order(p, m, h, s, a):
     """h times the matrix of the mode at ``m``, written at ``s[a]``."""
     for j in range(at.STEP_SIZE):
         s[a + j] = 0.0
@@ -38,7 +38,7 @@ def put_first_order(p, m, h, s, a):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def multiply(s, a, b, out):  # type: ignore[no-untyped-def]
+def multiply(s, a, b, out):
     """The five rows at ``a`` times the four rows of the states at ``b``, without the inputs of ``a``."""
     for r in range(5):
         for c in range(at.STEP_COLUMNS):
@@ -49,7 +49,7 @@ def multiply(s, a, b, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_short_step(p, m, h, s, d):  # type: ignore[no-untyped-def]
+def put_short_step(p, m, h, s, d):
     """D over an h that is short against the mode, by its Taylor series; three places behind are used."""
     term, first, product = d + at.STEP_SIZE, d + 2 * at.STEP_SIZE, d + 3 * at.STEP_SIZE
     put_first_order(p, m, h, s, first)
@@ -64,7 +64,7 @@ def put_short_step(p, m, h, s, d):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def double_step(s, d):  # type: ignore[no-untyped-def]
+def double_step(s, d):
     """D over twice the time."""
     product = d + 3 * at.STEP_SIZE
     multiply(s, d, d, product)
@@ -73,7 +73,7 @@ def double_step(s, d):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def keep_step(p, o, s, d):  # type: ignore[no-untyped-def]
+def keep_step(p, o, s, d):
     """Write the transition I + D at ``p[o]``."""
     for j in range(at.STEP_SIZE):
         p[o + j] = s[d + j]
@@ -82,14 +82,14 @@ def keep_step(p, o, s, d):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def scaled_coefficient(p, m, j):  # type: ignore[no-untyped-def]
+def scaled_coefficient(p, m, j):
     """Coefficient ``j`` of the matrix in the units of the energy; 0 where one side weighs nothing."""
     weight = p[m + at.MODE_WEIGHT + COLUMNS[j]]
     return p[m + at.MODE_WEIGHT + ROWS[j]] * p[m + j] / weight if weight > 0.0 else 0.0
 
 
 @kernel
-def norm_of(p, m):  # type: ignore[no-untyped-def]
+def norm_of(p, m):
     """Frobenius norm of the mode's matrix in the units of the energy."""
     total = 0.0
     for j in range(COEFFICIENTS):
@@ -99,7 +99,7 @@ def norm_of(p, m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def growth_of(p, m, s, a):  # type: ignore[no-untyped-def]
+def growth_of(p, m, s, a):
     """Logarithmic norm of the mode: the largest eigenvalue of the symmetric part, 0 where negative."""
     for j in range(16):
         s[a + j] = 0.0
@@ -123,7 +123,7 @@ def growth_of(p, m, s, a):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def rotate(s, a, r, c):  # type: ignore[no-untyped-def]
+def rotate(s, a, r, c):
     """One rotation of Jacobi's method: makes the elements (r, c) and (c, r) of the matrix at ``a`` zero."""
     beside = s[a + 4 * r + c]
     if abs(beside) <= NOTHING * (abs(s[a + 5 * r]) + abs(s[a + 5 * c])):

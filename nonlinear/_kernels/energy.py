@@ -20,7 +20,7 @@ LEDGER = layout.S_ENERGY
 
 
 @kernel
-def pieces_of(p, at, t):  # type: ignore[no-untyped-def]
+def pieces_of(p, at, t):
     """Into how many pieces a time is cut so that each is short against every eigenvalue."""
     coupling = math.sqrt(abs(p[at + layout.M12] * p[at + layout.M21]))
     rate = abs(p[at + layout.M11]) + abs(p[at + layout.M22]) + coupling
@@ -28,7 +28,7 @@ def pieces_of(p, at, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww):  # type: ignore[no-untyped-def]
+def add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww):
     """Add to the ledger what the integrals of i, i^2, i w and w^2 over a slip of ``angle`` mean."""
     Cv = p[layout.VISCOUS_REVERSE] if reverse > 0 else p[layout.VISCOUS]
     if p[layout.SOURCE] > 0.0:
@@ -44,7 +44,7 @@ def add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww):  # 
 
 
 @kernel
-def energy_slip(p, s, at, reverse, t, i, w, u, T, Tb):  # type: ignore[no-untyped-def]
+def energy_slip(p, s, at, reverse, t, i, w, u, T, Tb):
     """Add the energies of slipping for t from (i, w)."""
     pieces = pieces_of(p, at, t)
     h = t / pieces
@@ -64,7 +64,7 @@ def energy_slip(p, s, at, reverse, t, i, w, u, T, Tb):  # type: ignore[no-untype
 
 
 @kernel
-def prepare_forms(p, s):  # type: ignore[no-untyped-def]
+def prepare_forms(p, s):
     """Write the integrals over each whole segment as forms of (i, w, u, T), by the same quadrature."""
     for which in range(4):
         side = 1 if which > 1 else 0
@@ -81,7 +81,7 @@ def prepare_forms(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_node(p, s, at, side, t, weight, form):  # type: ignore[no-untyped-def]
+def add_node(p, s, at, side, t, weight, form):
     """Add one node of the quadrature to the forms: responses of i and w at t to each of (i, w, u, T)."""
     work = int(p[layout.AT_WORK]) + layout.WORK_MORE
     for n in range(4):
@@ -105,7 +105,7 @@ def add_node(p, s, at, side, t, weight, form):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def quadratic(p, at, a, b, c, d):  # type: ignore[no-untyped-def]
+def quadratic(p, at, a, b, c, d):
     """A quadratic form of four numbers from its ten coefficients."""
     return (
         a * (p[at] * a + p[at + 1] * b + p[at + 2] * c + p[at + 3] * d)
@@ -116,7 +116,7 @@ def quadratic(p, at, a, b, c, d):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def energy_whole(p, s, which, i, w, u, T, Tb):  # type: ignore[no-untyped-def]
+def energy_whole(p, s, which, i, w, u, T, Tb):
     """Add the energies of slipping over a whole segment; ``which`` is 2 for the reverse direction + part."""
     form, at = layout.FORMS + which * layout.FORM, layout.SLIP + which * layout.TRANSITION
     angle = p[at + layout.A31] * i + p[at + layout.A32] * w + p[at + layout.B3] * u + p[at + layout.C3] * T
@@ -128,7 +128,7 @@ def energy_whole(p, s, which, i, w, u, T, Tb):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def energy_stick(p, s, t, i, u):  # type: ignore[no-untyped-def]
+def energy_stick(p, s, t, i, u):
     """Add the energies of a locked rotor over t: i = i1 + (i0 - i1) exp(-R t/L)."""
     if p[layout.SOURCE] > 0.0 or t <= 0.0:
         return

@@ -12,13 +12,13 @@ IDEAL, DIFFERENCE, TRACKING = range(3)
 
 
 @kernel
-def counted(value, scale):  # type: ignore[no-untyped-def]
+def counted(value, scale):
     """Angle as counted: the count below (floor), or the angle itself without an encoder grid."""
     return float(math.floor(value * scale)) / scale if scale > 0.0 else value
 
 
 @kernel
-def difference(p, s, angle):  # type: ignore[no-untyped-def]
+def difference(p, s, angle):
     """Difference over the last m samples; the angles lie in the state, oldest first."""
     m, at = int(p[layout.DIFFERENCE_SAMPLES]), int(p[layout.AT_ANGLES])
     speed = (angle - s[at]) / (p[layout.DIFFERENCE_SAMPLES] * p[layout.VELOCITY_PERIOD])
@@ -29,7 +29,7 @@ def difference(p, s, angle):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def tracking(p, s, angle):  # type: ignore[no-untyped-def]
+def tracking(p, s, angle):
     """Tracking loop: p = th^ + T w^, r = th - p, th^ = p + 2 w0 T r, w^ += w0^2 T r."""
     speed = s[layout.S_TRACKED_SPEED]
     foreseen = s[layout.S_TRACKED_ANGLE] + p[layout.VELOCITY_PERIOD] * speed
@@ -41,7 +41,7 @@ def tracking(p, s, angle):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def measured_speed(p, s, io, w, th):  # type: ignore[no-untyped-def]
+def measured_speed(p, s, io, w, th):
     """Speed by the encoder's method, then its first-order filter, then the speed filters."""
     x, angle, source = w, th, int(p[layout.SPEED_SOURCE])
     if p[layout.SPEED_SENSOR] > 0.0:

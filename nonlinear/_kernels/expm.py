@@ -13,7 +13,7 @@ TERMS = 19  # Taylor terms at norm 1/2: 0.5**19/19! = 1.6e-23
 
 
 @kernel
-def matmul(work, a, b, out, n):  # type: ignore[no-untyped-def]
+def matmul(work, a, b, out, n):
     """Product of the n by n matrices at ``a`` and ``b``, written at ``out``."""
     for r in range(n):
         for c in range(n):
@@ -24,7 +24,7 @@ def matmul(work, a, b, out, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def halvings_of(work, at, n):  # type: ignore[no-untyped-def]
+def halvings_of(work, at, n):
     """How often a matrix is halved until its norm is at most 1/2."""
     norm = 0.0
     for r in range(n):
@@ -40,7 +40,7 @@ def halvings_of(work, at, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def exponential(work, at, n):  # type: ignore[no-untyped-def]
+def exponential(work, at, n):
     """exp of the n by n matrix at ``at``, which is scaled, at ``at + MATRIX``: Taylor series and squaring."""
     result, term, product = at + MATRIX, at + 2 * MATRIX, at + 3 * MATRIX
     halvings, scale = halvings_of(work, at, n)
@@ -64,7 +64,7 @@ def exponential(work, at, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def plant(p, reverse, dt, work, at, n):  # type: ignore[no-untyped-def]
+def plant(p, reverse, dt, work, at, n):
     """Write dt times the slipping plant at ``at``, n by n: states (i, w, th, u, T, ...), inputs held."""
     for j in range(n * n):
         work[at + j] = 0.0
@@ -84,7 +84,7 @@ def plant(p, reverse, dt, work, at, n):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def transition(p, reverse, dt, work, at, out):  # type: ignore[no-untyped-def]
+def transition(p, reverse, dt, work, at, out):
     """Write the twelve coefficients of the slipping plant over dt at ``p[out]``."""
     plant(p, reverse, dt, work, at, layout.SLIP_ORDER)
     exponential(work, at, layout.SLIP_ORDER)

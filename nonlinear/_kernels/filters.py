@@ -7,7 +7,7 @@ from nonlinear._kernels import layout
 
 
 @kernel
-def chain(p, at, count, s, to, x):  # type: ignore[no-untyped-def]
+def chain(p, at, count, s, to, x):
     """Pass x through ``count`` sections (direct form II transposed).
 
     Coefficients b0, b1, b2, a1, a2 of each section begin at ``p[at]``, its two states at ``s[to]``.
@@ -22,7 +22,7 @@ def chain(p, at, count, s, to, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def settle(p, at, count, s, to, x):  # type: ignore[no-untyped-def]
+def settle(p, at, count, s, to, x):
     """Set the states of a chain to those of a constant input x; returns its output."""
     for n in range(count):
         o, q = at + n * layout.SECTION, to + 2 * n

@@ -14,7 +14,7 @@ ITERATIONS = 200
 
 
 @kernel
-def first_landing(p, s, at, reverse, d, i, w, th, u, T, dt):  # type: ignore[no-untyped-def]
+def first_landing(p, s, at, reverse, d, i, w, th, u, T, dt):
     """First time in (0, dt] at which s w falls to zero.
 
     ``NONE_IN_SEGMENT`` if it stays positive; ``NEVER_LEFT`` if a speed that begins at zero has not become
@@ -38,7 +38,7 @@ def first_landing(p, s, at, reverse, d, i, w, th, u, T, dt):  # type: ignore[no-
 
 
 @kernel
-def refine(p, s, at, reverse, d, i, w, th, u, T, begin, end):  # type: ignore[no-untyped-def]
+def refine(p, s, at, reverse, d, i, w, th, u, T, begin, end):
     """Root of w in a bracket where s w falls through zero once: Newton inside bisection."""
     low, high = begin, end
     t = 0.5 * (low + high)

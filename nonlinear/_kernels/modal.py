@@ -19,7 +19,7 @@ NEARLY_DOUBLE = 1e-3  # |s/m| below which the eigenvalues count as nearly double
 
 
 @kernel
-def describe(p, reverse, at):  # type: ignore[no-untyped-def]
+def describe(p, reverse, at):
     """Write kind, mean and half difference of the eigenvalues and A at ``p[at]``."""
     J, L = p[layout.INERTIA], p[layout.INDUCTANCE]
     source = p[layout.SOURCE] > 0.0
@@ -38,7 +38,7 @@ def describe(p, reverse, at):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def phi12(x):  # type: ignore[no-untyped-def]
+def phi12(x):
     """(exp(x) - 1)/x and (exp(x) - 1 - x)/x^2."""
     if abs(x) < 0.5:
         total, term = 0.5, 0.5
@@ -51,7 +51,7 @@ def phi12(x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def phi12_complex(x, y):  # type: ignore[no-untyped-def]
+def phi12_complex(x, y):
     """The same for z = x + j y; returns the two real and imaginary parts."""
     size = x * x + y * y
     if size < 0.25:
@@ -71,7 +71,7 @@ def phi12_complex(x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def integrals(kind, m, s, t):  # type: ignore[no-untyped-def]
+def integrals(kind, m, s, t):
     """a(t), b(t) and their integrals (real distinct or complex eigenvalues m +- s, m +- j s)."""
     if kind == REAL:
         e1, f1 = phi12((m + s) * t)
@@ -83,7 +83,7 @@ def integrals(kind, m, s, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def slip_close(p, s, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
+def slip_close(p, s, reverse, t, i, w, th, u, T):
     """The same for nearly double eigenvalues."""
     at = int(p[layout.AT_WORK])
     plant(p, reverse, t, s, at, layout.SLIP_ORDER)
@@ -97,7 +97,7 @@ def slip_close(p, s, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def
 
 
 @kernel
-def slip_at(p, s, at, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-def]
+def slip_at(p, s, at, reverse, t, i, w, th, u, T):
     """State (i, w, th) after slipping for t under held u and torque T (dry friction included in T)."""
     kind = int(p[at + layout.KIND])
     if kind == SINGLE:
@@ -116,7 +116,7 @@ def slip_at(p, s, at, reverse, t, i, w, th, u, T):  # type: ignore[no-untyped-de
 
 
 @kernel
-def derivative(p, at, i, w, u, T):  # type: ignore[no-untyped-def]
+def derivative(p, at, i, w, u, T):
     """(i', w') while slipping."""
     if int(p[at + layout.KIND]) == SINGLE:
         return 0.0, p[at + layout.M22] * w + (p[layout.SOURCE_GAIN] * u + T) / p[layout.INERTIA]
@@ -126,7 +126,7 @@ def derivative(p, at, i, w, u, T):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_extremum(p, at, i, w, u, T, after):  # type: ignore[no-untyped-def]
+def first_extremum(p, at, i, w, u, T, after):
     """First time later than ``after`` at which w' = 0; inf if there is none."""
     kind = int(p[at + layout.KIND])
     if kind == SINGLE:

@@ -16,13 +16,13 @@ FINITE = 1e15
 
 
 @kernel
-def wave_angle(p, at, angle):  # type: ignore[no-untyped-def]
+def wave_angle(p, at, angle):
     """Order times angle plus phase, of the wave whose order and phase stand at ``p[at]``."""
     return p[at] * angle + p[at + 1]
 
 
 @kernel
-def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
+def hinge_moment(p, s, io):
     """M_ext of this tick: constant, series, slope, damping, and what bends with the angle."""
     y = output_angle(p, s)
     M = p[layout.LOAD] + p[layout.LOAD_SLOPE] * y + io[layout.IN_LOAD]
@@ -38,7 +38,7 @@ def hinge_moment(p, s, io):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def shaft_torque(p, s, io):  # type: ignore[no-untyped-def]
+def shaft_torque(p, s, io):
     """Extra torque at the motor shaft: from outside, and the motor's own over its angle."""
     th, T = s[layout.S_ANGLE], io[layout.IN_TORQUE]
     if p[layout.TORQUE_SLOPE] != 0.0:
@@ -50,7 +50,7 @@ def shaft_torque(p, s, io):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_load(p, s, moment, torque):  # type: ignore[no-untyped-def]
+def put_load(p, s, moment, torque):
     """Note dry friction and torque at the motor under a hinge moment and an extra torque."""
     dry = p[layout.LOAD_COEFFICIENT] * abs(moment)
     s[layout.S_LOAD], s[layout.S_EXTRA] = moment, torque
@@ -59,7 +59,7 @@ def put_load(p, s, moment, torque):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def quick_slip(p, s, part, u, d):  # type: ignore[no-untyped-def]
+def quick_slip(p, s, part, u, d):
     """Slip over a segment by its precomputed transition; 0 where the speed might cross zero within."""
     i, w = s[layout.S_CURRENT], s[layout.S_SPEED]
     side = 1 if d < 0.0 else 0
@@ -80,7 +80,7 @@ def quick_slip(p, s, part, u, d):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def quick_stick(p, s, part, u):  # type: ignore[no-untyped-def]
+def quick_stick(p, s, part, u):
     """Rest over a whole segment; 0 where the rotor might break away within."""
     i, Tb = s[layout.S_CURRENT], s[layout.S_TORQUE]
     final = u * p[layout.LOCKED_GAIN]
@@ -97,7 +97,7 @@ def quick_stick(p, s, part, u):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def quick(p, s, part, u):  # type: ignore[no-untyped-def]
+def quick(p, s, part, u):
     """The short way over a segment in which nothing happens; 0 where it has to be looked at."""
     if p[layout.LOOK] > 0.0:
         return 0
@@ -108,7 +108,7 @@ def quick(p, s, part, u):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def closely(p, s, part, u, events):  # type: ignore[no-untyped-def]
+def closely(p, s, part, u, events):
     """One segment by the general way; the events of this tick so far, -1 where there are too many."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
         status = elastic_motion(p, s, part, u, s[layout.S_LOAD], s[layout.S_EXTRA])
@@ -121,7 +121,7 @@ def closely(p, s, part, u, events):  # type: ignore[no-untyped-def]
 
 @seldom
 @kernel
-def count_events(s, events):  # type: ignore[no-untyped-def]
+def count_events(s, events):
     """Add the events of a tick; -1 marks a failed one."""
     if events < 0.0:
         s[layout.S_STATUS] = float(layout.TOO_MANY_EVENTS)
@@ -131,7 +131,7 @@ def count_events(s, events):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def hold(p, s, io):  # type: ignore[no-untyped-def]
+def hold(p, s, io):
     """What acts on the plant over the tick that begins: the delay line and the load."""
     # the delay line holds u_k and the q + 1 before it, oldest first
     last = layout.S_QUEUE + int(p[layout.DELAY_LINE]) - 1
@@ -144,7 +144,7 @@ def hold(p, s, io):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def motion(p, s, io):  # type: ignore[no-untyped-def]
+def motion(p, s, io):
     """Advance the plant by one tick."""
     hold(p, s, io)
     events = 0.0

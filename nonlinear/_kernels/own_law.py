@@ -7,7 +7,7 @@ from nonlinear._kernels import layout
 
 
 @kernel
-def own_output(p, s, io, command, error, angle, output):  # type: ignore[no-untyped-def]
+def own_output(p, s, io, command, error, angle, output):
     """The law's output; leaves its inputs, in the order of `LAW_INPUTS`, in the work space."""
     e, x = int(p[layout.AT_WORK]), int(p[layout.AT_OWN])
     s[e], s[e + 1], s[e + 2] = command, error, s[layout.S_MEASURED_SPEED]
@@ -22,7 +22,7 @@ def own_output(p, s, io, command, error, angle, output):  # type: ignore[no-unty
 
 
 @kernel
-def own_states(p, s, excess):  # type: ignore[no-untyped-def]
+def own_states(p, s, excess):
     """Step the states on, after `own_output`; ``excess`` is u - v."""
     n, e, x = int(p[layout.OWN_STATES]), int(p[layout.AT_WORK]), int(p[layout.AT_OWN])
     to = e + layout.OWN_INPUTS

@@ -15,7 +15,7 @@ STANDING = 1e-13  # change of the reference, relative, below which it stands sti
 
 
 @kernel
-def sloped(p, s, v, T):  # type: ignore[no-untyped-def]
+def sloped(p, s, v, T):
     """What the slope limit leaves of a current command that is updated every T, and its flag."""
     change = v - s[layout.S_CURRENT_BEFORE]
     allowed = clamp(change, p[CURRENT_RATE] * T)
@@ -25,7 +25,7 @@ def sloped(p, s, v, T):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def limited(p, s, v):  # type: ignore[no-untyped-def]
+def limited(p, s, v):
     """What the limits of the next stage leave of v, and their flags; nothing is stored."""
     if p[layout.HAS_VELOCITY] > 0.0:
         target = clamp(v, p[layout.SPEED_LIMIT])
@@ -44,7 +44,7 @@ def limited(p, s, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_voltage(p, s, io, v):  # type: ignore[no-untyped-def]
+def put_voltage(p, s, io, v):
     """Make v the voltage of this tick, through its probe."""
     s[layout.S_VOLTAGE_BEFORE] = s[layout.S_VOLTAGE] = v
     if p[PROBE_U] > 0.0:
@@ -53,7 +53,7 @@ def put_voltage(p, s, io, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_current(p, s, io, v):  # type: ignore[no-untyped-def]
+def put_current(p, s, io, v):
     """Make v the current command, through its probe."""
     s[layout.S_CURRENT_BEFORE] = s[layout.S_CURRENT_REFERENCE] = v
     if p[PROBE_I] > 0.0:
@@ -62,7 +62,7 @@ def put_current(p, s, io, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def put_outer(p, s, io, out, flags):  # type: ignore[no-untyped-def]
+def put_outer(p, s, io, out, flags):
     """Hand the outermost stage's output to the stage that it drives."""
     s[layout.S_FLAGS_OUTER] = flags
     if p[layout.HAS_VELOCITY] > 0.0:
@@ -77,7 +77,7 @@ def put_outer(p, s, io, out, flags):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def probed_output(p, s, io, y):  # type: ignore[no-untyped-def]
+def probed_output(p, s, io, y):
     """The output angle behind its probe."""
     s[layout.S_OUTPUT_BEFORE] = y
     s[layout.S_OUTPUT_AFTER] = probe(p, s, io, layout.POINT_OUTPUT, y)
@@ -85,7 +85,7 @@ def probed_output(p, s, io, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def position_feedback(p, s, io, th):  # type: ignore[no-untyped-def]
+def position_feedback(p, s, io, th):
     """The angle that the position loop sees, as an angle of the motor."""
     N = p[layout.RATIO]
     if p[layout.OUTPUT_SENSOR] > 0.0:
@@ -96,7 +96,7 @@ def position_feedback(p, s, io, th):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def feedforward(p, s, reference):  # type: ignore[no-untyped-def]
+def feedforward(p, s, reference):
     """Note the reference (motor side); returns k_ff dr/dt and renews the torque feed-forward."""
     last, before = s[layout.S_REFERENCE], s[layout.S_REFERENCE_BEFORE]
     change = reference - last
@@ -112,7 +112,7 @@ def feedforward(p, s, reference):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def position_law(p, s, io, reference, th):  # type: ignore[no-untyped-def]
+def position_law(p, s, io, reference, th):
     """P, PI or PID of position with feed-forward; returns the output behind the limits, and flags."""
     e = reference - position_feedback(p, s, io, th)
     rate = (e - s[layout.S_ERROR]) / p[layout.POSITION_PERIOD]
@@ -134,7 +134,7 @@ def position_law(p, s, io, reference, th):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def own_position(p, s, io, reference, th):  # type: ignore[no-untyped-def]
+def own_position(p, s, io, reference, th):
     """A law of one's own of the position; its own angle is the one that the probe has passed."""
     angle = counted(th, p[layout.OWN_COUNTS])
     output = counted(io[layout.IN_OUTPUT], p[layout.OWN_OUTPUT_COUNTS])
@@ -150,7 +150,7 @@ def own_position(p, s, io, reference, th):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def outer_rare(p, s, io, th):  # type: ignore[no-untyped-def]
+def outer_rare(p, s, io, th):
     """Update the outermost stage, whichever it is."""
     r = shape(p, s, io[layout.IN_COMMAND])
     if p[layout.HAS_POSITION] > 0.0 and p[layout.OWN_STAGE] == layout.OWN_POSITION:

@@ -11,7 +11,7 @@ from nonlinear._kernels.modal import COMPLEX, describe
 
 
 @kernel
-def prepare_run_sizes(p):  # type: ignore[no-untyped-def]
+def prepare_run_sizes(p):
     """Places of the parts of the state whose lengths differ from drive to drive, and both rows' lengths.
 
     Of an elastic drive `prepare_elastic_sizes` comes next: its row of parameters is longer.
@@ -39,7 +39,7 @@ def prepare_run_sizes(p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prepare_periods(p):  # type: ignore[no-untyped-def]
+def prepare_periods(p):
     """Who is outermost, how often it is updated, and what that means for limits and rates."""
     every = 1.0
     if p[layout.HAS_POSITION] > 0.0:
@@ -53,7 +53,7 @@ def prepare_periods(p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def any_of(p, first, behind):  # type: ignore[no-untyped-def]
+def any_of(p, first, behind):
     """1 where one of the numbers from ``first`` up to ``behind`` is not zero."""
     found = 0.0
     for j in range(first, behind):
@@ -63,7 +63,7 @@ def any_of(p, first, behind):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prepare_gates(p):  # type: ignore[no-untyped-def]
+def prepare_gates(p):
     """One number a stage that says whether it needs more than its short form."""
     more = max(any_of(p, layout.OUTPUT_SENSOR, layout.PROFILED), p[layout.PROFILED])
     more = max(more, any_of(p, layout.POSITION_INTEGRAL, layout.DERIVATIVE_COEFFICIENT))
@@ -90,7 +90,7 @@ def prepare_gates(p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prepare_own(p):  # type: ignore[no-untyped-def]
+def prepare_own(p):
     """What a law of one's own needs besides: its stage's longer form, the sensors, perhaps the speed."""
     stage = p[layout.OWN_STAGE]
     p[layout.RARE_SENSE] = 1.0
@@ -105,7 +105,7 @@ def prepare_own(p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prepare_plant(p, work):  # type: ignore[no-untyped-def]
+def prepare_plant(p, work):
     """Transitions over both segments and both directions, eigenvalues, decay of a locked current."""
     Ts, f = p[layout.PERIOD], p[layout.DELAY_FRACTION]
     p[layout.LENGTH], p[layout.LENGTH + 1] = f, Ts - f
@@ -131,7 +131,7 @@ def prepare_plant(p, work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prepare(p, s):  # type: ignore[no-untyped-def]
+def prepare(p, s):
     """Fill the derived part of ``p`` (after `prepare_run_sizes`); ``s`` lends its work space.
 
     With energies `prepare_forms` comes next, with the tanh law `prepare_tanh`, elastic `prepare_elastic`.

@@ -12,7 +12,7 @@ PROBE_Y = layout.PROBES + layout.POINT_OUTPUT * layout.PROBE_SIZE
 
 
 @kernel
-def probe(p, s, io, point, value):  # type: ignore[no-untyped-def]
+def probe(p, s, io, point, value):
     """Signal after the probe at ``point``: gain times the delayed value plus the injected signal.
 
     The past values lie in a ring of the state, one for each point.
@@ -37,7 +37,7 @@ def probe(p, s, io, point, value):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fill_ring(p, s, point, value):  # type: ignore[no-untyped-def]
+def fill_ring(p, s, point, value):
     """Take every past value at a point as ``value``."""
     size = int(p[layout.PROBE_RING])
     ring = int(p[layout.AT_PROBES]) + point * size

@@ -18,7 +18,7 @@ WARM_UP = 16
 
 
 @kernel
-def rest(x, m):  # type: ignore[no-untyped-def]
+def rest(x, m):
     """Remainder of two whole numbers held in floats, x >= 0, below 2^53."""
     r = x - math.floor(x / m) * m
     if r < 0.0:
@@ -27,7 +27,7 @@ def rest(x, m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def uniform(s, at):  # type: ignore[no-untyped-def]
+def uniform(s, at):
     """Next number of the stream at ``s[at]``, above 0 and below 1."""
     s[at] = rest(A_1 * s[at], M_1)
     s[at + 1] = rest(A_2 * s[at + 1], M_2)
@@ -38,7 +38,7 @@ def uniform(s, at):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def normal(s, stream):  # type: ignore[no-untyped-def]
+def normal(s, stream):
     """Next number of a stream with mean 0 and standard deviation 1 (Box and Muller)."""
     at = layout.S_NOISE + 2 * stream
     radius = math.sqrt(-2.0 * math.log(uniform(s, at)))
@@ -46,7 +46,7 @@ def normal(s, stream):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def seed_streams(s, seed):  # type: ignore[no-untyped-def]
+def seed_streams(s, seed):
     """Start every stream; another seed starts all of them elsewhere."""
     for stream in range(4):
         at = layout.S_NOISE + 2 * stream

@@ -7,7 +7,7 @@ from nonlinear._kernels import layout
 
 
 @kernel
-def record(p, io, history, rows, flag_history, row):  # type: ignore[no-untyped-def]
+def record(p, io, history, rows, flag_history, row):
     """Write the columns that every run has, and those of active probes."""
     history[row] = io[layout.IO_REFERENCE]
     history[rows + row] = io[layout.IO_OUTPUT]
@@ -23,7 +23,7 @@ def record(p, io, history, rows, flag_history, row):  # type: ignore[no-untyped-
 
 
 @kernel
-def record_more(p, io, history, rows, row):  # type: ignore[no-untyped-def]
+def record_more(p, io, history, rows, row):
     """Write both sides of each active probe, by point, then an elastic drive's load side, then the load."""
     col = layout.HISTORY_PROBES
     for point in range(4):

@@ -13,7 +13,7 @@ LIMITER_BITS = np.array(layout.LIMITER_BITS)
 
 
 @kernel
-def clear(p, out):  # type: ignore[no-untyped-def]
+def clear(p, out):
     """Reset a row of results for a run."""
     for j in range(layout.OUT_SIZE):
         out[j] = 0.0
@@ -33,7 +33,7 @@ def clear(p, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def extremes(io, count, out):  # type: ignore[no-untyped-def]
+def extremes(io, count, out):
     """Update minimum and maximum of each signal."""
     for j in range(count):
         at = layout.OUT_EXTREMES + 2 * j
@@ -42,7 +42,7 @@ def extremes(io, count, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def window(io, count, which, harmonics, c, s, out):  # type: ignore[no-untyped-def]
+def window(io, count, which, harmonics, c, s, out):
     """Add one tick to a window; (c, s) is the unit phasor of the fundamental."""
     for j in range(count):
         x = io[layout.IO_REFERENCE + j]
@@ -59,7 +59,7 @@ def window(io, count, which, harmonics, c, s, out):  # type: ignore[no-untyped-d
 
 
 @kernel
-def step_figures(y, y_last, k, band, out):  # type: ignore[no-untyped-def]
+def step_figures(y, y_last, k, band, out):
     """Update rise, peak and settling of a response normalised to its target; times in ticks."""
     at = layout.OUT_STEP
     if out[at + layout.STEP_T10] < 0.0 and y >= 0.1:
@@ -76,7 +76,7 @@ def step_figures(y, y_last, k, band, out):  # type: ignore[no-untyped-def]
 
 @seldom
 @kernel
-def note_limits(p, flags, first, until, out):  # type: ignore[no-untyped-def]
+def note_limits(p, flags, first, until, out):
     """Count the ticks from ``first`` to ``until`` (exclusive), in which the same limiters acted."""
     ticks = until - first
     window = max(until - max(float(first), p[layout.TICKS] - p[layout.WINDOW]), 0.0)
@@ -93,7 +93,7 @@ def note_limits(p, flags, first, until, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def windows(p, io, k, count, out):  # type: ignore[no-untyped-def]
+def windows(p, io, k, count, out):
     """Add tick k to the last window or the one before it."""
     length = int(p[layout.WINDOW])
     into = k - (int(p[layout.TICKS]) - 2 * length)
@@ -108,7 +108,7 @@ def windows(p, io, k, count, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def reduce(p, io, k, out):  # type: ignore[no-untyped-def]
+def reduce(p, io, k, out):
     """Add tick k to whatever is kept of the run."""
     if p[layout.STEP_TARGET] != 0.0:
         y = (io[layout.IO_OUTPUT] - p[layout.ANGLE_START] / p[layout.RATIO]) / p[layout.STEP_TARGET]

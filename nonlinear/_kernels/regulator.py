@@ -9,13 +9,13 @@ CONDITIONAL, CLAMPED, BACK_CALCULATION = range(3)
 
 
 @kernel
-def clamp(value, limit):  # type: ignore[no-untyped-def]
+def clamp(value, limit):
     """Value held within +-limit."""
     return min(max(value, -limit), limit)
 
 
 @kernel
-def pi(e, integral, gain, step, limit):  # type: ignore[no-untyped-def]
+def pi(e, integral, gain, step, limit):
     """PI with conditional integration: output, new integral, and 1 where the limit acts.
 
     ``step`` is Kp T/Tn.  The new integral is kept if the output is not clamped or v and e have opposite
@@ -32,7 +32,7 @@ def pi(e, integral, gain, step, limit):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def regulator(e, integral, gain, step, extra, limit, law, tracking):  # type: ignore[no-untyped-def]
+def regulator(e, integral, gain, step, extra, limit, law, tracking):
     """PI with a feed-forward ``extra`` and any anti-windup law; the same three numbers as `pi`.
 
     The limit acts where it clamps the output, and by law 1 where it clamps the integral.
@@ -60,7 +60,7 @@ def regulator(e, integral, gain, step, extra, limit, law, tracking):  # type: ig
 
 
 @kernel
-def velocity_regulator(p, s, e, limit):  # type: ignore[no-untyped-def]
+def velocity_regulator(p, s, e, limit):
     """The velocity controller's own law on its error."""
     return regulator(
         e, s[layout.S_VELOCITY_INTEGRATOR], p[layout.VELOCITY_GAIN], p[layout.VELOCITY_INTEGRAL],

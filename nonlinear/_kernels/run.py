@@ -11,7 +11,7 @@ from nonlinear._kernels.tick import step
 
 
 @kernel
-def run_block(p, s, io, block, first, count, history, flag_history, out):  # type: ignore[no-untyped-def]
+def run_block(p, s, io, block, first, count, history, flag_history, out):
     """Run ``count`` ticks from tick ``first`` on; returns the tick behind the last one done."""
     every, rows = int(p[layout.RECORD_EVERY]), flag_history.shape[0]
     row = int((first + every - 1) / every)
@@ -44,7 +44,7 @@ def run_block(p, s, io, block, first, count, history, flag_history, out):  # typ
 
 
 @kernel
-def finish(p, s, k, out):  # type: ignore[no-untyped-def]
+def finish(p, s, k, out):
     """Write the final state and the counts into the results."""
     out[layout.OUT_TICKS] = k
     out[layout.OUT_EVENTS], out[layout.OUT_MAX_EVENTS] = s[layout.S_EVENTS], s[layout.S_MAX_EVENTS]
@@ -63,7 +63,7 @@ def finish(p, s, k, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def run(p, s, io, block, tables, history, flag_history, out, shared):  # type: ignore[no-untyped-def]
+def run(p, s, io, block, tables, history, flag_history, out, shared):
     """Run the drive described by ``p`` from the state ``s``; returns a status number of ``layout``.
 
     ``history`` is flat, columns one after the other, or empty; ``flag_history`` one number a row; ``out`` a

@@ -12,7 +12,7 @@ from nonlinear._kernels.modal import slip_at
 
 
 @kernel
-def slip_step(p, o, i, w, th, u, T):  # type: ignore[no-untyped-def]
+def slip_step(p, o, i, w, th, u, T):
     """One precomputed transition."""
     return (
         p[o + layout.A11] * i + p[o + layout.A12] * w + p[o + layout.B1] * u + p[o + layout.C1] * T,
@@ -22,7 +22,7 @@ def slip_step(p, o, i, w, th, u, T):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def breakaway_time(p, i, level, u, Tb, dt):  # type: ignore[no-untyped-def]
+def breakaway_time(p, i, level, u, Tb, dt):
     """Time at which the drive torque of the locked rotor reaches ``level``; also the current then."""
     R, L = p[layout.RESISTANCE], p[layout.INDUCTANCE]
     i_level = (level - Tb) / p[layout.TORQUE_CONSTANT]
@@ -33,7 +33,7 @@ def breakaway_time(p, i, level, u, Tb, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def stick(p, i, u, Tb, Tp, Tm, dt, decay):  # type: ignore[no-untyped-def]
+def stick(p, i, u, Tb, Tp, Tm, dt, decay):
     """Locked rotor: time spent, current after it, direction of the breakaway (0: none).
 
     ``decay`` is exp(-R dt/L).
@@ -59,7 +59,7 @@ def stick(p, i, u, Tb, Tp, Tm, dt, decay):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def direction_at_rest(p, i, u, Tb, Tp, Tm, d):  # type: ignore[no-untyped-def]
+def direction_at_rest(p, i, u, Tb, Tp, Tm, d):
     """What follows a landing of motion d: 0 rest while |drive| <= Tc breakaway, -d motion the other way."""
     drive = p[layout.TORQUE_CONSTANT] * i + p[layout.SOURCE_GAIN] * u + Tb
     if (d > 0.0 and drive < -Tm) or (d < 0.0 and drive > Tp):
@@ -68,7 +68,7 @@ def direction_at_rest(p, i, u, Tb, Tp, Tm, d):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def slip_part(p, s, part, left, u, Tb, Tc, i, w, th, d):  # type: ignore[no-untyped-def]
+def slip_part(p, s, part, left, u, Tb, Tc, i, w, th, d):
     """Slip in direction d until it lands or the segment ends: time spent, (i, w, th), and how it ended.
 
     The end is `NONE_IN_SEGMENT`, `NEVER_LEFT`, or 0 for a landing.
@@ -95,7 +95,7 @@ def slip_part(p, s, part, left, u, Tb, Tc, i, w, th, d):  # type: ignore[no-unty
 
 @seldom
 @kernel
-def segment(p, s, part, u, events):  # type: ignore[no-untyped-def]
+def segment(p, s, part, u, events):
     """Advance current, speed, angle and direction of the state row over one segment with all its events.
 
     ``events`` counts those of this tick so far; returns their new number, or -1 where there are too many.

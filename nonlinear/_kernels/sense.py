@@ -14,13 +14,13 @@ from nonlinear._kernels.smooth import tanh_torque
 
 
 @kernel
-def output_angle(p, s):  # type: ignore[no-untyped-def]
+def output_angle(p, s):
     """Angle of the output shaft."""
     return s[layout.S_OUTPUT] if p[layout.ELASTIC_DRIVE] > 0.0 else s[layout.S_ANGLE] / p[layout.RATIO]
 
 
 @kernel
-def slopes(p, s):  # type: ignore[no-untyped-def]
+def slopes(p, s):
     """(i', w') at the sampling instant under the voltage that acted last."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
         di, dw, _dW, _dd = elastic_slopes(p, s)
@@ -37,7 +37,7 @@ def slopes(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def supply(p, s):  # type: ignore[no-untyped-def]
+def supply(p, s):
     """Bus voltage of this tick from voltage and current of the motor (model.md section 6)."""
     U, Us, Rs = s[layout.S_VOLTAGE_LIMIT], p[layout.SUPPLY_VOLTAGE], p[layout.SUPPLY_RESISTANCE]
     power, Ts = s[layout.S_VOLTAGE] * s[layout.S_CURRENT], p[layout.PERIOD]
@@ -60,7 +60,7 @@ def supply(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def applied_voltage(p, s, io):  # type: ignore[no-untyped-def]
+def applied_voltage(p, s, io):
     """What acts on the motor: the controller's voltage, or its share of a bus voltage that varies."""
     u = s[layout.S_VOLTAGE]
     if p[layout.SUPPLY] == layout.SUPPLY_SCALES:
@@ -69,7 +69,7 @@ def applied_voltage(p, s, io):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def sense(p, s, io):  # type: ignore[no-untyped-def]
+def sense(p, s, io):
     """Write what the controller measures of current, speed and angles, and the bus voltage."""
     i, w, th, y = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE], output_angle(p, s)
     if p[layout.SUPPLY] == layout.SUPPLY_LIMITS:

@@ -13,7 +13,7 @@ TRIANGLE, CHIRP, LOG_CHIRP = layout.TRIANGLE, layout.CHIRP, layout.LOG_CHIRP
 
 
 @kernel
-def triangle_wave(cycles):  # type: ignore[no-untyped-def]
+def triangle_wave(cycles):
     """Triangle of amplitude 1 in phase with sin(2 pi cycles)."""
     x = cycles + 0.25
     x -= math.floor(x)
@@ -21,7 +21,7 @@ def triangle_wave(cycles):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def chirp_cycles(kind, f0, f1, span, s):  # type: ignore[no-untyped-def]
+def chirp_cycles(kind, f0, f1, span, s):
     """Cycles since the start of a linear or logarithmic chirp from f0 to f1 over ``span`` seconds."""
     x = min(s, span)
     if kind == CHIRP:
@@ -33,7 +33,7 @@ def chirp_cycles(kind, f0, f1, span, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def signal(row, at, tables, k, period):  # type: ignore[no-untyped-def]
+def signal(row, at, tables, k, period):
     """Value at tick k of the signal whose eight numbers begin at ``row[at]``.
 
     Numbers: kind, amplitude, start time, then frequency and phase (sine, triangle), stop time (ramp),
@@ -61,7 +61,7 @@ def signal(row, at, tables, k, period):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fill(row, at, tables, first, count, stride, period, out, to):  # type: ignore[no-untyped-def]
+def fill(row, at, tables, first, count, stride, period, out, to):
     """Sample a signal at ticks first, first + stride, ... of ``count``, into ``out[to]`` and behind."""
     times = int((count + stride - 1) / stride)
     if int(row[at]) == SINE:
@@ -75,14 +75,14 @@ def fill(row, at, tables, first, count, stride, period, out, to):  # type: ignor
 
 
 @kernel
-def add_table(tables, start, length, first, count, out, to):  # type: ignore[no-untyped-def]
+def add_table(tables, start, length, first, count, out, to):
     """Write a table of one value a tick, its last value held, into ``out[to]`` and behind."""
     for n in range(count):
         out[to + n] = tables[start + min(first + n, length - 1)]
 
 
 @kernel
-def fill_block(p, tables, first, count, stride, block):  # type: ignore[no-untyped-def]
+def fill_block(p, tables, first, count, stride, block):
     """Work out all inputs of ``count`` ticks from tick ``first`` on; commands only every ``stride`` ticks."""
     period = p[layout.PERIOD]
     start = stride * int((first + stride - 1) / stride) - first
@@ -107,7 +107,7 @@ def fill_block(p, tables, first, count, stride, block):  # type: ignore[no-untyp
 
 
 @kernel
-def feed(block, j, io):  # type: ignore[no-untyped-def]
+def feed(block, j, io):
     """Hand the inputs beside the command of the j-th tick of a block to the drive."""
     io[layout.IN_LOAD], io[layout.IN_TORQUE] = block[layout.BLOCK_LOAD + j], block[layout.BLOCK_TORQUE + j]
     for point in range(4):

@@ -20,6 +20,7 @@ from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.energy import NODES, WEIGHTS, add_slip, energy_whole, pieces_of
 from nonlinear._kernels.expm import MATRIX, exponential, plant, transition
+from nonlinear._kernels.hyperbolic import tanh
 from nonlinear._kernels.segment import slip_step
 
 SATURATED = 19.0
@@ -31,7 +32,7 @@ FORM_II, FORM_IW, FORM_WW, FORM_NW = 7, 35, 63, 91  # after the seven of i
 
 
 @kernel
-def phi_columns(p, t, h, work, at):  # type: ignore[no-untyped-def]
+def phi_columns(p, t, h, work, at):
     """exp of the plant over t, at ``at + MATRIX``; a chain of integrators over h feeds the torque.
 
     Column 4 is the response to a unit torque, 5 to the torque t/h, 6 to (t/h)^2/2.
@@ -43,8 +44,9 @@ def phi_columns(p, t, h, work, at):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prepare_tanh(p, s):  # type: ignore[no-untyped-def]
+def prepare_tanh(p, s):
     """Fill the coefficients of every level for both segments, and what chooses among them."""
+    p[layout.TANH_PER_SPEED] = 1.0 / p[layout.SMOOTHING]
     p[layout.TANH_RATE] = STEP_FACTOR * math.sqrt(math.sqrt(p[layout.TANH_TOLERANCE]))
     for part in range(2):
         h = p[layout.LENGTH + part]
@@ -61,7 +63,7 @@ def prepare_tanh(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prepare_level(p, h, s, o):  # type: ignore[no-untyped-def]
+def prepare_level(p, h, s, o):
     """Fill the coefficients of one step length at ``p[o]``."""
     at = int(p[layout.AT_WORK])
     transition(p, layout.FORWARD, 0.5 * h, s, at, o + HALF)
@@ -79,7 +81,7 @@ def prepare_level(p, h, s, o):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prepare_level_forms(p, h, s, form):  # type: ignore[no-untyped-def]
+def prepare_level_forms(p, h, s, form):
     """Write the integrals over one step as forms of (i, w, u, T, n0, nm, nc)."""
     for j in range(layout.TANH_FORM):
         p[form + j] = 0.0
@@ -91,7 +93,7 @@ def prepare_level_forms(p, h, s, form):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_tanh_node(p, s, t, h, weight, form):  # type: ignore[no-untyped-def]
+def add_tanh_node(p, s, t, h, weight, form):
     """Add one node of the quadrature to the forms of a step."""
     at = int(p[layout.AT_WORK])
     phi_columns(p, t, h, s, at)
@@ -126,7 +128,7 @@ def add_tanh_node(p, s, t, h, weight, form):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def form_of_seven(p, at, a, b, c, d, e, f, g):  # type: ignore[no-untyped-def]
+def form_of_seven(p, at, a, b, c, d, e, f, g):
     """A quadratic form of seven numbers from its 28 coefficients."""
     return (
         a * (p[at] * a + p[at + 1] * b + p[at + 2] * c + p[at + 3] * d
@@ -142,7 +144,7 @@ def form_of_seven(p, at, a, b, c, d, e, f, g):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):  # type: ignore[no-untyped-def]
+def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):
     """Add the energies of one step under the friction torque (n0, nm, nc); ``angle`` is what it turned."""
     sum_i = p[form] * i + p[form + 1] * w + p[form + 2] * u + p[form + 3] * Tb
     sum_i += p[form + 4] * n0 + p[form + 5] * nm + p[form + 6] * nc
@@ -155,16 +157,16 @@ def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):  # type: ignore[no-
 
 
 @kernel
-def tanh_torque(p, w, Tcp, Tcm):  # type: ignore[no-untyped-def]
+def tanh_torque(p, w, Tcp, Tcm):
     """Torque of the friction beyond the forward viscous slope, with its sign in the equation of motion."""
-    x = w / p[layout.SMOOTHING]
+    x = w * p[layout.TANH_PER_SPEED]
     if w >= 0.0:
-        return -Tcp * math.tanh(x)
-    return -Tcm * math.tanh(x) - (p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) * w
+        return -Tcp * tanh(x)
+    return -Tcm * tanh(x) - (p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) * w
 
 
 @kernel
-def level_for(p, part, i, u, Tb, Tc, n0):  # type: ignore[no-untyped-def]
+def level_for(p, part, i, u, Tb, Tc, n0):
     """Number of halvings of a segment that the tolerance asks for under the friction torque n0."""
     if p[layout.TANH_LEVEL] >= 0.0:
         return int(p[layout.TANH_LEVEL])
@@ -185,7 +187,7 @@ def level_for(p, part, i, u, Tb, Tc, n0):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm, n0):  # type: ignore[no-untyped-def]
+def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm, n0):
     """One ETD4RK step from the friction torque n0: state after it, and the torque at its middle and end."""
     ih, wh, thh = slip_step(p, o + HALF, i, w, th, u, Tb)
     ia, wa, tha = ih + p[o + STAGE] * n0, wh + p[o + STAGE + 1] * n0, thh + p[o + STAGE + 2] * n0
@@ -205,7 +207,7 @@ def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm, n0):  # type: ignore[no-untyped-de
 
 
 @kernel
-def saturated(p, s, part, u):  # type: ignore[no-untyped-def]
+def saturated(p, s, part, u):
     """Cross a whole segment in one exact step where tanh is 1 all the way; returns 1 where that was so."""
     i, w, far = s[layout.S_CURRENT], s[layout.S_SPEED], SATURATED * p[layout.SMOOTHING]
     if abs(w) <= far or p[layout.TANH_LEVEL] >= 0.0:
@@ -225,7 +227,7 @@ def saturated(p, s, part, u):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def tanh_segment(p, s, part, u):  # type: ignore[no-untyped-def]
+def tanh_segment(p, s, part, u):
     """Advance the state row over one segment under the smoothed law."""
     if saturated(p, s, part, u) > 0:
         return

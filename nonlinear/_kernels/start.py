@@ -12,7 +12,7 @@ from nonlinear._kernels.tick import init_elastic, init_run, retune_elastic, retu
 
 
 @kernel
-def prepare_sizes(p):  # type: ignore[no-untyped-def]
+def prepare_sizes(p):
     """Work out the lengths of both rows; of an elastic drive train also its friction segments."""
     prepare_run_sizes(p)
     if p[layout.ELASTIC_DRIVE] > 0.0:
@@ -20,7 +20,7 @@ def prepare_sizes(p):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def derive(p, s):  # type: ignore[no-untyped-def]
+def derive(p, s):
     """Fill all derived parameters; ``s`` lends its work space."""
     prepare(p, s)
     if p[layout.WITH_ENERGY] > 0.0:
@@ -32,7 +32,7 @@ def derive(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def init(p, s):  # type: ignore[no-untyped-def]
+def init(p, s):
     """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
     init_run(p, s)
     if p[layout.ELASTIC_DRIVE] > 0.0:
@@ -40,7 +40,7 @@ def init(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def retune(p, s):  # type: ignore[no-untyped-def]
+def retune(p, s):
     """Fit the state to parameters that were changed between two ticks, after `derive`."""
     retune_rigid(p, s)
     if p[layout.ELASTIC_DRIVE] > 0.0:

@@ -20,7 +20,7 @@ from nonlinear._kernels.sense import applied_voltage, sense
 
 
 @kernel
-def init_controller(p, s):  # type: ignore[no-untyped-def]
+def init_controller(p, s):
     """Start values of the controller, all histories those of rest or of constant speed."""
     th = p[layout.ANGLE_START]
     s[layout.S_CURRENT_INTEGRATOR] = p[layout.CURRENT_INTEGRATOR_START]
@@ -37,7 +37,7 @@ def init_controller(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def init_estimate(p, s):  # type: ignore[no-untyped-def]
+def init_estimate(p, s):
     """Start values of the speed measurement: those of constant speed."""
     w, th, T = p[layout.SPEED_START], p[layout.ANGLE_START], p[layout.VELOCITY_PERIOD]
     m, at = int(p[layout.DIFFERENCE_SAMPLES]), int(p[layout.AT_ANGLES])
@@ -52,7 +52,7 @@ def init_estimate(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def init_command(p, s):  # type: ignore[no-untyped-def]
+def init_command(p, s):
     """Start values of profile and command filter: those of the outermost stage."""
     r = p[layout.ANGLE_START] / p[layout.RATIO]
     if p[layout.HAS_POSITION] <= 0.0:
@@ -70,7 +70,7 @@ def init_command(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def init_lines(p, s):  # type: ignore[no-untyped-def]
+def init_lines(p, s):
     """Fill the delay line and the probes' rings."""
     u, y = p[layout.VOLTAGE_START], p[layout.ANGLE_START] / p[layout.RATIO]
     for j in range(int(p[layout.DELAY_LINE])):
@@ -83,7 +83,7 @@ def init_lines(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def init_run(p, s):  # type: ignore[no-untyped-def]
+def init_run(p, s):
     """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
     for j in range(int(p[layout.STATE_SIZE])):
         s[j] = 0.0
@@ -102,7 +102,7 @@ def init_run(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def init_elastic(p, s):  # type: ignore[no-untyped-def]
+def init_elastic(p, s):
     """What `init_run` leaves to do for an elastic drive train: load side, contact, the output's own angle."""
     elastic_start(p, s)
     fill_ring(p, s, layout.POINT_OUTPUT, s[layout.S_OUTPUT])
@@ -110,7 +110,7 @@ def init_elastic(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def retune_rigid(p, s):  # type: ignore[no-untyped-def]
+def retune_rigid(p, s):
     """What parameters changed between two ticks mean for the state: torques, and whether the motor slips."""
     put_load(p, s, s[layout.S_LOAD], 0.0)
     w = s[layout.S_SPEED]
@@ -120,13 +120,13 @@ def retune_rigid(p, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def retune_elastic(p, s):  # type: ignore[no-untyped-def]
+def retune_elastic(p, s):
     """The same for an elastic drive train: contact and the load's slip too."""
     find_mode(p, s)
 
 
 @kernel
-def decide(p, s, io):  # type: ignore[no-untyped-def]
+def decide(p, s, io):
     """Sense and control at t_k, and note what there is to record."""
     i, w, th = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE]
     if p[layout.RARE_SENSE] > 0.0:
@@ -148,7 +148,7 @@ def decide(p, s, io):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def note_more(p, s, io):  # type: ignore[no-untyped-def]
+def note_more(p, s, io):
     """Note both sides of each probe, the current command under overload, an elastic drive's load side."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
         io[layout.IO_OUTPUT_SPEED], io[layout.IO_TWIST] = s[layout.S_OUTPUT_SPEED], s[elastic_layout.ES_TWIST]
@@ -163,7 +163,7 @@ def note_more(p, s, io):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def step(p, s, io):  # type: ignore[no-untyped-def]
+def step(p, s, io):
     """One tick: sense, control, move.  ``s[S_STATUS]`` says whether it went well."""
     decide(p, s, io)
     motion(p, s, io)
@@ -171,21 +171,21 @@ def step(p, s, io):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def tick(p, s, io):  # type: ignore[no-untyped-def]
+def tick(p, s, io):
     """`step` to be called from outside; returns the status."""
     step(p, s, io)
     return int(s[layout.S_STATUS])
 
 
 @kernel
-def get(p, s, to):  # type: ignore[no-untyped-def]
+def get(p, s, to):
     """Copy the state out."""
     for j in range(int(p[layout.STATE_SIZE])):
         to[j] = s[j]
 
 
 @kernel
-def set_state(p, s, source):  # type: ignore[no-untyped-def]
+def set_state(p, s, source):
     """Copy a state in."""
     for j in range(int(p[layout.STATE_SIZE])):
         s[j] = source[j]

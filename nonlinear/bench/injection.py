@@ -52,7 +52,7 @@ class Injection:
 
     def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched | None] = (None,)) -> None:
         design = setup.design
-        self.place, self.rows, self.ratio = place, setup.row(), design.total_ratio
+        self.place, self.rows, self.ratio = place, setup.rows(), design.total_ratio
         self.at_start = place in ("command", "load")
         self.outermost, self.readings = design.controller.outermost, len(watched)
         self.own = [k for k, each in enumerate(watched) if each is None]

@@ -123,19 +123,10 @@ class LoopSetup:
             return f"on a constant speed{pressed}"
         return "standing, without dry friction"
 
-    def row(self) -> Rows:
-        """Parameters of a run that starts in the steady state of the operating motion; see `rows`."""
-        return self.rows()
-
     def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
         """Parameters of runs that start in the steady state of the operating motion, one a value.
 
-        Parameters
-        ----------
-        gain : array_like
-            Factor on all parts of the controller in front of the point: the loop gain.
-        delay_samples : array_like
-            Extra delay at the point, in its own samples.
+        ``gain`` is a factor on the whole controller in front of the point; a delay is in the point's samples.
         """
         gains, delays = np.broadcast_arrays(np.atleast_1d(gain), np.atleast_1d(delay_samples))
         rows = self._base.repeat(gains.size)

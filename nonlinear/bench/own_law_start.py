@@ -37,14 +37,9 @@ class OwnStart:
 def own_start(
     design: Design, bias: OperatingMotion, wanted: float, gain: float, direct: float = 0.0, fed: float = 0.0
 ) -> OwnStart:
-    """Solve for states x_k = x0 + k x1 and the command of a law whose stage gives ``wanted``.
+    """Solve for states x_k = x0 + k x1 and the command of a law times ``gain`` whose stage gives ``wanted``.
 
-    Parameters
-    ----------
-    gain : float
-        Of the law.
-    direct, fed : float
-        What the stage adds to the law's output per command, and besides.
+    The stage adds ``direct`` per command to the law's output, and ``fed`` besides.
     """
     own = design.controller.own_law
     assert own is not None

@@ -15,7 +15,15 @@ from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
-from nonlinear.export.program import c_text, header_text, single, source_hash, source_text, template
+from nonlinear.export.program import (
+    c_text,
+    filled,
+    header_text,
+    replaced,
+    single,
+    source_hash,
+    source_text,
+)
 from nonlinear.export.rows import place_words
 from nonlinear.native import parameters
 from nonlinear.row.elastic import is_elastic
@@ -85,17 +93,19 @@ def c_export(design: Design, *, single_precision: bool = False, prefix: str = "d
     if single_precision:
         _refuse_single(design)
     ours = exported(design)
+    values = _values(ours)
     texts = {
         "drive.h": header_text(),
         "drive.c": source_text(),
-        f"{prefix}design.h": _design_header(ours),
-        f"{prefix}design.c": _design_source(ours),
+        f"{prefix}design.h": filled("design.h", values),
+        f"{prefix}design.c": filled("design.c", values),
     }
     if single_precision:
         texts = {name: single(text) for name, text in texts.items()}
-    texts["main.c"] = template("main.c").replace("@REAL@", "float" if single_precision else "double")
+    texts["main.c"] = filled("main.c", {"REAL": "float" if single_precision else "double"})
     texts["README.md"] = readme_text(ours, single_precision)
-    return {name: _named(text, prefix) for name, text in texts.items()}
+    names = {"prefix": prefix, "PREFIX": prefix.upper()}
+    return {name: replaced(text, names) for name, text in texts.items()}
 
 
 def refuse_prefix(prefix: str) -> None:
@@ -108,10 +118,6 @@ def refuse_prefix(prefix: str) -> None:
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*_", prefix):
         raise InputError(f"prefix = {prefix!r}: allowed: letters, digits and _, a letter first, _ last")
-
-
-def _named(text: str, prefix: str) -> str:
-    return text.replace("@prefix@", prefix).replace("@PREFIX@", prefix.upper())
 
 
 def _refuse_single(design: Design) -> None:
@@ -146,57 +152,20 @@ def exporter_version() -> str:
         return "not installed"
 
 
-def _design_header(ours: ExportedDesign) -> str:
-    return f"""/*
- * Parameters of the design {plain(ours.design.name)}.
- */
-#ifndef @PREFIX@DESIGN_H
-#define @PREFIX@DESIGN_H
-
-#include "drive.h"
-
-#define @PREFIX@DESIGN_NAME {c_text(ours.design.name)}
-#define @PREFIX@DESIGN_REVISION {c_text(ours.design.revision or "")}
-#define @PREFIX@DESIGN_HASH "{design_hash(ours.design)}" /* SHA-256 of its values */
-#define @PREFIX@SOURCE_HASH "{source_hash()}" /* SHA-256 of drive.h and drive.c in double precision */
-#define @PREFIX@EXPORTER_VERSION "{exporter_version()}"
-
-enum {{
-    @PREFIX@P_LENGTH = {ours.p_size}, /* of the row p of this design */
-    @PREFIX@S_LENGTH = {ours.s_size} /* of the row s of this design */
-}};
-
-/* Copies the parameters of the design into p, @PREFIX@P_LENGTH numbers; the derived ones become 0. */
-void @prefix@load_design(double *p);
-
-#endif
-"""
-
-
-def _design_source(ours: ExportedDesign) -> str:
-    """The initialiser: every place of the row with its name, unit and words."""
-    known = place_words()
-    lines = []
-    for place, value in enumerate(ours.row):
-        if value != 0.0 or place < at.COMMAND:  # signals, probes and chains only where they are set
-            lines.append(f"    p[{place}] = {c_float(float(value))}; /* {plain(known[place])} */")
-    body = "\n".join(lines)
-    return f"""/*
- * Parameters of the design {plain(ours.design.name)}, SI, motor side.
- * {plain(ours.design.title)}
- */
-#include "@prefix@design.h"
-
-#include <math.h>
-
-void @prefix@load_design(double *p)
-{{
-    for (int j = 0; j < @PREFIX@P_LENGTH; j += 1) {{
-        p[j] = 0.0;
-    }}
-{body}
-}}
-"""
+def _values(ours: ExportedDesign) -> dict[str, str]:
+    """What stands for the words of ``design.h`` and ``design.c``."""
+    design, known = ours.design, place_words()
+    lines = [
+        f"    p[{place}] = {c_float(float(value))}; /* {plain(known[place])} */"
+        for place, value in enumerate(ours.row)
+        if value != 0.0 or place < at.COMMAND  # signals, probes and chains only where they are set
+    ]
+    return {
+        "DESIGN": plain(design.name), "TITLE": plain(design.title),
+        "NAME": c_text(design.name), "REVISION": c_text(design.revision or ""),
+        "DESIGN_HASH": design_hash(design), "HASH": source_hash(), "VERSION": exporter_version(),
+        "P": str(ours.p_size), "S": str(ours.s_size), "VALUES": "\n".join(lines),
+    }  # fmt: skip
 
 
 def plain(text: str) -> str:
@@ -230,10 +199,7 @@ def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
         "HASH": source_hash(),
         "AXIS": "linear (m, N, kg)" if design.axis == "linear" else "rotary (rad, N m, kg m2)",
     }
-    text = template("README.md")
-    for key, value in values.items():
-        text = text.replace(f"@{key}@", value)
-    return text
+    return filled("README.md", values)
 
 
 def _stiffer(ours: ExportedDesign) -> str:

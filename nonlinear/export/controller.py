@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
 
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.compiled.program import Program
@@ -16,7 +15,7 @@ from nonlinear.export.c_files import exporter_version, plain, refuse_prefix
 from nonlinear.export.controller_cut import Controller, begins, controller_of
 from nonlinear.export.controller_names import signal_words, state_words
 from nonlinear.export.controller_vectors import roundings, vectors_text
-from nonlinear.export.program import FLAGS, c_text, single, template
+from nonlinear.export.program import FLAGS, c_text, filled, single
 
 _LIBRARY = re.compile(r"\b(sqrt|floor|fabs|exp|log|sin|cos|tan)\(")
 
@@ -58,24 +57,17 @@ def controller_export(
     values["SIZES"], values["LIBRARY"] = _sizes(ours, single_precision), _library(source)
     values["ROUNDINGS"] = str(roundings(ours))
     texts = {
-        "controller.h": _filled("controller.h", values),
+        "controller.h": filled("controller.h", values),
         "controller.c": source,
-        "controller.hpp": _filled("controller.hpp", values),
+        "controller.hpp": filled("controller.hpp", values),
     }
     if vectors:
         texts["vectors.h"] = vectors_text(ours, prefix, single_precision=single_precision)
-        texts["main.c"] = _filled("controller_main.c", values)
+        texts["main.c"] = filled("controller_main.c", values)
     if single_precision:
         typed = {"controller.h", "controller.c", "vectors.h"} & set(texts)
         texts |= {name: single(texts[name]) for name in typed}
-    return {**texts, "README.md": _filled("controller_readme.txt", values)}
-
-
-def _filled(name: str, values: Mapping[str, str]) -> str:
-    text = template(name)
-    for key, value in values.items():
-        text = text.replace(f"@{key}@", value)
-    return text
+    return {**texts, "README.md": filled("controller_readme.txt", values)}
 
 
 def _source(program: Program, prefix: str) -> str:

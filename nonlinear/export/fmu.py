@@ -16,7 +16,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear.export.c_files import c_export, exported, spare_parameters
 from nonlinear.export.model_description import MODEL, build_description, description
-from nonlinear.export.program import c_text, template
+from nonlinear.export.program import c_text, filled, template
 from nonlinear.export.relations import relation_functions
 from nonlinear.export.trace import KeyTrace, trace_keys
 from nonlinear.export.variables import (
@@ -113,17 +113,16 @@ def refuse_unknown(version: int, platforms: Sequence[str]) -> None:
 
 def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str]:
     texts = c_export(design)
-    spare = spare_parameters(exported(design))
     bits = ", ".join(str(bit) for bit in flag_bits())
     return {
         "drive.h": texts["drive.h"],
         "drive.c": texts["drive.c"],
         "drive_design.h": texts["drive_design.h"],
         "drive_design.c": texts["drive_design.c"],
-        "fmu_design.h": _design_header(design, trace, spare),
-        "fmu_design.c": _design_source(design, trace),
+        "fmu_design.h": filled("fmu_design.h", _header_values(design, trace)),
+        "fmu_design.c": filled("fmu_design.c", _source_values(design, trace)),
         "fmu_core.h": template("fmu_core.h"),
-        "fmu_core.c": template("fmu_core.c").replace("@BITS@", bits),
+        "fmu_core.c": filled("fmu_core.c", {"BITS": bits}),
         f"fmi{version}.c": template(f"fmi{version}.c"),
     }
 
@@ -134,96 +133,36 @@ def _token(texts: Mapping[str, str], variables: Sequence[Variable]) -> str:
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
 
 
-def _design_header(design: Design, trace: KeyTrace, spare: int) -> str:
-    return f"""/*
- * Keys of the design as parameters of the unit.
- */
-#ifndef FMU_DESIGN_H
-#define FMU_DESIGN_H
-
-#include <stddef.h>
-
-#define FMU_TOKEN "@TOKEN@"
-#define FMU_SPARE_P {spare} /* room for a stiffer coupling than the design's */
-#define FMU_KEYS {len(trace.keys)}U
-#define FMU_CONSTANTS {len(trace.constants)}U
-#define FMU_TEXTS {len(texts_of(design))}U
-#define FMU_FIRST_KEY {FIRST_KEY}U
-#define FMU_FIRST_CONSTANT {FIRST_CONSTANT}U
-#define FMU_FIRST_TEXT {FIRST_TEXT}U
-#define FMU_SUPPLY_VOLTAGE {c_float(supply_voltage(design))}
-
-typedef struct {{
-    double value; /* of the design, SI */
-    double low; /* allowed, both inclusive */
-    double high;
-    int fixed; /* 1: only before the run */
-    int whole; /* 1: a count, an integer variable */
-}} fmu_key;
-
-typedef struct {{
-    double value;
-    int whole;
-}} fmu_constant;
-
-extern const fmu_key fmu_keys[FMU_KEYS + 1U];
-extern const fmu_constant fmu_constants[FMU_CONSTANTS + 1U];
-extern const char *const fmu_texts[FMU_TEXTS + 1U];
-
-/* Works out the parameters p from the keys; 0 where they ask for another structure than the exported one. */
-int fmu_set_keys(const double *k, double *p);
-
-/* Whether the keys go together, as a design file has to have them; 0, and the reason, where they do not. */
-int fmu_related(const double *k, char *why, size_t size);
-
-#endif
-"""
+def _header_values(design: Design, trace: KeyTrace) -> dict[str, str]:
+    """What stands for the words of ``fmu_design.h``."""
+    return {
+        "SPARE": str(spare_parameters(exported(design))),
+        "KEYS": str(len(trace.keys)),
+        "CONSTANTS": str(len(trace.constants)),
+        "TEXTS": str(len(texts_of(design))),
+        "FIRST_KEY": str(FIRST_KEY),
+        "FIRST_CONSTANT": str(FIRST_CONSTANT),
+        "FIRST_TEXT": str(FIRST_TEXT),
+        "SUPPLY_VOLTAGE": c_float(supply_voltage(design)),
+    }
 
 
-def _design_source(design: Design, trace: KeyTrace) -> str:
-    keys = "\n".join(
+def _source_values(design: Design, trace: KeyTrace) -> dict[str, str]:
+    """What stands for the words of ``fmu_design.c``."""
+    keys = [
         f"    {{{c_float(key.value)}, {c_float(key_low(key))}, {c_float(key.high)}, {int(key.fixed)}, "
-        f"{int(key.whole)}}},"
-        f" /* {key.path} */"
+        f"{int(key.whole)}}}, /* {key.path} */"
         for key in trace.keys
-    )
-    constants = "\n".join(
+    ]
+    constants = [
         f"    {{{c_float(_finite(key.value))}, {int(key.whole)}}}, /* {key.path} */"
         for key in trace.constants
-    )
-    texts = "\n".join(f"    {c_text(value)}, /* {path} */" for path, value, _ in texts_of(design))
-    lines = "\n".join(f"    {line}" for line in trace.lines)
-    relations = relation_functions(design, trace.keys)
-    return f"""/*
- * Keys of the design as parameters of the unit, and how the drive's parameters follow from them.
- */
-#include "fmu_design.h"
-
-#include <math.h>
-#include <stdio.h>
-
-const fmu_key fmu_keys[FMU_KEYS + 1U] = {{
-{keys}
-    {{0.0, 0.0, 0.0, 0, 0}}
-}};
-
-const fmu_constant fmu_constants[FMU_CONSTANTS + 1U] = {{
-{constants}
-    {{0.0, 0}}
-}};
-
-const char *const fmu_texts[FMU_TEXTS + 1U] = {{
-{texts}
-    NULL
-}};
-
-int fmu_set_keys(const double *k, double *p)
-{{
-{lines}
-    return 1;
-}}
-
-{_relations_text(relations)}"""
+    ]
+    texts = [f"    {c_text(value)}, /* {path} */" for path, value, _ in texts_of(design)]
+    lines = [f"    {line}" for line in trace.lines]
+    parts = {"KEYS": keys, "CONSTANTS": constants, "TEXTS": texts, "LINES": lines}
+    relations = _relations_text(relation_functions(design, trace.keys))
+    return {name: "\n".join(each) for name, each in parts.items()} | {"RELATIONS": relations.rstrip("\n")}
 
 
 def _relations_text(relations: Sequence[Sequence[str]]) -> str:

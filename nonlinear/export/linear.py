@@ -1,6 +1,6 @@
-"""The sampled loops out of the running tick itself; emitted only, for the live page.
+"""The running tick as a linear map, cut at a place of a loop; emitted only, for the live page.
 
-Without dry friction, limits and grids the tick is a linear map.  So every loop is found by running it: from
+Without dry friction, limits and grids the tick is a linear map, which is found by running it: from
 each unit state, and with a unit input at the place where the loop is cut.  What comes out are A, b, c of
 ``x+ = A x + b v, y = c x`` at the period of the stage, to rounding.  Angles are measured from the motor's
 angle (a stored angle is its distance from it), so that a loop that does not see the angle has no state for
@@ -16,14 +16,19 @@ import numpy as np
 
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
+from nonlinear._kernels.regulator import CLAMPED
 from nonlinear._kernels.start import derive, prepare_sizes
 from nonlinear._kernels.tick import tick
-from nonlinear.export.linear_row import at_rest, linear_row, set_off
+from nonlinear.export.linear_row import at_rest, set_off
 
 MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
 AT_SPEED, AT_CURRENT, AT_VOLTAGE = range(4, 7)  # break points of the closed drive; POSITION is the output's
-NO_LOOP, TOO_LONG, PERIODIC, LOST = 0, -1, -2, -3  # lost: no double holds what a tick gives
+NO_LOOP, TOO_LONG, LOST = 0, -1, -2  # lost: no double holds what a tick gives
+MOST_TICKS = 16  # of a column that are noted
+# signals in front of limiters, and the integral that the limit of one clamps as well (0: none)
+SPEED, CURRENT_COMMAND, VOLTAGE, BESIDE_CURRENT, BESIDE_VOLTAGE = range(5)
+SEEN = 5
 
 # what the drive remembers, beside chains, delay line and stored angles; the angles first
 REMEMBERED = np.array([
@@ -88,39 +93,49 @@ def feeds_speed(q):
 
 
 @kernel
+def speed_interval(q):
+    """Ticks between two updates of the velocity stage, 1 where there is none."""
+    return int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
+
+
+@kernel
+def command_interval(q):
+    """Ticks between two commands of the drive."""
+    return int(q[layout.EVERY_POSITION]) if q[layout.HAS_POSITION] > 0.0 else speed_interval(q)
+
+
+@kernel
 def interval(q, stage):
     """Ticks from one update of the signal at a cut to the next; 0 where the drive has no such loop."""
-    outer = int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
-    slow = int(q[layout.EVERY_POSITION]) if q[layout.HAS_POSITION] > 0.0 else outer
+    current, velocity = q[layout.HAS_CURRENT] > 0.0, q[layout.HAS_VELOCITY] > 0.0
+    position = q[layout.HAS_POSITION] > 0.0
     if stage == CURRENT:
-        return 1 if q[layout.HAS_CURRENT] > 0.0 else NO_LOOP
+        return 1 if current else NO_LOOP
     if stage == VELOCITY:
-        return outer if q[layout.HAS_VELOCITY] > 0.0 else NO_LOOP
-    if stage == POSITION or stage == COMMAND:
-        return slow if q[layout.HAS_POSITION] > 0.0 else NO_LOOP
+        return speed_interval(q) if velocity else NO_LOOP
+    if stage == POSITION:
+        return command_interval(q) if position else NO_LOOP
+    if stage == COMMAND:
+        return command_interval(q)
     if stage == AT_SPEED:
-        return slow if q[layout.HAS_VELOCITY] > 0.0 and q[layout.HAS_POSITION] > 0.0 else NO_LOOP
-    if stage == AT_VOLTAGE and q[layout.HAS_CURRENT] > 0.0:
+        return command_interval(q) if velocity and position else NO_LOOP
+    if stage == AT_VOLTAGE and current:
         return 1
-    if q[layout.HAS_VELOCITY] <= 0.0 and q[layout.HAS_POSITION] <= 0.0:
+    if (not velocity and not position) or (stage == AT_CURRENT and not current):
         return NO_LOOP
-    if stage == AT_CURRENT and q[layout.HAS_CURRENT] <= 0.0:
-        return NO_LOOP
-    return outer if q[layout.HAS_VELOCITY] > 0.0 else slow
+    return speed_interval(q) if velocity else command_interval(q)
 
 
 @kernel
 def repeats(q, stage):
     """Ticks after which the loop repeats: more than `interval` where it is periodic."""
     every = interval(q, stage)
-    speed = int(q[layout.EVERY_VELOCITY]) if feeds_speed(q) else 1
+    speed = speed_interval(q) if feeds_speed(q) else 1
     if stage == CURRENT:
         return max(every, speed)
     if stage != AT_CURRENT and stage != AT_VOLTAGE:
         return every
-    outer = int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
-    slow = int(q[layout.EVERY_POSITION]) if q[layout.HAS_POSITION] > 0.0 else outer
-    return max(slow, max(speed, every))
+    return max(command_interval(q), max(speed, every))
 
 
 @kernel
@@ -130,39 +145,27 @@ def too_long(q):
 
 
 @kernel
+def added(places, count, first, length):
+    """Add places one after the other to a list; how many there are then, with those past MOST."""
+    for k in range(length):
+        if count + k < MOST:
+            places[count + k] = float(first + k)
+    return count + length
+
+
+@kernel
 def listed(q, places):
     """Where the drive remembers something, angles first; how many there are, and how many are angles."""
-    count = 2
     places[0], places[1] = float(REMEMBERED[0]), float(REMEMBERED[1])
-    for k in range(int(q[layout.DIFFERENCE_SAMPLES])):
-        if count < MOST:
-            places[count] = q[layout.AT_ANGLES] + k
-        count += 1
-    angles = count
+    angles = added(places, 2, int(q[layout.AT_ANGLES]), int(q[layout.DIFFERENCE_SAMPLES]))
+    count = angles
     for k in range(2, REMEMBERED.shape[0]):
-        if count < MOST:
-            places[count] = float(REMEMBERED[k])
-        count += 1
-    for k in range(2 * int(q[layout.COMMAND_FILTERS])):
-        if count < MOST:
-            places[count] = float(layout.S_COMMAND_CHAIN + k)
-        count += 1
-    for k in range(2 * int(q[layout.SPEED_FILTERS])):
-        if count < MOST:
-            places[count] = float(layout.S_SPEED_CHAIN + k)
-        count += 1
-    for k in range(2 * int(q[layout.TORQUE_FILTERS])):
-        if count < MOST:
-            places[count] = float(layout.S_TORQUE_CHAIN + k)
-        count += 1
-    for k in range(int(q[layout.OWN_STATES])):
-        if count < MOST:
-            places[count] = q[layout.AT_OWN] + k
-        count += 1
-    for k in range(int(q[layout.DELAY_LINE])):
-        if count < MOST:
-            places[count] = float(layout.S_QUEUE + k)
-        count += 1
+        count = added(places, count, int(REMEMBERED[k]), 1)
+    count = added(places, count, layout.S_COMMAND_CHAIN, 2 * int(q[layout.COMMAND_FILTERS]))
+    count = added(places, count, layout.S_SPEED_CHAIN, 2 * int(q[layout.SPEED_FILTERS]))
+    count = added(places, count, layout.S_TORQUE_CHAIN, 2 * int(q[layout.TORQUE_FILTERS]))
+    count = added(places, count, int(q[layout.AT_OWN]), int(q[layout.OWN_STATES]))
+    count = added(places, count, layout.S_QUEUE, int(q[layout.DELAY_LINE]))
     return count, angles
 
 
@@ -205,7 +208,23 @@ def put_inputs(q, s, io, stage, size):
 
 
 @kernel
-def one_column(q, s, io, stage, every, size, places, count, angles, column):
+def noted(q, s, k, j, seen):
+    """Put down what stands in front of each limiter at tick k, as column j."""
+    at = k * SEEN * (MOST + 1) + j
+    for signal in range(SEEN):
+        seen[at + signal * (MOST + 1)] = 0.0
+    seen[at + SPEED * (MOST + 1)] = s[layout.S_SPEED_COMMAND]
+    seen[at + CURRENT_COMMAND * (MOST + 1)] = s[layout.S_CURRENT_BEFORE]
+    seen[at + VOLTAGE * (MOST + 1)] = s[layout.S_VOLTAGE_BEFORE]
+    if int(q[layout.VELOCITY_WINDUP]) == CLAMPED and q[layout.TORQUE_FILTERS] <= 0.0:
+        beside = BESIDE_CURRENT if q[layout.HAS_CURRENT] > 0.0 else BESIDE_VOLTAGE
+        seen[at + beside * (MOST + 1)] = s[layout.S_VELOCITY_INTEGRATOR]
+    if q[layout.HAS_CURRENT] > 0.0 and int(q[layout.CURRENT_WINDUP]) == CLAMPED:
+        seen[at + BESIDE_VOLTAGE * (MOST + 1)] = s[layout.S_CURRENT_INTEGRATOR]
+
+
+@kernel
+def one_column(q, s, io, stage, every, size, places, count, angles, column, j, seen):
     """Run the drive as it stands over one period; writes the states after it, returns what the loop gave.
 
     NaN where a tick failed.
@@ -218,6 +237,8 @@ def one_column(q, s, io, stage, every, size, places, count, angles, column):
             return math.nan
         if k == 0:
             value = seen_value(q, s, io, stage)
+        if k < MOST_TICKS:
+            noted(q, s, k, j, seen)
     base = s[layout.S_ANGLE]
     for i in range(count):
         column[i] = s[int(places[i])]
@@ -226,45 +247,6 @@ def one_column(q, s, io, stage, every, size, places, count, angles, column):
             if abs(column[i]) < 1e-15 * abs(base):
                 column[i] = 0.0
     return value
-
-
-@kernel
-def needed(n, a, b, c, keep):
-    """Mark the states that the output sees and the input reaches; how many they are."""
-    for i in range(n):
-        keep[i] = 1.0 if c[i] != 0.0 else 0.0
-        keep[n + i] = 1.0 if b[i] != 0.0 else 0.0
-    for _round in range(n):
-        for i in range(n):
-            for j in range(n):
-                if a[i * n + j] != 0.0 and keep[i] > 0.0:
-                    keep[j] = 1.0
-                if a[i * n + j] != 0.0 and keep[n + j] > 0.0:
-                    keep[n + i] = 1.0
-    count = 0
-    for i in range(n):
-        keep[i] = 1.0 if keep[i] > 0.0 and keep[n + i] > 0.0 else 0.0
-        count += int(keep[i])
-    return count
-
-
-@kernel
-def pruned(n, a, b, c, keep):
-    """Leave out the other states, in place; the number that stays."""
-    count = needed(n, a, b, c, keep)
-    to_row = 0
-    for i in range(n):
-        if keep[i] <= 0.0:
-            continue
-        to = 0
-        for j in range(n):
-            if keep[j] > 0.0:
-                a[to_row * count + to] = a[i * n + j]
-                to += 1
-        b[to_row] = b[i]
-        c[to_row] = c[i]
-        to_row += 1
-    return count
 
 
 @kernel
@@ -294,7 +276,7 @@ def put_phase(q, s, ticks):
 
 
 @kernel
-def block(q, s, io, stage, first, every, places, n, angles, a, b, c, column):
+def block(q, s, io, stage, first, every, places, n, angles, a, b, c, column, seen):
     """A, b, c of the loop as run over the ``every`` ticks from tick ``first``; 0 where a tick failed."""
     for j in range(n + 1):
         if j < n:
@@ -303,7 +285,8 @@ def block(q, s, io, stage, first, every, places, n, angles, a, b, c, column):
             at_rest(q, s)
         put_phase(q, s, first)
         size = 0.0 if j < n else 1.0
-        value = one_column(q, s, io, stage, every, size, places, n, angles, column)
+        to = j if j < n else MOST
+        value = one_column(q, s, io, stage, every, size, places, n, angles, column, to, seen)
         if math.isnan(value):
             return 0
         if j < n:
@@ -341,47 +324,3 @@ def prepared(q, s, stage):
 def runs_closed(stage):
     """Whether a loop is run closed, through the command of its own stage."""
     return stage == CURRENT or stage == VELOCITY
-
-
-@kernel
-def assembled(p, q, s, io, stage, a, b, c, places, column):
-    """A, b, c of a loop of the drive with the parameters p; the number of states, or what stands in the way.
-
-    ``q``, ``s`` and ``io`` are rows of a second drive that is run here; ``q[PERIOD]`` and ``interval`` give
-    the period.
-    """
-    linear_row(p, q)
-    every = interval(q, stage)
-    if every <= 0:
-        return NO_LOOP
-    if repeats(q, stage) > every:
-        return PERIODIC
-    if prepared(q, s, stage) == 0:
-        return TOO_LONG
-    n, angles = listed(q, places)
-    if n > MOST:
-        return TOO_LONG
-    cut = cut_of(q, stage)
-    done = block(q, s, io, cut, 0, every, places, n, angles, a, b, c, column)
-    if done == 0:
-        return LOST
-    if runs_closed(cut):
-        for i in range(n):
-            for j in range(n):
-                a[i * n + j] += b[i] * c[j]
-    return pruned(n, a, b, c, column)
-
-
-@kernel
-def lead_of(p):
-    """Feed-forward in front of a position loop as k_ff/(Kv T), NaN where it is more than that."""
-    if p[layout.ELASTIC_DRIVE] > 0.0 and p[layout.RIGID] <= 0.0 and p[layout.OUTPUT_SENSOR] <= 0.0:
-        return math.nan  # the loop feeds back another angle than the output's
-    if p[layout.POSITION_INTEGRAL] != 0.0 or p[layout.DERIVATIVE] != 0.0:
-        return math.nan
-    if p[layout.OWN_STAGE] == layout.OWN_POSITION:
-        return math.nan
-    if p[layout.ACCELERATION_FEEDFORWARD] != 0.0 or p[layout.COMMAND_FILTERS] > 0.0:
-        return math.nan
-    period = p[layout.EVERY_POSITION] * p[layout.PERIOD]
-    return p[layout.FEEDFORWARD] / (p[layout.POSITION_GAIN] * period)

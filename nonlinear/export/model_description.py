@@ -20,20 +20,7 @@ _BASE = {"[mass]": "kg", "[length]": "m", "[time]": "s", "[current]": "A", "[ang
 def description(
     design: Design, variables: Sequence[Variable], token: str, version: int, sources: Sequence[str], tool: str
 ) -> bytes:
-    """The model description.
-
-    Parameters
-    ----------
-    design : Design
-    variables : sequence of Variable
-    token : str
-        GUID, instantiation token.
-    version : {2, 3}
-    sources : sequence of str
-        C files of the sources folder (FMI 2.0; FMI 3.0 has a build description of its own).
-    tool : str
-        Name and version of the tool.
-    """
+    """The model description of FMI 2 or 3; ``sources`` are the C files of FMI 2, ``token`` its GUID."""
     root = _root(design, token, sources, version, tool)
     root.append(_units(variables, version))
     log = ET.SubElement(root, "LogCategories")
@@ -47,19 +34,17 @@ def description(
     return text
 
 
-def _attributes(design: Design, tool: str) -> dict[str, str]:
-    return {
+def _root(design: Design, token: str, sources: Sequence[str], version: int, tool: str) -> ET.Element:
+    of_token, state = ("guid", "FMUstate") if version == 2 else ("instantiationToken", "FMUState")
+    about = {
+        "fmiVersion": f"{version}.0",
+        of_token: token,
         "modelName": design.name,
         "description": design.title,
         "version": design.revision or "1",
         "generationTool": tool,
         "variableNamingConvention": "structured",
     }
-
-
-def _root(design: Design, token: str, sources: Sequence[str], version: int, tool: str) -> ET.Element:
-    of_token, state = ("guid", "FMUstate") if version == 2 else ("instantiationToken", "FMUState")
-    about = {"fmiVersion": f"{version}.0", of_token: token, **_attributes(design, tool)}
     root = ET.Element("fmiModelDescription", about)
     can = {"modelIdentifier": MODEL, f"canGetAndSet{state}": "true", f"canSerialize{state}": "true"}
     simulation = ET.SubElement(root, "CoSimulation", can, canHandleVariableCommunicationStepSize="true")

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from actuator_lti.asked.drive_figure import drive_figure
-from actuator_lti.design.access import parameter_value, stacked
+from actuator_lti.design.access import parameter_value
 from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import Limiter
 from actuator_lti.drive.wiring import wire
@@ -14,8 +13,7 @@ from actuator_lti.loops.limiters import limiter_places
 from nonlinear._kernels import layout as at
 from nonlinear.export.linear_limiters import SIGNALS as SEEN
 from nonlinear.export.statement import Statement, used
-from nonlinear.export.trace import Tape, Traced, stored
-from nonlinear.row.parameters import design_row
+from nonlinear.export.trace import Tape, Traced, followed, reached
 
 PLACES = {
     "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
@@ -44,44 +42,27 @@ def limits_seen(design: Design) -> list[tuple[str, int, int]]:
 
 def changes_row(design: Design, path: str) -> bool | None:
     """Whether a key has an influence on the row; None where it cannot be followed."""
-    try:
-        row: Any = design_row(_followed(design, {path: parameter_value(design, path)})[1], kind=object)
-    except TypeError:
-        return None
-    return any(isinstance(item, Traced) for item in row)
+    places = reached(design, path, Tape(interpreted=True))
+    return None if places is None else bool(places)
 
 
 def changes_figure(design: Design, path: str, name: str, load_Nm: float) -> bool:
     """Whether a key has an influence on a figure of the whole drive."""
     try:
-        changed = _followed(design, {path: parameter_value(design, path)})[1]
+        changed = followed(design, {path: parameter_value(design, path)}, Tape(interpreted=True))
         return isinstance(drive_figure(changed, name, load_Nm), Traced)
     except TypeError:
         return False
-
-
-def row_statements(design: Design, keys: Mapping[str, float]) -> tuple[Statement, ...]:
-    """The statements from keys, ``k[0]``, ``k[1]``, ... in their order, to the row."""
-    tape, changed = _followed(design, keys)
-    row = design_row(changed, kind=object)
-    return used([*tape.statements, *stored(row)])
 
 
 def figure_statements(
     design: Design, keys: Mapping[str, float], name: str, load_Nm: float
 ) -> tuple[Statement, ...] | None:
     """The statements from keys to a figure of the whole drive, ``p[0]``; None where it cannot be followed."""
-    tape, changed = _followed(design, keys)
+    tape = Tape(interpreted=True)
     try:
-        figure = drive_figure(changed, name, load_Nm)
+        figure = drive_figure(followed(design, keys, tape), name, load_Nm)
     except TypeError:
         return None
     term = figure.name if isinstance(figure, Traced) else float(figure)
     return used([*tape.statements, Statement("store", 0, "", (term,))])
-
-
-def _followed(design: Design, keys: Mapping[str, float]) -> tuple[Tape, Design]:
-    """A tape, and the design whose keys write down on it what is done with them."""
-    tape = Tape(interpreted=True)
-    values = {path: Traced(tape, f"k[{n}]", value) for n, (path, value) in enumerate(keys.items())}
-    return tape, stacked(design, values)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 
@@ -63,6 +64,16 @@ def template(name: str) -> str:
     return files("nonlinear.export").joinpath("templates", name).read_text(encoding="utf-8")
 
 
+def filled(name: str, values: Mapping[str, str]) -> str:
+    """A file of the templates folder, what ``@KEY@`` stands for in its place."""
+    return replaced(template(name), values)
+
+
+def replaced(text: str, values: Mapping[str, str]) -> str:
+    """A text with what ``@KEY@`` stands for in its place; what is put in is not looked at again."""
+    return re.sub(r"@(\w+)@", lambda found: values.get(found[1], found[0]), text)
+
+
 @cache
 def header_text() -> str:
     """``drive.h``: lengths, places in the rows with units and words, prototypes."""
@@ -79,8 +90,7 @@ def header_text() -> str:
     heads = "\n".join(f"/* {_ABOUT[name]} */\n{text}" for name, text in program().declarations.items())
     sizes = f"enum {{\n    DRIVE_RUN_SIZE = {at.SIZE}, /* parameters of a run */\n"
     sizes += f"    DRIVE_IO_LENGTH = {at.IO_SIZE}\n}};"
-    return template("drive.h").replace("@BLOCKS@", blocks).replace("@FUNCTIONS@", heads).replace(
-        "@SIZES@", sizes)  # fmt: skip
+    return filled("drive.h", {"BLOCKS": blocks, "FUNCTIONS": heads, "SIZES": sizes})
 
 
 _DERIVED = ("DELAY_LINE", "RARE_LOAD", "STATE_SIZE", "PARAMETER_SIZE")

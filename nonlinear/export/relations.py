@@ -11,14 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from actuator_lti.design.access import stacked
 from actuator_lti.design.checks import FIRST_RELATIONS, RELATIONS
 from actuator_lti.design.mistakes import refusal_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.parameters import FrozenMap
 from nonlinear.export.program import c_text
 from nonlinear.export.statement import Statement, used
-from nonlinear.export.trace import Key, Tape, Traced
+from nonlinear.export.trace import Key, Tape, followed
 
 MOST_TURNS = 2  # branches beside the design's own that are followed; beyond: another structure
 BEYOND = "these parameters ask for another structure: export the changed design again"
@@ -56,10 +55,9 @@ def _followed(
 ) -> list[Statement]:
     """What a check does behind the outcomes that are told, up to what it refuses first."""
     way = _Way(loose=True, told=told)
-    values = {path: Traced(way, f"k[{n}]", value) for n, (path, value) in enumerate(keys.items())}
     end = Statement("allowed")
     try:
-        for refusal in check(stacked(design, values)):
+        for refusal in check(followed(design, keys, way)):
             end = _refusal(refusal_text(refusal))
             break
     except ArithmeticError:  # a turn that no values take: those of the keys' ranges never come here

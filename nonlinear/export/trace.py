@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -211,7 +211,7 @@ class Key:
     fixed: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class KeyTrace:
     """Keys that can be changed after the export, the rest, and the C statements from keys to the row."""
 
@@ -237,32 +237,39 @@ def trace_keys(design: Design) -> KeyTrace:
     constants: list[Key] = []
     for path in paths_of(design):
         key = _key(design, path)
-        reached = None if path in _DECIDED else _reached(design, path)
-        if reached:
-            free.append(Key(**{**vars(key), "fixed": bool(reached & _FIXED)}))
+        places = None if path in _DECIDED else reached(design, path, Tape())
+        if places:
+            free.append(replace(key, fixed=bool(places & _FIXED)))
         else:
             constants.append(key)
-    tape = Tape()
-    values = {key.path: Traced(tape, f"k[{n}]", key.value) for n, key in enumerate(free)}
-    row = design_row(stacked(design, values), kind=object)
-    lines = tuple(statement.c for statement in used([*tape.statements, *stored(row)]))
-    return KeyTrace(keys=tuple(free), constants=tuple(constants), lines=lines)
+    statements = row_statements(design, {key.path: key.value for key in free}, Tape())
+    return KeyTrace(tuple(free), tuple(constants), tuple(each.c for each in statements))
 
 
-def stored(row: Any) -> list[Statement]:
-    """Statements that put what was followed into the places of a row."""
-    places = ((place, item) for place, item in enumerate(row) if isinstance(item, Traced))
-    return [Statement("store", place, "", (item.name,)) for place, item in places]
+def followed(design: Design, keys: Mapping[str, float], tape: Tape) -> Design:
+    """The design whose keys, ``k[0]``, ``k[1]``, ... in their order, write down what is done with them."""
+    values = {path: Traced(tape, f"k[{n}]", value) for n, (path, value) in enumerate(keys.items())}
+    return stacked(design, values)
 
 
-def _reached(design: Design, path: str) -> set[int] | None:
+def row_statements(design: Design, keys: Mapping[str, float], tape: Tape) -> tuple[Statement, ...]:
+    """The statements from keys to the row."""
+    row = design_row(followed(design, keys, tape), kind=object)
+    stored = [Statement("store", place, "", (row[place].name,)) for place in _traced(row)]
+    return used([*tape.statements, *stored])
+
+
+def reached(design: Design, path: str, tape: Tape) -> set[int] | None:
     """Places of the row that a key has an influence on; None where it cannot be followed."""
-    traced = Traced(Tape(), "k", parameter_value(design, path))
     try:
-        row: Any = design_row(stacked(design, {path: traced}), kind=object)
+        changed = followed(design, {path: parameter_value(design, path)}, tape)
+        return set(_traced(design_row(changed, kind=object)))
     except TypeError:
         return None
-    return {int(place) for place in np.arange(row.size) if isinstance(row[place], Traced)}
+
+
+def _traced(row: Any) -> list[int]:
+    return [place for place in range(row.size) if isinstance(row[place], Traced)]
 
 
 def _key(design: Design, path: str) -> Key:

@@ -1,7 +1,7 @@
 """The drive as WebAssembly, built by ``make wasm`` and kept in the package with the hash of its sources.
 
 The module is a wasi reactor without imports: the tick of the drive, its loops found by running that tick
-(`nonlinear.export.linear`, `linear_periodic`), and the figures of a loop by the kernels of
+(`nonlinear.export.linear_loops`), and the figures of a loop by the kernels of
 `actuator_lti.batch`.  Rows lie in
 its memory; functions that end in ``_at`` say where.  A host writes the row of a run
 (`nonlinear.row.parameters.design_row`) at ``p_at()``.  Then ``start()`` and ``tick()`` run it, with inputs
@@ -22,19 +22,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from actuator_lti.batch import _figures, _quoted, _response, _run
+from actuator_lti.batch import _figures, _quoted, _response, _run, _withheld
 from actuator_lti.compiled import Program, emit_c
 from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.files.tree import Tree
-from nonlinear.export import (
-    linear,
-    linear_figures,
-    linear_limiters,
-    linear_periodic,
-    linear_rest,
-    linear_trust,
-)
+from nonlinear.export import linear, linear_limiters, linear_loops
 from nonlinear.export.program import ENTRIES, header_text, template
 
 MOST_BYTES = 100_000
@@ -44,30 +37,25 @@ _FLAGS = ("-Os", "-mexec-model=reactor", "-s", "-Wl,--strip-all", "-Wl,--gc-sect
 
 _ROW: Kind = "row"
 _LINEAR: dict[Any, tuple[Kind, ...]] = {
-    linear.assembled: (*(_ROW,) * 4, "int", *(_ROW,) * 5),
+    linear_loops.assembled: (*(_ROW,) * 4, "int", *(_ROW,) * 8),
     linear.interval: (_ROW, "int"),
     linear.repeats: (_ROW, "int"),
-    linear_periodic.periodic_assembled: (*(_ROW,) * 4, "int", *(_ROW,) * 7),
-    linear.lead_of: (_ROW,),
-    linear_figures.figures: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 12),
-    linear_figures.responded: ("int", _ROW, _ROW, _ROW, "int", *(_ROW,) * 5),
-    linear_limiters.limiters_assembled: (_ROW,) * 9,
+    linear_loops.lead_of: (_ROW,),
+    linear_loops.figures: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 12),
+    linear_loops.responded: ("int", _ROW, _ROW, _ROW, "int", *(_ROW,) * 5),
+    linear_limiters.limiters_assembled: (_ROW,) * 12,
     linear_limiters.limiter_sizes: (_ROW, "int", _ROW, _ROW, _ROW, "int", "int", *(_ROW,) * 4),
-    linear_limiters.outer_interval: (_ROW,),
-    linear_figures.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
-    linear_trust.rounding_decides: ("int", *(_ROW,) * 9),
-    linear_rest.corrected_at_rest: ("int", *(_ROW,) * 11),
-    linear_rest.crossover_missed: ("int", *(_ROW,) * 6),
+    linear_loops.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
+    _withheld.rounding_decides: ("int", *(_ROW,) * 8),
     _quoted.quoted: (_ROW, "float", _ROW),
 }
 _SIZES = {
     "MOST": linear.MOST,
-    "MOST_STATES": linear_periodic.MOST_STATES,
-    "MOST_PHASES": linear_periodic.MOST_PHASES,
-    "BLOCK": linear_periodic.BLOCK,
-    "PERIODIC": linear.PERIODIC,
-    "MOST_TICKS": linear_limiters.MOST_TICKS,
-    "SEEN": linear_limiters.SEEN,
+    "MOST_STATES": linear_loops.MOST_STATES,
+    "MOST_PHASES": linear_loops.MOST_PHASES,
+    "BLOCK": linear_loops.BLOCK,
+    "MOST_TICKS": linear.MOST_TICKS,
+    "SEEN": linear.SEEN,
     "SHOWN": linear_limiters.SHOWN,
     "STAGES": linear.AT_VOLTAGE + 1,
     "POSITION": linear.POSITION,
@@ -92,7 +80,14 @@ def _linear_header() -> str:
     """Prototypes and lengths beyond those of ``drive.h``."""
     known = {function.__name__ for function in _LINEAR}
     heads = [text for name, text in program().declarations.items() if name in known]
-    return "\n".join([*(f"enum {{ {name} = {size} }};" for name, size in _SIZES.items()), *heads, ""])
+    return "\n".join(
+        [
+            "#include <stdbool.h>",
+            *(f"enum {{ {name} = {size} }};" for name, size in _SIZES.items()),
+            *heads,
+            "",
+        ]
+    )
 
 
 def _source() -> str:

@@ -20,13 +20,14 @@ import numpy.typing as npt
 
 from actuator_lti.bounds import BATCH_TICKS
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, TooManyTicks
+from actuator_lti.errors import InputError, TooManyTicks, shown, whole_number
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe
 from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment, as_load
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.reduced import BatchResult
+from nonlinear.runs.running import Running
 from nonlinear.runs.setup import (
     Tables,
     check_frequency,
@@ -151,8 +152,8 @@ def simulate_many(
     >>> bool((result.step.rise_time_s < 0.1).all())
     True
     """
-    if not len(runs):
-        raise InputError("runs: at least one needed")
+    if not isinstance(runs, Sequence) or not runs or not isinstance(runs[0], Run):
+        raise InputError(f"runs = {shown(runs)}: allowed: a sequence of Run, at least one")
     tables = Tables()
     rows = np.array([run.row(tables) for run in runs])
     return run_rows(rows, tables.joined(), threads=threads, progress=progress)
@@ -164,8 +165,11 @@ def run_rows(
     *,
     threads: int | None = None,
     progress: Progress | None = None,
+    drives: Sequence[Running] | None = None,
 ) -> BatchResult:
     """Run parameter rows, shape (n, layout.SIZE), of `nonlinear.rows.Rows`.
+
+    Each of ``drives``, one a row, goes on from where it is to the row's number of ticks.
 
     Raises
     ------
@@ -179,10 +183,17 @@ def run_rows(
     series = np.zeros(1) if tables is None else np.ascontiguousarray(tables, dtype=float)
     n = rows.shape[0]
     outs, statuses = np.empty((n, at.OUT_SIZE)), np.empty(n, np.int64)
-    spans = _spans(rows[:, at.TICKS], available_threads() if threads is None else threads)
+    threads = available_threads() if threads is None else min(whole_number("threads", threads), len(rows))
+    spans = _spans(rows[:, at.TICKS], threads)
     done, shared = 0, np.zeros(2)
-    with ThreadPoolExecutor(max_workers=max(1, threads or available_threads())) as pool:
-        waiting = [pool.submit(_run_span, rows, series, a, b, outs, statuses, shared) for a, b in spans]
+    each = [None] * n if drives is None else drives
+    if len(spans) == 1 and ticks <= CHUNK_TICKS and watch() is None:  # not worth a thread
+        _run_span(rows, series, each, 0, n, outs, statuses, shared)
+        if progress is not None:
+            progress(n, n)
+        return BatchResult(rows=rows, outs=outs, status=statuses)
+    with ThreadPoolExecutor(max_workers=max(1, threads)) as pool:
+        waiting = [pool.submit(_run_span, rows, series, each, a, b, outs, statuses, shared) for a, b in spans]
         sizes = {future: b - a for future, (a, b) in zip(waiting, spans, strict=True)}
         try:
             pending, look = set(waiting), watch()
@@ -204,14 +215,18 @@ def run_rows(
 
 
 def _run_span(
-    rows: Floats, tables: Floats, start: int, stop: int, outs: Floats, statuses: np.ndarray, shared: Floats
-) -> None:
+    rows: Floats, tables: Floats, drives: Sequence[Running | None], start: int, stop: int, outs: Floats,
+    statuses: np.ndarray, shared: Floats,
+) -> None:  # fmt: skip
     """Run rows start to stop in this thread; the kernel runs without the GIL."""
-    from nonlinear.native import call
+    from nonlinear.native import parameters, resume
 
     history, flags = np.empty((0, 0)), np.empty(0, np.uint16)
     for r in range(start, stop):
-        statuses[r] = call(rows[r], tables, history, flags, outs[r], shared)
+        drive = drives[r]
+        p, s = parameters(rows[r]) if drive is None else (drive.p, drive.s)
+        p[at.TICKS] = rows[r, at.TICKS]
+        statuses[r] = resume(p, s, tables, history, flags, outs[r], shared)
 
 
 def available_threads() -> int:

@@ -91,7 +91,7 @@ class Running:
         """Ticks from one update of the outermost stage to the next: after them the same map acts again."""
         return int(self.p[at.OUTER_EVERY])
 
-    @property
+    @cached_property
     def matter(self) -> npt.NDArray[np.intp]:
         """Places of the state that what comes depends on: plant, controller and their memories, no counts."""
         queue = range(at.S_QUEUE, int(self.p[at.AT_WORK]))

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from actuator_lti.bounds import RUN_TICKS
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, finite_number, shown
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
-from nonlinear.commands import Command, write
+from nonlinear.commands import Command, numbers_of, write
 from nonlinear.loads import LoadMoment
 from nonlinear.runs.trajectory import State
 
@@ -57,8 +57,7 @@ class Tables:
 
 def ticks_of(duration_s: float, period_s: float) -> int:
     """Number of ticks in a duration, rounded; refuses a duration without any."""
-    if not isfinite(duration_s):
-        raise InputError(f"duration_s = {duration_s}: must be a finite number of seconds")
+    finite_number("duration_s", duration_s, "a finite number of seconds")
     ticks = round(min(duration_s / period_s, 1e18))
     RUN_TICKS.check(ticks, name=f"duration_s = {duration_s:g}")
     if ticks < 1:
@@ -73,8 +72,15 @@ def put_signal(row: Floats, place: int, command: Command, tables: Tables) -> Non
     write(command, row, place, offset, length)
 
 
+def check_command(given: object) -> None:
+    """Refuse what is no command."""
+    if not isinstance(given, Command):
+        raise InputError(f"{shown(given)}: allowed: a Command, from a function of nonlinear.commands")
+
+
 def check_frequency(design: Design, command: Command) -> None:
-    """Refuse a command that the outermost loop, sampled every so many ticks, cannot follow in principle."""
+    """Refuse what is no command, and one that the outermost loop, sampled, cannot follow in principle."""
+    check_command(command)
     control = design.controller
     loop = {"position": control.position, "velocity": control.velocity}.get(control.outermost)
     nyquist = 0.5 / (control.period_s * (1 if loop is None else loop.every))
@@ -102,7 +108,7 @@ def put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
 
 def put_torque(row: Floats, torque_Nm: npt.ArrayLike, tables: Tables) -> None:
     """Write an extra torque at the motor shaft: a number, or one value a tick."""
-    values = np.atleast_1d(np.asarray(torque_Nm, dtype=float))
+    values = numbers_of("disturbance_Nm", torque_Nm)
     if not np.isfinite(values).all():
         raise InputError("disturbance_Nm holds values that are not finite")
     row[at.TORQUE_TABLE], row[at.TORQUE_TABLE_LENGTH] = tables.add(values)
@@ -110,6 +116,7 @@ def put_torque(row: Floats, torque_Nm: npt.ArrayLike, tables: Tables) -> None:
 
 def put_supply(row: Floats, design: Design, supply: Command, scales: bool, tables: Tables) -> None:
     """Write a bus voltage over time; see `nonlinear.simulate`."""
+    check_command(supply)
     nominal = design.limits.voltage_V
     if scales and (design.controller.current is not None or not isfinite(nominal)):
         message = "supply_scales: needs a drive without a current loop, and a finite limits.voltage"
@@ -123,6 +130,8 @@ def put_supply(row: Floats, design: Design, supply: Command, scales: bool, table
 
 def put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
     """Write the probes, at most one a point."""
+    if not isinstance(probes, Sequence) or not all(isinstance(probe, Probe) for probe in probes):
+        raise InputError(f"probes = {shown(probes)}: allowed: a sequence of Probe")
     seen = set()
     for probe in probes:
         if probe.point in seen:
@@ -133,7 +142,7 @@ def put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
         if isinstance(probe.injection, Command):
             put_signal(row, place, probe.injection, tables)
         elif probe.injection is not None:
-            offset, length = tables.add(np.asarray(probe.injection, dtype=float))
+            offset, length = tables.add(numbers_of("injection", probe.injection))
             row[place], row[place + 1] = at.TABLE, 1.0
             row[place + 3], row[place + 4] = offset, length
 
@@ -146,6 +155,11 @@ def _check_point(row: Floats, point: str) -> None:
 
 def put_state(row: Floats, state: State) -> None:
     """Write the initial state."""
+    if not isinstance(state, State):
+        raise InputError(f"initial = {shown(state)}: allowed: a State, such as State(motor_angle_rad=0.1)")
+    for name, value in vars(state).items():
+        if name != "law" and value is not None:
+            finite_number(f"initial.{name}", value)
     row[at.ANGLE_START], row[at.SPEED_START] = state.motor_angle_rad, state.motor_speed_rad_s
     if row[at.ELASTIC_DRIVE]:
         angle, speed = state.motor_angle_rad / row[at.RATIO], state.motor_speed_rad_s / row[at.RATIO]
@@ -161,3 +175,9 @@ def put_state(row: Floats, state: State) -> None:
     row[at.SPEED_COMMAND_START] = state.speed_command_rad_s
     row[at.CURRENT_COMMAND_START] = state.current_command_A
     row[at.VOLTAGE_START] = state.voltage_V
+    law, order = numbers_of("initial.law", state.law), int(row[at.OWN_STATES])
+    if law.size:
+        if law.size != order or not np.isfinite(law).all():
+            given = shown(law.tolist())
+            raise InputError(f"initial.law = {given}: allowed: {order} numbers, the states of the law")
+        row[at.OWN_START : at.OWN_START + order] = law

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from actuator_lti.bounds import HISTORY_BYTES
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.errors import InputError, NumericalError, finite_number, whole_number
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe
 from nonlinear.commands import Command
@@ -137,9 +137,9 @@ def simulate(
     row = design_row(design, friction_on=friction_on, limits_on=limits_on)
     row[at.TICKS] = ticks_of(duration_s, design.controller.period_s)
     row[at.WITH_ENERGY] = energy
-    row[at.TANH_TOLERANCE], row[at.MAX_EVENTS] = tanh_tolerance, max_events
-    if record_every < 1:
-        raise InputError(f"record_every = {record_every}: must be at least 1")
+    row[at.TANH_TOLERANCE] = finite_number("tanh_tolerance", tanh_tolerance)
+    row[at.MAX_EVENTS] = min(whole_number("max_events", max_events), 2**53)
+    record_every = min(whole_number("record_every", record_every), 2**53)
     row[at.RECORD_EVERY] = record_every
     tables = Tables()
     for place, signal in ((at.COMMAND, command), (at.BIAS, bias)):

@@ -77,6 +77,7 @@ class State:
     """State of the drive at an instant, motor side; also what a run may start from.
 
     Output angle and speed are states of their own in an elastic drive; ``None`` is no twist, and one speed.
+    ``law`` are the states of a law of one's own, in the order of its A; empty: zero.
     Beside these, past encoder readings are taken as those of constant speed, past voltages as ``voltage_V``.
     """
 
@@ -90,6 +91,7 @@ class State:
     voltage_V: float = 0.0
     output_angle_rad: float | None = None
     output_speed_rad_s: float | None = None
+    law: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,22 +131,9 @@ class Energy:
     @property
     def balance_error_J(self) -> float:
         """Input less everything it became; zero but for rounding."""
-        out = (
-            self.copper_loss_J
-            + self.magnetic_J
-            + self.kinetic_J
-            + self.dry_friction_J
-            + self.viscous_friction_J
-            + self.spring_J
-            + self.coupling_damping_J
-            + self.parting_J
-            + self.load_dry_friction_J
-            + self.load_viscous_friction_J
-            + self.load_offset_friction_J
-        )
-        return self.electrical_input_J - (
-            out + self.offset_friction_J + self.output_work_J + self.conversion_J
-        )
+        apart = {"electrical_input_J", "supply_J", "supply_loss_J", "brake_J", "bus_capacitor_J"}
+        became = sum(value for name, value in vars(self).items() if name not in apart)
+        return self.electrical_input_J - became
 
     @property
     def relative_error(self) -> float:
@@ -246,16 +235,6 @@ class Trajectory:
         if self.stage == "velocity":
             return self.motor_speed_rad_s / self.ratio
         return {"current": self.current_A, "voltage": self.voltage_V}.get(self.stage, self.output_angle_rad)
-
-    @property
-    def probe_before(self) -> Floats:
-        """Signal in front of the first probe."""
-        return next(iter(self.probes.values())).before
-
-    @property
-    def probe_after(self) -> Floats:
-        """Signal behind the first probe."""
-        return next(iter(self.probes.values())).after
 
     @property
     def advice(self) -> str:

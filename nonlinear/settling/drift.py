@@ -20,8 +20,8 @@ Places = npt.NDArray[np.intp]
 DRIFT, CHECKED, EVEN = 64, 16, 1e-4  # periods of a window, of a look ahead; how alike two changes are
 STILL, ROUNDING = 2.0**-30, 2.0**-42  # of the largest value: a change in a window that counts; rounding
 MOST_LEAPS = int(1.0 / STILL)  # windows until what changes by `STILL` in each has changed by its own size
+_ANGLES = [at.S_ANGLE, at.S_OUTPUT]
 _MODES = (at.S_DIRECTION, ES.ES_SEGMENT, ES.ES_LOAD, ES.ES_CONTACT, ES.ES_BEND)  # they follow from the rest
-_ANGLES = (at.S_ANGLE, at.S_OUTPUT)
 
 
 def matter(drive: Running) -> Places:
@@ -31,7 +31,18 @@ def matter(drive: Running) -> Places:
         left.append(at.S_OVERLOAD)
     if abs(s[at.S_VOLTAGE]) < 0.5 * s[at.S_VOLTAGE_LIMIT]:
         left.append(at.S_VOLTAGE_LIMIT)
-    return drive.matter[~np.isin(drive.matter, left)]
+    kept = np.ones(s.size, dtype=bool)
+    kept[left] = False
+    return drive.matter[kept[drive.matter]]
+
+
+def stays_overloaded(drive: Running) -> bool:
+    """Whether the overload memory, on its way to what the current makes of it, stays where it limits."""
+    p, s = drive.p, drive.s
+    if s[at.S_OVERLOADED] == 0.0:
+        return False
+    reached = (s[at.S_CURRENT] / p[at.CONTINUOUS_CURRENT]) ** 2
+    return bool(min(reached, s[at.S_OVERLOAD]) >= p[at.OVERLOAD_RELEASE])
 
 
 def eventless(piece: Piece) -> bool:
@@ -50,9 +61,26 @@ def small(step: Floats, scale: Floats) -> npt.NDArray[np.bool_]:
     return np.abs(step) <= STILL * np.where(np.isfinite(scale), scale, 0.0)
 
 
-def even(step: Floats, other: Floats, scale: Floats) -> bool:
-    """Whether two changes of a state are one, number by number, or both next to nothing."""
-    rounding = ROUNDING * np.where(np.isfinite(scale), scale, 0.0)
+def grain(p: Floats, size: int) -> Floats:
+    """How many times coarser than by its own size each number of a state is rounded.
+
+    A filter's states by the DC gain of its poles, ``1/(1 + a1 + a2)``: a slow one sums up rounding for long.
+    """
+    coarse = np.ones(size)
+    for filters, place, states in (
+        (at.COMMAND_FILTERS, at.COMMAND_CHAIN, at.S_COMMAND_CHAIN),
+        (at.SPEED_FILTERS, at.SPEED_CHAIN, at.S_SPEED_CHAIN),
+        (at.TORQUE_FILTERS, at.TORQUE_CHAIN, at.S_TORQUE_CHAIN),
+    ):
+        for k in range(int(p[filters])):
+            a = p[place + k * at.SECTION + 3 : place + (k + 1) * at.SECTION]
+            coarse[states + 2 * k : states + 2 * k + 2] = max(1.0, 1.0 / abs(1.0 + a.sum()))
+    return coarse
+
+
+def even(step: Floats, other: Floats, scale: Floats, coarse: Floats) -> bool:
+    """Whether two changes of a state are one, number by number, or both next to nothing (`grain`)."""
+    rounding = ROUNDING * coarse * np.where(np.isfinite(scale), scale, 0.0)
     same = np.abs(step - other) <= EVEN * np.abs(step) + rounding
     return bool((same | (small(step, scale) & small(other, scale))).all())
 
@@ -71,18 +99,19 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
     int
         How far, 0 where the drive moves.
     """
-    moves = np.isin(places, _ANGLES) & ~small(step, scale)
-    if moves.any():
+    angles = (places == at.S_ANGLE) | (places == at.S_OUTPUT)
+    if (angles & ~small(step, scale)).any():
         return 0
-    stay, start = drive.s.copy(), drive.s[places]
+    stay, start, coarse = drive.s.copy(), drive.s[places], grain(drive.p, drive.s.size)[places]
     step = np.where(small(step, scale) & (np.abs(step - before) > EVEN * np.abs(step)), 0.0, step)
 
     def holds(windows: int) -> bool:
         drive.s[:] = stay
         drive.s[places] = ahead = start + windows * step
-        piece = drive.advance(CHECKED * drive.base_ticks)
+        if not _undisturbed(drive, CHECKED * drive.base_ticks):
+            return False
         after = change(drive.s[places], ahead)
-        return eventless(piece) and even(after, CHECKED / DRIFT * step, np.maximum(scale, np.abs(ahead)))
+        return even(after, CHECKED / DRIFT * step, np.maximum(scale, np.abs(ahead)), coarse)
 
     low, high = 0, 1
     while high <= MOST_LEAPS and holds(high):
@@ -96,6 +125,19 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
         ticks = low * DRIFT * drive.base_ticks
         drive.s[at.S_OVERLOAD] = overload(drive.p, stay, drive.s[at.S_CURRENT], ticks)
     return low
+
+
+def _undisturbed(drive: Running, ticks: int) -> bool:
+    """Go on from tick 0; whether nothing happens that moves anything. Looked at in full only where it may."""
+    before = drive.s.copy()
+    drive.run(ticks)
+    drive.work += ticks + int(drive.s[at.S_STEPS] - before[at.S_STEPS])
+    if drive.s[at.S_EVENTS] == before[at.S_EVENTS] or drive.s[at.S_STATUS] > 0.0:
+        return bool(drive.s[at.S_STATUS] == 0.0)
+    if (drive.s[_ANGLES] != before[_ANGLES]).any():
+        return False
+    drive.s[:] = before
+    return eventless(drive.advance(ticks))
 
 
 def overload(p: Floats, s: Floats, current_A: float, ticks: int) -> float:

@@ -29,7 +29,19 @@ import numpy.typing as npt
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear.runs.running import Piece, Running
-from nonlinear.settling.drift import DRIFT, MOST_LEAPS, STILL, change, even, eventless, leap, matter, small
+from nonlinear.settling.drift import (
+    DRIFT,
+    MOST_LEAPS,
+    STILL,
+    change,
+    even,
+    eventless,
+    grain,
+    leap,
+    matter,
+    small,
+    stays_overloaded,
+)
 from nonlinear.settling.scales import Scales
 
 Floats = npt.NDArray[np.float64]
@@ -38,7 +50,7 @@ Verdict = Literal["at rest", "limit cycle", "still moving", "diverging"]
 PERIODS, ALIKE = 8, 0.01
 MOST_WORK = 4_000_000  # ticks, and integration steps within them
 PIECE_TICKS = 4096
-PART_WORK = 512  # ticks and steps after which the work is looked at, where ticks may take many steps
+PART_WORK = 4096  # ticks and steps after which the work is looked at, where ticks may take many steps
 _RANGED = [1, at.HISTORY_ANGLE, 3, 4, 5, 6]  # both angles, currents, voltage, commands
 
 
@@ -107,7 +119,7 @@ def judge(running: Running, most_work: int = MOST_WORK) -> Rest | None:
     return None if drive is None else _Watch(drive, most_work).judged()
 
 
-def first_motion_s(running: Running, most_work: int = MOST_WORK) -> float:
+def first_motion_s(running: Running) -> float:
     """Time after which the motor first moves from where it is; inf: never, as far as the work goes.
 
     Raises
@@ -118,7 +130,7 @@ def first_motion_s(running: Running, most_work: int = MOST_WORK) -> float:
     drive = running.held()
     if drive is None:
         raise InputError("first motion: command, load and supply must stay as they are")
-    watch, start = _Watch(drive, most_work), drive.s[at.S_ANGLE]
+    watch, start = _Watch(drive, MOST_WORK), drive.s[at.S_ANGLE]
     while not watch.spent and not watch.quiet():
         moved = np.concatenate([seen[2] for seen in watch.seen[-2:]]) != start / drive.p[at.RATIO]
         if moved.any():
@@ -141,11 +153,13 @@ class _Watch:
     stood: list[_Stand] = field(default_factory=list)  # before it broke away
     scales: Scales = field(init=False)
     period_s: float = field(init=False)
+    coarse: Floats = field(init=False)
 
     def __post_init__(self) -> None:
         """Begin with the state that is there."""
         self.period_s = self.drive.base_ticks * float(self.drive.p[at.PERIOD])
         self.scales = Scales(self.drive, DRIFT * self.period_s)
+        self.coarse = grain(self.drive.p, self.drive.s.size)
 
     def judged(self) -> Rest:
         """Go on until the verdict is known."""
@@ -227,10 +241,13 @@ class _Watch:
             return False  # cut short, as the work is done
         scale = self.scales.states[places]
         before, step = change(states[1], states[0]), change(states[2], states[1])
-        nothing = bool((small(before, scale) & small(step, scale)).all())
+        kept = (places == at.S_OVERLOAD) & stays_overloaded(drive)
+        nothing = bool((kept | (small(before, scale) & small(step, scale))).all())
         if all(self._still(piece) for piece in pieces) and (nothing or self._turning):
             return True
-        if not all(eventless(piece) for piece in pieces) or not even(step, before, scale):
+        if not all(eventless(piece) for piece in pieces) or not even(
+            step, before, scale, self.coarse[places]
+        ):
             return False
         windows = leap(drive, places, step, before, scale)
         self.periods += windows * DRIFT
@@ -244,15 +261,13 @@ class _Watch:
 
         As near as a count of the sensors, or `STILL` of the largest angle, is the same place.
         """
-        last, p = self.stood[-1], self.drive.p
+        p = self.drive.p
         counts = p[at.COUNTS_PER_RAD] * p[at.RATIO], p[at.POSITION_COUNTS]
         far = max([STILL * float(self.scales.signals[1]), *(1.0 / each for each in counts if each > 0.0)])
-        away, visits = True, list[_Stand]()
-        for one in reversed(self.stood):
-            near = max(abs(one.followed - last.followed), abs(one.motor - last.motor)) <= far
-            if near and away:
-                visits.append(one)
-            away = not near
+        places = np.array([(one.followed, one.motor) for one in self.stood])
+        near = np.abs(places - places[-1]).max(axis=1) <= far
+        came = np.flatnonzero(near & ~np.append(near[1:], [False]))[::-1]  # last of each stay
+        visits = [self.stood[k] for k in came]
         for turns in range(1, (len(visits) - 1) // 2 + 1):
             now, before, first = (visits[k * turns] for k in range(3))
             if not _alike(now.time_s - before.time_s, before.time_s - first.time_s):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from reports.numbers import plain_decade, short, to_minus
+from reports.numbers import plain_decade, short
 
 MARGIN = 0.05
 
@@ -27,7 +27,6 @@ class Axis:
     high: float | None = None
     ticks: Sequence[tuple[float, str]] | None = None
     grid: bool = True
-    unit: str = ""
     name: str = ""
     reversed: bool = False
     seen: list[float] = field(default_factory=list)
@@ -103,21 +102,7 @@ def linear_ticks(low: float, high: float, room: int = 6) -> list[tuple[float, st
     power = 10.0 ** math.floor(math.log10(rough))
     step = next(f * power for f in (1.0, 2.0, 2.5, 5.0, 10.0) if f * power >= rough * (1.0 - 1e-9))
     first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    values = [k * step for k in range(first, last + 1)]
-    return [(value, plain(value, step)) for value in values]
-
-
-def plain(value: float, step: float) -> str:
-    """Write a tick with the decimals that its step needs."""
-    if abs(value) < 1e-9 * step:
-        return "0"
-    largest = max(abs(value), step)
-    if largest >= 1e6 or largest < 1e-3:
-        return short(float(f"{value:.12g}"), 4)
-    power = math.floor(math.log10(step) + 1e-9)
-    decimals = max(0, -power + (round(step / 10.0**power, 6) == 2.5))
-    text = f"{value:.{decimals}f}"
-    return to_minus(text.rstrip("0").rstrip(".") if "." in text and decimals < 3 else text)
+    return [(k * step, short(k * step, 12)) for k in range(first, last + 1)]
 
 
 def log_ticks(low: float, high: float, room: int = 6) -> list[tuple[float, str]]:

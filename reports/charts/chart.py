@@ -160,32 +160,26 @@ class Panel:
 
     def rule_x(self, at: float, words: str = "", label: str = "", *, seen: bool = False, **look: Any) -> None:
         """Draw an upright line; ``seen``: the axis reaches it."""
-        self._rule(at, "x", words, label, look, seen)
+        self.x.see([at] if seen else [])
+        self.items.append(Rule(at=float(at), across="x", look=_thin(look), words=words, label=label))
 
     def rule_y(self, at: float, words: str = "", label: str = "", *, seen: bool = False, **look: Any) -> None:
         """Draw a level; ``seen``: the axis reaches it."""
-        self._rule(at, "y", words, label, look, seen)
-
-    def _rule(
-        self, at: float, across: Literal["x", "y"], words: str, label: str, look: Any, seen: bool
-    ) -> None:
-        if seen:
-            (self.x if across == "x" else self.y).see([at])
-        made = Look(**{"colour": "muted", "width": 1.0, **look})
-        self.items.append(Rule(at=float(at), across=across, look=made, words=words, label=label))
+        self.y.see([at] if seen else [])
+        self.items.append(Rule(at=float(at), across="y", look=_thin(look), words=words, label=label))
 
     def band_x(self, low: float, high: float, label: str = "", **look: Any) -> None:
         """Shade a stretch of x."""
-        self.items.append(Band(low=low, high=high, across="x", look=Look(**_shade(look)), label=label))
+        self.items.append(Band(low=low, high=high, across="x", look=_shade(look), label=label))
 
     def band_y(self, low: float, high: float, **look: Any) -> None:
         """Shade a stretch of y."""
-        self.items.append(Band(low=low, high=high, across="y", look=Look(**_shade(look))))
+        self.items.append(Band(low=low, high=high, across="y", look=_shade(look)))
 
     def shape(self, rings: Sequence[tuple[Values, Values]], label: str = "", **look: Any) -> None:
         """Fill outlines."""
         made = [(numbers(x), numbers(y)) for x, y in rings]
-        self.items.append(Shape(rings=made, look=Look(**_shade(look)), label=label))
+        self.items.append(Shape(rings=made, look=_shade(look), label=label))
 
     def bar(self, row: float, start: float, stop: float, label: str = "", **look: Any) -> None:
         """Draw a bar that lies along x."""
@@ -258,6 +252,10 @@ class Chart:
         return list(result.items())
 
 
-def _shade(look: Mapping[str, Any]) -> dict[str, Any]:
+def _thin(look: Mapping[str, Any]) -> Look:
+    return Look(**{"colour": "muted", "width": 1.0, **look})
+
+
+def _shade(look: Mapping[str, Any]) -> Look:
     """Fill with the colour, faintly, without an edge."""
-    return {"fill": look.get("colour", "c1"), "opacity": 0.13, "width": 0.0, **look}
+    return Look(**{"fill": look.get("colour", "c1"), "opacity": 0.13, "width": 0.0, **look})

@@ -49,9 +49,8 @@ class Room:
         points = np.column_stack([x, y])
         pairs = good[1:] & good[:-1]
         start, stop = points[:-1][pairs], points[1:][pairs]
-        if len(start):
-            near = _clipped(start, stop, self.frame)
-            start, stop = start[near], stop[near]
+        near = _clipped(start, stop, self.frame)
+        start, stop = start[near], stop[near]
         if len(start):
             longest = float(np.max(np.abs(stop - start)))
             parts = min(max(int(longest / 4.0), 1), 120)
@@ -64,38 +63,28 @@ class Room:
         for dx, dy in ((0, 0), (size, 0), (-size, 0), (0, size), (0, -size)):
             self.ink.append(np.column_stack([x[good] + dx, y[good] + dy]))
 
-    def near(
-        self, at: tuple[float, float], size: tuple[float, float], *, over: bool = False
-    ) -> tuple[Box, float]:
-        """Find the best place near a point (``over`` it, if free); also how far the words are from it."""
-        return self._best(_around(at, size, over), at)
+    def near(self, at: tuple[float, float], size: tuple[float, float], *, over: bool = False) -> Box:
+        """Take the best place near a point; ``over`` it, if free."""
+        return self._best((box, distance(box, at)) for box in _around(at, size, over))
 
     def corner(self, wanted: str, size: tuple[float, float], inset: float = 6.0) -> Box:
-        """Find the best corner, the one asked for where it is free."""
+        """Take the best corner, the one asked for where it is free."""
         x0, y0, x1, y1 = self.frame
         w, h = size
         across = {"left": x0 + inset, "right": x1 - inset - w, "middle": (x0 + x1 - w) / 2.0}
         up = {"top": y0 + inset, "bottom": y1 - inset - h, "center": (y0 + y1 - h) / 2.0}
         first_up, first_across = wanted.split()
-        orders = [
-            (a, b)
-            for a in (first_up, *(k for k in up if k != first_up))
-            for b in (first_across, *(k for k in across if k != first_across))
-        ]
-        boxes = ((across[b], up[a], across[b] + w, up[a] + h) for a, b in orders)
-        ranked = ((box, 20.0 * k) for k, box in enumerate(boxes))
-        return self._take(min(ranked, key=lambda pair: self._cost(pair[0]) + AWAY * pair[1])[0])
+        tops = [up.pop(first_up), *up.values()]
+        lefts = [across.pop(first_across), *across.values()]
+        return self.first_free([(x, y, x + w, y + h) for y in tops for x in lefts])
 
     def first_free(self, boxes: Iterable[Box]) -> Box:
         """Take the cheapest of some places, the earlier the better."""
-        return self._take(min(enumerate(boxes), key=lambda kb: self._cost(kb[1]) + 2.0 * kb[0])[1])
+        return self._best((box, 20.0 * k) for k, box in enumerate(boxes))
 
-    def _best(self, boxes: Iterable[Box], at: tuple[float, float]) -> tuple[Box, float]:
-        ranked = [(self._cost(box) + AWAY * _distance(box, at), box) for box in boxes]
-        box = self._take(min(ranked)[1])
-        return box, _distance(box, at)
-
-    def _take(self, box: Box) -> Box:
+    def _best(self, boxes: Iterable[tuple[Box, float]]) -> Box:
+        """Take the cheapest of places, each with how far it is from where it should be."""
+        box, _ = min(boxes, key=lambda place: self._cost(place[0]) + AWAY * place[1])
         self.boxes.append(box)
         return box
 
@@ -136,7 +125,8 @@ def _around(at: tuple[float, float], size: tuple[float, float], over: bool) -> I
             yield (x - w / 2.0, y - h / 2.0, x + w / 2.0, y + h / 2.0)
 
 
-def _distance(box: Box, at: tuple[float, float]) -> float:
+def distance(box: Box, at: tuple[float, float]) -> float:
+    """How far a box is from a point."""
     dx = max(box[0] - at[0], 0.0, at[0] - box[2])
     dy = max(box[1] - at[1], 0.0, at[1] - box[3])
     return math.hypot(dx, dy)

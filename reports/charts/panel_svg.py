@@ -1,13 +1,14 @@
-"""One panel as SVG: grid, ticks, curves, marks, words."""
+"""One panel as SVG: grid, ticks, curves, marks; the words near their points, over no curve, in the frame."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from reports.charts.axis import minor_ticks
 from reports.charts.chart import Band, Curve, Item, Note, Panel, Rule, Shape
-from reports.charts.labels import Room
-from reports.charts.notes_svg import by_need, note_svg
+from reports.charts.labels import Room, distance, text_box
 from reports.charts.paint import MARKER_PATHS
 from reports.charts.pen import FAR, Frame, Pen
 from reports.visible import escape
@@ -57,7 +58,6 @@ def _data(panel: Panel, frame: Frame, hide_x: bool) -> str:
 
 
 def _axes(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
-    """Write grid, ticks, labels and title."""
     xs, ys = (
         panel.x.named_ticks(max(3, int(frame.width / (40 if panel.x.log else 58)))),
         panel.y.named_ticks(room_y(panel, frame.height)),
@@ -178,11 +178,78 @@ def _stairs(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _path(x: np.ndarray, y: np.ndarray) -> str:
-    """Write a line with gaps; a third decimal along y keeps the read-out exact."""
+    """Write a line with gaps: where it begins, then from point to point, in hundredths that do not drift."""
     good = np.isfinite(x) & np.isfinite(y)
-    parts, pen_down = [], False
-    for a, b, there in zip(x.tolist(), y.tolist(), good.tolist(), strict=True):
-        if there:
-            parts.append(f"{'L' if pen_down else 'M'}{a:.2f} {b:.2f}")
-        pen_down = there
-    return "".join(parts)
+    places = np.rint(100.0 * np.column_stack([x, y])[good]).astype(int)
+    steps = np.diff(places, axis=0, prepend=0)
+    begins = good & ~np.concatenate([[False], good[:-1]])
+    return "".join(
+        f"M{at[0] / 100} {at[1] / 100}" if first else f"l{by[0] / 100:.10g} {by[1] / 100:.10g}"
+        for at, by, first in zip(places.tolist(), steps.tolist(), begins[good].tolist(), strict=True)
+    )
+
+
+NOTE = 10.5
+LEADER = 26.0  # words further away from their point are tied to it by a line
+
+
+def by_need(items: Sequence[Item]) -> list[Item]:
+    """Give what has words, the pinned ones first: they cannot give way."""
+    wordy = [item for item in items if (isinstance(item, Rule | Note) and item.words)]
+    return sorted(wordy, key=lambda item: 0 if isinstance(item, Note) and item.pinned else 1)
+
+
+def note_svg(item: Item, panel: Panel, frame: Frame, pen: Pen, room: Room) -> str:
+    """Write the words of a rule or note where they cover nothing."""
+    assert isinstance(item, Rule | Note)
+    w, h = text_box(item.words, NOTE)
+    size = (w + 6.0, h + 2.0)
+    if isinstance(item, Rule):
+        return _rule_words(item, panel, frame, pen, room, size)
+    if item.at is None:
+        box = room.corner(item.corner or "top left", size)
+        return _boxed(item, box, pen, "")
+    (x,), (y,) = frame.x(panel.x, [item.at[0]]), frame.y(panel.y, [item.at[1]])
+    x, y = float(np.clip(x, frame.left, frame.right)), float(np.clip(y, frame.top, frame.bottom))
+    tied = f' data-at="{x:.2f} {y:.2f}"' if pen.page else ""
+    if item.pinned:
+        box = (x - size[0] / 2, y - size[1] / 2, x + size[0] / 2, y + size[1] / 2)
+        room.boxes.append(box)
+        return _boxed(item, box, pen, tied)
+    box, leader = room.near((x, y), size, over=item.over), ""
+    if distance(box, (x, y)) > LEADER and not item.over:
+        ex, ey = float(np.clip(x, box[0], box[2])), float(np.clip(y, box[1], box[3]))
+        thin = pen.style(stroke="muted", stroke_width="0.8", fill="none")
+        leader = f'<path class="leader" d="M{x:.1f} {y:.1f}L{ex:.1f} {ey:.1f}" {thin}/>'
+    return _boxed(item, box, pen, tied, leader)
+
+
+def _boxed(item: Note, box: tuple[float, float, float, float], pen: Pen, tied: str, leader: str = "") -> str:
+    words = pen.words(
+        item.words, box[0] + 3.0, box[1] + 1.0 + NOTE, size=NOTE, colour=item.colour, bold=item.bold
+    )
+    back = (
+        f'<rect x="{box[0]:.1f}" y="{box[1]:.1f}" width="{box[2] - box[0]:.1f}" '
+        f'height="{box[3] - box[1]:.1f}" rx="2" {pen.style(fill="paper", fill_opacity="0.82")}/>'
+    )
+    return f'<g class="note"{tied}>{leader}{back}{words}</g>'
+
+
+def _rule_words(
+    item: Rule, panel: Panel, frame: Frame, pen: Pen, room: Room, size: tuple[float, float]
+) -> str:
+    w, h = size
+    note = Note(words=item.words, colour=item.look.colour)
+    if item.across == "y":
+        (at,), ends = frame.y(panel.y, [item.at]), (frame.top, frame.bottom)
+        lefts = [frame.right - w - 4, frame.left + 4, (frame.left + frame.right - w) / 2]
+        boxes = [(x, y, x + w, y + h) for x in lefts for y in (at - h - 2, at + 3)]
+        tied = f"{frame.right:.1f} {at:.2f}"
+    else:
+        (at,), ends = frame.x(panel.x, [item.at]), (frame.left, frame.right)
+        tops = [frame.top + 4, frame.bottom - h - 4, (frame.top + frame.bottom - h) / 2]
+        boxes = [(x, y, x + w, y + h) for y in tops for x in (at + 4, at - w - 4)]
+        tied = f"{at:.2f} {frame.top:.1f}"
+    if not ends[0] - 1 <= at <= ends[1] + 1:
+        return ""
+    return _boxed(note, room.first_free(boxes), pen, f' data-at="{tied}"' if pen.page else "")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -79,3 +80,26 @@ def time_axis(panel: Panel, last_s: float) -> float:
     scale, unit = time_unit(last_s)
     panel.x.label = f"time, {unit}"
     return scale
+
+
+def kept_rows(series: Sequence[np.ndarray], buckets: int = 300) -> np.ndarray:
+    """Rows of a long series to draw: of each bucket the first, and the smallest and largest of every series.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> y = np.zeros(1000)
+    >>> y[503] = 1.0
+    >>> bool(503 in kept_rows([y], 10))
+    True
+    """
+    rows = len(series[0])
+    if rows <= 2 * buckets:
+        return np.arange(rows)
+    edges = np.linspace(0, rows, buckets + 1).astype(np.int64)
+    kept = {0, rows - 1}
+    for values in series:
+        for start, stop in pairwise(edges):
+            part = values[start:stop]
+            kept.update((int(start + np.argmin(part)), int(start + np.argmax(part))))
+    return np.array(sorted(kept), dtype=np.int64)

@@ -15,15 +15,17 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.request import OnMachines, Option, flag, options
 from analyses.studies.study_asked import study_with
 from reports.analyses import Analysis
-from reports.cli.drive import SetOption, load_drive, read_changes
 from reports.cli.options import (
     DEFAULT_DESIGN,
     DesignArgument,
     JsonOption,
     QuietOption,
+    SetOption,
+    folder_for_results,
+    load_drive,
+    read_changes,
     read_quantity,
 )
-from reports.cli.targets import folder_for_results
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design

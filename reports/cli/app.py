@@ -5,19 +5,21 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from importlib import import_module
+from math import isfinite
 from typing import Annotated, Any
 
 import typer
 
+from actuator_lti.errors import InputError
 from reports.analyses import ANALYSES, COMMANDS_IN
 from reports.cli.analysis import command as declared
-from reports.cli.numbers import bounded
 
 
 def _declared(group: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(one.name.split()[0] for one in ANALYSES if one.group == group))
 
 
+_WHOLE_BITS = 63
 # In the order in which the help lists them, by the panel that they stand in.
 PANELS: dict[str, tuple[str, ...]] = {
     "Designs": (*_declared("Designs"), "objects"),
@@ -119,3 +121,27 @@ def flowed(text: str) -> str:
     """Give a docstring as paragraphs of one line each: the terminal breaks them at its own width."""
     paragraphs = inspect.cleandoc(text).split("\n\n")
     return "\n\n".join(" ".join(part.split("\n")) for part in paragraphs)
+
+
+def bounded(command: Any) -> Any:
+    """Let every option and argument of a command, and of those below it, refuse numbers beyond this."""
+    for parameter in command.params:
+        parameter.process_value = _checked(parameter, parameter.process_value)
+    for below in getattr(command, "commands", {}).values():
+        bounded(below)
+    return command
+
+
+def _checked(parameter: Any, cast: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    name = max(parameter.opts, key=len)
+
+    def checked(context: Any, value: Any) -> Any:
+        result = cast(context, value)
+        for each in result if isinstance(result, list | tuple) else (result,):
+            if isinstance(each, float) and not isfinite(each):
+                raise InputError(f"{name} {each}: must be a finite number")
+            if isinstance(each, int) and each.bit_length() > _WHOLE_BITS:
+                raise InputError(f"{name}: must lie between -2^63 and 2^63")
+        return result
+
+    return checked

@@ -10,14 +10,15 @@ the report as well.
 from __future__ import annotations
 
 import os
+import platform
 import sys
+import tempfile
 from collections.abc import Callable, Mapping
 
 import typer
 
 from actuator_lti.errors import InputError, Mistakes, NumericalError, OutOfTime, UnstableError
 from reports.cli import time_limit
-from reports.cli.crash import write_crash_file
 
 DONE = 0
 VERDICT_FAILED = 1
@@ -150,3 +151,21 @@ def _quiet_pipe() -> int:
     """Nobody reads the output any more: stop without a word (128 + SIGPIPE)."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 141
+
+
+def write_crash_file(tracebacks: str) -> str:
+    """Write tracebacks to a new file among the temporary ones; its path, or why there is none."""
+    from reports.provenance import package_version
+
+    head = [
+        f"actuator-lti {package_version()}, Python {platform.python_version()}, {platform.platform()}",
+        f"arguments: {sys.argv[1:]!a}",
+        "",
+    ]
+    try:
+        handle, path = tempfile.mkstemp(prefix="actuator-lti-", suffix=".traceback.txt")
+        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
+            file.write("\n".join(head) + tracebacks)
+    except OSError as error:
+        return f"could not be written: {error.strerror or error}"
+    return path

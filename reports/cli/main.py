@@ -11,12 +11,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and give the exit status.
 
     At the start of a process linear algebra gets one thread and one kernel (`reports.arithmetic`) unless the
-    environment says otherwise.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Without the program's name; those of the process where left out.
+    environment says otherwise. Arguments are without the program's name; those of the process where left out.
     """
     arithmetic.settle()
     from reports.cli.app import built, options_by_name

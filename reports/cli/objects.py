@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from reports.cli.drive import SetOption, load_drive
-from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption
-from reports.cli.targets import write_new
+from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, SetOption, load_drive, write_new
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import ControllerObject

@@ -1,18 +1,37 @@
-"""Arguments and options that several commands share; imports only typer."""
+"""Arguments and options that several commands share, and what they mean; imports only typer."""
 
 from __future__ import annotations
 
+import os
+import tomllib
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from reports.cli.targets import folder_for_results
+from actuator_lti.errors import InputError
+from actuator_lti.files.tree import Tree
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
     from analyses.request import Kind
+
+
+def folder_for_results(path: Path | None) -> Path | None:
+    """Refuse a folder that cannot be written, before anything is computed; made only when it is needed."""
+    if path is None:
+        return None
+    there = path.absolute()
+    while not there.exists() and there != there.parent:
+        there = there.parent
+    if not there.is_dir():
+        raise InputError("is not a directory; allowed for --out: a folder, made if needed", where=str(there))
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise InputError("cannot be written to; allowed for --out: a folder of your own", where=str(there))
+    return path
+
 
 DEFAULT_DESIGN = "ilr33-amber"
 DEFAULT_OUT = Path("out")
@@ -25,28 +44,24 @@ OutOption = Annotated[
     Path,
     typer.Option("--out", metavar="DIR", help="Folder for the results.", callback=folder_for_results),
 ]
+QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress on standard error.")]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help='Change a value of the design, e.g. control.position.gain="90 1/s" (repeatable).',
+    ),
+]
 
 
 def read_quantity(option: str, words: str | None, kind: Kind, drive: Design) -> float | None:
     """A number of the command line with its unit; of a load or of the command also without it.
 
-    Parameters
-    ----------
-    option : str
-        For the message.
-    words : str or None
-    kind : {"output", "load", "command"}
-        In SI: a position of the output, a load there; in its usual unit: the outermost loop's command.
-    drive : Design
-        Its axis and outermost loop say the unit.
-
-    Raises
-    ------
-    InputError
-        For no number, or a unit of something else.
+    In SI a position of the output or a load there, in its usual unit the outermost loop's command; the
+    drive's axis and outermost loop say the unit. ``option`` is for the message.
     """
     from actuator_lti.design.units import parse_quantity
-    from actuator_lti.errors import InputError
     from nonlinear.runs.trajectory import COMMAND_UNITS
 
     if words is None:
@@ -72,4 +87,55 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design) -> 
         raise InputError(f"{option} {words!r}: {reason}; allowed: {allowed}") from None
 
 
-QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress on standard error.")]
+def load_drive(name_or_path: str, changes: Sequence[str] | None = None) -> Design:
+    """A shipped design or a design file, with values changed as its file would write them.
+
+    Changes are ``KEY=VALUE``, such as ``"control.position.gain=90 1/s"`` or ``"limits.voltage=24 V"``.
+    """
+    from actuator_lti.design import load_design, with_overrides
+
+    design = load_design(name_or_path)
+    return with_overrides(design, read_changes(changes)) if changes else design
+
+
+def read_changes(changes: Sequence[str]) -> Tree:
+    """Keys and values of ``KEY=VALUE`` texts; numbers, lists and tables as TOML has them, all else a text.
+
+    Examples
+    --------
+    >>> read_changes(["limits.voltage=24 V", "gear.worm.ratio=40", "friction.law=tanh"])
+    {'limits.voltage': '24 V', 'gear.worm.ratio': 40, 'friction.law': 'tanh'}
+    """
+    result: Tree = {}
+    for words in changes:
+        key, equals, value = words.partition("=")
+        if not equals or not key.strip():
+            raise InputError(f"--set {words!r}: allowed: KEY=VALUE, such as limits.voltage='24 V'")
+        result[key.strip()] = _value(value.strip())
+    return result
+
+
+def _value(words: str) -> Any:
+    if "\n" in words:
+        return words
+    try:
+        return tomllib.loads(f"v = {words}")["v"]
+    except (tomllib.TOMLDecodeError, ValueError, RecursionError):
+        return words
+
+
+def refuse_existing(path: Path, force: bool) -> None:
+    """Refuse to overwrite a file without ``--force``, and anything that is no file always."""
+    if path.is_dir():
+        raise InputError("is a directory; allowed: a file to write", where=str(path))
+    if path.exists() and not force:
+        raise InputError("exists already; allowed: another name, or --force", where=str(path))
+
+
+def write_new(path: Path | None, text: str, force: bool) -> None:
+    """Write a file that is not there yet, or with ``--force``; nothing without a path."""
+    from actuator_lti.files.atomic import write_text
+
+    if path is not None:
+        refuse_existing(path, force)
+        write_text(path, text)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from actuator_lti.errors import InputError
 from reports.cli.options import JsonOption
 
 ReportArgument = Annotated[Path, typer.Argument(metavar="REPORT_JSON", help="A report.json of any command.")]
@@ -26,7 +27,6 @@ def pdf(
     as_json: JsonOption = False,
 ) -> None:
     """Typeset any report.json as PDF: cover with verdicts and lines to sign, tables, vector figures."""
-    from actuator_lti.errors import InputError
     from analyses.isolation import drain
     from reports.cli.output import print_json, print_line
     from reports.document import load

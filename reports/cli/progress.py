@@ -26,36 +26,23 @@ def progress(description: str, *, quiet: bool = False) -> Iterator[Report]:
     >>> with progress("counting") as report:
     ...     report(1, 1)
     """
-    bar = _Bar(description, enabled=not quiet and sys.stderr.isatty())
-    try:
-        yield bar.report
-    finally:
-        bar.close()
+    shown, started_s = not quiet and sys.stderr.isatty(), time.monotonic()
+    bars: list[Progress] = []
 
-
-class _Bar:
-    """A rich progress bar that appears only after `PATIENCE_S`."""
-
-    def __init__(self, description: str, *, enabled: bool) -> None:
-        self._description = description
-        self._enabled = enabled
-        self._started_s = time.monotonic()
-        self._bar: Progress | None = None
-
-    def report(self, done: int, total: int) -> None:
-        if not self._enabled:
+    def report(done: int, total: int) -> None:
+        if not shown or (not bars and time.monotonic() - started_s < PATIENCE_S):
             return
-        if self._bar is None:
-            if time.monotonic() - self._started_s < PATIENCE_S:
-                return
-            self._bar = _rich_bar()
-            self._bar.start()
-            self._task = self._bar.add_task(self._description, total=total)
-        self._bar.update(self._task, completed=done, total=total)
+        if not bars:
+            bars.append(_rich_bar())
+            bars[0].start()
+            bars[0].add_task(description)
+        bars[0].update(bars[0].task_ids[0], completed=done, total=total)
 
-    def close(self) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+    try:
+        yield report
+    finally:
+        for bar in bars:
+            bar.stop()
 
 
 def _rich_bar() -> Progress:

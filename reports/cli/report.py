@@ -10,7 +10,6 @@ import typer
 
 from actuator_lti.errors import InputError
 from reports.analyses import FURTHER
-from reports.cli.drive import SetOption, load_drive
 from reports.cli.options import (
     DEFAULT_DESIGN,
     DEFAULT_OUT,
@@ -18,6 +17,8 @@ from reports.cli.options import (
     JsonOption,
     OutOption,
     QuietOption,
+    SetOption,
+    load_drive,
 )
 from reports.cli.pdf import SummaryOption
 

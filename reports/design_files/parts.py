@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
 _FILE = Path(__file__).parents[1] / "templates" / "parts.toml"
-_WORDS = ("title", "source", "grade")
+_WORDS = ("title", "source", "grade", "constants")
 _PLACES = {
     **dict.fromkeys(("voltage", "continuous_current"), "[limits]"),
     **dict.fromkeys(("stiffness", "torque_1", "stiffness_2", "torque_2", "stiffness_3"), "[coupling]"),
@@ -43,7 +43,9 @@ def part(kind: str, name: str) -> Tree:
     """
     known = parts()[kind]
     if name not in known:
-        raise InputError(f'--{kind} = "{name}"{nearest(name, known)}: allowed: {", ".join(known)}')
+        plain = "-".join(name.lower().split())
+        near = [one for one in known if plain in one] or known
+        raise InputError(f'--{kind} = "{name}"{nearest(plain, known)}: allowed: {", ".join(near)}')
     found: Tree = known[name]
     return found
 
@@ -56,8 +58,11 @@ def with_parts(text: str, motor: str | None, gear: str | None) -> str:
     """
     chosen = {kind: part(kind, name) for kind, name in (("motor", motor), ("gear", gear)) if name is not None}
     if motor is not None:
-        entry = chosen["motor"]
+        entry = dict(chosen["motor"])
         speed = _derived(0.9 * float(entry["no_load_speed"].split()[0]), "rpm", "0.9 of that without a load")
+        if "no_load_current" not in entry:
+            del entry["no_load_speed"]
+        chosen["motor"] = entry
         text = _put(_put(text, "[friction]", dry_torque=None, viscous=None), "[limits]", speed=speed)
     if gear is not None:
         text = _put(text, "[[gear]]", name=json.dumps(gear), input_inertia=None, output_inertia=None)
@@ -72,6 +77,9 @@ def with_parts(text: str, motor: str | None, gear: str | None) -> str:
             elif key not in _WORDS:
                 table = _PLACES.get(key, "[[gear]]" if kind == "gear" else "[motor]")
                 text = _put(text, table, **{key: _said(entry[key], entry["source"], entry["grade"])})
+    if "constants" in chosen.get("motor", {}):  # an AC motor: which amperes is to be said
+        text = _put(text, "[motor]", constants=json.dumps(chosen["motor"]["constants"]))
+        text = re.sub(r'(?m)^((?:gain|peak_current) = "[^"]*\bA)\b', r"\1 dc", text)
     titles = ", ".join(entry["title"] for entry in chosen.values())
     words = (
         "Values of the data sheets; the load is assumed, limits and gains follow: change them to your own."
@@ -83,8 +91,12 @@ def with_parts(text: str, motor: str | None, gear: str | None) -> str:
 def _suited(text: str, design: Design) -> str:
     """The text with the load, limits, gains and requirements of that drive."""
     ratio, spring, current = design.total_ratio, design.coupling, design.limits.continuous_current_A
-    keys = ("torque_constant", "resistance", "inductance")
-    k, resistance, inductance = (design.parameters[f"motor.{key}"].value for key in keys)
+    motor = design.effective_motor
+    k, resistance, inductance = motor.torque_constant_Nm_A, motor.resistance_ohm, motor.inductance_H
+    assert k is not None
+    assert resistance is not None
+    assert inductance is not None
+    ampere = "A" if design.motor.constants == "dc" else "A dc"
     turning = design.motor_side_inertia_kgm2
     integral = max(inductance / resistance, design.controller.period_s)
     load, moment = turning * ratio**2, 0.4 * k * current * ratio
@@ -93,6 +105,9 @@ def _suited(text: str, design: Design) -> str:
         crossing = min(crossing, sqrt(spring.stiffness_Nm_rad / load) / 8.0)
         damping = 2.0 * 0.05 * sqrt(spring.stiffness_Nm_rad * load)
         text = _put(text, "[coupling]", damping=_derived(damping, "N*m*s/rad", "5 % of critical", "X"))
+    if not design.friction.dry_torque_Nm:
+        dry = _derived(20.0 * k * current, "mN*m", "assumed: 2 % of the continuous torque", "X")
+        text = _put(text, "[friction]", dry_torque=dry)
     if not design.friction.load_coefficient:
         lost = _derived(100.0 / ratio, "mN*m/(N*m)", "assumed: a tenth is lost under load", "X")
         text = _put(text, "[friction]", load_coefficient=lost)
@@ -104,14 +119,16 @@ def _suited(text: str, design: Design) -> str:
         },
         "[limits]": {
             "acceleration": _derived(k * current / (2.0 * turning), "rad/s^2", "at continuous current"),
-            "peak_current": _derived(2.0 * current, "A", "twice the continuous current"),
+            "peak_current": _derived(2.0 * current, ampere, "twice the continuous current"),
         },
         "[control.current]": {
-            "gain": _derived(2000.0 * resistance * integral, "V/A", "crosses at 2000 rad/s: Kp = w R Ti"),
+            "gain": _derived(2000.0 * resistance * integral, f"V/{ampere}", "crosses at 2000 rad/s: w R Ti"),
             "integral_time": _derived(1e3 * integral, "ms", "L/R, and a period at least"),
         },
         "[control.velocity]": {
-            "gain": _derived(2.0 * crossing * turning / k, "A*s/rad", f"crosses at {crossing:.3g} rad/s"),
+            "gain": _derived(
+                2.0 * crossing * turning / k, f"{ampere}*s/rad", f"crosses at {crossing:.3g} rad/s"
+            ),
             "integral_time": _derived(5e3 / crossing, "ms", "five over the crossing"),
         },
         "[control.position]": {"gain": _derived(crossing / 4.0, "1/s", "a quarter of the velocity loop")},

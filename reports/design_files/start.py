@@ -68,7 +68,7 @@ def start(asked: Asked) -> Started:
     """
     from actuator_lti.design import read_design_text
     from actuator_lti.files.atomic import write_text
-    from reports.cli.targets import refuse_existing
+    from reports.cli.options import refuse_existing
     from reports.design_files.parts import with_parts
 
     refuse_existing(asked.file, asked.force)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.verdict import Verdict
-from reports.cli.targets import folder_for_results, refuse_existing
+from reports.cli.options import folder_for_results, refuse_existing
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -38,7 +38,7 @@ class Exported:
         return None if self.check is None or self.check.reason else Verdict.of(not self.check.failed)
 
     def __str__(self) -> str:
-        from reports.export_check import summary
+        from reports.export_documents import summary
 
         return "\n".join([self.words, *([summary(self.check)] if self.check else [])])
 
@@ -52,7 +52,7 @@ def export_c(design: Design, asked: AskedC) -> Exported:
         If there are such files already, the folder cannot be written, or the prefix is no name.
     """
     from nonlinear.export import c_export
-    from reports.export_check import check_text
+    from reports.export_documents import check_text
 
     folder = asked.target
     folder_for_results(folder)

@@ -11,6 +11,7 @@ from nonlinear.export.page import line_of
 from reports.charts import style
 from reports.charts.style import Chart, Panel
 from reports.charts.svg import page_svg
+from reports.sections.limits import COLOURS
 
 NOW = {"colour": style.BLUE, "width": 2.0}
 BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}
@@ -18,7 +19,7 @@ PINNED = tuple(zip("ABC", style.SERIES[1:], strict=False))
 FRAME = 1.6
 HERTZ = (1.0, 1000.0)
 FOLLOWED = "live"  # the loop whose figures share a cursor
-BORDERS = tuple(limiter.words for limiter in LIMITERS.values() if line_of(limiter) is not None)
+BORDERS = {one.words: COLOURS[name] for name, one in LIMITERS.items() if line_of(one) is not None}
 
 
 def live_charts(unit: str, axis: Axis = "rotary", *, electrical: bool = True) -> dict[str, str]:
@@ -146,8 +147,8 @@ def _border(unit: str) -> Chart:
     panel = chart.panel()
     _empty(panel, "lowest, as designed", **BEFORE)
     _empty(panel, "lowest, as changed", **{**NOW, "width": 2.6})
-    for k, name in enumerate(BORDERS):
-        _empty(panel, name, colour=style.SERIES[k + 1], width=1.1)
+    for name, colour in BORDERS.items():
+        _empty(panel, name, colour=colour, width=1.1)
     style.frequency(panel, HERTZ)
     panel.y.log, panel.y.label = True, f"command amplitude, {unit}"
     panel.y.limits(1e-3, 1e3)

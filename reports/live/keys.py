@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from actuator_lti.design.access import located, parameter_value, paths_of
 from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design, Parameter, Tolerance
-from nonlinear.export.page import changes_figure, changes_row, figure_statements, row_statements
+from nonlinear.export.page import changes_figure, changes_row, figure_statements
 from nonlinear.export.statement import Statement, Term
+from nonlinear.export.trace import Tape, row_statements
 from reports.live_schema import FixedKey, NamedKey, SliderKey
 
 Figure = tuple[str, float]  # of the whole drive: name, load in N m
@@ -32,17 +33,9 @@ COUNTED = 10.0  # a whole number has at least this range
 
 @dataclass(frozen=True, kw_only=True)
 class Followed:
-    """Keys with a slider, keys without, and the statements from keys to the row.
+    """Keys with a slider, keys without, and statements from keys (``k[n]``: a free one) to row and figures.
 
-    Attributes
-    ----------
-    free, fixed : list of dict
-        As they stand in the page's data.
-    lines : list of list
-        Statements (`nonlinear.export.statement`) from the keys to the row: ``k[n]`` is the n-th free key.
-    figures : dict
-        Statements from the keys to each figure of the whole drive, by name and load; without those that
-        cannot be followed.
+    Figures of the whole drive that cannot be followed are left out.
     """
 
     free: list[SliderKey]
@@ -69,7 +62,7 @@ def followed(design: Design, figures: Iterable[Figure] = ()) -> Followed:
     return Followed(
         free=free,
         fixed=fixed,
-        lines=_data(row_statements(design, values)),
+        lines=_data(row_statements(design, values, Tape(interpreted=True))),
         figures={each: _data(lines) for each, lines in made.items() if lines is not None},
     )
 

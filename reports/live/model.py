@@ -35,7 +35,7 @@ from reports.live_schema import (
     SliderKey,
     StepData,
 )
-from reports.sections.amplitude_map import COLOURS, WORDS
+from reports.sections.limits import COLOURS, WORDS
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
 MAP = "The friction of the loops has the slope of the first piece of its map."

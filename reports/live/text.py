@@ -21,20 +21,15 @@ _STRING = r'"(?:[^"\\]|\\.)*"' + r"|'[^']*'"
 _ENTRY = re.compile(r"(\s*[^=]+?\s*=\s*)(.*)", re.DOTALL)
 _VALUE = re.compile(rf"(\bvalue\s*=\s*)({_STRING}|[^\s,}}#]+)")
 _SOURCE = re.compile(rf"(\bsource\s*=\s*)({_STRING})")
-_GRADE = re.compile(rf"(,\s*|^)grade\s*=\s*(?:{_STRING})[ \t]*\n?", re.MULTILINE)
+_GRADE = re.compile(rf",\s*grade\s*=\s*(?:{_STRING})|^grade\s*=\s*(?:{_STRING})[ \t]*\n?", re.MULTILINE)
 _PLAIN = re.compile(rf"({_STRING}|[^\s#]+)")
 
 
 def patches(design: Design, keys: Sequence[SliderKey], source: str | None = None) -> tuple[str, list[Patch]]:
     """Give the text of a design, and for each key what its change replaces.
 
-    Parameters
-    ----------
-    design : Design
-    keys : sequence of SliderKey
-    source : str, optional
-        The text that the design was read from: only the entries of changed keys are written anew in it, all
-        else stays, comments too. Without it, or where a key cannot be changed in it, all is written anew.
+    In ``source``, the text that the design was read from, only the entries of changed keys are written anew.
+    Without it, or where a key cannot be changed in it, all is written anew.
     """
     if source is not None:
         own = [_own(design, key, source) for key in keys]

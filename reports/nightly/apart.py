@@ -38,17 +38,7 @@ class Task(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """What builds a task, and what it may take.
-
-    Parameters
-    ----------
-    build : str
-        ``module:function``; gets a payload, returns ``(meta, files)`` (see `reports.nightly.cache`).
-    time_limit_s : float
-        A task that takes longer is ended, with its process.
-    memory_bytes : int
-        A process that asks for more gets none.
-    """
+    """What builds a task, ``module:function`` from a payload to ``(meta, files)``, and what it may take."""
 
     build: str
     time_limit_s: float

@@ -56,15 +56,7 @@ class Cache:
         return self.folder / key[:2] / f"{key}.entry"
 
     def take(self, key: str, data: bytes) -> Entry:
-        """Store an entry that was made elsewhere (see `sealed`), whole or not at all.
-
-        Raises
-        ------
-        CorruptEntry
-            Where it is not whole, or that of another key.
-        InputError
-            Where it cannot be written.
-        """
+        """Store an entry that was made elsewhere (see `sealed`), whole or not at all (`CorruptEntry`)."""
         entry, path = _opened(key, data), self.path(key)
         temporary = path.with_name(f".{path.name[:16]}.{os.getpid()}.part")
         try:
@@ -77,13 +69,7 @@ class Cache:
         return entry
 
     def read(self, key: str) -> Entry | None:
-        """Return an entry, or ``None`` where there is none.
-
-        Raises
-        ------
-        CorruptEntry
-            Where the file is there but not whole.
-        """
+        """Return an entry, or ``None``; a file that is not whole raises `CorruptEntry`."""
         path = self.path(key)
         if path.is_symlink():
             raise CorruptEntry("is a symbolic link")

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from analyses.studies.proof import hash_of
-from reports.nightly.job import canonical
+from reports.nightly.source import canonical
 from reports.nightly.text import one_line, sha256
 from reports.provenance import git, package_version
 

@@ -17,27 +17,12 @@ if TYPE_CHECKING:
 
 
 def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
-    """Compute a report and write it out.
+    """Compute a report: what `reports.nightly.figures.digest` keeps of it, and its files.
 
-    Parameters
-    ----------
-    payload : mapping
-        ``name``, ``settings`` (``pdf``, ``validation``, ``monte_carlo``) and either ``design``, the text of
-        a design file, or ``study``, all designs of a study as texts, which makes their comparison;
-        ``refused`` in place of them says why there is no design.
-
-    Returns
-    -------
-    meta : dict
-        Figures and verdicts (see `reports.nightly.figures.digest`); of a comparison none, as they are those
-        of its designs.
-    files : dict
-        ``report.html``, ``report.json`` and, where asked for, ``report.pdf``.
-
-    Raises
-    ------
-    InputError, NumericalError
-        From reading the designs and from the computations.
+    The payload has ``name``, ``settings`` (``pdf``, ``validation``, ``monte_carlo``) and either ``design``,
+    the text of a design file, or ``study``, all designs of a study as texts, which makes their comparison (no
+    figures are kept of it, as they are those of its designs); ``refused`` in place of them says why there is
+    no design.
     """
     from analyses.isolation import drain
     from reports import document as doc

@@ -35,7 +35,10 @@ class Figure:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """One requirement: ``distance`` is positive where it is met; ``waiver`` of one that is not proven."""
+    """One requirement: ``distance`` is positive where it is met; ``waiver`` of one that is not proven.
+
+    ``limit`` says its limit in words, ``bound`` is the number.
+    """
 
     id: str
     label: str
@@ -49,6 +52,7 @@ class Verdict:
     source: str = ""
     reason: str = ""
     what: str = REQUIREMENTS
+    bound: float | None = None
 
     @property
     def role(self) -> str:
@@ -98,7 +102,8 @@ def _verdict(name: str, item: Mapping[str, Any], what: str) -> Verdict:
         left = distance if limit is None or value is None else reserve(of, value, limit, distance)
     same = {key: item[key] for key in ("value", "unit", "distance", "verdict", "waiver", "source", "reason")}
     words = "" if limit is None else f"{item['comparison']} {limit:.6g}".strip()
-    return Verdict(id=name, label=item["label"] or name, limit=words, relative=left, what=what, **same)
+    named: dict[str, Any] = {"id": name, "label": item["label"] or name, "what": what}
+    return Verdict(limit=words, bound=number(limit), relative=left, **named, **same)
 
 
 def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:
@@ -171,15 +176,3 @@ def _is_number(value: object) -> TypeGuard[float]:
 def number(value: object) -> float | None:
     """Return a finite number, or ``None`` for anything else."""
     return float(value) if _is_number(value) and math.isfinite(value) else None
-
-
-def first_number(text: str) -> float | None:
-    """Return the first number in a text such as ``>= 6 dB``."""
-    for word in text.replace("≥", " ").replace("≤", " ").replace(">", " ").replace("<", " ").split():
-        try:
-            value = float(word.strip("=,;"))
-        except ValueError:
-            continue
-        if math.isfinite(value):
-            return value
-    return None

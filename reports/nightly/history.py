@@ -105,13 +105,7 @@ class History:
         self._put(replace(self.index, baselines=[*self.index.baselines, *more]))
 
     def claim(self, study: str) -> None:
-        """Note whose history this is.
-
-        Raises
-        ------
-        InputError
-            Where it is that of another study.
-        """
+        """Note whose history this is; that of another study is refused."""
         known = self.index.study
         if known and known != study:
             raise InputError(
@@ -137,13 +131,7 @@ class History:
         return Memory(self.index.id, len(self.runs), len(self.index.baselines))
 
     def night(self, run: int) -> Night:
-        """The results of a finished night.
-
-        Raises
-        ------
-        InputError
-            Where its file is missing, or not what was written.
-        """
+        """The results of a finished night; a file that is missing, or not what was written, is refused."""
         if run not in self._nights:
             wanted = next(one for one in self.runs if one.id == run)
             path = self._path(run)
@@ -207,13 +195,7 @@ class History:
 
 
 def open_history(state: Path) -> History:
-    """Open (or begin) the history of a state folder.
-
-    Raises
-    ------
-    InputError
-        Where a file is no history, is damaged or was written by a newer version.
-    """
+    """Open (or begin) the history of a state folder; one that is damaged or newer is refused."""
     path = state / FILE
     if not path.exists() or not path.stat().st_size:
         return History(state, Index(id=secrets.token_hex(16)))

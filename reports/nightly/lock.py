@@ -20,17 +20,7 @@ from reports.nightly.text import now, one_line
 def hold(state: Path, wait_s: float = 0.0) -> Iterator[None]:
     """Hold the lock of a state folder; the system frees it when the process ends, however it ends.
 
-    Parameters
-    ----------
-    state : pathlib.Path
-        Folder of history and cache.
-    wait_s : float
-        How long to wait for another nightly, in s; 0 not at all.
-
-    Raises
-    ------
-    InputError
-        Where the lock is still held then; names process, host and since when.
+    Where it is still held after ``wait_s``, the refusal names process, host and since when.
     """
     state.mkdir(parents=True, exist_ok=True)
     lock = FileLock(state / "nightly.lock")

@@ -46,13 +46,7 @@ def remembered(site: Path) -> Memory | None:
 
 
 def check(site: Path, now: Memory, state: Path) -> None:
-    """Refuse a history that knows less than its site.
-
-    Raises
-    ------
-    HistoryLost
-        One line: what is missing, how to restore it, how to go on without it on purpose.
-    """
+    """Refuse a history that knows less than its site: what is missing, how to go on."""
     old = state / "history.sqlite"
     if not now.nights and old.exists():
         raise HistoryLost(

@@ -7,7 +7,6 @@ import platform
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,11 +20,10 @@ from reports.nightly.cache import Cache, CorruptEntry
 from reports.nightly.code_version import CodeVersion, code_version, commit_of
 from reports.nightly.figures import Figure
 from reports.nightly.history import FILE, NIGHTS, History, Reported, open_history
-from reports.nightly.job import Job, check_jobs
 from reports.nightly.lock import hold
 from reports.nightly.records import Result, Run
+from reports.nightly.source import Job, Study, check_jobs
 from reports.nightly.text import now, one_line
-from reports.nightly.tolerance import Tolerances
 from reports.nightly.view import Overview, overview
 from reports.nightly.worker import Answer
 from reports.visible import visible
@@ -39,17 +37,6 @@ def _nobody(*_said: object) -> None:
     """Whom nothing is told."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Study:
-    """What a team builds every night: designs and variants, and how far figures may move."""
-
-    name: str
-    jobs: tuple[Job, ...]
-    title: str = ""
-    origin: Path | None = None
-    tolerances: Tolerances = field(default_factory=Tolerances)
-
-
 class Outcome(NamedTuple):
     """What came of a job, and what its report says where there is one."""
 
@@ -61,11 +48,7 @@ class Outcome(NamedTuple):
 def state_of(site: Path, settings: Settings) -> Path:
     """Return the folder of history, cache and lock: beside the site, so that none of it is published.
 
-    Raises
-    ------
-    InputError
-        For a state that is no folder, leads elsewhere or lies inside the site, or a site that has no folder
-        beside it.
+    Refused is what is no folder, leads elsewhere or lies inside the site.
     """
     state = _state_of(site, settings)
     folders = (state, state / "cache", state / NIGHTS)
@@ -112,20 +95,8 @@ def run_night(
     """Build all of a study, note it in the history and publish the site.
 
     Whatever ends this early leaves the site of the night before whole; what was built until then is in
-    the cache and not built again.
-
-    Parameters
-    ----------
-    study : Study
-        What to build.
-    site : pathlib.Path
-        Folder of the site; made where it is missing, refused where it holds something else.
-    progress : callable, optional
-        Called with (jobs done, jobs in all).
-    say : callable, optional
-        Called with one line for whatever somebody should know (a corrupt cache entry).
-    code : CodeVersion, optional
-        Version of the code; found out where left out.
+    the cache and not built again. The site is made where it is missing, refused where it holds something
+    else. ``say`` gets one line for whatever somebody should know (a corrupt cache entry).
 
     Raises
     ------
@@ -188,10 +159,7 @@ def approve(
 ) -> Overview:
     """Make the last night the baseline that later ones are held against, and publish the site anew.
 
-    Raises
-    ------
-    InputError
-        Where name or reason is empty, there is no night yet, or a design has no result in it.
+    Refused without name or reason, without a night, and for a design that has no result in it.
     """
     use = settings or Settings()
     if not by.strip() or not reason.strip():

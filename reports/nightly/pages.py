@@ -7,7 +7,7 @@ from typing import Any
 
 from actuator_lti.files.tree import Tree
 from reports.html import render
-from reports.nightly.between import SHOWN_CHANGES
+from reports.nightly.changes import SHOWN_CHANGES
 from reports.nightly.course import Course, course_of
 from reports.nightly.headline import cause_words, change_words, headlines, main_changes
 from reports.nightly.history import History
@@ -37,6 +37,7 @@ def index(night: Overview, folder: str) -> str:
     """Make the page that stands at the root of the site; its links lead into ``folder``."""
     return _render(
         "nightly/index.html",
+        asset("nightly/nightly.js"),
         night=night,
         folder=folder,
         STATE_ORDER=tuple(STATES),
@@ -58,6 +59,7 @@ def design_page(night: Overview, design: DesignView, history: History, available
     course = course_of(night, design, history, past)
     return _render(
         "nightly/design.html",
+        bundled("figures"),
         night=night,
         design=design,
         charts=course.charts,
@@ -76,11 +78,11 @@ def figures_csv(design: DesignView, history: History) -> str:
     return csv_text(("figure", "value", "unit", "kind"), rows)
 
 
-def _render(template: str, **context: Any) -> str:
+def _render(template: str, code: str, **context: Any) -> str:
     return render(
         template,
         style=asset("nightly/nightly.css"),
-        code=asset("nightly/nightly.js") + bundled("figures"),
+        code=code,
         states=STATES,
         night_signs=NIGHT_SIGNS,
         cause_lines=cause_lines,

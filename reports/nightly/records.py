@@ -48,17 +48,7 @@ class Run:
 
 @dataclass(frozen=True, kw_only=True)
 class Content:
-    """The figures of a result and what is behind them.
-
-    Attributes
-    ----------
-    layout : int
-        Which of the lists of figures of the night.
-    values : str
-        Their numbers, as `packed`.
-    inputs : dict
-        Parameters and settings.
-    """
+    """The figures of a result, as `packed`, in one of the layouts of its night; parameters and settings."""
 
     layout: int
     values: str
@@ -69,13 +59,8 @@ class Content:
 class Result:
     """What one design came to in one night.
 
-    Attributes
-    ----------
-    run : int
-        The night.
-    home : int or None
-        The night whose file holds the content: an earlier one where all is as it was then; None where there
-        is no result.
+    ``home`` is the night whose file holds the content, an earlier one where all is as it was then; None where
+    there is no result.
     """
 
     run: int

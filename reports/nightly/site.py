@@ -33,13 +33,7 @@ _CONTENT = re.compile(r"[0-9a-f]{16}\Z")
 
 
 def check_place(site: Path) -> None:
-    """Refuse a folder that holds something else, or that cannot be written.
-
-    Raises
-    ------
-    InputError
-        In one line that names the folder.
-    """
+    """Refuse, by name, a folder that holds something else, or that cannot be written."""
     for name in ("", "nights", "reports", "index.html", *_FOR_MACHINES, MARKER):
         if (site / name).is_symlink():
             raise InputError("is a symbolic link: a site is a folder of its own", where=str(site / name))
@@ -55,13 +49,7 @@ def check_place(site: Path) -> None:
 
 
 def mark(site: Path) -> None:
-    """Make a folder a site; one that is a site already stays it.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be written.
-    """
+    """Make a folder a site; one that is a site already stays it."""
     write_text(site / MARKER, "actuator-lti nightly site 1\n")
 
 
@@ -76,13 +64,7 @@ def remove_leftovers(*folders: Path) -> int:
 
 
 def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep_reports: int) -> None:
-    """Lay out a night and switch to it.
-
-    Raises
-    ------
-    InputError
-        Where the site cannot be written; it is as it was then.
-    """
+    """Lay out a night and switch to it; where the site cannot be written it stays as it was."""
     folder = f"nights/{night.run.id:06d}-{secrets.token_hex(4)}"
     kept = _reports_to_keep(history, night, keep_reports)
     write_together(file for design in night.designs for file in _lacking(site, design, cache))

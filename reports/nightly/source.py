@@ -9,21 +9,91 @@ A study file may hold a table for the nightly beside what `analyses.studies.stud
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from actuator_lti.bounds import JOB_BYTES, NIGHTLY_JOBS
 from actuator_lti.design import design_hash, load_design, write_design
 from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
 from actuator_lti.files.reading import read_toml, shown_path
 from actuator_lti.files.tree import Tree
 from analyses.studies.study import Study as StudyFile
 from analyses.studies.study import Variant, is_study, study_from_tree, study_of
 from analyses.toml_tables import Table
-from reports.nightly.job import Job
-from reports.nightly.night import Study
-from reports.nightly.tolerance import read_tolerances
+from reports.nightly.text import one_line, sha256
+from reports.nightly.tolerance import Tolerances, read_tolerances
+
+BROKEN = ("error", "timeout", "crash")  # how a job ends without a result
+
+MAX_NAME = 20_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One report to build: a design or variant (any text is a name), or the comparison of a whole study.
+
+    ``payload`` is plain JSON and all that the result depends on, except the code; ``parameters`` are dotted
+    keys with texts as written: what is shown when a figure has moved.
+    """
+
+    name: str
+    kind: str = "design"
+    payload: Mapping[str, Any] = field(default_factory=dict)
+    design_hash: str = ""
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    revision: str = ""
+
+    def key(self, code: str) -> str:
+        """Content address of the result: design, settings and code version."""
+        return sha256(canonical([self.name, self.kind, self.design_hash, self.payload, code]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """What a team builds every night: designs and variants, and how far figures may move."""
+
+    name: str
+    jobs: tuple[Job, ...]
+    title: str = ""
+    origin: Path | None = None
+    tolerances: Tolerances = field(default_factory=Tolerances)
+
+
+def canonical(value: Any) -> str:
+    """JSON text that is the same for the same content."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+
+
+def _is_unicode(text: str) -> bool:
+    return not any("\ud800" <= sign <= "\udfff" for sign in text)
+
+
+def check_jobs(jobs: tuple[Job, ...], where: str) -> tuple[Job, ...]:
+    """Refuse a study that is too large or names two designs alike."""
+    if not jobs:
+        raise InputError("nothing to build: no design and no variant", where=where)
+    NIGHTLY_JOBS.check(len(jobs), where)
+    seen: set[str] = set()
+    for job in jobs:
+        if len(job.name) > MAX_NAME:
+            raise InputError(
+                f"name {one_line(job.name, 40)!r} has {len(job.name)} characters: at most {MAX_NAME} allowed",
+                where=where,
+            )
+        if not one_line(job.name) or not _is_unicode(job.name):
+            raise InputError(
+                f"name {job.name[:40]!a}: a name needs at least one sign, all in valid Unicode",
+                where=where,
+            )
+        if job.name in seen:
+            raise InputError(f"name {one_line(job.name, 80)!r} is used twice: names must differ", where=where)
+        seen.add(job.name)
+        JOB_BYTES.check(len(canonical(job.payload)), where, name=repr(one_line(job.name, 80)))
+    return jobs
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,23 +104,10 @@ class _Nightly:
 
 
 def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) -> Study:
-    """Read what is to be built every night.
+    """Read what is to be built every night: a study file, or a design, which is then a study of one.
 
     A variant that its design's checks refuse becomes a job that fails with their words; the others are built.
-
-    Parameters
-    ----------
-    path : str
-        A study file, or a design (by path or shipped name), which is then a study of one.
-    pdf : bool
-        Whether a PDF is made beside each report; the study file may ask for it, too.
-    validation : bool, optional
-        Whether reports hold the nonlinear validation; as the study says where left out.
-
-    Raises
-    ------
-    InputError
-        From the file: one line with place, key and what is allowed.
+    ``pdf`` and ``validation`` are as the study says where left out.
     """
     table = Table({}, "nightly", shown_path(path))
     if is_study(path):

@@ -58,11 +58,6 @@ def _declared(figure: Figure) -> float:
 def read_tolerances(table: Mapping[str, object], where: str) -> Tolerances:
     """Read ``{"*phase_margin*" = "0.5 deg", "*bandwidth*" = "1 %"}``; a bare number is in the figure's unit.
 
-    Raises
-    ------
-    InputError
-        Where a value is no number of at least 0.
-
     Examples
     --------
     >>> read_tolerances({"*bandwidth*": "1 %"}, "study.toml").rules

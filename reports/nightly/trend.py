@@ -33,19 +33,9 @@ class ChangePoint:
 
 
 def change_points(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ...]:
-    """Find the nights at which the level of a figure changed.
+    """Find the nights (values, NaN where there is none) at which the level of a figure changed.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        One value a night; NaN where there is none (these are no change).
-    tolerance : float
-        Steps that are smaller do not count, in the unit of the values.
-
-    Returns
-    -------
-    tuple of ChangePoint
-        In the order of the nights.
+    Steps that are smaller than the tolerance, in the unit of the values, do not count.
 
     Examples
     --------

@@ -7,23 +7,19 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from analyses.slugs import hashed
-from reports.nightly.between import Between
 from reports.nightly.cache import Cache, Entry
-from reports.nightly.changes import Change, Comparison
+from reports.nightly.changes import Between, Change, Comparison
 from reports.nightly.figures import Verdict
 from reports.nightly.history import History
-from reports.nightly.job import BROKEN
 from reports.nightly.memory import Memory
 from reports.nightly.records import Baseline, Result, Run
+from reports.nightly.source import BROKEN, Study
 from reports.nightly.trend import WINDOW, missing_nights
-
-if TYPE_CHECKING:
-    from reports.nightly.night import Study
 
 STRIP = 30
 CLOSER = 1e-3  # of the limit; a smaller step of the distance is none
@@ -100,9 +96,9 @@ class DesignView:
 
     @property
     def rank(self) -> tuple[float, ...]:
-        """Order of the index: no result first, then the worst distance to a requirement."""
+        """Order of the index: no result first, then what fails, then the worst distance to a requirement."""
         worst = np.inf if self.result.worst is None else self.result.worst
-        return (0.0 if self.broken else 1.0, worst)
+        return (0.0 if self.broken else 1.0 if self.state == "fail" else 2.0, worst)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 from actuator_lti.asked.quantities import AT_A_GLANCE, QUANTITIES, reserve
 from analyses.linear.held_loops import HELD
@@ -13,24 +13,14 @@ from analyses.linear.responses import frequency_grid
 from analyses.specification.mending import Move
 from analyses.specification.weakest import Spread, View, WeakPoint
 from reports import document as doc
-from reports.document_schema import (
-    Bar,
-    Block,
-    GlanceBlock,
-    GlanceFigure,
-    GlanceLoop,
-    Section,
-    Status,
-    VerdictItem,
-    Weakest,
-)
-from reports.findings import Finding, gathered, plain
+from reports.document_schema import Bar, GlanceBlock, GlanceFigure, GlanceLoop, Weakest
 from reports.live.keys import named
 from reports.numbers import capital, short
 from reports.sections import loop as loop_section
+from reports.sections import loop_charts
 from reports.sections.margins import margin_row, range_words, shown, worst_status
 from reports.sections.names import LOOPS, POINTS, loop_words
-from reports.verdict_summary import tally
+from reports.verdict_summary import gathered, tally
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -43,24 +33,24 @@ NO_MOVE = "No gain alone mends it without losing a requirement or another margin
 
 def section(
     figures: Mapping[str, LoopFigures],
-    items: Sequence[VerdictItem],
-    sections: Sequence[Section],
+    items: Sequence[doc.VerdictItem],
+    sections: Sequence[doc.Section],
     point: WeakPoint | None = None,
     ranges: Mapping[str, Mapping[str, Spread]] | None = None,
     *,
     bounds: Corners | None = None,
     mend: str = "",
-) -> Section:
+) -> doc.Section:
     """Make the first screen from the loops, the verdicts on the requirements and all other sections.
 
     ``point`` is the weakest of all views and ``mend`` the words of the move that mends it; ``ranges`` are the
     margins over the operating points, ``bounds`` the corners, between which each requirement's figure lies.
     """
     linear = next((part.get("result", "") for part in sections if part["id"] == "limits"), "")
-    result = [item for item in gathered(sections) if item.text != linear]
-    apart: dict[str, Finding] = {}  # the same seen by two margins stands once on the first screen
+    result = [item for item in gathered(sections) if item["text"] != linear]
+    apart: dict[str, doc.Finding] = {}  # the same seen by two margins stands once on the first screen
     for item in result:
-        apart.setdefault(item.text.partition(";")[0], item)
+        apart.setdefault(item["text"].partition(";")[0], item)
     bars = _bars(items, bounds)
     glance: GlanceBlock = {
         "kind": "glance",
@@ -70,16 +60,18 @@ def section(
         "linear": linear,
         "bars": bars[:MOST_BARS],
         "more_bars": max(len(bars) - MOST_BARS, 0),
-        "findings": plain([*apart.values()][:SHOWN]),
+        "findings": [*apart.values()][:SHOWN],
         "more": len(result) - min(len(apart), SHOWN),
     }
     status = worst_status([one.sound for one in figures.values()])
-    if any(item["verdict"] == "not met" for item in items) or any(item.severity == "fail" for item in result):
+    if any(item["verdict"] == "not met" for item in items) or any(
+        item["severity"] == "fail" for item in result
+    ):
         status = "fail"
     return doc.section("answer", "At a glance", [glance, *_pictures(figures, point)], status=status)
 
 
-def believed(sections: Sequence[Section]) -> str:
+def believed(sections: Sequence[doc.Section]) -> str:
     """Say in one line how far linear and simulated agree, and what is not proven."""
     blocks = [block for part in sections for block in doc.walk(part)]
     checks = doc.judged(block for block in blocks if block.get("what") == "checks")
@@ -116,7 +108,7 @@ def power_above(value: float) -> str:
     return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
-def _bars(items: Sequence[VerdictItem], bounds: Corners | None) -> list[Bar]:
+def _bars(items: Sequence[doc.VerdictItem], bounds: Corners | None) -> list[Bar]:
     """Give each requirement with a figure and a limit, the one with least left first."""
     known = [item for item in items if item["value"] is not None and item["limit"] is not None]
     found: dict[tuple[str, str | None], list[float]] = {}
@@ -124,13 +116,12 @@ def _bars(items: Sequence[VerdictItem], bounds: Corners | None) -> list[Bar]:
         for one in corner.verdicts:
             if one.value is not None and math.isfinite(one.value):
                 found.setdefault((one.id, one.loop), []).append(one.value)
-    return [_bar(item, found) for item in sorted(known, key=_nearness)]
-
-
-def _bar(item: Mapping[str, Any], found: Mapping[tuple[str, str | None], list[float]]) -> Bar:
-    values = found.get((item["id"], item.get("loop")), [])
-    kept = {name: item[name] for name in Bar.__annotations__ if name != "band"}
-    return cast(Bar, {**kept, "band": [min(values), max(values)] if values else None})
+    bars = []
+    for item in sorted(known, key=_nearness):
+        values = found.get((item["id"], item.get("loop")), [])
+        kept = {name: value for name, value in item.items() if name in Bar.__annotations__}
+        bars.append(cast(Bar, {**kept, "band": [min(values), max(values)] if values else None}))
+    return bars
 
 
 def move_words(design: Design, move: Move) -> str:
@@ -149,7 +140,7 @@ def move_words(design: Design, move: Move) -> str:
 
 
 def _loop(
-    name: str, figures: LoopFigures, items: Sequence[VerdictItem], ranges: Mapping[str, Spread]
+    name: str, figures: LoopFigures, items: Sequence[doc.VerdictItem], ranges: Mapping[str, Spread]
 ) -> GlanceLoop:
     """Give the chosen figures of a loop, each with the requirement that is nearest to it."""
     cells: list[GlanceFigure] = []
@@ -193,7 +184,7 @@ def weakest(point: WeakPoint) -> Weakest:
         f"{quantity.words} {short(point.value, 3)}{unit}, {kind} {short(point.limit, 6)}{unit}: "
         f"{short(abs(left), 3)}{unit} {side}"
     )
-    status: Status = "pass" if left >= 0.0 else "fail" if point.required else "warn"
+    status: doc.Status = "pass" if left >= 0.0 else "fail" if point.required else "warn"
     return {"label": label, "words": words, "status": status}
 
 
@@ -204,14 +195,14 @@ def weakest_label(view: View) -> str:
     return capital(", ".join(filter(None, (loop, view.place, cut))))
 
 
-def _nearness(item: VerdictItem) -> float:
+def _nearness(item: doc.VerdictItem) -> float:
     """What is left to the limit; without a distance the requirement is as good as far away."""
     if item["distance"] is None or item["value"] is None or item["limit"] is None:
         return math.inf
     return reserve(item.get("quantity", ""), item["value"], item["limit"], item["distance"])
 
 
-def _pictures(figures: Mapping[str, LoopFigures], point: WeakPoint | None) -> list[Block]:
+def _pictures(figures: Mapping[str, LoopFigures], point: WeakPoint | None) -> list[doc.Block]:
     """Make the Bode figure of the weakest view and the step of its loop; none of a drive without loops."""
     if not figures:
         return []
@@ -222,13 +213,13 @@ def _pictures(figures: Mapping[str, LoopFigures], point: WeakPoint | None) -> li
     seen = there if there and (there.margins.gain_margins or there.margins.phase_margins) else result
     own = seen is result
     title = LOOPS[name] if own or view is None else weakest_label(view)
-    bode = loop_section.open_bode(title, seen, frequency_grid(seen), name=name if own else "", small=True)
+    bode = loop_charts.open_bode(title, seen, frequency_grid(seen), name=name if own else "", small=True)
     if result.step is None:
         return [bode]
     return [bode, loop_section.step(LOOPS[name], result, None, name=name, small=True)]
 
 
-def unchecked() -> Finding:
+def unchecked() -> doc.Finding:
     """Give the finding of a report that no simulation stands behind."""
     text = "No simulation stands behind this report: friction, limits and large commands are not checked."
-    return Finding(severity="warn", text=text, where="provenance")
+    return doc.Finding(severity="warn", text=text, where="provenance")

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -13,16 +11,13 @@ from analyses.identification.surface_fit import SurfaceFit
 from analyses.records.record import Record
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart, Panel
-from reports.document_schema import Block
-from reports.sections.thinning import kept_rows
 
 NAMES = ("C0", "Cv", "CM")
 
 
-def surface_figure(fit: SurfaceFit) -> Block:
+def surface_figure(fit: SurfaceFit) -> doc.Block:
     """Runs and fitted lines over speed, a line for each load; runs that were left out are ringed."""
-    chart = Chart(width=style.WIDE, height=380.0, legend=True)
+    chart = style.Chart(width=style.WIDE, height=380.0, legend=True)
     panel = chart.panel("motor speed, rad/s", "friction torque at the motor, mN m")
     loads = np.array([p.load_Nm for p in fit.points])
     line = np.linspace(0.0, max(p.speed_rad_s for p in fit.points), 2)
@@ -31,7 +26,8 @@ def surface_figure(fit: SurfaceFit) -> Block:
         mean = float(np.mean([p.load_Nm for p in here]))
         label = f"{mean:.2g} N m"
         panel.curve(line, 1e3 * fit.predict_Nm(line, np.full(2, mean)), label, **style.series(k))
-        panel.points(*_place(here), label, **style.marked(k))
+        place = [p.speed_rad_s for p in here], [1e3 * p.torque_Nm for p in here]
+        panel.points(*place, label, **style.marked(k))
     named = {o.run for o in fit.outliers}
     for point in fit.points:
         if point.run in named:
@@ -41,11 +37,7 @@ def surface_figure(fit: SurfaceFit) -> Block:
     return doc.figure("identification_surface", chart, caption)
 
 
-def _place(points: Sequence[Any]) -> tuple[list[float], list[float]]:
-    return [p.speed_rad_s for p in points], [1e3 * p.torque_Nm for p in points]
-
-
-def _ring(panel: Panel, at: tuple[float, float], words: str, size: float) -> None:
+def _ring(panel: style.Panel, at: tuple[float, float], words: str, size: float) -> None:
     panel.points([at[0]], [at[1]], size=size, hollow=True, colour=style.RED, read=False)
     panel.note(words, at)
 
@@ -59,9 +51,9 @@ def _levels(loads: np.ndarray) -> list[float]:
     return result[:10]
 
 
-def residual_figure(fit: SurfaceFit) -> Block:
+def residual_figure(fit: SurfaceFit) -> doc.Block:
     """Residuals over speed and load."""
-    chart = Chart(width=style.WIDE, height=310.0)
+    chart = style.Chart(width=style.WIDE, height=310.0)
     named = {o.run for o in fit.outliers}
     y, std = 1e6 * fit.own_residuals_Nm, 1e6 * fit.residual_stds_Nm
     for x, label in (
@@ -81,12 +73,12 @@ def residual_figure(fit: SurfaceFit) -> Block:
     return doc.figure("identification_residuals", chart, caption)
 
 
-def region_figure(fit: SurfaceFit) -> Block:
+def region_figure(fit: SurfaceFit) -> doc.Block:
     """Joint 95 % regions of pairs of coefficients, in percent of their values."""
     from scipy.stats import chi2
 
     radius = float(np.sqrt(chi2.ppf(0.95, 2)))
-    chart = Chart(width=style.WIDE, height=300.0)
+    chart = style.Chart(width=style.WIDE, height=300.0)
     for i, j in combinations(fit.told, 2):
         scale = 100.0 / fit.values[[i, j]]
         panel = chart.panel(f"{NAMES[i]}, % from its value", f"{NAMES[j]}, %", by_point=True)
@@ -115,7 +107,7 @@ def _ellipse(
     return x, y
 
 
-def window_figures(result: CampaignResult) -> list[Block]:
+def window_figures(result: CampaignResult) -> list[doc.Block]:
     """The first, the middle and the last run with their steady part marked; the others on demand."""
     runs = {run.id: run for run in result.imported.runs}
     points = result.fit.points
@@ -130,12 +122,12 @@ def window_figures(result: CampaignResult) -> list[Block]:
     return [*figures[:1], *more]
 
 
-def _window(record: Record, start_s: float, stop_s: float) -> Chart:
+def _window(record: Record, start_s: float, stop_s: float) -> style.Chart:
     """Draw each signal in a panel of its own, the steady part shaded."""
     labels = {"speed": "speed, rad/s", "current": "current, A", "torque": "torque, N m"}
     shown = [name for name in labels if name in record.signals]
-    rows = kept_rows([record[name] for name in shown])
-    chart = Chart(width=style.WIDE, height=60.0 + 120.0 * len(shown))
+    rows = style.kept_rows([record[name] for name in shown])
+    chart = style.Chart(width=style.WIDE, height=60.0 + 120.0 * len(shown))
     panels = chart.column(*(1.0 for _ in shown))
     for k, (panel, name) in enumerate(zip(panels, shown, strict=True)):
         panel.curve(record.time_s[rows], record[name][rows], colour=style.SERIES[k % 7], width=1.1)

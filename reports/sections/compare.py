@@ -1,40 +1,45 @@
-"""Variants side by side: verdicts, figures with differences, what moved them, overlaid responses."""
+"""Variants side by side: verdicts, figures with differences, what moved them, predictions."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
-from actuator_lti.asked.verdict import Verdict
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
 from analyses.comparison.variant_figures import FigureName
 from analyses.comparison.variants import Compared, Comparison
 from analyses.specification.requirements import RequirementVerdict
+from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.as_json import as_json
-from reports.document_schema import Block, Column, Row, Section, Status, VerdictItem
 from reports.numbers import capital, significant
-from reports.sections import compare_best, compare_figures, compare_ledger, compare_many
+from reports.sections import compare_best, compare_figures
 from reports.sections.compare_best import number
-from reports.sections.names import LOOPS
+from reports.sections.names import LOOPS, unit_words
 from reports.sections.requirements import item, label, limit_words
+from reports.sections.validation import loop_name, quantity_name
 from reports.terminal import Brief
 
 GROUPS = {**LOOPS, "drive": "Drive", "large": "Large signals"}
 COLUMNS = 4  # variants beside the base in one table: what reads on one screen
 _MOST_MOVERS = 3
+_TERMINAL = ("gain_margin", "phase_margin", "modulus_margin", "bandwidth", "overshoot", "settling_time")
+_MARKS = "In brackets the difference from the base. ▲ best and ▽ worst of all designs."
 _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 
 
-def section(comparison: Comparison) -> list[Section]:
+def section(comparison: Comparison) -> list[doc.Section]:
     """Make all sections of a comparison; of very many designs those at the ends are shown."""
-    shown = compare_many.choice(comparison)
+    shown = compare_best.choice(comparison)
     best = compare_best.section(shown)
-    best["intro"] = f"{best['intro']} {compare_many.shown_words(shown)}".strip()
+    best["intro"] = f"{best['intro']} {compare_best.shown_words(shown)}".strip()
     made = [best, verdicts(shown), figures(shown), differences(shown)]
-    return [*made, *compare_ledger.sections(shown), *compare_figures.sections(shown)]
+    return [*made, *ledger(shown), *compare_figures.sections(shown)]
 
 
 def text(comparison: Comparison | str) -> str | None:
@@ -43,13 +48,13 @@ def text(comparison: Comparison | str) -> str | None:
 
 
 def brief(comparison: Comparison) -> Brief:
-    """Which designs meet their requirements."""
-    shown = compare_many.choice(comparison)
+    """Which designs meet their requirements, and what moved in their loops."""
+    shown = compare_best.choice(comparison)
     kept = ("design", "met", "missed", "unproven")
     block = doc.with_columns(compare_best.designs(shown, note=""), kept)
     left_out = len(comparison.all) - len(shown.all)
-    notes = [f"{left_out} more designs are in {compare_many.TABLE}"] if left_out else []
-    return Brief(result(comparison), [block], notes)
+    notes = [f"{left_out} more designs are in {compare_best.TABLE}"] if left_out else []
+    return Brief(result(comparison), [block, *_moved_loops(shown)], notes)
 
 
 def data(comparison: Comparison) -> Tree:
@@ -62,8 +67,8 @@ def write(comparison: Comparison, folder: Path | None) -> list[str]:
     """Write every figure of every design as a table."""
     if folder is None:
         return []
-    write_text(folder / compare_many.TABLE, compare_many.table_text(comparison))
-    return [str(folder / compare_many.TABLE)]
+    write_text(folder / compare_best.TABLE, compare_best.table_text(comparison))
+    return [str(folder / compare_best.TABLE)]
 
 
 def result(comparison: Comparison) -> str:
@@ -80,28 +85,28 @@ def result(comparison: Comparison) -> str:
     return said + " A prediction is not confirmed by the simulator." * comparison.unconfirmed
 
 
-def verdicts(comparison: Comparison) -> Section:
+def verdicts(comparison: Comparison) -> doc.Section:
     """Verdicts of every design: a row a requirement, a column a design."""
     wanted = comparison.base.verdicts
-    blocks: list[Block] = compare_many.worst(comparison)
+    blocks: list[doc.Block] = compare_best.worst(comparison)
     if wanted:
         note = "In brackets the difference from the base, in the unit of the requirement."
-        for k, designs in enumerate(batches(comparison)):
-            first = doc.column("what", "Requirement"), doc.column("limit", "Limit")
-            columns = [*first, *design_columns(designs)]
-            rows = [_verdict_row(verdict, designs) for verdict in wanted]
-            title = "Requirements of every design" + ("" if k == 0 else f", part {k + 1}")
-            blocks.append(doc.table(title, columns, rows, note if k == 0 else ""))
+        heads = [
+            doc.of(label, "what", "Requirement"),
+            doc.of(lambda verdict: limit_words(verdict.requirement), "limit", "Limit"),
+        ]
+        title = "Requirements of every design"
+        blocks += _side_by_side(title, wanted, heads, batches(comparison), _verdict_cell, note)
     blocks += [
-        doc.details(f"Verdicts of {one.variant.name}", [doc.verdicts([_named(one, v) for v in one.verdicts])])
+        doc.details(f"Verdicts of {one.variant.name}", [doc.verdicts(_named(one))])
         for one in comparison.all
         if one.verdicts
     ]
-    for variant in comparison.refused[: compare_many.MANY]:
+    for variant in comparison.refused[: compare_best.MANY]:
         blocks.append(doc.text(f"{variant.name}: no design. {variant.error}"))
-    if len(comparison.refused) > compare_many.MANY:
-        blocks.append(doc.text(f"{len(comparison.refused) - compare_many.MANY} more have no design."))
-    status: Status = "fail" if comparison.refused else comparison.tally.role
+    if len(comparison.refused) > compare_best.MANY:
+        blocks.append(doc.text(f"{len(comparison.refused) - compare_best.MANY} more have no design."))
+    status: doc.Status = "fail" if comparison.refused else comparison.tally.role
     words = result(comparison)
     return doc.section("verdicts", "Requirements side by side", blocks, result=words, status=status)
 
@@ -113,59 +118,70 @@ def batches(comparison: Comparison) -> list[list[Compared]]:
     return [[comparison.base, *stretch] for stretch in stretches]
 
 
-def design_columns(designs: Sequence[Compared]) -> list[Column]:
-    """Make a column a design."""
-    return [doc.column(f"d{k}", one.variant.name, align="right") for k, one in enumerate(designs)]
-
-
-def _named(one: Compared, verdict: RequirementVerdict) -> VerdictItem:
-    made = item(verdict)
-    return {**made, "id": f"{one.variant.slug}/{made['id']}"}
-
-
-def _verdict_row(wanted: RequirementVerdict, designs: Sequence[Compared]) -> Row:
-    row: Row = {"what": label(wanted), "limit": limit_words(wanted.requirement)}
-    for k, one in enumerate(designs):
-        verdict = next((v for v in one.verdicts if v.id == wanted.id), None)
-        if verdict is None or verdict.value is None:
-            row[f"d{k}"] = {"text": "none", "status": verdict.role if verdict else "info"}
-            continue
-        words = number(verdict.value) or ""
-        change = 0.0 if wanted.value is None else verdict.value - wanted.value
-        if abs(change) > _SEEN * abs(verdict.value):
-            words += f" ({_signed(change)})"
-        row[f"d{k}"] = {"text": words, "status": verdict.role}
-    return row
-
-
-def figures(comparison: Comparison) -> Section:
-    """Every figure of every design, a table a group; best and worst marked."""
+def _side_by_side(
+    title: str, items: Sequence[Any], heads: list[doc.Shown], batches: Sequence[Sequence[Compared]],
+    cell: Callable[[Compared, Any], Any], note: str = "",
+) -> list[doc.Block]:  # fmt: skip
+    """Tables with a row an item and a column a design; ``cell`` is what a design has of an item."""
     blocks = []
+    for part, designs in enumerate(batches, 1):
+        own = [
+            doc.of(partial(cell, one), f"d{k}", one.variant.name, align="right")
+            for k, one in enumerate(designs)
+        ]
+        heading = title if part == 1 else f"{title}, part {part}"
+        blocks.append(doc.listing(heading, items, [*heads, *own], note if part == 1 else ""))
+    return blocks
+
+
+def _named(one: Compared) -> list[doc.VerdictItem]:
+    return [{**item(verdict), "id": f"{one.variant.slug}/{verdict.id}"} for verdict in one.verdicts]
+
+
+def _verdict_cell(one: Compared, wanted: RequirementVerdict) -> doc.Cell:
+    verdict = next((v for v in one.verdicts if v.id == wanted.id), None)
+    if verdict is None or verdict.value is None:
+        return {"text": "none", "status": verdict.role if verdict else "info"}
+    words = number(verdict.value) or ""
+    change = 0.0 if wanted.value is None else verdict.value - wanted.value
+    if abs(change) > _SEEN * abs(verdict.value):
+        words += f" ({_signed(change)})"
+    return {"text": words, "status": verdict.role}
+
+
+def figures(comparison: Comparison) -> doc.Section:
+    """Every figure of every design, a table a group; best and worst marked."""
+    heads = [
+        doc.of(lambda name: capital(name.label), "figure", "Figure"),
+        doc.of(lambda name: "ms" if name.unit == "s" else name.unit.replace("^2", "²"), "unit", "Unit"),
+    ]
+    blocks: list[doc.Block] = []
     for group, title in GROUPS.items():
-        names = [name for name in comparison.names if name.group == group]
-        for k, designs in enumerate(batches(comparison) if names else []):
-            heading = title if k == 0 else f"{title}, part {k + 1}"
-            blocks.append(_group_table(heading, names, comparison, designs))
+        if names := [name for name in comparison.names if name.group == group]:
+            blocks += _side_by_side(title, names, heads, batches(comparison), partial(_cell, comparison))
     variants = comparison.everything.variants
     moved = sum(bool(one.differences) for one in variants)
     result = f"{moved} of {len(variants)} variants change a figure of the base."
-    intro = "In brackets the difference from the base. ▲ best and ▽ worst of all designs."
-    return doc.section("figures", "Figures side by side", blocks, result=result, intro=intro)
+    return doc.section("figures", "Figures side by side", blocks, result=result, intro=_MARKS)
 
 
-def _group_table(
-    title: str, names: Sequence[FigureName], comparison: Comparison, designs: Sequence[Compared]
-) -> Block:
-    columns = [doc.column("figure", "Figure"), doc.column("unit", "Unit"), *design_columns(designs)]
-    rows = []
-    for name in names:
-        unit = "ms" if name.unit == "s" else name.unit.replace("^2", "²")
-        row: Row = {"figure": capital(name.label), "unit": unit}
-        rows.append(row | {f"d{k}": _cell(one, name, comparison) for k, one in enumerate(designs)})
-    return doc.table(title, columns, rows)
+def _moved_loops(comparison: Comparison) -> list[doc.Block]:
+    """The loops' main figures that a design beside the base has moved, of the designs that a screen holds."""
+    names = [
+        name
+        for name in comparison.names
+        if name.group in LOOPS and name.key.removeprefix(f"{name.group}.") in _TERMINAL
+        if any(name.key in one.differences for one in comparison.variants)
+    ]
+    heads = [
+        doc.of(lambda name: f"{GROUPS[name.group]}: {name.label}", "figure", "Figure"),
+        doc.of(lambda name: "ms" if name.unit == "s" else name.unit, "unit", "Unit"),
+    ]
+    made = _side_by_side("Loops", names, heads, batches(comparison)[:1], partial(_cell, comparison), _MARKS)
+    return made if names else []
 
 
-def _cell(one: Compared, name: FigureName, comparison: Comparison) -> str | None:
+def _cell(comparison: Comparison, one: Compared, name: FigureName) -> str | None:
     value = one.figures.get(name.key)
     if value is None:
         return None
@@ -179,9 +195,9 @@ def _cell(one: Compared, name: FigureName, comparison: Comparison) -> str | None
     return words
 
 
-def differences(comparison: Comparison) -> Section:
+def differences(comparison: Comparison) -> doc.Section:
     """What changed in each variant, and which key moved which figure."""
-    blocks: list[Block] = []
+    blocks: list[doc.Block] = []
     for one in comparison.variants:
         if not one.changed and not one.differences:
             blocks.append(doc.text(f"{one.variant.name}: equal to the base."))
@@ -198,7 +214,7 @@ def differences(comparison: Comparison) -> Section:
     return doc.section("differences", "Cause of each change", blocks, result=result, intro=intro)
 
 
-def _moved_table(one: Compared, comparison: Comparison) -> Block:
+def _moved_table(one: Compared, comparison: Comparison) -> doc.Block:
     columns = [
         doc.of(lambda name: f"{GROUPS[name.group]}: {name.label}", "figure", "Figure"),
         doc.of("unit", "unit", "Unit"),
@@ -227,3 +243,48 @@ def _signed(value: float) -> str:
     if not math.isfinite(value):
         return "unlimited"
     return ("+" if value > 0 else "") + significant(value, 3)
+
+
+ROUNDING = 1e-9  # of a value
+
+
+def ledger(comparison: Comparison) -> list[doc.Section]:
+    """Make the section; nothing where no design was validated."""
+    tested = [one for one in comparison.all if one.checks or one.untested]
+    if not tested:
+        return []
+    tables: dict[tuple[str, str], dict[str, Check]] = {}
+    for entry in (entry for one in tested for entry in one.checks):
+        tables.setdefault((entry.loop, entry.condition), {}).setdefault(entry.name, entry)
+    heads = [
+        doc.of(lambda entry: capital(quantity_name(entry)), "what", "Prediction"),
+        doc.of(lambda entry: unit_words(entry.unit), "unit", "Unit"),
+    ]
+    parts = [tested[k : k + COLUMNS + 1] for k in range(0, len(tested), COLUMNS + 1)]
+    blocks: list[doc.Block] = []
+    for (loop, condition), wanted in tables.items():
+        title = f"{loop_name(loop)}: {condition}"
+        blocks += _side_by_side(title, list(wanted.values()), heads, parts, _ledger_cell)
+    blocks += [doc.text(f"{one.variant.name}: not tested. {one.untested}") for one in tested if one.untested]
+    tally = Tally.of(entry.verdict for one in comparison.everything.all for entry in one.checks)
+    result = f"{tally.words('predictions')}."
+    intro = (
+        "Simulated values, or the relative error of a response; in brackets the difference from the linear "
+        "prediction where it is more than rounding."
+    )
+    title = "Predictions and simulation"
+    return [doc.section("ledger", title, blocks, result=result, intro=intro, status=tally.role)]
+
+
+def _ledger_cell(one: Compared, wanted: Check) -> doc.Cell:
+    key = (wanted.loop, wanted.name, wanted.condition)
+    entry = next((each for each in one.checks if (each.loop, each.name, each.condition) == key), None)
+    if entry is None:
+        return None
+    status = entry.verdict.role()
+    if entry.found is None or entry.predicted is None or not math.isfinite(entry.found):
+        return {"text": f"±{entry.error:.1e}" if math.isfinite(entry.error) else "none", "status": status}
+    words, difference = significant(entry.found, 4), entry.found - entry.predicted
+    if abs(difference) > ROUNDING * abs(entry.predicted):
+        words += f" ({'+' if difference > 0 else ''}{significant(difference, 2)})"
+    return {"text": words, "status": status}

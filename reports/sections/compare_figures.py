@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, drive_cases
 from analyses.comparison.variants import Compared, Comparison
-from analyses.linear.responses import Curve, answer_curve, curve, frequency_grid
+from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.responses import answer_curve, curve, frequency_grid
 from analyses.specification.sensitivity import Sensitivity
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Section
+from reports.sections.loop_charts import both
 from reports.sections.names import LOOPS
 
 MOST_CURVES = 7
@@ -22,15 +22,14 @@ MOST_BARS = 10
 MOST_CHARTS = 8
 
 
-def sections(comparison: Comparison) -> list[Section]:
-    """Make the sections with overlaid responses and tornado charts."""
+def sections(comparison: Comparison) -> list[doc.Section]:
     return [overlays(comparison), tornadoes(comparison)]
 
 
-def overlays(comparison: Comparison) -> Section:
+def overlays(comparison: Comparison) -> doc.Section:
     """Open-loop Bode, closed-loop Bode and step of every loop, one design over the other."""
     drawn = comparison.all[:MOST_CURVES]
-    blocks: list[Block] = []
+    blocks: list[doc.Block] = []
     for name, title in LOOPS.items():
         if name not in comparison.base.loops:
             continue
@@ -44,54 +43,44 @@ def overlays(comparison: Comparison) -> Section:
     )
 
 
-def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[Block]:
+def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[doc.Block]:
     which = "closed loop" if closed else "open loop"
-    chart = Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
+    chart = style.Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
     top, bottom = chart.column(1.0, 1.0)
-    made: list[tuple[Curve, np.ndarray]] = []
     known = [(one, one.loops[name]) for one in drawn if name in one.loops]
     known = [(one, result) for one, result in known if result.stable or not closed]
-    lowest = min((frequency_grid(result, 140)[0] for _, result in known), default=0.0)
+    if not known:
+        return []
+    lowest = min(frequency_grid(result, 140)[0] for _, result in known)
+    curves = []
     for one, result in known:
         own = frequency_grid(result, 140)
         grid = np.unique(np.concatenate([np.geomspace(lowest, own[0], 20), own]))
         response = answer_curve(result, grid) if closed else curve(result.loop.plain_open, grid)
-        magnitude = response.magnitude_db - (_dc_db(result) if closed else 0.0)
-        label, look = one.variant.name[:60], _look(len(made))
-        top.curve(response.frequency_hz, magnitude, label, **look)
-        bottom.curve(response.frequency_hz, response.phase_deg, label, **look)
-        made.append((response, magnitude))
-    if not made:
-        return []
+        values = response.values / (_dc_gain(result) if closed else 1.0)
+        curves.append((one.variant.name[:60], replace(response, values=values)))
     whole = math.inf  # curves are cut nowhere: where two differ is what is looked for
-    style.bound(top, [y for _, magnitude in made for y in magnitude], span=whole, top_room=0.1)
-    style.phase_axis(bottom, [y for response, _ in made for y in response.phase_deg], span=whole, room=0.05)
-    hertz = [response.frequency_hz for response, _ in made]
-    style.frequency(bottom, (min(f[0] for f in hertz), max(f[-1] for f in hertz)))
-    top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
+    both(curves, None, top, bottom, span=whole, phase_span=whole, look=_look)
     caption = f"{title}, {which}: the base and its variants."
     return [doc.figure("overlay", chart, caption)]
 
 
 def _look(k: int) -> style.Style:
-    """The first is the base and stands out."""
     colour = style.INK if k == 0 else style.SERIES[(k - 1) % 7]
     return {"colour": colour, "dash": k % 7, "width": 2.4 if k == 0 else 1.7}
 
 
-def _dc_db(result: Any) -> float:
-    """Gain at DC of the closed loop, so that loops in any unit start at 0 dB."""
-    if result.bandwidth is None or not result.bandwidth.dc_gain:
-        return 0.0
-    return float(20.0 * np.log10(abs(result.bandwidth.dc_gain)))
+def _dc_gain(result: LoopFigures) -> float:
+    """Size of the closed loop at DC, so that loops in any unit start at 0 dB; 1 where there is none."""
+    return abs(result.bandwidth.dc_gain or 1.0) if result.bandwidth else 1.0
 
 
-def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[Block]:
+def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[doc.Block]:
     steps = [(one, one.loops[name].step) for one in drawn if name in one.loops]
     shown = [(one.variant.name[:60], step) for one, step in steps if step is not None]
     if not shown:
         return []
-    chart = Chart(width=style.WIDE, height=410.0, title=f"{title}, step")
+    chart = style.Chart(width=style.WIDE, height=410.0, title=f"{title}, step")
     panel = chart.panel(y="response to a unit step")
     scale = style.time_axis(panel, max(float(step.time_s[-1]) for _, step in shown))
     for k, (label, step) in enumerate(shown):
@@ -103,10 +92,10 @@ def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[Block]:
     return [doc.figure("overlay", chart, caption)]
 
 
-def tornadoes(comparison: Comparison) -> Section:
+def tornadoes(comparison: Comparison) -> doc.Section:
     """Tornado charts of the figures that the requirements look at, then every slope in a table."""
     wanted = _wanted(comparison)
-    blocks: list[Block] = []
+    blocks: list[doc.Block] = []
     for key, limit in wanted.items():
         bars = comparison.sensitivities.tornado(key)
         if bars:
@@ -152,7 +141,9 @@ def _wanted(comparison: Comparison) -> dict[str, float | None]:
     return {key: result[key] for key in order}
 
 
-def _tornado(comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], limit: float | None) -> Block:
+def _tornado(
+    comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], limit: float | None
+) -> doc.Block:
     name = next((n for n in comparison.names if n.key == key), None)
     words = f"{LOOPS.get(key.partition('.')[0], 'Drive')}: {name.label if name else key}"
     base = comparison.sensitivities.base[key]
@@ -160,7 +151,7 @@ def _tornado(comparison: Comparison, key: str, bars: tuple[Sensitivity, ...], li
     near = limit is not None and min(ends) - 3 * abs(base - min(ends)) <= limit <= max(ends) + 3 * abs(
         max(ends) - base
     )
-    chart = Chart(width=style.WIDE, height=90.0 + 27.0 * len(bars), legend=True)
+    chart = style.Chart(width=style.WIDE, height=90.0 + 27.0 * len(bars), legend=True)
     panel = chart.panel(f"{words}, {name.unit}" if name and name.unit else words)
     low: style.Style = {"colour": style.ORANGE, "fill": "none", "hatch": "//", "width": 1.2}
     for k, bar in enumerate(bars):
@@ -180,8 +171,7 @@ def _bar_label(bar: Sensitivity) -> str:
     return f"{bar.path} ±{width:.3g} %"
 
 
-def _slopes(comparison: Comparison) -> Block:
-    """Slopes of the strongest figures, one row a parameter and figure."""
+def _slopes(comparison: Comparison) -> doc.Block:
     known = comparison.sensitivities
     columns = [
         doc.of(lambda pair: pair[0], "figure", "Figure"),

@@ -8,16 +8,13 @@ from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
 from analyses.corners import Corner, Corners
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Row, Section
 from reports.sections.margins import shown
 from reports.sections.names import figure_column, loop_words
 
 PER_LOOP = [QUANTITIES[name] for name in (*CORNERED, "bandwidth")]
 
 
-def section(result: Corners) -> Section:
-    """Make the section from `analyses.corners.corners`."""
+def section(result: Corners) -> doc.Section:
     intro = (
         "Each corner is a design of its own, put through the same sampled loops and the same requirements. "
         "The worst ends are those that one by one lower the margin of the loop where it is smallest, all "
@@ -67,9 +64,9 @@ def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:
     return min(found, key=lambda each: quantity.better * each[0], default=None)
 
 
-def chart(result: Corners) -> Chart:
+def chart(result: Corners) -> style.Chart:
     """Draw for each figure and corner a line from nominal to the corner, one a loop; and the limit."""
-    made = Chart(width=style.WIDE, height=96.0 + 38.0 * len(result.corners), legend=True)
+    made = style.Chart(width=style.WIDE, height=96.0 + 38.0 * len(result.corners), legend=True)
     nominal = result.corners[0]
     for quantity in (QUANTITIES[name] for name in CORNERED):
         panel = made.panel(title=quantity.words)
@@ -91,14 +88,12 @@ def chart(result: Corners) -> Chart:
         for limit in {value for value in limits if value is not None}:
             panel.x.see([limit])
             panel.rule_x(limit, label="limit", colour=style.INK, dash=1, width=1.4)
-        panel.y.ticks = [(float(row), corner.name) for row, corner in enumerate(result.corners)]
-        panel.y.limits(-0.6, len(result.corners) - 0.4)
-        panel.y.reversed, panel.y.grid = True, False
+        style.rows(panel, [corner.name for corner in result.corners])
         panel.x.label = f"{quantity.words}, {quantity.shown[0]}"
     return made
 
 
-def _summary_table(result: Corners) -> Block:
+def _summary_table(result: Corners) -> doc.Block:
     columns = [doc.column("corner", "Corner")]
     for name in CORNERED:
         label = f"{superlative(QUANTITIES[name])} {QUANTITIES[name].words}".capitalize()
@@ -106,7 +101,7 @@ def _summary_table(result: Corners) -> Block:
     columns.append(doc.column("unmet", "Not met"))
     rows = []
     for corner in result.corners:
-        row: Row = {"corner": corner.name}
+        row: doc.Row = {"corner": corner.name}
         for name in CORNERED:
             found = worst(corner, QUANTITIES[name])
             of = found and loop_words(found[1], corner.figures[found[1]].rotor)
@@ -121,7 +116,7 @@ def superlative(quantity: Quantity) -> str:
     return "least" if quantity.better > 0 else "largest"
 
 
-def _loop_table(result: Corners) -> Block:
+def _loop_table(result: Corners) -> doc.Block:
     columns = [
         doc.of(lambda pair: pair[0].name, "corner", "Corner"),
         doc.of(lambda pair: loop_words(pair[1].loop.name, pair[1].rotor), "loop", "Loop"),

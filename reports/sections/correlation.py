@@ -6,14 +6,19 @@ from collections.abc import Sequence
 
 from analyses.correlation.closed_loop import CorrelationResult
 from analyses.correlation.compare import SignalComparison
-from analyses.correlation.summary import BESIDE, SignalSummary, agrees, moves_alike, summarise, worst_of
+from analyses.correlation.run import (
+    BESIDE,
+    Correlation,
+    SignalSummary,
+    agrees,
+    moves_alike,
+    summarise,
+    worst_of,
+)
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Section, Status
 from reports.numbers import show
-from reports.sections.record_tables import finding_table, input_table
-from reports.sections.thinning import kept_rows
+from reports.sections.identified import finding_table, input_table
 
 NAMES = {
     "angle": "Motor angle",
@@ -27,7 +32,9 @@ NAMES = {
 }
 
 
-def section(result: CorrelationResult, number: int = 1, *, error_limit: float | None = None) -> Section:
+def record_section(
+    result: CorrelationResult, number: int = 1, *, error_limit: float | None = None
+) -> doc.Section:
     """Make the section of one record; ``error_limit`` is the largest relative error allowed."""
     figures = [signal_figure(signal) for signal in result.signals.values()]
     active = {name: share for name, share in result.limits.items() if share > 0.0}
@@ -85,7 +92,7 @@ def _share(signal: SignalComparison) -> str:
     return f"{show(100.0 * signal.share_of_motion, 'sig:3')} %"
 
 
-def summary_section(results: Sequence[CorrelationResult], *, error_limit: float | None = None) -> Section:
+def summary_section(results: Sequence[CorrelationResult], *, error_limit: float | None = None) -> doc.Section:
     """Make the section of all records together: a table with a row for all, and the worst one's figure."""
     rows: list[tuple[str, SignalComparison | SignalSummary]] = []
     for name, one in summarise(results).items():
@@ -107,14 +114,14 @@ def summary_section(results: Sequence[CorrelationResult], *, error_limit: float 
     result, signal = worst_of(results)
     figure = signal_figure(signal, f"The worst record, {result.record}. ")
     intro = f"{len(results)} records against {result.design}; the motion of {result.record} is furthest off."
-    status: Status = "pass" if agrees(results, error_limit) else "fail"
+    status: doc.Status = "pass" if agrees(results, error_limit) else "fail"
     return doc.section(
         "correlation", "All records", [table, figure],
         result=words(results, error_limit), intro=intro, status=status,
     )  # fmt: skip
 
 
-def comparison_table(result: CorrelationResult) -> Block:
+def comparison_table(result: CorrelationResult) -> doc.Block:
     """One row a signal."""
     columns = [
         doc.of(lambda s: NAMES.get(s.name, s.name), "name", "Signal"),
@@ -135,13 +142,13 @@ def comparison_table(result: CorrelationResult) -> Block:
     return doc.listing(f"{result.design} against {result.record}", result.signals.values(), columns, note)
 
 
-def signal_figure(signal: SignalComparison, first: str = "") -> Block:
+def signal_figure(signal: SignalComparison, first: str = "") -> doc.Block:
     """Both signals and their difference."""
     difference = signal.modelled - signal.measured
-    rows = kept_rows([signal.measured, signal.modelled, difference])
+    rows = style.kept_rows([signal.measured, signal.modelled, difference])
     name = NAMES.get(signal.name, signal.name)
     time = signal.time_s[rows]
-    chart = Chart(width=style.WIDE, height=380.0)
+    chart = style.Chart(width=style.WIDE, height=380.0)
     upper, lower = chart.column(2.2, 1.0)
     upper.curve(time, signal.measured[rows], "measured", colour=style.BLUE)
     upper.curve(time, signal.modelled[rows], "model", colour=style.ORANGE, width=1.4, dash=1)
@@ -152,3 +159,12 @@ def signal_figure(signal: SignalComparison, first: str = "") -> Block:
     lower.x.limits(time[0], time[-1])
     caption = f"{first}{name}: measured and model, {_share(signal)} of the motion off"
     return doc.figure("correlation_signal", chart, caption)
+
+
+def section(result: Correlation) -> list[doc.Section]:
+    """Records against the model: all together, then each."""
+    limit = result.limit
+    made = [record_section(one, k, error_limit=limit) for k, one in enumerate(result.records, 1)]
+    if len(made) > 1:
+        made.insert(0, summary_section(result.records, error_limit=limit))
+    return made

@@ -6,9 +6,8 @@ from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.limit_cycles import Confirmation, LimitCycles
-from analyses.motion.settling import Settling, judged_by, verdict_of, words
+from analyses.motion.settling import FROM_THE_LARGEST, judged_by, verdict_of, words
 from reports import document as doc
-from reports.document_schema import Block, Section
 from reports.sections.names import fine_unit, load_unit
 
 CAUSES = {
@@ -18,8 +17,7 @@ CAUSES = {
 }
 
 
-def section(result: LimitCycles) -> Section:
-    """Make the section from `analyses.limit_cycles.limit_cycles`."""
+def section(result: LimitCycles) -> doc.Section:
     fine, small = fine_unit(result.design.axis)
     intro = (
         "Play acts for a sinusoidal twist as a softer coupling, a sensor's count for a small swing about its "
@@ -27,7 +25,7 @@ def section(result: LimitCycles) -> Section:
         "size, then the simulator is started in its shape at many sizes. Cycles of dry friction alone stand "
         "under Dry friction at small signals."
     )
-    blocks: list[Block] = []
+    blocks: list[doc.Block] = []
     if result.confirmations:
         blocks.append(_predicted(result, fine, small))
     else:
@@ -63,7 +61,7 @@ def _judged(result: LimitCycles) -> Verdict:
     return verdict_of(result.design, result.hunting)
 
 
-def _predicted(result: LimitCycles, fine: float, small: str) -> Block:
+def _predicted(result: LimitCycles, fine: float, small: str) -> doc.Block:
     size: dict[str, Any] = {"unit": small, "format": "sig:3"}
     columns = [
         doc.of(lambda one: CAUSES[one.cycle.cause], "cause", "Cause"),
@@ -71,7 +69,7 @@ def _predicted(result: LimitCycles, fine: float, small: str) -> Block:
         doc.of(lambda one: "stable" if one.cycle.stable else "unstable", "kind", "Kind"),
         doc.of("cycle.output_rad", "size", "Predicted, peak", scale=fine, **size, better=-1),
         doc.of("cycle.frequency_hz", "hz", "at", "Hz", format="sig:3"),
-        doc.of(lambda one: _seen(one, fine), "seen", "Simulated", **size),
+        doc.of(_seen, "seen", "Simulated", scale=fine, **size),
         doc.of("frequency_hz", "seen_hz", "at", "Hz", format="sig:3"),
         doc.of("verdict", "verdict", "Verdict"),
     ]
@@ -82,25 +80,21 @@ def _predicted(result: LimitCycles, fine: float, small: str) -> Block:
     return doc.listing("Predicted limit cycles, at the output", result.confirmations, columns, note)
 
 
-def _seen(one: Confirmation, fine: float) -> float | None:
-    return None if one.ratio is None else fine * one.ratio * one.cycle.output_rad
+def _seen(one: Confirmation) -> float | None:
+    return None if one.ratio is None else one.ratio * one.cycle.output_rad
 
 
-def _rests(result: LimitCycles, fine: float, small: str) -> Block:
+def _rests(result: LimitCycles, fine: float, small: str) -> doc.Block:
     size: dict[str, Any] = {"unit": small, "scale": fine, "format": "sig:3"}
     columns = [
         doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
         doc.of("amplitude_rad", "step", "Step", **size),
-        doc.of(_end, "end", "Ends"),
+        doc.of(lambda one: one.rest.verdict + ", a limit acting" * bool(one.rest.limited), "end", "Ends"),
         doc.of(lambda one: one.rest.amplitude or None, "size", "Output, peak", **size, better=-1),
         doc.of(lambda one: one.rest.motor_amplitude or None, "motor", "Motor, at the output", **size),
         doc.of("rest.frequency_hz", "hz", "at", "Hz", format="sig:3"),
     ]
-    note = "The drive as it is: dry friction, play, quantisation and limits at work."
+    note = f"The drive as it is: dry friction, play, quantisation and limits at work. {FROM_THE_LARGEST}"
     return doc.listing(
         "What steps end in", result.rests, columns, note, lambda one: "warn" if one.hunting else None
     )
-
-
-def _end(one: Settling) -> str:
-    return one.rest.verdict + (", a limit acting" if one.rest.limited else "")

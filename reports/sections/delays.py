@@ -8,8 +8,6 @@ from actuator_lti.loops.delay_budget import DelayBudget
 from reports import document as doc
 from reports.charts import style
 from reports.charts.paint import HATCHES
-from reports.charts.style import Chart, Panel
-from reports.document_schema import Section
 from reports.sections.names import hertz, loop_words
 
 PARTS = {
@@ -22,8 +20,7 @@ PARTS = {
 }
 
 
-def section(budgets: Mapping[str, DelayBudget]) -> Section:
-    """Make the section from the budget of each loop."""
+def section(budgets: Mapping[str, DelayBudget]) -> doc.Section:
     parts = _parts(budgets)
     columns = [
         doc.of(lambda one: loop_words(one[0]), "loop", "Loop"),
@@ -41,16 +38,16 @@ def section(budgets: Mapping[str, DelayBudget]) -> Section:
     )
     caption = "Lag at the gain crossover of each loop, by cause. The rest to 180° is phase margin."
     blocks = [
-        doc.figure("delay_budget", chart(budgets), caption=caption, alt=f"Stacked bars. {caption}"),
+        doc.figure("delay_budget", chart(budgets), caption),
         doc.listing("Phase at the gain crossover", budgets.items(), columns, note),
     ]
     intro = "The phase at the gain crossover of each loop, divided into its causes."
     return doc.section("delays", "Delay budget", blocks, result=_result(budgets), intro=intro)
 
 
-def chart(budgets: Mapping[str, DelayBudget]) -> Chart:
+def chart(budgets: Mapping[str, DelayBudget]) -> style.Chart:
     """Draw lag to the right and lead to the left of zero; what is left to 180 deg is phase margin."""
-    made = Chart(width=style.WIDE, height=70.0 + 48.0 * len(budgets), legend=True)
+    made = style.Chart(width=style.WIDE, height=70.0 + 48.0 * len(budgets), legend=True)
     words = "lag at the gain crossover, deg (lead left of zero; at 180 deg no phase margin is left)"
     panel = made.panel(words)
     parts = _parts(budgets)
@@ -70,8 +67,7 @@ def chart(budgets: Mapping[str, DelayBudget]) -> Chart:
     return made
 
 
-def _bar(panel: Panel, row: float, parts: Mapping[str, float], names: list[str]) -> None:
-    """Draw the parts of one loop and their sum."""
+def _bar(panel: style.Panel, row: float, parts: Mapping[str, float], names: list[str]) -> None:
     ends = {1: 0.0, -1: 0.0}
     for name, deg in parts.items():
         side, k = (1 if deg >= 0 else -1), names.index(name)

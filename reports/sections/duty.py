@@ -9,15 +9,12 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.duty import Duty, Heating
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart, Panel
-from reports.document_schema import Block, Row, Section
 from reports.sections.names import load_unit, output_unit
 
 _SHOWN = 400
 
 
-def section(result: Duty) -> Section:
-    """Make the section from `analyses.duty.duty`."""
+def section(result: Duty) -> doc.Section:
     intro = (
         "The motion is simulated until it is steady, friction, play and limits at work, the overload "
         "protection left out. Its current, repeated without end, heats the winding by its mean copper loss "
@@ -74,10 +71,10 @@ def _note(result: Duty) -> str:
     return " ".join(words)
 
 
-def _rows(result: Duty) -> list[Row]:
+def _rows(result: Duty) -> list[doc.Row]:
     over, heat = result.overload, result.heating
     peak = result.design.limits.peak_current_A
-    rows: list[Row] = [
+    rows: list[doc.Row] = [
         _row("current, rms", result.rms_A, result.continuous_A, "A"),
         _row("current in motion, rms", result.moving_rms_A, math.inf, "A"),
     ]
@@ -93,13 +90,13 @@ def _rows(result: Duty) -> list[Row]:
 
 def _row(
     what: str, value: float, limit: float, unit: str, when: float | None = None, *, judged: bool = True
-) -> Row:
+) -> doc.Row:
     status = "fail" if judged and value > limit else None
     return {"what": what, "value": value, "limit": limit, "unit": unit, "when": when, "_status": status}
 
 
-def _figure(result: Duty) -> Block:
-    chart = Chart(width=style.WIDE, height=320.0)
+def _figure(result: Duty) -> doc.Block:
+    chart = style.Chart(width=style.WIDE, height=320.0)
     panel = chart.panel(y="current, A", title="One period of the motion")
     every, last = max(1, len(result.time_s) // _SHOWN), float(result.time_s[-1])
     scale = style.time_axis(panel, last)
@@ -115,7 +112,7 @@ def _figure(result: Duty) -> Block:
     return doc.figure("duty", chart, caption)
 
 
-def _winding(panel: Panel, heat: Heating) -> None:
+def _winding(panel: style.Panel, heat: Heating) -> None:
     scale = style.time_axis(panel, float(heat.time_s[-1]))
     panel.curve(heat.time_s * scale, heat.temperature_degC, "winding", **style.series(1))
     if math.isfinite(heat.limit_degC):

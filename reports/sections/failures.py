@@ -6,12 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from actuator_lti.asked.verdict import Verdict
 from analyses.failures import Failures
-from analyses.motion.settling import noticed, words
+from analyses.motion.settling import noticed, told, verdict_of
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Section, Severity
 from reports.numbers import short
 from reports.sections.names import load_unit, output_unit
 
@@ -27,8 +26,7 @@ NAMES = {
 _SHOWN = 400
 
 
-def section(result: Failures) -> Section:
-    """Make the section from `analyses.failures.failures`."""
+def section(result: Failures) -> doc.Section:
     scale, unit = output_unit(result.design.axis)
     load, asked = load_unit(result.design), result.asked
     stop, near = f"{scale * asked.stop_rad:.4g} {unit}", f"{scale * asked.deflection_rad:.4g} {unit}"
@@ -36,7 +34,7 @@ def section(result: Failures) -> Section:
     swing = noticed(result.design, result.before)
     held = "has come to rest"
     if swing is not None:
-        held = f"does not come to rest ({words(swing.rest, scale, unit)})"
+        held = f"does not come to rest ({told(result.design, swing, scale, unit)})"
     intro = (
         f"Each failure is simulated from a drive that {held} under {asked.load_Nm:g} {load} (positive "
         f"pushes forward). Deflection counts from where the output was; the stop is {stop} away, and "
@@ -47,8 +45,10 @@ def section(result: Failures) -> Section:
     blocks += [
         doc.text(f"{NAMES[name]}: not for this drive, as {why}.") for name, why in result.left_out.items()
     ]
-    told: Severity = "info" if swing is None else "warn"
-    return doc.section("failures", "Failure cases", blocks, result=summary(result), intro=intro, told=told)
+    severity: doc.Severity = "info" if verdict_of(result.design, swing) is Verdict.MET else "warn"
+    return doc.section(
+        "failures", "Failure cases", blocks, result=summary(result), intro=intro, told=severity
+    )
 
 
 def summary(result: Failures) -> str:
@@ -58,12 +58,12 @@ def summary(result: Failures) -> str:
     size = short(scale * worst.at_detection_rad, 3)
     when = f"{1e3 * result.asked.detection_s:.4g} ms"
     stop = "" if worst.to_stop_s is None else f"; it reaches the stop after {1e3 * worst.to_stop_s:.3g} ms"
-    if noticed(result.design, result.before) is not None:
+    if verdict_of(result.design, noticed(result.design, result.before)) is not Verdict.MET:
         stop += "; the drive does not come to rest before it"
     return f"{NAMES[worst.name]} moves the output most until it is detected: {size} {unit} in {when}{stop}."
 
 
-def _table(result: Failures, scale: float, unit: str, near: str) -> Block:
+def _table(result: Failures, scale: float, unit: str, near: str) -> doc.Block:
     time: dict[str, Any] = {"unit": "ms", "scale": 1e3, "format": "ms:3"}
     most: dict[str, Any] = {"format": "sig:3", "better": -1}
     has_current = result.design.motor.has_electrical_dynamics
@@ -83,14 +83,14 @@ def _table(result: Failures, scale: float, unit: str, near: str) -> Block:
     return doc.listing("Failure cases", result.cases, columns, note)
 
 
-def _figure(result: Failures, scale: float, unit: str, load: str) -> Block:
+def _figure(result: Failures, scale: float, unit: str, load: str) -> doc.Block:
     asked = result.asked
     stops = [case.to_stop_s for case in result.cases if case.to_stop_s is not None]
     last = min(asked.watched_s, 1.2 * max([2.0 * asked.detection_s, *stops]))
     shown = [case for case in result.cases if case.name != "oscillatory-command"]  # a band of ink
     counts = [int(np.searchsorted(case.time_s, last)) for case in shown]
     last = max(float(case.time_s[count - 1]) for case, count in zip(shown, counts, strict=True))
-    chart = Chart(width=style.WIDE, height=460.0, legend=True)
+    chart = style.Chart(width=style.WIDE, height=460.0, legend=True)
     top, bottom = chart.column(1.2, 1.0)
     per_s = style.time_axis(bottom, last)
     for k, (case, count) in enumerate(zip(shown, counts, strict=True)):
@@ -104,4 +104,4 @@ def _figure(result: Failures, scale: float, unit: str, load: str) -> Block:
     top.y.label, bottom.y.label = f"deflection, {unit}", f"moment, {load}"
     bottom.x.limits(0.0, last * per_s)
     caption = "Deflection of the output and moment in the train after each failure but the oscillation."
-    return doc.figure("failures", chart, caption=caption, alt=f"Two panels. {caption}")
+    return doc.figure("failures", chart, caption)

@@ -1,21 +1,20 @@
-"""The three linear forms side by side: what sampling and delay cost."""
+"""The loops seen from other sides: in three forms, at every break point, at every operating point."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from actuator_lti.design.model import Design
 from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_survey import BreakPoint, OperatingPointFigures
 from analyses.linear.responses import curve, frequency_grid
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Row, Section
 from reports.numbers import to_minus
-from reports.sections.loop import nyquist_hz
-from reports.sections.loop_charts import both
-from reports.sections.margins import evidence_notes, margin_row, response_row
-from reports.sections.names import FORMS, figure_column, loop_words
+from reports.sections.loop_charts import both, nyquist_hz
+from reports.sections.margins import MARGIN_COLUMNS, evidence_notes, margin_row, response_row, worst_status
+from reports.sections.names import FORMS, POINTS, figure_column, load_unit, loop_words
 
 COLUMNS = [
     doc.column("loop", "Loop"),
@@ -31,7 +30,7 @@ COLUMNS = [
 ]
 
 
-def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[str] = ()) -> Section:
+def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[str] = ()) -> doc.Section:
     """Make the section from the figures by form and loop; ``refused`` says which are missing, and why."""
     rows = [
         _row(name, form, result[name], forms.get("ideal", {}).get(name))
@@ -61,13 +60,14 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
     row = min(costs, key=lambda row: float(row["phase_cost_deg"]))
     change = to_minus(f"{row['phase_cost_deg']:+.1f}")
     most = ", the largest change of all loops" if len(costs) > 1 else ""
+    loop = row["loop"].lower() + "," * ("," in row["loop"])
     return (
-        f"Sampling and delay change the phase margin of the {row['loop'].lower()} by {change} deg{most}; "
+        f"Sampling and delay change the phase margin of the {loop} by {change} deg{most}; "
         "its crossover moves, too."
     )
 
 
-def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) -> Row:
+def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) -> doc.Row:
     """Give one line, with the phase margin lost against the ideal form."""
     margins, response = margin_row(figures), response_row(figures)
     reference = margin_row(ideal)["phase_margin_deg"] if ideal else None
@@ -77,9 +77,8 @@ def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) 
     return row | ({"_status": "fail"} if figures.sound is False else {})
 
 
-def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> Block:
-    """Make the overlaid open-loop Bode figures of all loops."""
-    chart = Chart(width=style.WIDE, height=400.0)
+def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> doc.Block:
+    chart = style.Chart(width=style.WIDE, height=400.0)
     for name, sampled in forms["sampled"].items():
         grid = frequency_grid(sampled, points=130)
         curves = [
@@ -92,4 +91,147 @@ def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> Block:
         top.rule_y(0.0, colour=style.INK)
         bottom.rule_y(-180.0, colour=style.INK)
     caption = "Open loops in the three forms, each up to its Nyquist frequency (dotted line)."
-    return doc.figure("forms", chart, caption=caption, alt=f"Bode diagrams. {caption}")
+    return doc.figure("forms", chart, caption)
+
+
+BREAK_COLUMNS = [
+    doc.column("point", "Cut at"),
+    doc.column("others", "Other loops"),
+    *(c for c in MARGIN_COLUMNS if c["key"] not in ("loop", "delay_margin_samples", "disk_margin")),
+]
+EXACT_COLUMNS = [
+    doc.of(lambda pair: POINTS.get(pair[0], pair[0]), "point", "Cut at"),
+    doc.of(lambda pair: pair[1].gain_upper, "gain_upper", "Gain may grow by", "×", format="sig:4"),
+    doc.of(lambda pair: pair[1].gain_lower or None, "gain_lower", "and fall to", "×", format="sig:3"),
+    doc.of(lambda pair: pair[1].delay_s, "delay_ms", "Delay may grow by", "ms", scale=1e3, format="sig:3"),
+]
+
+
+def break_points(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures]) -> doc.Section:
+    """Make the section; ``stages`` are the loops with the outer ones open."""
+    rows: list[doc.Row] = []
+    reasons: list[str] = []
+    for name, point in points.items():
+        own = [result for result in stages.values() if result.loop.break_point == name]
+        rows += [_break_point(name, "outer ones open", result) for result in own]
+        rows.append(_break_point(name, "all closed", point.figures))
+        reasons += [f"{POINTS.get(name, name)}: {point.reason}."] if point.reason else []
+    note = "The outermost loop has no other loop outside it, so its two lines agree."
+    blocks = [doc.table("Break-point matrix", BREAK_COLUMNS, rows, note)]
+    there = {POINTS.get(name, name): one.figures for name, one in points.items() if one.figures is not None}
+    reasons += evidence_notes(there)
+    blocks += [doc.text(reason) for reason in reasons]
+    exact = [(name, point.exact) for name, point in points.items() if point.exact is not None]
+    if exact:
+        words = (
+            "A fast loop cut inside slower ones is periodically time-varying; the rows above describe its "
+            "fundamental. The exact stability limits follow from the eigenvalues over one period."
+        )
+        blocks += [doc.text(words), doc.listing("Stability limits of periodic loops", exact, EXACT_COLUMNS)]
+    intro = (
+        "In the finished drive a gain error or a delay occurs at one point, with every other loop closed. "
+        "The matrix shows what the drive tolerates at each point."
+    )
+    status = worst_status([point.stable for point in points.values()])
+    return doc.section(
+        "break-points", "Break-point matrix", blocks, result=_most_sensitive(rows), intro=intro, status=status
+    )
+
+
+def _most_sensitive(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Say where the finished drive tolerates least."""
+    closed = [row for row in rows if row["others"] == "all closed" and row.get("s_peak_db") is not None]
+    if not closed:
+        return "No margin of the finished drive is known."
+    row = max(closed, key=lambda row: float(row["s_peak_db"]))
+    return (
+        f"With all loops closed the drive is most sensitive at the {row['point']}: peak of S "
+        f"{row['s_peak_db']:.2f} dB."
+    )
+
+
+def _break_point(name: str, others: str, figures: LoopFigures | None) -> doc.Row:
+    if figures is None:
+        return {"point": POINTS.get(name, name), "others": others, "stable": "see below"}
+    return {"point": POINTS.get(name, name), "others": others, **margin_row(figures)}
+
+
+def operating_points(points: Sequence[OperatingPointFigures], design: Design) -> doc.Section:
+    """Make the section; one line an operating point, three figures a loop."""
+    names = list(dict.fromkeys(name for point in points for name in point.figures))
+    linear = design.axis == "linear"
+    columns = [
+        doc.column("point", "Operating point"),
+        doc.column("load", "Load", load_unit(design), format="short:3"),
+        doc.column("slope", "Friction slope", "N s/m" if linear else "mN m s/rad", format="sig:3"),
+    ]
+    for name in names:
+        label = name.capitalize()
+        columns += [
+            figure_column("phase_margin", f"{name}_phase", label=f"{label} PM", format="fix:1"),
+            figure_column("gain_margin", f"{name}_gain", label=f"{label} GM", format="fix:1"),
+            figure_column(
+                "bandwidth", f"{name}_band", label=f"{label} −3\N{NO-BREAK SPACE}dB", format="sig:3"
+            ),
+        ]
+    rows = [_operating_point(point, 1.0 if linear else 1e3) for point in points]
+    note = (
+        "Sliding: the dry part is a constant torque and leaves no trace in the loops, whatever the load. "
+        "At rest: slope Cv + Tc/w_s of the smoothed law. Speed amplitude W: describing function, "
+        "slope Cv + 4 Tc/(π W); Tc = C0 + CM |load|."
+    )
+    loops = [(f"{point.label}, {name} loop", f) for point in points for name, f in point.figures.items()]
+    reasons = list(dict.fromkeys(reason for one in loops for reason in evidence_notes(dict([one]))))
+    note += " All margins are certified" + (" but those named below." if reasons else ".")
+    blocks = [
+        doc.table(
+            "PM: phase margin, GM: gain margin, −3 dB: bandwidth (position: to the command)",
+            columns,
+            rows,
+            note,
+        )
+    ]
+    blocks += [doc.text(reason) for reason in reasons]
+    intro = "The effect of friction on small motions depends on speed and load."
+    return doc.section("operating-points", "Operating points", blocks, result=_spread(points), intro=intro)
+
+
+def _spread(points: Sequence[OperatingPointFigures]) -> str:
+    """Say the smallest phase margin over all operating points."""
+    unstable = [_where(point) for point in points if any(f.sound is False for f in point.figures.values())]
+    if unstable:
+        return f"Unstable at {len(unstable)} of {len(points)} operating points: {'; '.join(unstable)}."
+    unknown = [_where(point) for point in points if any(f.sound is None for f in point.figures.values())]
+    if unknown:
+        count = f"{len(unknown)} of {len(points)} operating points"
+        return f"Stability is not known at {count}: {'; '.join(unknown)}."
+    result = [
+        (row["phase_margin_deg"], name, _where(point))
+        for point in points
+        for name, figures in point.figures.items()
+        if (row := margin_row(figures))["phase_margin_deg"] is not None
+    ]
+    if not result:
+        return f"Stable at all {len(points)} operating points."
+    deg, name, label = min(result, key=lambda each: float(each[0]))
+    return (
+        f"Stable at all {len(points)} operating points; the smallest phase margin is {deg:.1f} deg "
+        f"({name} loop, {label})."
+    )
+
+
+def _where(point: OperatingPointFigures) -> str:
+    return point.place or point.label
+
+
+def _operating_point(point: OperatingPointFigures, scale: float) -> doc.Row:
+    row: doc.Row = {"point": point.label, "slope": point.slope_Nms_rad * scale}
+    row["load"] = "any" if point.load_Nm is None else point.load_Nm
+    for name, result in point.figures.items():
+        margins, response = margin_row(result), response_row(result)
+        row[f"{name}_phase"] = margins["phase_margin_deg"] if result.stable else result.margins.verdict
+        row[f"{name}_gain"] = margins["gain_margin_db"]
+        row[f"{name}_band"] = response["minus3db_hz"] or None
+    if any(result.sound is False for result in point.figures.values()):
+        row["_status"] = "fail"
+    return row

@@ -10,20 +10,26 @@ from actuator_lti.design.model import Command, Design
 from analyses.friction_effects import FrictionEffects
 from analyses.friction_effects.cycles import LimitCycles
 from analyses.friction_effects.result import FrictionPoint
-from analyses.motion.settling import Settling, accepted_rad, judged_by, noticed, verdict_of
+from analyses.motion.settling import (
+    FROM_THE_LARGEST,
+    Settling,
+    accepted_rad,
+    noticed,
+    told,
+    verdict_of,
+)
 from analyses.motion.settling import words as end_words
+from nonlinear.bench.on_the_bench import quiet
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Section, Severity, Status, VerdictItem
 from reports.sections.names import fine_unit, load_unit
 from reports.verdict_summary import tally
 
+ROUNDING = 1e-9  # of the triangle's amplitude: a width that is none
 LEFT = 1e-3  # of a step: an error that is spoken of
 
 
-def section(result: FrictionEffects) -> Section:
-    """Make the section from `analyses.friction_effects.friction_effects`."""
+def section(result: FrictionEffects) -> doc.Section:
     title = "Dry friction at small signals"
     if not result.points:
         return doc.section("friction-effects", title, [], result=f"Not applicable: {result.reason}.")
@@ -36,30 +42,32 @@ def section(result: FrictionEffects) -> Section:
     blocks += [_settling_table(result, fine, small, load)]
     intro = (
         "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion. "
-        "Friction alone: counts and noise of the sensors are left out here."
+        "Friction alone: counts and noise of the sensors are left out."
     )
-    status: Status = tally(items).role
-    severity: Severity = "fail" if status == "fail" else "warn" if status == "warn" else "info"
+    status: doc.Status = tally(items).role
+    severity: doc.Severity = "fail" if status == "fail" else "warn" if status == "warn" else "info"
     words = _summary(result, fine, small)
     return doc.section(
         "friction-effects", title, blocks, result=words, intro=intro, status=status, told=severity
     )
 
 
-def _cycle_verdict(design: Design, point: FrictionPoint, fine: float, small: str, load: str) -> VerdictItem:
+def _cycle_verdict(
+    design: Design, point: FrictionPoint, fine: float, small: str, load: str
+) -> doc.VerdictItem:
     """Say whether friction keeps the drive hunting, and whether that was predicted."""
     cycles, swing = point.cycles, noticed(design, point.cycles.settlings)
     predicted = _predicted_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
         result = f"at rest after steps of {len(cycles.settlings)} sizes"
     else:
-        result = "; ".join(filter(None, (end_words(swing.rest, fine, small), judged_by(design))))
+        result = told(design, swing, fine, small)
     agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
-        f"No limit cycle of friction after small steps at {point.load_Nm:g} {load}",
+        f"No limit cycle of friction after steps at {point.load_Nm:g} {load}",
         value=0.0 if swing is None else fine * swing.swing_rad,
         limit=fine * accepted_rad(design),
         unit=small,
@@ -94,30 +102,31 @@ def _slip_words(cycles: LimitCycles, fine: float, small: str) -> str:
     return f"stick-slip analysis: ±{size:.3g} {small} at {one.frequency_hz:.3g} Hz{kind}"
 
 
-def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> Block:
-    """List thresholds and lost motion by load."""
+def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> doc.Block:
     torque, torque_scale = ("mN m", 1e3) if load == "N m" else ("N", 1.0)
     size: dict[str, Any] = {"unit": small, "scale": fine, "format": "sig:3"}
     wait: dict[str, Any] = {"unit": "ms", "scale": 1e3, "format": "sig:3"}
     columns = [
         doc.of("load_Nm", "load", "Load", load, format="short:4"),
         doc.of("dry_torque_Nm", "dry", "Dry friction, motor", torque, scale=torque_scale, format="sig:3"),
-        doc.of("threshold.static.forward_rad", "threshold", "Step that moves immediately", **size),
+        doc.of("threshold.static.forward_rad", "threshold", "Step that starts the motor at once", **size),
         doc.of("threshold.simulated_rad", "simulated", "simulated", **size),
         doc.of(lambda point: _wait(point, "predicted_s"), "wait", "Wait at half of it", **wait),
         doc.of(lambda point: _wait(point, "simulated_s"), "waited", "simulated", **wait),
         doc.of(lambda point: _lost(point, "lost_motion_rad"), "width", "Lost at a reversal", **size),
         doc.of(lambda point: _lost(point, "predicted_rad"), "predicted", "predicted", **size),
-        doc.of("hysteresis.largest_rad", "largest", "Largest effect of friction", **size),
+        doc.of("hysteresis.largest_rad", "largest", f"Largest effect of {_cause(result)}", **size),
     ]
     note = (
         f"The {result.integrator} controller integrates: a step below the threshold moves the output later"
-        f"{_after(result)}, and motion lost in front of its sensor is recovered. The effect of friction is "
-        "largest just after a reversal."
+        f"{_after(result)}, and motion lost in front of its sensor is recovered{_behind(result)}. The effect "
+        "is largest just after a reversal."
         if result.integrator
-        else "No controller integrates: a step below the threshold never moves the output. Each "
-        "reversal loses 2 Tc over the stiffness."
+        else "No controller integrates: a step below the threshold never moves the output. Each reversal "
+        f"loses the torque that sliding takes, both ways, over the stiffness{_behind(result)}."
     )
+    if not any(point.threshold for point in result.points):
+        note = "The smoothed law of friction creeps: it has no threshold, and holds no motion at a reversal."
     if result.design.command != Command():
         note += " Steps as they come behind the profile and filter of the command."
     return doc.listing(
@@ -133,6 +142,21 @@ def _after(result: FrictionEffects) -> str:
     return ", after Tn (A0/A − 1)" if alone and not kicks else ""
 
 
+def _cause(result: FrictionEffects) -> str:
+    """What loses motion at a reversal."""
+    coupling = result.design.coupling
+    return "friction" if coupling is None or coupling.play_rad == 0.0 else "friction and play"
+
+
+def _behind(result: FrictionEffects) -> str:
+    """What is lost behind the sensor of the motor."""
+    design = result.design
+    if design.coupling is None or design.controller.position_loop.sensor == "output":
+        return ""
+    play = " and its play are" if design.coupling.play_rad else " is"
+    return f"; behind the motor's sensor the spring's twist under the load's dry friction{play} lost"
+
+
 def _wait(point: FrictionPoint, name: str) -> float | None:
     """A time of the wait at half the threshold, where that was waited for."""
     known = point.threshold
@@ -143,12 +167,15 @@ def _wait(point: FrictionPoint, name: str) -> float | None:
 
 
 def _lost(point: FrictionPoint, name: str) -> float | None:
-    """A width of the hysteresis, 0 where it has none."""
-    return None if point.hysteresis is None else max(getattr(point.hysteresis, name) or 0.0, 0.0)
+    """A width of the hysteresis, 0 where rounding leaves it."""
+    loop = point.hysteresis
+    if loop is None:
+        return None
+    width = float(getattr(loop, name))
+    return width if abs(width) > ROUNDING * loop.amplitude_rad else 0.0
 
 
-def _settling_table(result: FrictionEffects, fine: float, small: str, load: str) -> Block:
-    """List the steady-state error after steps."""
+def _settling_table(result: FrictionEffects, fine: float, small: str, load: str) -> doc.Block:
     size: dict[str, Any] = {"unit": small, "scale": fine}
     columns = [
         doc.of(lambda pair: pair[0], "load", "Load", load, format="short:4"),
@@ -159,9 +186,11 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
     ]
     ends = [(point.load_Nm, one) for point in result.points for one in point.cycles.settlings]
     note = (
-        "Two steps at each load; where there is a threshold, one of 0.3 of it, where a cycle is predicted, "
-        "one of its size. Errors below 10⁻⁶ of the step are shown as 0."
+        "At each load steps from small to full deflection; where stick and slip is predicted, one of its "
+        f"size as well. {FROM_THE_LARGEST} Errors below 10⁻⁶ of the step are shown as 0."
     )
+    if quiet(result.design) != result.design:
+        note += " Steps that come to rest are those of the drive as it is, counts of its sensors included."
     return doc.listing(
         "Steady-state error after a step", ends, columns, note,
         lambda pair: "warn" if pair[1].hunting else None,
@@ -172,8 +201,7 @@ def _error(one: Settling) -> float:
     return one.rest.error if abs(one.rest.error) > 1e-6 * one.amplitude_rad else 0.0
 
 
-def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Block | None:
-    """Make the loops and the waiting times."""
+def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> doc.Block | None:
     points = [(f"load {point.load_Nm:g} {load}", point) for point in result.points]
     loops = [(label, one.hysteresis) for label, one in points if one.hysteresis is not None]
     waits = [
@@ -181,7 +209,7 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
     ]
     if not loops:
         return None
-    chart = Chart(width=style.WIDE, height=330.0)
+    chart = style.Chart(width=style.WIDE, height=330.0)
     title = "Position error over a slow triangle of the command"
     panel = chart.panel(f"command, {small}", f"output less command, {small}", title=title, by_point=True)
     for k, (label, loop) in enumerate(loops):
@@ -197,7 +225,9 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> Bloc
         predicted = [1e3 * one.predicted_s for one in waiting]
         panel.curve(sizes, predicted, f"{label}: predicted", **style.series(k))
         panel.points(sizes, seen, f"{label}: simulated", **style.marked(k))
-    caption = "Position error over a slow triangular command; without friction only the small lag remains."
+    caption = (
+        f"Position error over a slow triangular command; without {_cause(result)} only a small lag is left."
+    )
     if waits:
         caption += " Right: a step below the threshold waits until the speed integrator reaches breakaway."
     return doc.figure("hysteresis", chart, caption)
@@ -208,18 +238,18 @@ def _summary(result: FrictionEffects, fine: float, small: str) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
     swing = noticed(result.design, settlings)
     if swing is not None:
-        return f"Friction keeps the drive from rest after a step: {end_words(swing.rest, fine, small)}."
+        return f"Friction keeps the drive from rest after a step: {told(result.design, swing, fine, small)}."
     left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
     does = (
         f"The {result.integrator} controller integrates" if result.integrator else "No controller integrates"
     )
     if left:
-        most = max(left, key=lambda one: abs(one.rest.error))
+        most = max(settlings, key=lambda one: abs(one.rest.error))
         under = f", at a load of {most.load_Nm:g} {load_unit(result.design)}" if most.load_Nm else ""
         return f"{does}; an error of up to {fine * abs(most.rest.error):.3g} {small} is left at rest{under}."
     if not result.integrator:
         return f"{does}; the steps leave no error at rest."
     return (
-        f"After small steps dry friction alone leaves no steady-state error and causes no hunting: the "
+        f"After steps dry friction alone leaves no steady-state error and causes no hunting: the "
         f"{result.integrator} integrator removes the error."
     )

@@ -1,4 +1,4 @@
-"""What the sections of all identifications share: the verdict, and one table of values."""
+"""What sections of records share: parameters, verdict, columns that went in, whether a record is sound."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from collections.abc import Sequence
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
 from analyses.identification.verdict import Identified, Item
+from analyses.records.consistency import Finding
+from analyses.records.inputs import InputUse
 from reports import document as doc
-from reports.document_schema import Block, Row, Section, Status, VerdictItem
 from reports.numbers import show
 
 
 def judged(
-    id: str, title: str, found: Identified, blocks: Sequence[Block], *, result: str, intro: str
-) -> Section:
+    id: str, title: str, found: Identified, blocks: Sequence[doc.Block], *, result: str, intro: str
+) -> doc.Section:
     """Put the section of one kind together: its verdict first, in words and item by item."""
-    status: Status = "pass" if found.passed else "fail"
+    status: doc.Status = "pass" if found.passed else "fail"
     first = [verdict_block(found.items)]
     if not found.passed:
         said = (
@@ -40,12 +41,12 @@ def verdict_words(items: Sequence[Item], result: str) -> str:
     return f"{first.label} fails{why}{more}. {result}"
 
 
-def verdict_block(items: Sequence[Item]) -> Block:
+def verdict_block(items: Sequence[Item]) -> doc.Block:
     """The verdict, item by item; shares in per cent."""
     return doc.verdicts(map(_verdict, items), "bench checks")
 
 
-def _verdict(item: Item) -> VerdictItem:
+def _verdict(item: Item) -> doc.VerdictItem:
     value = None if item.value is None else 100.0 * item.value
     limit = None if item.limit is None else 100.0 * item.limit
     unit, comparison = "" if value is None else "%", "" if limit is None else "<="
@@ -64,8 +65,8 @@ def value_words(fit: Fit, name: str, axis: str = "rotary") -> str:
 
 def parameter_table(
     caption: str, fit: Fit, note: str = "", *, axis: str = "rotary", more: Sequence[doc.Shown] = ()
-) -> Block:
-    """Every value with standard error and 95 % interval; what was fixed, and why.
+) -> doc.Block:
+    """Every value with standard error and 95 % interval; below it what was fixed, and why.
 
     ``more`` are further columns, each with what it shows of a name that was fitted.
     """
@@ -77,17 +78,46 @@ def parameter_table(
         doc.column("high", "to", format="sig:5"),
         doc.column("unit", "Unit"),
         *(column for column, _ in more),
-        *([doc.column("why", "Fixed because")] if fit.fixed else []),
     ]
-    rows: list[Row] = []
+    rows: list[doc.Row] = []
+    kept: list[str] = []
     for name, one in fit.parameters.items():
         known = parameter(name, axis)
-        row: Row = {"name": known.label, "value": known.scale * one.value, "unit": known.unit}
+        row: doc.Row = {"name": known.label, "value": known.scale * one.value, "unit": known.unit}
         if one.interval_95 is None:
-            row["why"] = fit.fixed[name].reason
+            kept.append(f"{known.label}, fixed: {fit.fixed[name].reason}.")
         else:
             low, high = (known.scale * end for end in one.interval_95)
             row |= {"std": known.scale * (one.standard_error or 0.0), "low": low, "high": high}
             row |= {column["key"]: read(name) for column, read in more}
         rows.append(row)
-    return doc.table(caption, columns, rows, note)
+    return doc.table(caption, columns, rows, " ".join([*kept, note]).strip())
+
+
+def input_table(caption: str, inputs: Sequence[InputUse]) -> doc.Block:
+    """The columns of files: meaning, unit, range in SI, whether each is used and why not."""
+    columns = [
+        *([doc.of("file", "file", "File")] if any(one.file for one in inputs) else []),
+        doc.of("column", "column", "Column"),
+        doc.of("meaning", "meaning", "Meaning"),
+        doc.of("unit", "unit", "Unit read"),
+        doc.of("low", "low", "From", format="sig:4"),
+        doc.of("high", "high", "to", format="sig:4"),
+        doc.of("si", "si", "in"),
+        doc.of("use", "use", "Used"),
+    ]
+    return doc.listing(caption, inputs, columns, status=lambda one: None if one.is_used else "warn")
+
+
+def finding_table(record: str, findings: Sequence[Finding]) -> doc.Block:
+    """Whether a record agrees with itself and with the design's limits."""
+    words = {True: "yes", False: "NO", None: "not told"}
+    columns = [
+        doc.of("subject", "subject", "Looked at"),
+        doc.of(lambda one: words[one.passed], "state", "Agrees"),
+        doc.of("text", "text", "Found"),
+    ]
+    return doc.listing(
+        f"Does {record} agree with itself and the design?", findings, columns,
+        status=lambda one: "info" if one.passed is None else "pass" if one.passed else "fail",
+    )  # fmt: skip

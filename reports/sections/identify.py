@@ -1,47 +1,172 @@
-"""An identification of any kind: its section, and the design that it writes."""
+"""An identification of any kind: its section, and the design that it writes; a plan, a frequency response."""
 
 from __future__ import annotations
 
+from itertools import groupby
 from pathlib import Path
 
+import numpy as np
+
 from actuator_lti.files.atomic import write_text
+from analyses.estimation.parameters import parameter
 from analyses.identification.bench import BenchResult
+from analyses.identification.frequency import response
 from analyses.identification.frequency_bench import FrequencyResult
 from analyses.identification.measured_response import ResponseResult
 from analyses.identification.plan import Plan
 from analyses.identification.run import CampaignAnswer
+from analyses.identification.two_mass import NAMES, angle_responses
 from analyses.identification.verdict import Identified
-from reports.document_schema import Section
-from reports.sections import identify_campaign, identify_plan, identify_records, identify_response
+from reports import document as doc
+from reports.charts import style
+from reports.sections import identify_campaign, identify_records
+from reports.sections.identified import finding_table, input_table, judged, parameter_table, value_words
 
 
-def section(result: BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan) -> Section:
-    """Make the section."""
+def section(result: BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan) -> doc.Section:
     if isinstance(result, Plan):
-        return identify_plan.section(result)
+        return _plan(result)
     if isinstance(result, BenchResult):
         return identify_records.section(result)
     if isinstance(result, FrequencyResult):
-        return identify_response.section(result)
+        return _two_mass(result)
     if isinstance(result, ResponseResult):
-        return identify_response.of_loop(result)
+        return _of_loop(result)
     return identify_campaign.section(result)
 
 
 def write(result: Identified | Plan, folder: Path | None) -> list[str]:
     """Write the identified design, where all checks pass or it was accepted; of a plan the command."""
+    if folder is None:
+        return []
     if isinstance(result, Plan):
-        return [] if folder is None else [_command(result, folder / f"{result.design.name}-plan.csv")]
-    if folder is None or not (result.passed or result.accepted):
+        path = folder / f"{result.design.name}-plan.csv"
+        name = "position_reference_m" if result.design.axis == "linear" else "reference_rad"  # as in a record
+        rows = zip(result.time_s.tolist(), result.command.tolist(), strict=True)
+        write_text(path, f"time_s,{name}\n" + "".join(f"{t:.3f},{value:.9g}\n" for t, value in rows))
+        return [str(path)]
+    if not (result.passed or result.accepted):
         return []
     path = folder / f"{result.design.name}-identified.toml"
     write_text(path, result.text)
     return [str(path)]
 
 
-def _command(plan: Plan, path: Path) -> str:
-    """The command as a file for the drive, under the name by which a record has it."""
-    name = "position_reference_m" if plan.design.axis == "linear" else "reference_rad"
-    rows = zip(plan.time_s.tolist(), plan.command.tolist(), strict=True)
-    write_text(path, f"time_s,{name}\n" + "".join(f"{t:.3f},{value:.9g}\n" for t, value in rows))
-    return str(path)
+NEXT = "What the records at hand tell is counted; these motions are what to measure next."
+
+
+def _plan(plan: Plan) -> doc.Section:
+    axis = plan.design.axis
+    unit, rate = ("m", "m/s") if axis == "linear" else ("rad", "rad/s")
+    drive = "V" if plan.design.effective_motor.torque_constant_Nm_A is None else "A"
+    groups = [(next(same), 1 + sum(1 for _ in same)) for _, same in groupby(plan.segments, key=id)]
+    columns = [
+        doc.of(lambda row: row[1], "times", "Times", format="int"),
+        doc.of(lambda row: row[0].shape, "shape", "Motion of 4 s"),
+        doc.of(lambda row: row[0].cycles / 4.0, "frequency", "Frequency", "Hz", format="sig:3"),
+        doc.of(lambda row: row[0].amplitude, "amplitude", "Amplitude, output", unit, format="sig:3"),
+        doc.of(lambda row: row[0].speed, "speed", "Largest motor speed", rate, format="sig:3"),
+        doc.of(lambda row: row[0].drive_rms, "rms", "Drive signal, rms", drive, format="sig:3"),
+    ]
+    share = doc.of(plan.half_widths.get, "share", "Half interval", "%", scale=100.0, format="sig:3")
+    note = "Half interval: over the value; of the offset over the dry friction."
+    lasts = len(plan.command) * 1e-3
+    worst = max(plan.half_widths, key=lambda name: plan.half_widths[name])
+    found = f"{100.0 * plan.half_widths[worst]:.3g} % of the {parameter(worst, axis).label.lower()}"
+    words = (
+        f"{lasts:g} s of motion are expected to tell every value within {100.0 * plan.within:g} % (95 %); "
+        f"the least closely {found}."
+        if plan.passed
+        else f"{lasts:g} s of motion are not enough: {found} is told, {100.0 * plan.within:g} % asked."
+    )
+    expected = "Intervals to be expected, at the design's values"
+    blocks = [
+        parameter_table(expected, plan.expected, note, axis=axis, more=[share]),
+        doc.listing("Motions, in this order", groups, columns),
+    ]
+    if plan.segments:
+        rows = style.kept_rows([plan.command])
+        chart = style.Chart(width=style.WIDE, height=260.0)
+        panel = chart.panel("time, s", f"command at the output, {unit}")
+        panel.curve(plan.time_s[rows], plan.command[rows], "command", colour=style.BLUE)
+        caption = "Command of all motions, one after the other"
+        blocks.append(doc.figure("plan", chart, caption))
+    intro = (
+        f"Motions from rest to rest, as large as the limits of {plan.design.name} allow in simulation, "
+        f"chosen one by one (A-optimal); recorded at 1 kHz with white noise {plan.noise:g} {drive} rms. "
+        f"The covariance is that of the fit itself. {NEXT if plan.measured else ''}"
+    )
+    status: doc.Status = "pass" if plan.passed else "fail"
+    return doc.section("plan", "Plan of motions", blocks, result=words, intro=intro.strip(), status=status)
+
+
+def _two_mass(result: FrequencyResult) -> doc.Section:
+    """Make the section of a frequency response's identification."""
+    fit = result.fit
+    blocks = [
+        parameter_table("Identified two-mass drive", result.found),
+        *_response_figures(result),
+        input_table(f"Inputs: {result.record.name}", result.inputs),
+        *(finding_table(name, rows) for name, rows in result.findings.items()),
+    ]
+    intro = (
+        f"{fit.lines} lines of a period of {result.period_s:g} s, means over {result.lines.periods} periods; "
+        "two-mass drive by maximum likelihood with the noise of every line from the spectrum beside it. "
+        f"Misfit {fit.misfit:.2f} (1: the noise explains the residuals)."
+    )
+    low, high = fit.antiresonance_rad_s[0] / (2.0 * np.pi), fit.resonance_rad_s[0] / (2.0 * np.pi)
+    words = f"Antiresonance {low:.4g} Hz, resonance {high:.4g} Hz, stiffness {value_words(fit, 'stiffness')}"
+    if result.play is not None:
+        words += f", play {2e3 * result.play.half_rad:.3g} mrad"
+    return judged(
+        "frequency-identification", "Two-mass drive", result, blocks, result=f"{words}.", intro=intro
+    )
+
+
+SEEN = {"L": "open loop", "T": "closed loop L/(1+L)", "S": "sensitivity", "closed": "command to output"}
+
+
+def _of_loop(result: ResponseResult) -> doc.Section:
+    """Make the section of a design that was fitted to a measured response of one of its loops."""
+    fit, measured = result.fit, result.measured
+    noise = "no deviations were measured: errors are those of the residual"
+    if fit.misfit is not None:
+        noise = f"misfit {fit.misfit:.2f} (1: the measured deviations explain the residual)"
+    intro = (
+        f"{measured.name}: {len(measured.frequency_hz)} frequencies from {measured.frequency_hz[0]:.4g} to "
+        f"{measured.frequency_hz[-1]:.4g} Hz, {SEEN[result.of]} of {result.loop}; least squares of the exact "
+        f"sampled loop, {noise}."
+    )
+    blocks: list[doc.Block] = [parameter_table("Identified values", fit)]
+    for label, of in (("magnitude", np.abs), ("phase, deg", lambda z: np.degrees(np.angle(z)))):
+        chart = style.Chart(width=style.WIDE, height=280.0)
+        panel = chart.panel("frequency, Hz", label, "xy" if label == "magnitude" else "x")
+        panel.points(measured.frequency_hz, of(measured.response), "measured", colour=style.BLUE)
+        panel.curve(measured.frequency_hz, of(result.modelled), "identified design", **style.series(1))
+        what = label.partition(",")[0].capitalize()
+        words = f"{what} of the {SEEN[result.of]} of {result.loop}, measured and fitted"
+        blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
+    found = "; ".join(f"{parameter(name).key} {value_words(fit, name)}" for name in fit.names)
+    return judged(
+        "response-identification", "Measured response", result, blocks, result=f"{found}.", intro=intro
+    )
+
+
+def _response_figures(result: FrequencyResult) -> list[doc.Block]:
+    """Motor angle (and load angle) over motor torque: measured lines and the model."""
+    lines, fit = result.lines, result.fit
+    own = {name: fit[name] for name in NAMES}
+    model = angle_responses(lines.omega_rad_s, own, fit.reduction, fit.reaction)
+    hertz = lines.omega_rad_s / (2.0 * np.pi)
+    figures = []
+    for k, (signal, label) in enumerate((("angle", "motor angle"), ("load_angle", "load angle"))):
+        if signal not in lines.names:
+            continue
+        measured, _ = response(lines, signal, lines.names[0])
+        chart = style.Chart(width=style.WIDE, height=320.0)
+        panel = chart.panel("frequency, Hz", f"{label} over torque, rad/(N m)", "xy")
+        panel.points(hertz, np.abs(measured), "measured", colour=style.BLUE)
+        panel.curve(hertz, np.abs(model[k]), "two-mass model", **style.series(1))
+        caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
+        figures.append(doc.figure("response", chart, caption))
+    return figures

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import groupby
 
 import numpy as np
@@ -13,7 +12,6 @@ from analyses.identification.richer import LawScore, RicherLaws
 from analyses.identification.run import CampaignAnswer
 from analyses.identification.surface_fit import SurfaceFit
 from reports import document as doc
-from reports.document_schema import Block, Row, Section
 from reports.sections.campaign_figures import (
     NAMES,
     region_figure,
@@ -21,12 +19,10 @@ from reports.sections.campaign_figures import (
     surface_figure,
     window_figures,
 )
-from reports.sections.identified import judged, parameter_table, value_words
-from reports.sections.record_tables import input_table
+from reports.sections.identified import input_table, judged, parameter_table, value_words
 
 
-def section(answer: CampaignAnswer) -> Section:
-    """Make the section of a campaign's result."""
+def section(answer: CampaignAnswer) -> doc.Section:
     result = answer.result
     fit = result.fit
     blocks = [
@@ -61,7 +57,7 @@ def _intro(result: CampaignResult) -> str:
     )
 
 
-def coefficient_table(fit: SurfaceFit) -> Block:
+def coefficient_table(fit: SurfaceFit) -> doc.Block:
     """Values, standard errors, 95 % intervals, and how they go together."""
     random = np.diag(fit.random_covariance) / np.maximum(np.diag(fit.covariance), 1e-300)
     scatter = dict(zip(NAMES, (100.0 * random).tolist(), strict=True))
@@ -76,7 +72,7 @@ def coefficient_table(fit: SurfaceFit) -> Block:
     return parameter_table("Friction coefficients", fit, note, more=more)
 
 
-def contribution_table(answer: CampaignAnswer) -> Block:
+def contribution_table(answer: CampaignAnswer) -> doc.Block:
     """Table 1 of the paper."""
     terms = {"C0": "C0", "Cv": "Cv w", "CM": "CM |M_ext|"}
     columns = [
@@ -89,7 +85,7 @@ def contribution_table(answer: CampaignAnswer) -> Block:
     return doc.listing(caption, answer.shares, columns)
 
 
-def shared_table(fit: SurfaceFit) -> Block:
+def shared_table(fit: SurfaceFit) -> doc.Block:
     """What the bound of each shared error does to each coefficient."""
     columns = [doc.column("name", "Systematic error, at its bound")]
     columns += [doc.column(name, name, "%", format="fix:3") for name in NAMES]
@@ -104,11 +100,8 @@ def shared_table(fit: SurfaceFit) -> Block:
     return doc.table("Systematic errors", columns, rows, note)
 
 
-def law_table(laws: RicherLaws) -> Block:
+def law_table(laws: RicherLaws) -> doc.Block:
     """Richer laws by cross-validation."""
-
-    def shown(name: str, scale: float) -> Callable[[LawScore], float | None]:
-        return lambda one: scale * getattr(one, name) if one.possible else None
 
     def verdict(one: LawScore) -> str:
         return "–" if one.name == "plain" else "yes" if one.warranted else one.reason or "no"
@@ -116,9 +109,9 @@ def law_table(laws: RicherLaws) -> Block:
     columns = [
         doc.of("name", "name", "Law"),
         doc.of("formula", "formula", "Terms"),
-        doc.of(shown("error_Nm", 1e6), "error", "Error, unseen runs", "µN m", format="sig:3"),
-        doc.of(shown("gain", 100.0), "gain", "Squared error less by", "%", format="fix:1"),
-        doc.of(shown("gain_std", 100.0), "std", "± standard error", "%", format="fix:1"),
+        doc.of("error_Nm", "error", "Error, unseen runs", "µN m", scale=1e6, format="sig:3"),
+        doc.of("gain", "gain", "Squared error less by", "%", scale=100.0, format="fix:1"),
+        doc.of("gain_std", "std", "± standard error", "%", scale=100.0, format="fix:1"),
         doc.of(verdict, "verdict", "Warranted"),
     ]
     note = (
@@ -128,7 +121,7 @@ def law_table(laws: RicherLaws) -> Block:
     return doc.listing("Is a richer law warranted?", laws.scores, columns, note)
 
 
-def suggestion_blocks(suggestion: CampaignSuggestion) -> list[Block]:
+def suggestion_blocks(suggestion: CampaignSuggestion) -> list[doc.Block]:
     """What to measure next, and for which margins."""
     columns = [
         doc.column("order", "Run"),
@@ -160,9 +153,9 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[Block]:
     ]
 
 
-def _grouped(suggestion: CampaignSuggestion) -> list[Row]:
+def _grouped(suggestion: CampaignSuggestion) -> list[doc.Row]:
     """Suggested runs, the same point several times in one row."""
-    rows: list[Row] = []
+    rows: list[doc.Row] = []
     for point, runs in groupby(suggestion.runs, key=lambda run: (run.speed_rad_s, run.load_Nm)):
         same = list(runs)
         first, last = same[0].order, same[-1].order
@@ -173,7 +166,7 @@ def _grouped(suggestion: CampaignSuggestion) -> list[Row]:
     return rows
 
 
-def account_blocks(result: CampaignResult) -> list[Block]:
+def account_blocks(result: CampaignResult) -> list[doc.Block]:
     """Outliers and runs set aside, by name."""
     outlier = [
         doc.of("run", "run", "Outlier, run"),
@@ -191,7 +184,7 @@ def account_blocks(result: CampaignResult) -> list[Block]:
     ]
 
 
-def run_table(result: CampaignResult) -> Block:
+def run_table(result: CampaignResult) -> doc.Block:
     """One row a run: means, window, rows, clock."""
     records = {run.id: run.record for run in result.imported.runs}
     fit = result.fit

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from analyses.estimation.parameters import parameter
 from analyses.identification.bench import BenchResult
 from analyses.identification.design_values import DesignValue
-from analyses.identification.joint_model import JointModel
+from analyses.identification.drive_constant import given_constant
+from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.output_error import OutputErrorResult
+from analyses.identification.residuals import ResidualTest
 from reports import document as doc
-from reports.document_schema import Block, Section
-from reports.sections import residuals
-from reports.sections.identified import judged, parameter_table, value_words
-from reports.sections.record_tables import finding_table, input_table
+from reports.charts import style
+from reports.numbers import show
+from reports.sections.identified import finding_table, input_table, judged, parameter_table, value_words
 
 
-def section(result: BenchResult) -> Section:
-    """Make the section of an identification from records."""
+def section(result: BenchResult) -> doc.Section:
     axis, model = result.design.axis, result.model
     blocks = [_parameters(model, axis)]
     if result.design_values:
@@ -39,7 +41,7 @@ def section(result: BenchResult) -> Section:
             *[doc.text(f"{part.name}: {note}") for note in (str(record.counts), *part.notes)],
         ]
     blocks += [finding_table(record.name, result.findings[record.name]) for record in result.validation]
-    blocks += residuals.blocks(model, result.residual_tests, axis)
+    blocks += residual_blocks(model, result.residual_tests, axis)
     return judged(
         "dynamic-identification", "Dynamic identification", result, blocks,
         result=_result(result, axis), intro=_intro(result),
@@ -56,6 +58,11 @@ def _result(result: BenchResult, axis: str) -> str:
         keys = result.refined.names[:3]
         parts = [f"{key} {value_words(result.refined, key, axis)}" for key in keys]
         parts[0] = f"refined by simulation: {parts[0]}"
+    given = given_constant(model)
+    if given is not None and parts:
+        one = parameter(given, axis)
+        name = one.label[:1].lower() + one.label[1:]
+        parts[-1] += f", all at the design's {name}, {show(model[given], 'sig:4')} {one.unit}"
     worst = max(result.resimulated, key=lambda one: one.relative_error)
     met = "The written design meets "
     met += "its records" if len(result.resimulated) > 1 else worst.record
@@ -79,7 +86,7 @@ def _intro(result: BenchResult) -> str:
     )
 
 
-def _parameters(model: JointModel, axis: str) -> Block:
+def _parameters(model: JointModel, axis: str) -> doc.Block:
     """Values, their standard errors as published recipes give them, and as the record really tells."""
     white = dict(zip(model.names, model.white_errors.tolist(), strict=True))
     more = [doc.of(white.get, "white", "Standard error if white", format="sig:4")]
@@ -93,7 +100,7 @@ def _parameters(model: JointModel, axis: str) -> Block:
     return parameter_table("Identified parameters", model, note, axis=axis, more=more)
 
 
-def _against_design(values: Sequence[DesignValue], axis: str) -> Block:
+def _against_design(values: Sequence[DesignValue], axis: str) -> doc.Block:
     """Every number of the design that the records tell, beside what they say."""
     columns = [
         doc.of(lambda one: parameter(one.name, axis).label, "name", "Number"),
@@ -112,7 +119,7 @@ def _against_design(values: Sequence[DesignValue], axis: str) -> Block:
     )  # fmt: skip
 
 
-def _refined(refined: OutputErrorResult, axis: str) -> Block:
+def _refined(refined: OutputErrorResult, axis: str) -> doc.Block:
     """The values refined by simulation, which are those of the design."""
     note = (
         "Simulation with each record's own command: the relative error of the signal that is fitted falls "
@@ -125,7 +132,7 @@ def _refined(refined: OutputErrorResult, axis: str) -> Block:
     return parameter_table("Refined by simulation", refined, note, axis=axis)
 
 
-def law_table(result: BenchResult, axis: str) -> Block:
+def law_table(result: BenchResult, axis: str) -> doc.Block:
     """The friction laws that were tried, by the Bayesian criterion."""
     unit = "m/s" if axis == "linear" else "rad/s"
     columns = [
@@ -147,7 +154,7 @@ def law_table(result: BenchResult, axis: str) -> Block:
     return doc.listing("Friction laws", result.laws, columns, note)
 
 
-def scatter_table(model: JointModel, axis: str) -> Block:
+def scatter_table(model: JointModel, axis: str) -> doc.Block:
     """Each record alone, and the scatter between them."""
     columns = [doc.column("name", "Parameter")]
     count = max((len(values) for values in model.singles.values()), default=0)
@@ -163,3 +170,86 @@ def scatter_table(model: JointModel, axis: str) -> Block:
         "does not determine is fixed at its joint value there."
     )
     return doc.table("Fits of single records", columns, rows, note)
+
+
+def residual_blocks(model: JointModel, tests: Sequence[ResidualTest], axis: str) -> list[doc.Block]:
+    """The tests of all records, and four pictures of each; those of further records on demand."""
+    made = [figure for part in model.records for figure in _figures(part, tests, axis)]
+    each = len(made) // len(model.records)
+    more = [doc.details("Residuals of the other records", made[each:])] if made[each:] else []
+    return [_residual_table(tests), *made[:each], *more]
+
+
+def _residual_table(tests: Sequence[ResidualTest]) -> doc.Block:
+    columns = [
+        doc.of("record", "record", "Record"),
+        doc.of("name", "name", "Test"),
+        doc.of("input", "input", "Input"),
+        doc.of("largest", "largest", "Largest correlation", format="fix:3"),
+        doc.of("lag", "lag", "at lag", "rows", format="int"),
+        doc.of("bound", "bound", "Bound (99 %)", format="fix:3"),
+        doc.of("within", "within", "Within", format="yesno"),
+    ]
+    note = (
+        "Whiteness: autocorrelation of the innovations (the residual through its autoregressive model); "
+        "independence: their cross-correlation with an input that passed the same filter. Beyond the bound "
+        "something is not modelled, and the truth need not lie in the intervals. What the simulated record "
+        "leaves too is taken off first."
+    )
+    return doc.listing(
+        "Residual tests", tests, columns, note, status=lambda one: "pass" if one.within else "warn"
+    )
+
+
+def _figures(part: RecordFit, tests: Sequence[ResidualTest], axis: str) -> list[doc.Block]:
+    own = [test for test in tests if test.record == part.name]
+    unit, rate = ("N", "m/s") if axis == "linear" else ("N m", "rad/s")
+    return [
+        _figure("time", _over_time(part, unit), f"{part.name}: residual over time, and its spectrum"),
+        _figure("correlation", _correlation(own), f"{part.name}: correlations of the residual, with bounds"),
+        _figure("friction", _friction(part, unit, rate), f"{part.name}: friction over speed, rows and model"),
+    ]
+
+
+def _figure(name: str, chart: style.Chart, caption: str) -> doc.Block:
+    return doc.figure(f"residual_{name}", chart, caption)
+
+
+def _over_time(part: RecordFit, unit: str) -> style.Chart:
+    from scipy.signal import welch
+
+    chart = style.Chart(width=style.WIDE, height=300.0)
+    left = chart.panel("time, s; rows left out are gaps", f"residual, {unit}")
+    right = chart.panel("frequency, Hz", f"{unit}/√Hz", "xy")
+    whole = np.full(len(part.keep), np.nan)
+    whole[part.keep] = part.residual
+    rows = style.kept_rows([np.nan_to_num(whole)])
+    left.rule_y(0.0)
+    left.curve(part.step_s * rows, whole[rows], "residual", colour=style.BLUE, width=1.1)
+    hertz, power = welch(part.residual, 1.0 / part.step_s, nperseg=min(256, len(part.residual)))
+    right.curve(hertz[1:], np.sqrt(power[1:]), "amplitude density of the residual", colour=style.BLUE)
+    return chart
+
+
+def _correlation(tests: Sequence[ResidualTest]) -> style.Chart:
+    chart = style.Chart(width=style.WIDE, height=130.0 * max(len(tests), 1))
+    for panel, test in zip(chart.column(*(1.0 for _ in tests)) if tests else (), tests, strict=True):
+        reach = 1.2 * max(test.bound, abs(test.largest))
+        panel.y.limits(-reach, reach)
+        panel.band_y(-test.bound, test.bound)
+        panel.rule_y(0.0)
+        panel.points(test.lags, test.correlation, size=4.0, colour=style.BLUE)
+        panel.y.label = test.input or test.name
+        panel.x.label = "lag, rows"
+    return chart
+
+
+def _friction(part: RecordFit, unit: str, rate: str) -> style.Chart:
+    chart = style.Chart(width=style.WIDE, height=320.0)
+    panel = chart.panel(f"speed, {rate}", f"friction, {unit}", by_point=True)
+    few = slice(None, None, max(1, len(part.speed) // 1500))
+    order = np.argsort(part.speed)
+    line = order[style.kept_rows([(part.friction - part.residual)[order]])]
+    panel.points(part.speed[few], part.friction[few], "rows of the record", size=3.0, colour=style.BLUE)
+    panel.curve(part.speed[line], (part.friction - part.residual)[line], "model", colour=style.ORANGE)
+    return chart

@@ -1,4 +1,7 @@
-"""Predictions shown in time: the injected sweep, one small step, runs on either side of each margin."""
+"""Predictions shown in time: the injected sweep, one small step, runs beside each margin.
+
+Margins from small, medium and large deviations: where an oscillation lasts, with and without friction.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +11,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
+from analyses.large_signal.by_amplitude import AmplitudeMargin
 from analyses.validation import Validation
 from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.in_time import MarginShown, StepShown
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Section, Status
-from reports.findings import Finding
-from reports.sections import by_amplitude
-from reports.sections.names import LOOPS
+from reports.sections.limits import words_of
+from reports.sections.names import loop_words, output_unit
 
 
-def sections(validation: Validation) -> list[Section]:
+def sections(validation: Validation) -> list[doc.Section]:
     """Make the section of the sweep and that of steps and margins, as far as there are any."""
     made = []
     if validation.sweeps:
@@ -30,7 +31,7 @@ def sections(validation: Validation) -> list[Section]:
     return made
 
 
-def _injection(sweeps: Sequence[BenchSweep]) -> Section:
+def _injection(sweeps: Sequence[BenchSweep]) -> doc.Section:
     """What an analyser on the bench would see of every loop."""
     blocks = [_sweep(sweep) for sweep in sweeps]
     intro = (
@@ -41,8 +42,8 @@ def _injection(sweeps: Sequence[BenchSweep]) -> Section:
     return doc.section("injection", "Frequency response by injection", blocks, result=words, intro=intro)
 
 
-def _sweep(sweep: BenchSweep) -> Block:
-    chart = Chart(width=style.WIDE, height=400.0)
+def _sweep(sweep: BenchSweep) -> doc.Block:
+    chart = style.Chart(width=style.WIDE, height=400.0)
     top, bottom = chart.column(1.1, 1.0)
     phase = np.degrees(np.unwrap(np.angle(sweep.linear)))
     seen = phase + np.degrees(np.angle(sweep.open_loop / sweep.linear))
@@ -55,9 +56,14 @@ def _sweep(sweep: BenchSweep) -> Block:
     style.phase_axis(bottom, phase.tolist())
     style.frequency(bottom)
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
-    caption = f"{LOOPS[sweep.loop]}, open: linear (line), simulated (circles)"
+    caption = f"{_tested(sweep.loop)}, open: linear (line), simulated (circles)"
     caption += f"; largest difference {_largest([sweep]):.1e}."
     return doc.figure("injected_sweep", chart, caption)
+
+
+def _tested(loop: str) -> str:
+    """The loop as it is put to the simulator: the current loop with the rotor locked."""
+    return loop_words(loop, "locked")
 
 
 def _largest(sweeps: Sequence[BenchSweep]) -> float:
@@ -65,37 +71,36 @@ def _largest(sweeps: Sequence[BenchSweep]) -> float:
     return float(max(np.nanmax(np.abs(one.open_loop / one.linear - 1.0)) for one in sweeps))
 
 
-def _in_time(validation: Validation) -> Section:
-    """Steps, runs beside the margins, margins by amplitude."""
-    blocks: list[Block] = []
+def _in_time(validation: Validation) -> doc.Section:
+    blocks: list[doc.Block] = []
     for name in validation.figures:
         if name in validation.steps:
             blocks.append(_step(validation.steps[name]))
         if name in validation.margins:
             blocks.append(_margin(validation.margins[name]))
-    blocks += by_amplitude.blocks(validation.amplitude_margins)
+    blocks += by_amplitude(validation.amplitude_margins)
     findings = [
-        Finding(severity="warn", text=words, where="confirmation")
-        for words in by_amplitude.remarks(validation.amplitude_margins)
+        doc.Finding(severity="warn", text=words, where="confirmation")
+        for words in remarks(validation.amplitude_margins)
     ]
     rows = [shown.row for shown in validation.steps.values()]
     rows += [row for shown in validation.margins.values() for row in shown.rows]
     met = sum(row.verdict is Verdict.MET for row in rows)
-    status: Status = "pass" if met == len(rows) else "fail"
+    status: doc.Status = "pass" if met == len(rows) else "fail"
     intro = (
         "On the operating motion: one small step, sample by sample, and the drive started on its critical "
         "mode 1 % inside and 1 % outside of the gain margin, where it dies out or grows by the predicted "
         "factor."
     )
-    result = " ".join([f"{met} of {len(rows)} runs go as predicted.", *(one.text for one in findings[:1])])
+    result = " ".join([f"{met} of {len(rows)} runs go as predicted.", *(one["text"] for one in findings[:1])])
     return doc.section(
         "confirmation", "Predictions in time", blocks, result=result, intro=intro, status=status,
         findings=findings,
     )  # fmt: skip
 
 
-def _step(shown: StepShown) -> Block:
-    chart = Chart(width=style.HALF, height=240.0)
+def _step(shown: StepShown) -> doc.Block:
+    chart = style.Chart(width=style.HALF, height=240.0)
     panel = chart.panel(y="response to a unit step")
     scale = style.time_axis(panel, float(shown.time_s[-1]))
     some = slice(None, None, max(1, shown.time_s.size // 400))
@@ -104,14 +109,14 @@ def _step(shown: StepShown) -> Block:
     look: style.Style = {"size": 4.5, "hollow": True, "colour": style.ORANGE}
     panel.points(scale * shown.time_s[few], shown.simulated[few], "simulated", **look)
     caption = (
-        f"{LOOPS[shown.place]}: small step on the operating motion; largest difference {shown.row.error:.1e} "
-        f"of its height, {shown.row.because.split(', of ')[-1]}."
+        f"{_tested(shown.place)}: small step on the operating motion; largest difference "
+        f"{shown.row.error:.1e} of its height, {shown.row.because.split(', of ')[-1]}."
     )
     return doc.figure("small_step", chart, caption, layout="half")
 
 
-def _margin(shown: MarginShown) -> Block:
-    chart = Chart(width=style.HALF, height=240.0)
+def _margin(shown: MarginShown) -> doc.Block:
+    chart = style.Chart(width=style.HALF, height=240.0)
     panel = chart.panel(y="amplitude of the critical mode")
     scale = style.time_axis(panel, max(float(run.time_s[-1]) for run in (shown.inside, shown.outside)))
     for run, words, k in ((shown.inside, "1 % inside", 0), (shown.outside, "1 % outside", 3)):
@@ -120,8 +125,131 @@ def _margin(shown: MarginShown) -> Block:
         panel.points(scale * run.time_s, run.amplitude, f"{words}, simulated", **look | {"size": 4.0})
     decibel = 20.0 * math.log10(shown.ratio)
     caption = (
-        f"{LOOPS[shown.place]}: gain margin on the operating motion {decibel:.2f} dB at "
+        f"{_tested(shown.place)}: gain margin on the operating motion {decibel:.2f} dB at "
         f"{shown.frequency_hz:.4g} Hz. The run inside dies out, the run outside grows (circles), each by the "
         "predicted factor (lines)."
     )
     return doc.figure("margin_runs", chart, caption, layout="half")
+
+
+KINDS = {"gain": "loop gain, up", "delay": "delay at the loop"}
+NEXT_TO_NOTHING = 0.01  # of the linear margin
+WORTH_SAYING = 0.9  # of the linear margin: what takes less is not said
+LOWEST = 0.02  # of the linear margin: what lies below is drawn here
+
+
+def by_amplitude(items: Sequence[AmplitudeMargin]) -> list[doc.Block]:
+    """Make figure, remarks and table, if there are any."""
+    if not items:
+        return []
+    return [_amplitudes(items), *(doc.text(words) for words in remarks(items)), _amplitude_table(items)]
+
+
+def remarks(items: Sequence[AmplitudeMargin]) -> list[str]:
+    """Say where large motion takes more than a tenth of a margin, worst case of each loop and kind."""
+    worst: dict[tuple[str, str], AmplitudeMargin] = {}
+    for item in items:
+        if item.value is None or item.value > WORTH_SAYING * item.linear:
+            continue
+        key = item.loop, "" if _already(item) else item.kind  # as designed: whatever is varied
+        known = worst.get(key)
+        if known is None or item.value < (known.value or item.value):
+            worst[key] = item
+    return [remark(item) for item in worst.values()]
+
+
+def remark(item: AmplitudeMargin) -> str:
+    """Say from where on a large motion keeps oscillating."""
+    value, linear = _text(item.value or 0.0, item), _text(item.linear, item)
+    if _already(item):
+        cause = "as designed"
+    elif item.kind == "gain":
+        cause = f"if its gain is raised by {value} or more"
+    else:
+        cause = f"if a delay of {value} or more is added"
+    quiet = "" if item.friction_on else ", without dry friction,"
+    acting = f" The {words_of(item.limiter)} acts." if item.limiter else ""
+    return (
+        f"The {item.loop} loop{quiet} sustains an oscillation{_of(item)} {cause} after release from "
+        f"{100.0 * item.part:.0f} % of full range; the linear {item.kind} margin on the validation's "
+        f"operating motion is {linear}.{acting}"
+    )
+
+
+def _of(item: AmplitudeMargin) -> str:
+    """How large the oscillation is at the output, where it moves."""
+    scale, unit = output_unit(item.axis)
+    return f" of {scale * item.output:.2g} {unit} at the output" if item.output > 0.0 else ""
+
+
+def _already(item: AmplitudeMargin) -> bool:
+    """Whether it is the drive as designed: less than a hundredth of the linear margin away."""
+    value = item.value or 0.0
+    if item.kind == "delay":
+        return value < NEXT_TO_NOTHING * item.linear
+    return abs(math.log(value)) < NEXT_TO_NOTHING * abs(math.log(item.linear))
+
+
+def _amplitudes(items: Sequence[AmplitudeMargin]) -> doc.Block:
+    chart = style.Chart(width=style.HALF, height=300.0)
+    panel = chart.panel("initial deviation", "margin over linear margin", "y", by_point=True)
+    sizes = list(dict.fromkeys(item.size for item in items))
+    keys = list(dict.fromkeys((item.loop, item.kind) for item in items))
+    for k, (loop, kind) in enumerate(keys):
+        for friction_on in (False, True):
+            own = [x for x in items if (x.loop, x.kind, x.friction_on) == (loop, kind, friction_on)]
+            x = [sizes.index(item.size) + 0.06 * (k - len(keys) / 2) for item in own]
+            y = [None if item.value is None else max(item.value / item.linear, LOWEST) for item in own]
+            look: style.Style = {"colour": style.SERIES[k % 7], "size": 6.5, "width": 1.4}
+            if friction_on:
+                look |= {"hollow": True, "dash": 1, "marker": "s"}
+            panel.curve(x, y, f"{loop}: {KINDS[kind]}", **({"marker": "o"} | look))
+    panel.rule_y(1.0)
+    panel.x.ticks = [(float(k), words) for k, words in enumerate(sizes)]
+    panel.x.limits(-0.4, len(sizes) - 0.6)
+    values = [max(item.value / item.linear, LOWEST) for item in items if item.value]
+    panel.y.limits(min([*values, 1.0]) / 1.3, max([*values, 1.0]) * 1.5)
+    panel.y.ticks = [(t, f"{t:g}") for t in (LOWEST, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)]
+    caption = (
+        "Margins after release from rest at small, medium and large deviations, limits active; hollow and "
+        "dashed: with dry friction."
+    )
+    return doc.figure("margins_by_amplitude", chart, caption, layout="half")
+
+
+def _amplitude_table(items: Sequence[AmplitudeMargin]) -> doc.Block:
+    columns = [
+        doc.of("loop", "loop", "Loop"),
+        doc.of(lambda item: KINDS[item.kind], "kind", "Varied"),
+        doc.of(lambda item: f"{100.0 * item.part:.0f} % of full range", "size", "Released from"),
+        doc.of(lambda item: "on" if item.friction_on else "off", "friction", "Dry friction"),
+        doc.of(lambda item: _shown(item.linear, item), "linear", "Linear margin", format="sig:4"),
+        doc.of(lambda item: _shown(item.value, item), "value", "Oscillation lasts from", format="sig:3"),
+        doc.of(_unit, "unit", "Unit"),
+        doc.of(lambda item: words_of(item.limiter) if item.limiter else "", "limiter", "Limit acting"),
+        doc.of(_remark, "remark", ""),
+    ]
+    made = doc.listing("Margins by amplitude", items, columns)
+    return doc.details("Margins from small, medium and large deviations", [made])
+
+
+def _remark(item: AmplitudeMargin) -> str:
+    if item.value is None:
+        return f"no oscillation lasts up to {_text(item.furthest, item)}"
+    if item.value == (0.0 if item.kind == "delay" else 1.0):
+        return "the nominal drive oscillates"
+    return "fewer values asked: its runs are long" if item.coarser else ""
+
+
+def _unit(item: AmplitudeMargin) -> str:
+    return "ms" if item.kind == "delay" else "dB"
+
+
+def _shown(value: float | None, item: AmplitudeMargin) -> float | None:
+    if value is None:
+        return None
+    return 1e3 * value * item.period_s if item.kind == "delay" else 20.0 * math.log10(value)
+
+
+def _text(value: float, item: AmplitudeMargin) -> str:
+    return f"{_shown(value, item):.3g} {_unit(item)}"

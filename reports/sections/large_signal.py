@@ -23,16 +23,12 @@ from analyses.large_signal.sawtooth import (
 )
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart, Panel
-from reports.document_schema import Block, Section, Status, VerdictItem
-from reports.sections.amplitude_map import chart as map_chart
-from reports.sections.limits import words_of
+from reports.sections.limits import map_chart, words_of
 from reports.sections.names import figure_column, load_unit, output_unit
 from reports.verdict_summary import tally
 
 
-def section(result: LargeSignals) -> Section:
-    """Make the section from `analyses.large_signal.large_signals`."""
+def section(result: LargeSignals) -> doc.Section:
     design = result.design
     scale, unit = output_unit(design.axis)
     items = _sawtooth_verdicts(result.sawtooth)
@@ -52,7 +48,7 @@ def section(result: LargeSignals) -> Section:
         "model holds. Above them the limit that is reached first determines the output."
     )
     words = _result(result.bode, scale, unit, _linear(design))
-    status: Status = tally(items).role if items else "info"
+    status: doc.Status = tally(items).role if items else "info"
     return doc.section(
         "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, told="info"
     )
@@ -102,7 +98,7 @@ def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
     return f"between {low:.3g} and {high:.3g} Hz{unsteady}" if math.isfinite(high) else f"above {low:.3g} Hz"
 
 
-def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
+def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[doc.VerdictItem]:
     """Judge the rate-limit formulas, where they apply."""
     if not (sawtooth.runs and sawtooth.applicable):
         return []
@@ -126,7 +122,7 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[VerdictItem]:
     ]
 
 
-def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
+def _map_figure(result: LargeSignals, scale: float, unit: str) -> doc.Block:
     """Make the map with the linear onset lines, and where limits are first reached with friction."""
     caption = (
         "What limits a sine command, at no load, with friction. Colour: limit that acts longest. Marks: "
@@ -136,21 +132,19 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> Block:
     if result.design.command != Command():
         caption += " Simulated behind the profile and filter of the command, drawn in front of them."
     shown = result.map
-    if shown.coarser:
-        points_shown = f"{shown.amplitude_rad.size} amplitudes by {shown.frequency_hz.size} frequencies"
-        caption += f" The drive settles slowly: a coarser grid, {points_shown}."
+    caption += f" {shown.amplitude_rad.size} amplitudes by {shown.frequency_hz.size} frequencies"
+    caption += ": its runs take much work, a coarser grid." if shown.coarser else "."
     chart = map_chart(result, scale, unit)
     return doc.figure("map", chart, caption=caption, alt=_map_words(shown))
 
 
 def _map_words(amplitude_map: AmplitudeMap) -> str:
-    """Say in words what the map shows."""
-    shares = {name: amplitude_map.share((name,)) for name in CAUSES}
+    shares = {name: amplitude_map.share(name) for name in CAUSES}
     parts = [f"{name} {100 * share:.0f} %" for name, share in shares.items() if share > 0.0]
     return "Map of amplitude and frequency; share of the points by what acts: " + ", ".join(parts)
 
 
-def _shift_table(shift: LimitShift, design: Design, scale: float, unit: str) -> Block:
+def _shift_table(shift: LimitShift, design: Design, scale: float, unit: str) -> doc.Block:
     """List the linear limit and what friction makes of it, frequency by frequency."""
     small: dict[str, Any] = {"unit": unit, "scale": scale, "format": "sig:4"}
     columns = [
@@ -162,15 +156,16 @@ def _shift_table(shift: LimitShift, design: Design, scale: float, unit: str) -> 
         doc.of(lambda k: words_of(shift.simulated_limiter[k]), "acts", "Acting limiter"),
     ]
     note = "The shift by friction is shown, not judged."
+    if shift.coarser:
+        note += " Its runs take much work: fewer frequencies."
     if design.command != Command():
         note += " Amplitudes behind the profile and filter of the command."
     places = range(len(shift.frequency_hz))
     return doc.listing("Amplitude at which a limit is first reached", places, columns, note)
 
 
-def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: float) -> Block:
-    """Make the amplitude Bode."""
-    chart = Chart(width=style.WIDE, height=440.0)
+def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: float) -> doc.Block:
+    chart = style.Chart(width=style.WIDE, height=440.0)
     gain, phase = chart.column(1.0, 1.0, width=1.45, title="Output over command")
     both = (
         (gain, amplitude_bode.linear_db, amplitude_bode.gain_db),
@@ -202,8 +197,7 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
     return doc.figure("amplitude_bode", chart, caption)
 
 
-def _bandwidths(panel: Panel, result: AmplitudeBode, scale: float, unit: str, full: float) -> None:
-    """Draw both bandwidths against amplitude, with the linear ones as levels."""
+def _bandwidths(panel: style.Panel, result: AmplitudeBode, scale: float, unit: str, full: float) -> None:
     pairs = (
         (result.minus3db_hz, result.linear_minus3db_hz, "−3 dB", style.GREEN, "o", 0),
         (result.minus90deg_hz, result.linear_minus90deg_hz, "−90°", style.PURPLE, "D", 1),
@@ -216,8 +210,7 @@ def _bandwidths(panel: Panel, result: AmplitudeBode, scale: float, unit: str, fu
     panel.rule_x(full * scale, dash=2)
 
 
-def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str) -> Block:
-    """List both bandwidths at the design's amplitudes."""
+def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str) -> doc.Block:
     columns = [
         doc.column("fraction", "of full deflection", "%", format="sig:3"),
         doc.column("amplitude", "Amplitude", unit, format="sig:3"),
@@ -239,14 +232,14 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: s
     return doc.table("Bandwidth against amplitude", columns, rows)
 
 
-def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[Block]:
+def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[doc.Block]:
     """Make the sawtooth, or say why there is none."""
     if not sawtooth.runs:
         return [doc.text(f"Sawtooth: not applicable, {sawtooth.reason}.")]
     limit = scale * sawtooth.rate_limit_rad_s
     rows = 3 if sawtooth.has_current else 2
     title = "Sawtooth: a sine faster than the rate limit"
-    chart = Chart(width=style.WIDE, height=160.0 + 130.0 * rows, title=title)
+    chart = style.Chart(width=style.WIDE, height=160.0 + 130.0 * rows, title=title)
     highest = 1.15 * scale * max(float(np.abs(run.reference_rad).max()) for run in sawtooth.runs)
     current = max(float(np.abs(run.current_A).max()) for run in sawtooth.runs)
     for run in sawtooth.runs:
@@ -272,7 +265,7 @@ def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str
     return [doc.figure("sawtooth", chart, caption)]
 
 
-def _sawtooth_column(panels: list[Panel], run: SawtoothRun, scale: float, unit: str) -> None:
+def _sawtooth_column(panels: list[style.Panel], run: SawtoothRun, scale: float, unit: str) -> None:
     """Draw the motion at one load, on panels of position, rate and (where there is one) current."""
     formula, time = run.formula, run.time_s
     peak = "–" if formula.peak is None else f"{scale * formula.peak:.3g} {unit}"

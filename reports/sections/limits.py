@@ -1,26 +1,27 @@
-"""What the linear model says about its own limits: the amplitude at which each limiter is reached."""
+"""The limit of linear validity, and the map of amplitude over frequency behind it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.loops.limiters import Onset
+from analyses.large_signal import LargeSignals
+from analyses.large_signal.classify import CAUSES, WAVEFORMS
 from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Section
 from reports.sections.names import hertz
 
 
-def section(design: Design, border: Onset) -> Section:
-    """Make the section from the onset amplitudes."""
+def section(design: Design, border: Onset) -> doc.Section:
     unit, scale = COMMAND_UNITS[design.axis, design.controller.outermost]
     where = ", at the output," if design.controller.outermost in ("position", "velocity") else ""
     caption = (
@@ -37,14 +38,14 @@ def section(design: Design, border: Onset) -> Section:
     )
 
 
-def _chart(design: Design, border: Onset, scale: float, unit: str) -> Chart:
+def _chart(design: Design, border: Onset, scale: float, unit: str) -> style.Chart:
     """Draw every limiter's line; below the lowest the linear model holds."""
-    chart = Chart(width=style.WIDE, height=370.0, legend=True, legend_title="limit reached at this amplitude")
+    chart = style.Chart(
+        width=style.WIDE, height=370.0, legend=True, legend_title="limit reached at this amplitude"
+    )
     panel = chart.panel(y=f"command amplitude, {unit}", log="y")
     hertz = border.omega_rad_s / (2.0 * np.pi)
-    lines = {name: scale * np.asarray(values) for name, values in border.each_rad.items()}
-    lines = {name: values for name, values in lines.items() if np.isfinite(values).any()}
-    lowest = np.min([np.where(np.isfinite(v), v, np.inf) for v in lines.values()], axis=0)
+    lowest = scale * border.amplitude_rad
     there = np.isfinite(lowest)
     full = _full(design) * scale
     top = 4.0 * max([full, *lowest[there][:1]]) if there.any() else 1.0
@@ -55,9 +56,7 @@ def _chart(design: Design, border: Onset, scale: float, unit: str) -> Chart:
         x, y = hertz[there].tolist(), lowest[there].tolist()
         floor = bottom * 1e-3
         panel.shape([([*x, x[-1], x[0]], [*y, floor, floor])], colour=style.GREEN, opacity=0.1)
-    for k, (name, values) in enumerate(lines.items()):
-        values = np.where(np.isfinite(values), values, np.nan)
-        panel.curve(hertz, values, LIMITERS[name].words, **style.series(k))
+    _onsets(panel, hertz, border.each_rad, scale)
     panel.note("linear below the lowest line", corner="bottom left", colour=style.MUTED)
     if full:
         panel.rule_y(full, f"full deflection {full:g} {unit}", colour=style.INK, dash=2)
@@ -121,7 +120,7 @@ def _rows(design: Design, border: Onset, scale: float) -> list[_Linear]:
     return rows
 
 
-def _table(rows: Sequence[_Linear], unit: str) -> Block:
+def _table(rows: Sequence[_Linear], unit: str) -> doc.Block:
     columns = [
         doc.of("amplitude", "amplitude", "Command amplitude", unit, format="short:3"),
         doc.of("fraction", "fraction", "Of full deflection", "%", scale=100.0, format="fix:0"),
@@ -139,3 +138,119 @@ def _crossing(border: Onset, first: int, amplitude: float) -> float:
     part = math.log(above / amplitude) / math.log(above / below)
     low, high = border.omega_rad_s[first - 1], border.omega_rad_s[first]
     return float(low * (high / low) ** part)
+
+
+PALETTE = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.SKY, style.INK, style.MUTED)
+LINES = {name: k for k, name in enumerate(LIMITERS)}
+COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE, "other": style.MUTED} | {
+    name: PALETTE[k % len(PALETTE)] for name, k in LINES.items()
+}
+WORDS = {
+    "friction": "dry friction",
+    "stiction": "stiction",
+    "none": "linear",
+    "other": "play, gravity or counts",
+} | {name: limiter.words for name, limiter in LIMITERS.items()}
+GLYPHS: dict[str, style.Style] = {
+    "triangle": {"marker": "^", "size": 5.0},
+    "parabola": {"marker": "o", "size": 4.8, "hollow": True},
+    "distorted": {"marker": ".", "size": 4.2},
+    "stick-slip": {"marker": "s", "size": 4.6, "hollow": True},
+    "no motion": {"marker": "x", "size": 4.8},
+    "not steady": {"marker": "2", "size": 6.0},
+}
+EVERY = 2  # a glyph in every second column
+
+
+def map_chart(result: LargeSignals, scale: float, unit: str) -> style.Chart:
+    """Draw regions, glyphs and lines."""
+    made = style.Chart(
+        width=style.WIDE, height=500.0, legend=True, legend_title="waveform; first reached, linear loop"
+    )
+    panel, shown = made.panel("command frequency, Hz", f"command amplitude, {unit}", "xy"), result.map
+    x, y = shown.frequency_hz, scale * shown.amplitude_rad
+    xe, ye = _edges(x), _edges(y)
+    panel.x.limits(xe[0], xe[-1])
+    panel.y.limits(ye[0], ye[-1])
+    panel.x.grid = panel.y.grid = False
+    _regions(panel, CAUSES, shown.cause, xe, ye)
+    _glyphs(panel, WAVEFORMS, shown.waveform, x, y)
+    _onsets(panel, x, shown.onset_rad, scale)
+    _first_limited(panel, result, scale)
+    full = scale * result.design.validation.full_deflection_rad
+    panel.rule_y(full, "full\ndeflection", dash=4, width=0.8)
+    _names(panel, CAUSES, shown.cause, x, y)
+    return made
+
+
+def _edges(centres: np.ndarray) -> np.ndarray:
+    """Give the borders between points on a logarithmic scale."""
+    inner = np.sqrt(centres[1:] * centres[:-1])
+    first, last = centres[0] ** 2 / inner[0], centres[-1] ** 2 / inner[-1]
+    return np.concatenate([[first], inner, [last]])
+
+
+def _regions(
+    panel: style.Panel, names: Sequence[str], cause: np.ndarray, xe: np.ndarray, ye: np.ndarray
+) -> None:
+    """Fill the points of each cause."""
+    boxes: dict[str, list[Any]] = {}
+    for k, row in enumerate(cause):
+        for a, b in pairwise([0, *(np.flatnonzero(np.diff(row)) + 1).tolist(), len(row)]):
+            ring = ([xe[a], xe[b], xe[b], xe[a]], [ye[k], ye[k], ye[k + 1], ye[k + 1]])
+            boxes.setdefault(names[row[a]], []).append(ring)
+    for name, rings in boxes.items():
+        if name in COLOURS:
+            panel.shape(rings, colour=COLOURS[name], opacity=0.28)
+
+
+def _glyphs(
+    panel: style.Panel, names: Sequence[str], waveform: np.ndarray, x: np.ndarray, y: np.ndarray
+) -> None:
+    """Mark the waveform in every second column; a sine has no mark."""
+    shown = np.zeros_like(waveform, dtype=bool)
+    shown[:, ::EVERY] = True
+    for name, look in GLYPHS.items():
+        if name not in names:
+            continue
+        rows, columns = np.nonzero((waveform == names.index(name)) & shown)
+        if len(rows):
+            panel.points(x[columns], y[rows], name, colour=style.INK, read=False, **look)
+
+
+def _onsets(panel: style.Panel, hertz: np.ndarray, each_rad: Mapping[str, np.ndarray], scale: float) -> None:
+    """Draw A_k(w) of every limiter."""
+    for name, values in each_rad.items():
+        if np.isfinite(values).any():
+            limited = np.where(np.isfinite(values), scale * np.asarray(values), np.nan)
+            look: style.Style = {"colour": COLOURS[name], "dash": LINES[name], "width": 2.3}
+            panel.curve(hertz, limited, LIMITERS[name].words, **look)
+
+
+def _first_limited(panel: style.Panel, result: LargeSignals, scale: float) -> None:
+    """Mark the amplitudes at which the simulator first limits."""
+    shift = result.shift
+    if shift is not None and np.isfinite(shift.simulated_rad).any():
+        sizes = scale * shift.simulated_rad / shift.command_gain
+        look: style.Style = {"colour": style.INK, "marker": "D", "size": 7.0, "hollow": True}
+        panel.points(shift.frequency_hz, sizes, "simulated, with friction", **look)
+
+
+def _names(panel: style.Panel, names: Sequence[str], cause: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
+    """Write the name of each region into its middle."""
+    for k, name in enumerate(names):
+        mask = cause == k
+        if mask.sum() < 8:
+            continue
+        row, column = _deepest(mask)
+        panel.note(WORDS.get(name, name), (x[column], y[row]), bold=True, over=True)
+
+
+def _deepest(mask: np.ndarray) -> tuple[int, int]:
+    """Give the point furthest inside a region, weighing rows as two columns."""
+    outside = np.argwhere(~np.pad(mask, 1)) - 1
+    inside = np.argwhere(mask)
+    gaps = inside[:, None, :] - outside[None, :, :]
+    depth = np.hypot(1.6 * gaps[..., 0], 0.6 * gaps[..., 1]).min(axis=1)
+    row, column = inside[int(np.argmax(depth))]
+    return int(row), int(column)

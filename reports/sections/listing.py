@@ -6,10 +6,9 @@ from functools import partial
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from reports import document as doc
-from reports.document_schema import Section
 
 
-def section(result: Any) -> Section:
+def section(result: Any) -> doc.Section:
     """Make the section of a result whose one tuple, if there is any, holds the rows."""
     rows = next((value for value in vars(result).values() if isinstance(value, tuple)), ())
     columns = _columns(type(rows[0])) if rows else []

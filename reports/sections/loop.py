@@ -1,4 +1,4 @@
-"""One loop: open and closed loop over frequency, Nyquist, S and T, step."""
+"""One loop: its figures over frequency, S and T, step."""
 
 from __future__ import annotations
 
@@ -8,20 +8,13 @@ import numpy as np
 
 from actuator_lti.asked.quantities import AT_A_GLANCE
 from actuator_lti.design.model import Design
+from actuator_lti.step import StepFigures
 from analyses.linear.loop_figures import LoopFigures
-from analyses.linear.responses import (
-    answer_curve,
-    curve,
-    frequency_grid,
-    nyquist_curve,
-    response_at,
-    sampled_step,
-)
+from analyses.linear.responses import frequency_grid, response_at, sampled_step
 from analyses.specification.command_limits import said_of
 from reports import document as doc
-from reports.document_schema import Block, Section
+from reports.charts import style
 from reports.numbers import capital, fixed, seconds, to_minus
-from reports.numbers import hertz as hertz_words
 from reports.sections import loop_charts
 from reports.sections.margins import (
     MEANING,
@@ -35,24 +28,24 @@ from reports.sections.margins import (
 )
 from reports.sections.names import LOOPS, hertz
 
-FRAME = 1.6
 STEP_POINTS = 300
+Response = tuple[str, np.ndarray, np.ndarray]  # label, time in s, response
 
 
-def section(name: str, design: Design, figures: LoopFigures) -> Section:
+def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
     """Make the section of one loop; of a current loop that with the rotor locked is drawn beside it."""
     locked = figures.locked
     grid = frequency_grid(figures)
     title, status = LOOPS[name], worst_status([figures.sound])
-    blocks = [_facts(figures), open_bode(title, figures, grid, name=name)]
+    blocks = [_facts(figures), loop_charts.open_bode(title, figures, grid, name=name)]
     if figures.stable:
-        blocks.append(closed_bode(title, figures, grid, locked, name=name))
-    blocks.append(nyquist(title, figures, grid))
+        blocks.append(loop_charts.closed_bode(title, figures, grid, locked, name=name))
+    blocks.append(loop_charts.nyquist(title, figures, grid))
     if figures.peaks is not None:
         blocks.append(sensitivity(title, design, name, figures, grid))
     if figures.step is not None:
         blocks.append(step(title, figures, locked, name=name))
-    blocks.append(doc.details("Nichols chart", [nichols(title, figures, grid)]))
+    blocks.append(doc.details("Nichols chart", [loop_charts.nichols(title, figures, grid)]))
     corner = figures.bandwidth.minus3db_hz if name == "position" and figures.bandwidth else None
     notes = [
         *filter(None, [said_of(design, corner)]),
@@ -75,12 +68,13 @@ def result(figures: LoopFigures) -> str:
         ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"]),
     ]
     words = [
-        f"{name} {value:.1f} {unit}" + (f" at {hertz_words(hz)}" if hz else "")
+        f"{name} {value:.1f} {unit}" + (f" at {style.hertz(hz)}" if hz else "")
         for name, value, unit, hz in parts
         if value is not None
     ]
     if bandwidth is not None:
-        words.append(f"bandwidth {hertz_words(bandwidth)}")
+        to = " to the command" if figures.loop.name == "position" else ""
+        words.append(f"bandwidth{to} {style.hertz(bandwidth)}")
     rotor = "Rotor free, " if figures.loop.name == "current" else ""
     verdict = f"{rotor}{figures.margins.verdict} ({figures.margins.evidence})"
     return to_minus(capital(f"{verdict}: {', '.join(words)}." if words else f"{verdict}."))
@@ -94,8 +88,7 @@ def _intro(name: str, figures: LoopFigures) -> str:
     return f"{words} The margins are {figures.margins.evidence}: {MEANING[figures.margins.evidence]}."
 
 
-def _facts(figures: LoopFigures) -> Block:
-    """Give the figures to remember of this loop."""
+def _facts(figures: LoopFigures) -> doc.Block:
     chosen = [
         doc.fact(
             each.label, _short(shown(each, figures), each.at_a_glance), each.shown[0], better=each.direction
@@ -114,68 +107,8 @@ def _short(value: float | None, format: str) -> float | None:
     return round(value, int(places)) if kind == "fix" else float(f"{value:.{places}g}")
 
 
-def open_bode(
-    title: str, figures: LoopFigures, grid: np.ndarray, *, name: str = "", small: bool = False
-) -> Block:
-    """Make the open-loop Bode figure with every margin on it."""
-    open_loop = [("open loop", curve(figures.loop.plain_open, grid))]
-    chart = loop_charts.bode(open_loop, figures.margins, nyquist_hz(figures), name, small)
-    caption = (
-        f"{title}, open loop: gain margins at the phase crossovers (■), "
-        "phase margins at the gain crossovers (●)."
-    )
-    return doc.figure("bode", chart, caption=caption, alt=_margin_words(title, figures), layout="half")
-
-
-def closed_bode(
-    title: str, figures: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
-) -> Block:
-    """Make the closed-loop Bode figure with the bandwidths."""
-    other = figures.reference
-    first = "rotor free" if locked else "to the command" if other else "closed loop"
-    curves = [(first, answer_curve(figures, grid))]
-    if other is not None:
-        curves.append(("to the reference", answer_curve(other, grid)))
-    if locked is not None and locked.stable:
-        curves.append(("rotor locked", curve(locked.plain_response, grid)))
-    band = figures.bandwidth
-    chart = loop_charts.closed_bode(curves, band, nyquist_hz(figures), name)
-    corner, lag = (_hz(band.minus3db_hz), _hz(band.minus90deg_hz)) if band else (_hz(None), _hz(None))
-    words = f"{title}, closed loop: −3 dB at {corner}, −90° at {lag}."
-    return doc.figure("closed_bode", chart, words, alt=f"Bode diagram. {words}", layout="half")
-
-
-def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
-    """Make the Nyquist figure."""
-    margins, system = figures.margins, figures.loop.plain_open
-    omega, points = nyquist_curve(system, grid, FRAME)
-    closest = margins.modulus_frequency_rad_s
-    there = closest is not None and math.isfinite(closest) and closest > 0
-    at = complex(response_at(system, np.array([closest]))[0]) if there else None
-    phases = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0]
-    on_circle = response_at(system, np.array(phases)) if phases else np.empty(0, dtype=complex)
-    chart = loop_charts.nyquist(omega / (2.0 * np.pi), points, margins, at, on_circle, FRAME)
-    modulus = "withheld" if margins.modulus_margin is None else f"{margins.modulus_margin:.3f}"
-    caption = (
-        f"{title}, Nyquist curve near −1: it keeps a distance of {modulus} "
-        "(modulus margin, 1 over the peak of S)."
-    )
-    return doc.figure("nyquist", chart, caption=caption, alt=f"Nyquist diagram. {caption}", layout="tall")
-
-
-def nichols(title: str, figures: LoopFigures, grid: np.ndarray) -> Block:
-    """Make the Nichols chart."""
-    one = curve(figures.loop.plain_open, grid)
-    chart = loop_charts.nichols(one.frequency_hz, one.magnitude_db, one.phase_deg)
-    caption = (
-        f"{title}, Nichols chart: gain over phase. Inside the outlines about the critical points (+) the "
-        "peak of S or of T exceeds 6 dB."
-    )
-    return doc.figure("nichols", chart, caption=caption, alt=f"{caption} {_margin_words(title, figures)}")
-
-
-def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray) -> Block:
-    """Make the figure of S and T."""
+def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
+    """Draw S and T, their peaks and the limit of a requirement."""
     peaks = figures.peaks
     assert peaks is not None
     limits = [
@@ -185,13 +118,30 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
         and item.loop in (name, "every", None)
         and item.maximum is not None
     ]
-    both = (figures.loop.plain_sensitivity, figures.loop.plain_closed)
-    s_db, t_db = (_db(response_at(each, grid)) for each in both)
-    found = (
-        (finite(hertz(peaks.sensitivity_rad_s)), finite(peaks.sensitivity_db)),
-        (finite(hertz(peaks.complementary_rad_s)), finite(peaks.complementary_db)),
+    grid_hz, values = grid / (2.0 * np.pi), []
+    chart = style.Chart(width=style.HALF, height=225.0, loop=name)
+    panel = chart.panel(y="magnitude, dB")
+    drawn = (
+        ("S", figures.loop.plain_sensitivity, peaks.sensitivity_rad_s, peaks.sensitivity_db, style.ORANGE),
+        ("T", figures.loop.plain_closed, peaks.complementary_rad_s, peaks.complementary_db, style.BLUE),
     )
-    chart = loop_charts.sensitivity(grid / (2 * np.pi), s_db, t_db, found, min(limits, default=None), name)
+    for k, (letter, system, omega, peak, colour) in enumerate(drawn):
+        at, db = finite(hertz(omega)), finite(peak)
+        words = f"|{letter}|, no peak"
+        if db is not None and at and db >= 0.005:
+            words = f"|{letter}|, peak {db:.2f} dB at {style.hertz(at)}"
+        values.append(_db(response_at(system, grid)))
+        panel.curve(grid_hz, values[k], words, colour=colour, dash=k)
+        if db is not None and at and grid_hz[0] <= at <= grid_hz[-1] * 1.001:
+            panel.points([at], [db], marker="^", colour=colour, size=7.0, read=False)
+    panel.rule_y(0.0, colour=style.INK)
+    style.frequency(panel, grid_hz)
+    style.bound(panel, np.ravel(values), span=45.0, top_room=0.12)
+    if limits:
+        low, high = panel.y.span()
+        limit = min(limits)
+        panel.y.limits(high=max(high, limit + 0.2 * (limit - low)))
+        panel.rule_y(limit, f"limit of |S|: {limit:g} dB", colour=style.INK, width=1.2, dash=1)
     caption = (
         f"{title}: sensitivity S = 1/(1 + L), peak {fixed(peaks.sensitivity_db, 2)} dB, "
         f"and closed loop T = L/(1 + L), peak {fixed(peaks.complementary_db, 2)} dB."
@@ -201,8 +151,8 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
 
 def step(
     title: str, loop_figures: LoopFigures, locked: LoopFigures | None, *, name: str = "", small: bool = False
-) -> Block:
-    """Make the step figure."""
+) -> doc.Block:
+    """Draw the step responses, as stairs where sampled, and the figures read from the first."""
     figures = loop_figures.step
     assert figures is not None
     end = None
@@ -211,19 +161,55 @@ def step(
     responses = [_response("rotor free" if locked else "closed loop", loop_figures, end)]
     if locked is not None and locked.step is not None:
         responses.append(_response("rotor locked", locked, end))
-    chart = loop_charts.step(responses, figures, loop_figures.loop.period_s is not None, name, small)
+    width, height = (style.SMALL, 280.0) if small else (style.HALF, 225.0)
+    chart = style.Chart(width=width, height=height, loop=name)
+    panel = chart.panel(y="response to a unit step")
+    last, held = float(responses[0][1][-1]), loop_figures.loop.period_s is not None
+    scale = style.time_axis(panel, last)
+    for k, (label, time, response) in enumerate(responses):
+        panel.curve(time * scale, response, label, stairs=held and len(time) < 80, **style.series(k))
+    panel.x.limits(0.0, last * scale)
+    lowest = min(style.known(y for _, _, response in responses for y in response), default=0.0)
+    panel.y.limits(low=min(0.0, 1.05 * lowest))
+    if math.isfinite(figures.final_value):
+        step_figures(panel, figures, responses[0], scale, held and len(responses[0][1]) < 80)
     caption = f"{title}, response to a unit step of its command; the band is 2 % about the final value."
     if end is not None and float(figures.settling_time_s) > end:
         caption += " With the rotor free, back-EMF keeps it from settling within the time shown."
     return doc.figure("step", chart, caption=caption, alt=f"Step response. {caption}", layout="half")
 
 
-def nyquist_hz(figures: LoopFigures) -> float | None:
-    """Give the Nyquist frequency of a sampled loop."""
-    return None if figures.loop.period_s is None else 0.5 / figures.loop.period_s
+def step_figures(
+    panel: style.Panel, figures: StepFigures, drawn: Response, scale: float, stairs: bool
+) -> None:
+    """Draw the 2 % band, the 10-90 % rise on the curve as it is drawn, and the settling time."""
+    final, words = float(figures.final_value), []
+    _, time, response = drawn
+    last = float(time[-1])
+    panel.band_y(0.98 * final, 1.02 * final, colour=style.GREEN)
+    panel.rule_y(final)
+    part = np.asarray(figures.response) / final
+    if (part >= 0.9).any():
+        # both series are parts of the response, each thinned in its own way: the earlier is nearer
+        found = ((figures.time_s, part), (time, np.asarray(response) / final))
+        start = min(float(at[np.argmax(one >= 0.1)]) for at, one in found if (one >= 0.1).any())
+        for t in (start, start + float(figures.rise_time_s)):
+            if t <= last:
+                there = response[np.searchsorted(time, t * (1.0 + 1e-12), side="right") - 1]
+                level = there if stairs else np.interp(t, time, response)
+                panel.points([t * scale], [float(level)], colour=style.GREEN, size=6.0, read=False)
+        words.append(f"rise 10–90 %: {seconds(float(figures.rise_time_s))}")
+    if math.isfinite(figures.overshoot_percent):
+        words.append(f"overshoot: {figures.overshoot_percent:.1f} %")
+    if math.isfinite(figures.settling_time_s):
+        if figures.settling_time_s <= last:
+            panel.rule_x(figures.settling_time_s * scale, colour=style.PURPLE, width=1.3, dash=1)
+        words.append(f"settled to 2 %: {seconds(figures.settling_time_s)}")
+    if words:
+        panel.note("\n".join(words), corner="bottom right")
 
 
-def _response(label: str, loop_figures: LoopFigures, end_s: float | None = None) -> loop_charts.Response:
+def _response(label: str, loop_figures: LoopFigures, end_s: float | None = None) -> Response:
     """Give a step response, cut where nothing happens any more and thinned."""
     figures = loop_figures.step
     assert figures is not None
@@ -248,16 +234,3 @@ def _response(label: str, loop_figures: LoopFigures, end_s: float | None = None)
 def _db(values: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore"):
         return np.asarray(20.0 * np.log10(np.abs(values)))
-
-
-def _hz(value: float | None) -> str:
-    known = finite(value)
-    return "no frequency in the band" if known is None else f"{known:.4g} Hz"
-
-
-def _margin_words(title: str, figures: LoopFigures) -> str:
-    row = margin_row(figures)
-    gain = "none" if row["gain_margin_db"] is None else f"{row['gain_margin_db']:.1f} dB"
-    phase = "none" if row["phase_margin_deg"] is None else f"{row['phase_margin_deg']:.1f} deg"
-    name = title[:1].lower() + title[1:]
-    return f"Open-loop Bode diagram of the {name}: gain margin {gain}, phase margin {phase}."

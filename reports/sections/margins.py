@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from actuator_lti.asked.quantities import QUANTITIES, Quantity
+from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.bandwidth import Bandwidth
 from actuator_lti.files.tree import Tree
@@ -13,16 +13,15 @@ from analyses.linear.held_loops import HELD, OPEN
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.loop_survey import OperatingPointFigures
 from analyses.margins import Margins
-from analyses.specification.weakest import Spread, spread
+from analyses.specification.weakest import Spread, figures_of, spread
 from reports import document as doc
-from reports.document_schema import Block, Row, Section, State, Status
 from reports.numbers import short, to_minus
 from reports.sections import measured, requirements
-from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words
+from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words, unit_words
 from reports.terminal import Brief, SideBySide
 
-STATUS: dict[bool | None, Status] = {True: "pass", False: "fail", None: "warn"}
-EVIDENCE_STATUS: dict[str, Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
+STATUS: dict[bool | None, doc.Status] = {True: "pass", False: "fail", None: "warn"}
+EVIDENCE_STATUS: dict[str, doc.Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
 MEANING = {
     "certified": "exact arithmetic on the numbers of the loop as stored, each crossing and pole in a proven "
     "interval, and the same answer for numbers 8 units in the last place away",
@@ -33,13 +32,11 @@ MEANING = {
 
 
 def _figure(quantity: str, key: str, format: str) -> doc.Shown:
-    """The column of a figure of the registry, and the figure."""
     of = QUANTITIES[quantity]
     return figure_column(quantity, key, format=format), doc.of(of.reader, key, "", scale=of.shown[1])[1]
 
 
 def _at(name: str) -> Callable[[LoopFigures], float | None]:
-    """Where a margin is."""
     return lambda figures: hertz(getattr(getattr(figures.margins, name), "frequency_rad_s", None))
 
 
@@ -83,14 +80,15 @@ CROSSING_COLUMNS = [
 ]
 
 
-def section(result: Margins) -> list[Section]:
+def section(result: Margins) -> list[doc.Section]:
     """Make the sections from `analyses.margins.margins`: the loops as asked for, the requirements."""
     asked, judged = result.asked, requirements.section(result.requirements, load_unit(result.design))
     known = {**{LOOPS[name]: one for name, one in result.loops.items()}, **result.around}
     made = _loops(known, result.operating_points, f"{FORMS[asked.form].capitalize()}; {_where(result)}. ")
     made["blocks"] += [doc.text(note) for note in _notes(result, known)]
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
-    return [{**made, "result": f"{_stability(known)}. {judged['result']}"}, judged]
+    said = f"{_stability(known)}. {judged['result']}{_below_custom(result)}"
+    return [{**made, "result": said}, judged]
 
 
 def brief(result: Margins) -> Brief:
@@ -107,6 +105,19 @@ def brief(result: Margins) -> Brief:
     told = [] if result.measured is None else [measured.words(result.measured)]
     notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
     return Brief(first["result"], [SideBySide(head, tables), *crossings, *judged["blocks"]], notes)
+
+
+def _below_custom(result: Margins) -> str:
+    """Of a design without requirements: margins below what is customary, which nothing else would name."""
+    low = [
+        f"{LOOPS[name].lower()}, {QUANTITIES[quantity].words} {value:.3g}{unit} (of {limit:g}{unit})"
+        for name, one in result.loops.items()
+        if one.sound and not result.requirements
+        for quantity, value in figures_of(one.judged.margins).items()
+        for limit, unit in [(CUSTOMARY[quantity], f" {unit_words(QUANTITIES[quantity].unit)}".rstrip())]
+        if value < limit
+    ]
+    return f" Below what is customary: {'; '.join(low)}." if low else ""
 
 
 def _where(result: Margins) -> str:
@@ -134,14 +145,16 @@ def _stability(named: Mapping[str, LoopFigures]) -> str:
     return f"the drive is stable, all loops closed; {', '.join(held)}" if held else "every loop is stable"
 
 
-def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> Section:
+def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:
     """Make the section from the figures of the sampled, sliding loops, and those of the operating points."""
     how = "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
     made = _loops({LOOPS[name]: one for name, one in figures.items()}, points, how)
     return {**made, "result": result(figures)}
 
 
-def _loops(loops: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures], how: str) -> Section:
+def _loops(
+    loops: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures], how: str
+) -> doc.Section:
     named = with_held(loops)
     own = with_own_margins(named)
     blocks = [
@@ -210,7 +223,7 @@ def evidence_notes(named: Mapping[str, LoopFigures]) -> list[str]:
     ]
 
 
-def margin_table(named: Mapping[str, LoopFigures]) -> Block:
+def margin_table(named: Mapping[str, LoopFigures]) -> doc.Block:
     """Make the table of the margins to quote."""
     note = (
         "Of several crossings the table quotes the gain margin nearest to 0 dB and the phase margin nearest "
@@ -221,7 +234,7 @@ def margin_table(named: Mapping[str, LoopFigures]) -> Block:
     return doc.table("Stability margins", MARGIN_COLUMNS, rows, note)
 
 
-def response_table(named: Mapping[str, LoopFigures]) -> Block:
+def response_table(named: Mapping[str, LoopFigures]) -> doc.Block:
     """Make the table of bandwidths and step figures."""
     note = (
         "−3 dB: where the closed loop has fallen to 1/√2 of its gain at DC. −90°: where its phase reaches "
@@ -240,15 +253,15 @@ SPREAD_COLUMNS = [
 ]
 
 
-def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, LoopFigures]) -> Block:
+def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, LoopFigures]) -> doc.Block:
     """Make the table of the least and largest margins over the operating points that the drive has."""
     seen = [point for point in points if point.kind != "describing-function"]
     places = "; ".join(dict.fromkeys(point.place or "sliding" for point in seen))
     labels = [next(iter(with_held({label: figures}))) for label, figures in named.items()]
-    rows: list[Row] = []
+    rows: list[doc.Row] = []
     for label, figures in zip(labels, named.values(), strict=True):
         name, own = figures.loop.name, spread(seen).get(figures.loop.name, {})
-        row: Row = {"loop": label}
+        row: doc.Row = {"loop": label}
         row |= {key: range_words(own[f"{key}_margin"]) for key in ("gain", "phase") if f"{key}_margin" in own}
         doubts = [p.place or "sliding" for p in seen if name in p.figures and not p.figures[name].sound]
         row |= {"gain": f"not stable {'; '.join(doubts)}"} if doubts else {}
@@ -263,7 +276,7 @@ def range_words(range_: Spread) -> str:
     return least if least == most else f"{least} ({range_.where}) to {most}"
 
 
-def crossing_table(named: Mapping[str, LoopFigures]) -> Block:
+def crossing_table(named: Mapping[str, LoopFigures]) -> doc.Block:
     """Make the table of every crossing."""
     rows = [row for name, loop_figures in named.items() for row in _crossings(name, loop_figures)]
     return doc.table("Every gain and phase crossover", CROSSING_COLUMNS, rows)
@@ -289,11 +302,11 @@ def _resonance_hz(band: Bandwidth | None) -> float | None:
     return (band.resonance_hz or None) if band else None
 
 
-def _evidence(figures: LoopFigures) -> State:
+def _evidence(figures: LoopFigures) -> doc.State:
     return {"text": figures.margins.evidence, "status": EVIDENCE_STATUS[figures.margins.evidence]}
 
 
-def _state(figures: LoopFigures) -> State:
+def _state(figures: LoopFigures) -> doc.State:
     """Say whether a loop is stable, or unstable only by itself."""
     if figures.held is not None:
         return {"text": "unstable by itself", "status": "warn"}
@@ -346,8 +359,7 @@ def shown(quantity: Quantity, figures: LoopFigures) -> float | None:
     return times(value, quantity.shown[1])
 
 
-def _crossings(name: str, figures: LoopFigures) -> list[Row]:
-    """List every crossing of one loop."""
+def _crossings(name: str, figures: LoopFigures) -> list[doc.Row]:
     m = figures.margins
     rows = [
         _crossing(name, "phase crossover", margin.db, "dB", margin.frequency_rad_s)
@@ -365,7 +377,7 @@ def _crossings(name: str, figures: LoopFigures) -> list[Row]:
     return rows
 
 
-def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> Row:
+def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> doc.Row:
     row = {
         "_loop": next((key for key in LOOPS if name in (LOOPS[key], loop_words(key))), ""),
         "_hz": finite(hertz(omega_rad_s)) or None,
@@ -384,7 +396,7 @@ def _gain_note(ratio: float, tangent: bool) -> str:
     return limit + (", touches, does not cross" if tangent else "")
 
 
-def worst_status(stable: Iterable[bool | None]) -> Status:
+def worst_status(stable: Iterable[bool | None]) -> doc.Status:
     """Give the status of a section from the stability of its loops: unstable fails, unknown warns."""
     known = list(stable)
     if False in known:

@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Row, Section
-from reports.sections.names import LOOPS
+from reports.sections.names import LOOPS, hertz
 
 if TYPE_CHECKING:
+    from actuator_lti.margins.results import StabilityMargins
     from analyses.margins.measured import Measured
-
-MARGINS = [
-    doc.column("kind", "Measured margin"),
-    doc.column("value", "Value", format="sig:4"),
-    doc.column("low", "from", format="sig:4"),
-    doc.column("high", "to", format="sig:4"),
-    doc.column("unit", "Unit"),
-    doc.column("hz", "at", "Hz", format="sig:4"),
-]
-DIFFERENCES = [
-    doc.column("hz", "Frequency", "Hz", format="sig:4"),
-    doc.column("db", "Measured", "dB", format="fix:2"),
-    doc.column("deg", "Phase", "deg", format="fix:1"),
-    doc.column("off_db", "Over model", "dB", format="fix:2"),
-    doc.column("off_deg", "Phase over model", "deg", format="fix:1"),
-    doc.column("spread", "Spread", "dB", format="fix:2"),
-]
 
 
 def words(one: Measured) -> str:
@@ -50,92 +32,82 @@ def _place(one: Measured) -> str:
     return LOOPS.get(one.loop, f"loop at {one.loop}").lower()
 
 
-def section(one: Measured) -> Section:
-    """Make the section from `analyses.margins.measured.measured_over`."""
+def section(one: Measured) -> doc.Section:
     return doc.section("measured-response", "Measured response", blocks(one)[1:], result=words(one))
 
 
-def blocks(one: Measured) -> list[Block]:
+def blocks(one: Measured) -> list[doc.Block]:
     """Give verdict, margins, differences and charts."""
     made = [doc.text(words(one))]
     if one.margins is not None:
-        made.append(doc.table("Margins of the measured loop", MARGINS, _margins(one)))
+        made.append(_margins(one.margins))
     rows = doc.details("Difference to the model at each frequency", [differences(one)])
     return [*made, rows, _bode(one), _nyquist(one)]
 
 
-def differences(one: Measured) -> Block:
-    """Make the table of differences."""
-    phase, spread = np.degrees(np.unwrap(np.angle(one.measured))), _spread_db(one)
-    columns = zip(one.frequency_hz, 20.0 * np.log10(np.abs(one.measured)), phase, one.difference_db,
-                  one.difference_deg, spread, strict=True)  # fmt: skip
-    keys = [column["key"] for column in DIFFERENCES]
-    rows: list[Row] = [dict(zip(keys, map(float, row), strict=True)) for row in columns]
-    return doc.table("Measured over model", DIFFERENCES, rows)
+def differences(one: Measured) -> doc.Block:
+    columns = [
+        doc.column("hz", "Frequency", "Hz", format="sig:4"),
+        doc.column("db", "Measured", "dB", format="fix:2"),
+        doc.column("deg", "Phase", "deg", format="fix:1"),
+        doc.column("off_db", "Over model", "dB", format="fix:2"),
+        doc.column("off_deg", "Phase over model", "deg", format="fix:1"),
+        doc.column("spread", "Spread", "dB", format="fix:2"),
+    ]
+    size, phase = np.abs(one.measured), np.degrees(np.unwrap(np.angle(one.measured)))
+    decibel, spread = 20.0 * np.log10(size), 20.0 * np.log10(1.0 + one.radius / size)
+    found = (one.frequency_hz, decibel, phase, one.difference_db, one.difference_deg, spread)
+    return doc.table("Measured over model", columns, zip(*found, strict=True))
 
 
-def _spread_db(one: Measured) -> np.ndarray:
-    return 20.0 * np.log10(1.0 + one.radius / np.abs(one.measured))
+def _margins(of: StabilityMargins) -> doc.Block:
+    """Each margin of the measured loop with its range, where the points tell one."""
+    columns = [
+        doc.column("kind", "Measured margin"),
+        doc.column("value", "Value", format="sig:4"),
+        doc.column("low", "from", format="sig:4"),
+        doc.column("high", "to", format="sig:4"),
+        doc.column("unit", "Unit"),
+        doc.column("hz", "at", "Hz", format="sig:4"),
+    ]
+    none = (None, None)
+    gains = [(m.db, m.ratio_range and 20.0 * np.log10(m.ratio_range), m) for m in of.gain_margins]
+    found: list[tuple[str, float | None, Any, str, float | None]]
+    found = [("Gain margin", db, range_, "dB", m.frequency_rad_s) for db, range_, m in gains]
+    found += [("Phase margin", m.deg, m.deg_range, "deg", m.frequency_rad_s) for m in of.phase_margins]
+    modulus = of.modulus_margin, of.modulus_range, "", of.modulus_frequency_rad_s
+    found.append(("Modulus margin", *modulus))
+    rows = [
+        (kind, value, *(none if range_ is None else range_), unit, hertz(omega))
+        for kind, value, range_, unit, omega in found
+    ]
+    return doc.table("Margins of the measured loop", columns, rows)
 
 
-def _margins(one: Measured) -> list[Row]:
-    assert one.margins is not None
-    rows: list[Row] = []
-    for gain in one.margins.gain_margins:
-        low, high = (
-            (None, None) if gain.ratio_range is None else (20.0 * np.log10(x) for x in gain.ratio_range)
-        )
-        hz = gain.frequency_rad_s / (2.0 * np.pi)
-        rows.append(
-            {"kind": "Gain margin", "value": gain.db, "low": low, "high": high, "unit": "dB", "hz": hz}
-        )
-    for phase in one.margins.phase_margins:
-        low, high = phase.deg_range or (None, None)
-        hz = phase.frequency_rad_s / (2.0 * np.pi)
-        rows.append(
-            {"kind": "Phase margin", "value": phase.deg, "low": low, "high": high, "unit": "deg", "hz": hz}
-        )
-    low, high = one.margins.modulus_range or (None, None)
-    hz = (one.margins.modulus_frequency_rad_s or np.nan) / (2.0 * np.pi)
-    modulus = one.margins.modulus_margin
-    rows.append({"kind": "Modulus margin", "value": modulus, "low": low, "high": high, "unit": "", "hz": hz})
-    return [{key: doc.plain(value) for key, value in row.items()} for row in rows]
-
-
-def _bode(one: Measured) -> Block:
-    chart = Chart(width=style.WIDE, height=410.0)
+def _bode(one: Measured) -> doc.Block:
+    chart = style.Chart(width=style.WIDE, height=410.0)
     top, bottom = chart.column(1.15, 1.0)
-    f, first, shown = one.frequency_hz, 0.0, []
     top.x.log = bottom.x.log = True
-    for k, (label, L) in enumerate((("measured", one.measured), ("model", one.model))):
-        db, phase = 20.0 * np.log10(np.abs(L)), np.degrees(np.unwrap(np.angle(L)))
-        if k:  # of the same turn as the measurement
-            phase += 360.0 * np.round((first - phase[0]) / 360.0)
-        shown += phase.tolist()
-        if k:
-            top.curve(f, db, label, **style.series(k))
-            bottom.curve(f, phase, label, **style.series(k))
-            continue
-        first, reach = phase[0], np.minimum(one.radius / np.abs(L), 0.999)
-        top.points(f, db, label, colour=style.BLUE)
-        bottom.points(f, phase, label, colour=style.BLUE)
-        ends = 20.0 * np.log10(1.0 - reach), 20.0 * np.log10(1.0 + reach)
-        around = np.degrees(np.arcsin(reach))
-        for panel, y, (low, high) in ((top, db, ends), (bottom, phase, (-around, around))):
-            ring = np.concatenate([f, f[::-1]]), np.concatenate([y + low, (y + high)[::-1]])
-            panel.shape(
-                [ring], "99 % of the measurement" if panel is top else "", colour=style.BLUE, opacity=0.15
-            )
+    f, reach = one.frequency_hz, np.minimum(one.radius / np.abs(one.measured), 0.999)
+    both = (one.measured, one.model)
+    found, model = ((20.0 * np.log10(np.abs(L)), np.degrees(np.unwrap(np.angle(L)))) for L in both)
+    model[1][:] += 360.0 * np.round((found[1][0] - model[1][0]) / 360.0)  # of the same turn
+    ends = 20.0 * np.log10(1.0 - reach), 20.0 * np.log10(1.0 + reach)
+    around = np.degrees(np.arcsin(reach))
+    spread = (ends, (-around, around))
+    for panel, y, fitted, (low, high) in zip((top, bottom), found, model, spread, strict=True):
+        panel.points(f, y, "measured", colour=style.BLUE)
+        ring = np.concatenate([f, f[::-1]]), np.concatenate([y + low, (y + high)[::-1]])
+        panel.shape([ring], "99 % of the measurement", colour=style.BLUE, opacity=0.15)
+        panel.curve(f, fitted, "model", **style.series(1))
     top.y.label, bottom.y.label, bottom.x.label = "magnitude, dB", "phase, deg", "frequency, Hz"
-    style.phase_axis(bottom, shown)
+    style.phase_axis(bottom, [*found[1], *model[1]])
     caption = f"{one.name}: measured {_place(one)} with its spread, and the model"
-    return doc.figure(
-        "measured", chart, caption=caption, alt="Measured and modelled open loop over frequency"
-    )
+    return doc.figure("measured", chart, caption, alt="Measured and modelled open loop over frequency")
 
 
-def _nyquist(one: Measured) -> Block:
-    chart = Chart(width=style.HALF, height=430.0)
+def _nyquist(one: Measured) -> doc.Block:
+    chart = style.Chart(width=style.HALF, height=430.0)
     panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
     panel.equal = True
     turn = np.exp(2j * np.pi * np.arange(25) / 24)

@@ -3,32 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from functools import partial
 from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
-from analyses.monte_carlo import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
-from analyses.specification.verdicts import RequirementVerdict
+from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
+from analyses.monte_carlo.statistics import ColumnStatistics
+from analyses.specification.requirements import RequirementVerdict
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart, Panel
-from reports.document_schema import Block, Section, VerdictItem
 from reports.numbers import or_none
 from reports.sections.margins import finite
 from reports.sections.names import unit_words
 from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
 
-_SHOWN = {"q01": 0.01, "q05": 0.05, "q50": 0.5, "q95": 0.95, "q99": 0.99}
+_SHOWN = (1, 5, 50, 95, 99)  # per cent
 
 
-def section(result: MonteCarloResult) -> Section:
-    """Make the section from `analyses.monte_carlo.monte_carlo`."""
+def section(result: MonteCarloResult) -> doc.Section:
     items = [_verdict(result, odds) for odds in result.odds if odds.id != "all"]
     items += [_not_sampled(one) for one in result.left_out]
-    blocks: list[Block] = [doc.verdicts(items, what="odds")] if items else []
+    blocks: list[doc.Block] = [doc.verdicts(items, what="odds")] if items else []
     if result.odds:
         blocks.append(_odds_table(result))
         blocks += _figures(result)
@@ -83,7 +82,7 @@ def _result(result: MonteCarloResult) -> str:
     )
 
 
-def _verdict(result: MonteCarloResult, odds: Odds) -> VerdictItem:
+def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
     """Judge one requirement by its odds."""
     wanted = 1.0 if result.at_least is None else result.at_least
     passed = result.judged(odds) is Verdict.MET
@@ -103,7 +102,7 @@ def _verdict(result: MonteCarloResult, odds: Odds) -> VerdictItem:
     )
 
 
-def _not_sampled(one: RequirementVerdict) -> VerdictItem:
+def _not_sampled(one: RequirementVerdict) -> doc.VerdictItem:
     return doc.verdict(
         f"tolerance/{one.id}", f"{label(one)}: met within the tolerances", passed=None, reason=one.reason,
         waiver=one.waiver.words if one.waiver else "",
@@ -118,7 +117,7 @@ def _why(odds: Odds, case: WorstCase | None) -> str:
     return f"every sample passes, but the worst case of the tolerance box fails: {case.value:.4g} {case.unit}"
 
 
-def _odds_table(result: MonteCarloResult) -> Block:
+def _odds_table(result: MonteCarloResult) -> doc.Block:
     share: dict[str, Any] = {"unit": "%", "scale": 100.0, "format": "fix:3"}
     columns = [
         doc.of("label", "label", "Requirement"),
@@ -139,12 +138,12 @@ def _odds_table(result: MonteCarloResult) -> Block:
     )  # fmt: skip
 
 
-def _figure_table(columns: Iterable[ColumnStatistics]) -> Block:
+def _figure_table(columns: Iterable[ColumnStatistics]) -> doc.Block:
     shown = [
         doc.of(lambda c: _words(c.name), "figure", "Figure"),
         doc.of(lambda c: unit_words(c.unit), "unit", "Unit"),
         doc.of("minimum", "minimum", "Min", format="sig:4"),
-        *(doc.of(_quantile(q), key, f"{100.0 * q:g} %", format="sig:4") for key, q in _SHOWN.items()),
+        *(doc.of(partial(_quantile, q), f"q{q:02d}", f"{q} %", format="sig:4") for q in _SHOWN),
         doc.of("maximum", "maximum", "Max", format="sig:4"),
         doc.of("mean", "mean", "Mean", format="sig:4"),
         doc.of("std", "std", "Std", format="sig:3"),
@@ -156,8 +155,8 @@ def _figure_table(columns: Iterable[ColumnStatistics]) -> Block:
     return doc.listing("Distribution of every figure", columns, shown, note)
 
 
-def _quantile(share: float) -> Callable[[ColumnStatistics], float | None]:
-    return lambda c: dict(zip(c.shares, c.quantiles, strict=True)).get(share)
+def _quantile(percent: int, c: ColumnStatistics) -> float | None:
+    return dict(zip(c.shares, c.quantiles, strict=True)).get(percent / 100)
 
 
 def _words(name: str) -> str:
@@ -176,7 +175,7 @@ def _words(name: str) -> str:
     )
 
 
-def _figures(result: MonteCarloResult) -> list[Block]:
+def _figures(result: MonteCarloResult) -> list[doc.Block]:
     """Draw the distribution behind every requirement, at most three a figure, in rows of like length."""
     shown = [
         (odds, result.columns[name])
@@ -189,7 +188,7 @@ def _figures(result: MonteCarloResult) -> list[Block]:
     rows = -(-len(shown) // 3)
     for row in range(rows):
         part = shown[row * len(shown) // rows : (row + 1) * len(shown) // rows]
-        chart = Chart(width=style.WIDE, height=250.0, legend=True)
+        chart = style.Chart(width=style.WIDE, height=250.0, legend=True)
         for odds, column in part:
             _histogram(chart.panel(title=_words(column.name)), result, odds, column)
         names = ", ".join(_words(column.name) for _, column in part)
@@ -198,7 +197,7 @@ def _figures(result: MonteCarloResult) -> list[Block]:
     return blocks
 
 
-def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: ColumnStatistics) -> None:
+def _histogram(panel: style.Panel, result: MonteCarloResult, odds: Odds, column: ColumnStatistics) -> None:
     """Fill the counts under a line; mark limits, nominal design and worst case, each with its own dash."""
     edges, counts = [e for e in column.edges if math.isfinite(e)], column.counts
     x = [edges[0], *(e for edge in edges[1:-1] for e in (edge, edge)), edges[-1]]
@@ -223,7 +222,7 @@ def _histogram(panel: Panel, result: MonteCarloResult, odds: Odds, column: Colum
     panel.x.label, panel.y.label, panel.x.grid = unit, "samples", False
 
 
-def _driver_table(result: MonteCarloResult) -> Block:
+def _driver_table(result: MonteCarloResult) -> doc.Block:
     """Say of each required figure which tolerances move it most, and between which values."""
     strongest: dict[str, list[Driver]] = {}
     for one in (each for each in result.drivers if each.swing != 0.0):
@@ -231,34 +230,31 @@ def _driver_table(result: MonteCarloResult) -> Block:
     places = [("first", "Driven most by"), ("second", "then by"), ("third", "then by")]
     columns = [
         doc.of(lambda item: _words(item[0]), "figure", "Figure"),
-        *(doc.of(_driver(k), key, label) for k, (key, label) in enumerate(places)),
+        *(doc.of(partial(_driver, k), key, label) for k, (key, label) in enumerate(places)),
         doc.of(lambda item: unit_words(result.columns[item[0]].unit), "unit", "Unit"),
     ]
     note = "The figure with that parameter alone at the low and the high end of its tolerance."
     return doc.listing("Which tolerance drives which figure", strongest.items(), columns, note)
 
 
-def _driver(place: int) -> Callable[[tuple[str, list[Driver]]], str]:
-    def words(item: tuple[str, list[Driver]]) -> str:
-        if place >= len(item[1]):
-            return ""
-        one = item[1][place]
-        told = ([or_none(value, digits) for value in (one.low, one.high)] for digits in range(3, 7))
-        return next((f"{one.path}: {low} to {high}" for low, high in told if low != high), "")
-
-    return words
+def _driver(place: int, item: tuple[str, list[Driver]]) -> str:
+    if place >= len(item[1]):
+        return ""
+    one = item[1][place]
+    told = ([or_none(value, digits) for value in (one.low, one.high)] for digits in range(3, 7))
+    return next((f"{one.path}: {low} to {high}" for low, high in told if low != high), "")
 
 
-def _worst_table(result: MonteCarloResult) -> Block:
+def _worst_table(result: MonteCarloResult) -> doc.Block:
     columns = [
         doc.of("requirement", "requirement", "Worst case for"),
         doc.of(lambda case: "" if case.file is None else case.file.name, "file", "Design file"),
     ]
     for k, path in enumerate(result.paths):
-        columns.append(doc.of(_parameter(path), f"p{k}", path, format="sig:5"))
+        columns.append(doc.of(partial(_parameter, path), f"p{k}", path, format="sig:5"))
     note = "Each is saved as a design that `report` opens."
     return doc.listing("Worst designs, SI values", result.worst, columns, note)
 
 
-def _parameter(path: str) -> Callable[[WorstCase], float]:
-    return lambda case: case.parameters[path]
+def _parameter(path: str, case: WorstCase) -> float:
+    return case.parameters[path]

@@ -7,7 +7,6 @@ import math
 from actuator_lti.asked.quantities import QUANTITIES as REGISTRY
 from actuator_lti.design.model import Design
 from reports import document as doc
-from reports.document_schema import Column
 
 LOOPS = {"current": "Current loop", "velocity": "Velocity loop", "position": "Position loop"}
 FORMS = {"sampled": "sampled", "continuous": "continuous with delays", "ideal": "ideal, no delay"}
@@ -25,7 +24,7 @@ def loop_words(name: str, rotor: str = "free") -> str:
     return f"{LOOPS[name]}, rotor {rotor or 'free'}" if name == "current" else LOOPS[name]
 
 
-def figure_column(quantity: str, key: str, *, format: str, label: str = "") -> Column:
+def figure_column(quantity: str, key: str, *, format: str, label: str = "") -> doc.Column:
     """Describe the column of a figure of the registry: its heading, unit and better direction."""
     of = REGISTRY[quantity]
     return doc.column(key, label or of.heading, of.shown[0], format=format, better=of.direction)

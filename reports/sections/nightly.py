@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from actuator_lti.files.tree import Tree
 from reports import document as doc
-from reports.document_schema import Section
 from reports.nightly.machines import summary
 from reports.nightly.text import one_line
 from reports.nightly.view import STATE_WORDS, DesignView
@@ -16,8 +15,7 @@ if TYPE_CHECKING:
     from reports.nightly.view import Overview
 
 
-def section(night: Overview) -> Section:
-    """Make the section of a night."""
+def section(night: Overview) -> doc.Section:
     columns = [
         doc.of(lambda design: STATE_WORDS[design.state], "state", "State"),
         doc.of(lambda design: one_line(design.name, 60), "name", "Design"),

@@ -1,13 +1,12 @@
-"""Every value of the design file with its source, grade and tolerance."""
+"""The values of the design with their sources, and what the report was made of and with."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from actuator_lti.design.model import Design, Parameter
 from reports import document as doc
-from reports.document_schema import Block, Section, Status
-from reports.findings import Finding
 from reports.sections.names import unit_words
 
 GRADES = (
@@ -32,11 +31,10 @@ FACTS = [
 ]
 
 
-def section(design: Design, warnings: Sequence[str] = ()) -> Section:
-    """Make the section."""
+def section(design: Design, warnings: Sequence[str] = ()) -> doc.Section:
     parameters = list(design.parameters.values())
     assumed = sum("X" in item.grade for item in parameters)
-    blocks: list[Block] = [_derived(design)]
+    blocks: list[doc.Block] = [_derived(design)]
     if warnings:
         rows = [{"warning": warning, "_status": "warn"} for warning in warnings]
         blocks.append(doc.table("To be checked", [doc.column("warning", "Warning")], rows))
@@ -45,8 +43,8 @@ def section(design: Design, warnings: Sequence[str] = ()) -> Section:
     if design.facts:
         facts = doc.listing("Facts", design.facts, FACTS)
         blocks.append(doc.details("Facts that enter no equation", [facts]))
-    status: Status = "warn" if warnings else "info"
-    findings = [Finding(severity="warn", text=words, where="parameters") for words in warnings]
+    status: doc.Status = "warn" if warnings else "info"
+    findings = [doc.Finding(severity="warn", text=words, where="parameters") for words in warnings]
     result = (
         f"{len(parameters)} values; {assumed} of them are assumed (grade X)."
         if parameters
@@ -54,7 +52,7 @@ def section(design: Design, warnings: Sequence[str] = ()) -> Section:
     )
     if assumed:
         told = f"{assumed} of {len(parameters)} values are assumed."
-        findings.append(Finding(severity="info", text=told, where="parameters"))
+        findings.append(doc.Finding(severity="info", text=told, where="parameters"))
     return doc.section(
         "parameters", "Parameters and their sources", blocks, result=result,
         intro=GRADES if parameters else "",
@@ -62,8 +60,7 @@ def section(design: Design, warnings: Sequence[str] = ()) -> Section:
     )  # fmt: skip
 
 
-def _derived(design: Design) -> Block:
-    """Give what follows from the values."""
+def _derived(design: Design) -> doc.Block:
     mass, unit = ("Inertia at the motor", "kg m²") if design.axis == "rotary" else ("Moving mass", "kg")
     items = [
         doc.fact("Total reduction N", float(f"{design.total_ratio:.6g}")),
@@ -84,3 +81,27 @@ def tolerance_words(item: Parameter) -> str:
     width = tolerance.half_width if tolerance.kind == "uniform" else tolerance.std
     text = tolerance.text or ("" if width is None else f"{width:.3g}")
     return f"±{text}" if tolerance.kind == "uniform" else f"σ {text}, {tolerance.kind}"
+
+
+def provenance(
+    design: Mapping[str, Any], head: Mapping[str, Any], findings: Sequence[doc.Finding] = ()
+) -> doc.Section:
+    """Make the section of provenance from the document's own head."""
+    rows = [
+        ("design", f"{design['name']}, revision {design['revision'] or 'none'}"),
+        ("design file", design["origin"] or "none"),
+        ("hash of the design (SHA-256)", head["design_hash"]),
+        ("actuator-lti", head["version"]),
+        ("commit", head["commit"] or "not built from a git tree"),
+        ("built", head["time"]),
+        ("Python", f"{head['python']}, {head['platform']}"),
+        *head["libraries"].items(),
+    ]
+    columns = [doc.column("what", "What"), doc.column("value", "Value")]
+    blocks = [
+        doc.details("To build this report again", [doc.table("Design, program and libraries", columns, rows)])
+    ]
+    result = (
+        f"Computed by actuator-lti {head['version']} from the design with hash {head['design_hash'][:12]}."
+    )
+    return doc.section("provenance", "Provenance", blocks, result=result, findings=findings)

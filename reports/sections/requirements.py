@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from actuator_lti.asked.verdict import Verdict
 from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
-from reports.document_schema import Section, Status, VerdictItem
 from reports.sections.names import QUANTITIES, unit_words
 
 if TYPE_CHECKING:
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from analyses.monte_carlo import Odds
 
 
-def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> Section:
+def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> doc.Section:
     """Make the section from the verdicts; ``load_unit`` is N for a linear axis."""
     if not verdicts:
         none = "The design states no requirements."
@@ -27,7 +26,7 @@ def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> S
         "Distance is what is left to the limit, negative where it is missed."
     )
     items = [item(verdict, load_unit) for verdict in verdicts]
-    status: Status = tally(verdicts).role
+    status: doc.Status = tally(verdicts).role
     return doc.section(
         "verdicts", "Requirements", [doc.verdicts(items)], result=result(verdicts), intro=intro, status=status
     )
@@ -42,7 +41,7 @@ def result(verdicts: Sequence[RequirementVerdict]) -> str:
     return " ".join(said)
 
 
-def item(verdict: RequirementVerdict, load_unit: str = "N m") -> VerdictItem:
+def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem:
     """Make one line of the verdicts."""
     requirement = verdict.requirement
     limit, comparison = _limit(verdict)

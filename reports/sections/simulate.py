@@ -11,28 +11,23 @@ from actuator_lti.design.control import Stage
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
 from analyses.motion import Motion
-from analyses.motion.conduct import conduct
-from analyses.motion.summary import summary
+from analyses.motion.conduct import conduct, summary
 from nonlinear import Trajectory
 from nonlinear.runs.trajectory import COMMAND_UNITS, LimitUse
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart, Panel
 from reports.charts.svg import paper_svg
-from reports.document_schema import Block, Row, Section, Status
-from reports.sections.thinning import kept_rows
 
 Signals = list[tuple[str, npt.NDArray[np.float64]]]
 LONGEST_GAP_S = 0.002  # spans of an active limit closer than this fraction of the run are drawn as one
 
 
-def section(result: Motion) -> Section:
-    """Make the section from `analyses.motion.motion`."""
+def section(result: Motion) -> doc.Section:
     run, ended = result.run, conduct(result.run)
     detail = f" ({ended.detail})" if ended.detail else ""
     blocks = [_table(run), _limits(run), *([_energy(run)] if run.energy else [])]
     figure = doc.figure("trajectory", chart_of(run), caption="The motion over time.", alt="The motion.")
-    status: Status = "info" if ended.wanted else "warn"
+    status: doc.Status = "info" if ended.wanted else "warn"
     words = f"{run.time_s.size} rows, status {ended.status}{detail}"
     return doc.section("simulate", "Motion", [figure, *blocks], result=words, status=status)
 
@@ -49,10 +44,10 @@ def write(result: Motion, folder: Path | None) -> list[str]:
     return result.asked.files
 
 
-def _table(run: Trajectory) -> Block:
+def _table(run: Trajectory) -> doc.Block:
     """Largest and last values: outputs in the unit of the command line, motor speeds in rpm as well."""
     unit, per_SI = COMMAND_UNITS[run.axis, run.stage]
-    rows: list[Row] = []
+    rows: list[doc.Row] = []
     for name, value in summary(run).items():
         if name.startswith(("largest_command", "largest_error")):
             rows.append({"what": " ".join(name.split("_")[:2]), "value": value * per_SI, "unit": unit})
@@ -74,7 +69,7 @@ UNITS = (
 )  # fmt: skip
 
 
-def _in_words(name: str, value: float) -> list[Row]:
+def _in_words(name: str, value: float) -> list[doc.Row]:
     """A figure as people read it.
 
     Examples
@@ -84,26 +79,27 @@ def _in_words(name: str, value: float) -> list[Row]:
     """
     ending, factor, unit = next((one for one in UNITS if name.endswith(one[0])), ("", 1.0, ""))
     what = name.removesuffix(ending).replace("_", " ")
-    more: list[Row] = [{"what": "", "value": value * 30.0 / np.pi, "unit": "rpm"}] if unit == "rad/s" else []
+    more: list[doc.Row] = (
+        [{"what": "", "value": value * 30.0 / np.pi, "unit": "rpm"}] if unit == "rad/s" else []
+    )
     return [{"what": what, "value": value * factor, "unit": unit}, *more]
 
 
-def _limits(run: Trajectory) -> Block:
+def _limits(run: Trajectory) -> doc.Block:
+    def stated(pair: tuple[str, LimitUse]) -> bool:
+        return bool(np.isfinite(pair[1].limit))
+
     columns = [
         doc.of(lambda pair: pair[0], "name", "Limit"),
-        doc.of(lambda pair: _there(pair[1], pair[1].limit, "none"), "limit", "Value", format="short:6"),
-        doc.of(lambda pair: _there(pair[1], pair[1].unit, ""), "unit", "Unit"),
+        doc.of(lambda pair: pair[1].limit if stated(pair) else "none", "limit", "Value", format="short:6"),
+        doc.of(lambda pair: pair[1].unit if stated(pair) else "", "unit", "Unit"),
         doc.of(lambda pair: 100.0 * pair[1].fraction, "share", "Acts, of the time", "%", format="short:3"),
         doc.of(lambda pair: pair[1].first_time_s, "first", "First at", "s", format="short:6"),
     ]
     return doc.listing("Limits", run.limits.items(), columns)
 
 
-def _there(use: LimitUse, shown: float | str, otherwise: str) -> float | str:
-    return shown if np.isfinite(use.limit) else otherwise
-
-
-def _energy(run: Trajectory) -> Block:
+def _energy(run: Trajectory) -> doc.Block:
     assert run.energy is not None
     values = {**vars(run.energy), "balance, relative": run.energy.relative_error}
     rows = [
@@ -113,7 +109,7 @@ def _energy(run: Trajectory) -> Block:
     return doc.table("Where the electrical energy went", COLUMNS, rows)
 
 
-def chart_of(run: Trajectory) -> Chart:
+def chart_of(run: Trajectory) -> style.Chart:
     """Position, speed, current and voltage on one time axis, thinned with the peaks kept."""
     linear = run.axis == "linear"
     angle, unit = (1e3, "mm") if linear else (180.0 / np.pi, "deg")
@@ -131,8 +127,8 @@ def chart_of(run: Trajectory) -> Chart:
         *([("motor current, A", current, "current")] if run.current_A.any() else []),
         ("voltage, V", [("voltage", run.voltage_V), *command.get("voltage", [])], "voltage"),
     ]
-    rows = kept_rows([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])
-    chart = Chart(width=style.WIDE, height=60.0 + 150.0 * len(parts), legend=True)
+    rows = style.kept_rows([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])
+    chart = style.Chart(width=style.WIDE, height=60.0 + 150.0 * len(parts), legend=True)
     panels = chart.column(*(1.0 for _ in parts))
     scale = style.time_axis(panels[-1], float(run.time_s[rows][-1]))
     time = run.time_s[rows] * scale
@@ -153,7 +149,7 @@ def _scaled(signals: Signals, factor: float) -> Signals:
     return [(name, factor * values) for name, values in signals]
 
 
-def _limit(panel: Panel, limit: float, peak: float) -> None:
+def _limit(panel: style.Panel, limit: float, peak: float) -> None:
     """Draw both signs of the limit where it lies within reach of the signals."""
     if limit > 4.0 * peak:
         panel.note(f"limit ±{limit:.4g}, off scale", corner="top left", colour=style.MUTED)

@@ -11,9 +11,6 @@ from actuator_lti.design.model import Design
 from analyses.specification import Specification
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart, Panel
-from reports.document_schema import Block, Section
-from reports.findings import Finding
 from reports.numbers import short, significant
 from reports.sections.limits import words_of
 from reports.sections.names import load_unit, output_unit
@@ -28,8 +25,7 @@ BOUND_COLOURS = {
 }
 
 
-def section(result: Specification) -> Section:
-    """Make the section from `analyses.specification.specification`."""
+def section(result: Specification) -> doc.Section:
     blocks = [_capability_table(result), *_planes(result), _manoeuvre_table(result), _step_table(result)]
     intro = (
         "Closed form and simulation side by side, behind the profile of the command; manoeuvres and steps "
@@ -77,11 +73,11 @@ def _commanded(design: Design) -> str:
     return f" The profile of its command asks for at most {' and '.join(parts)}." if parts else ""
 
 
-def _findings(result: Specification) -> list[Finding]:
+def _findings(result: Specification) -> list[doc.Finding]:
     """Name the loads at which the drive cannot run without pause."""
     unit = load_unit(result.design)
     return [
-        Finding(
+        doc.Finding(
             severity="warn",
             text=(
                 f"At {one.figures.load_Nm:g} {unit} load the continuous current allows a duty of "
@@ -94,8 +90,7 @@ def _findings(result: Specification) -> list[Finding]:
     ]
 
 
-def _capability_table(result: Specification) -> Block:
-    """List rate, acceleration, current and duty by load."""
+def _capability_table(result: Specification) -> doc.Block:
     scale, unit = output_unit(result.design.axis)
     rate: dict[str, Any] = {"unit": f"{unit}/s", "scale": scale, "format": "sig:4"}
     push: dict[str, Any] = {"unit": f"{unit}/s²", "scale": scale, "format": "sig:4"}
@@ -117,15 +112,15 @@ def _capability_table(result: Specification) -> Block:
             doc.of("duty", "duty", "Duty", **share),
         ]
     note = (
-        "Acceleration in closed form is that of the largest torque from rest; simulated, the mean over a "
-        "tenth of the run-up, where the current controller lags behind the rising back-EMF. Duty is the "
-        "share of the time that keeps the rms current at the continuous one."
+        "Acceleration in closed form is that of the largest torque from rest, at most the acceleration "
+        "limit; simulated, the mean over a tenth of the run-up, where controllers lag and overshoot."
     )
+    if result.design.motor.has_electrical_dynamics:
+        note += " Duty is the share of the time that keeps the rms current at the continuous one."
     return doc.listing("Rate, acceleration and current at each load", result.capabilities, columns, note)
 
 
-def _planes(result: Specification) -> list[Block]:
-    """Make a torque-speed plane for each load."""
+def _planes(result: Specification) -> list[doc.Block]:
     linear = result.design.axis == "linear"
     fast, speed_label = (1.0, "speed, m/s") if linear else (60.0 / (2.0 * math.pi), "motor speed, rpm")
     strong, torque_label = (1.0, "force, N") if linear else (1e3, "motor torque, mN m")
@@ -135,7 +130,7 @@ def _planes(result: Specification) -> list[Block]:
         load = one.figures.load_Nm
         moves = [move for move in result.manoeuvres if move.load_Nm == load]
         title = f"{'Force' if linear else 'Torque'} and speed of the motor, load {load:g} {unit}"
-        chart = Chart(width=style.WIDE, height=400.0, title=title, legend=True)
+        chart = style.Chart(width=style.WIDE, height=400.0, title=title, legend=True)
         panel = chart.panel(speed_label, torque_label, by_point=True)
         widest, top = fast * _fastest(result, moves), strong * _top(result, moves)
         panel.x.limits(-0.02 * widest, widest)
@@ -169,7 +164,7 @@ def _planes(result: Specification) -> list[Block]:
 
 
 def _bound(
-    panel: Panel, name: str, speed: np.ndarray, torque: np.ndarray, inside: tuple[float, float]
+    panel: style.Panel, name: str, speed: np.ndarray, torque: np.ndarray, inside: tuple[float, float]
 ) -> None:
     """Draw one bound in both halves, named once."""
     look: style.Style = {"colour": BOUND_COLOURS.get(name, style.INK), "width": 1.3, "dash": 1}
@@ -209,8 +204,7 @@ def _fastest(result: Specification, moves: list[Any]) -> float:
     return 1.12 * max([highest, *upright, *[c for c in crossing if c < 4.0 * highest]])
 
 
-def _manoeuvre_table(result: Specification) -> Block:
-    """List currents and duty of the manoeuvres."""
+def _manoeuvre_table(result: Specification) -> doc.Block:
     columns = [
         doc.of("name", "name", "Manoeuvre"),
         doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
@@ -240,8 +234,7 @@ def _limit_words(limits: dict[str, float]) -> str:
     return ", ".join(parts) or "none"
 
 
-def _step_table(result: Specification) -> Block:
-    """List step times from small to full deflection."""
+def _step_table(result: Specification) -> doc.Block:
     scale, unit = output_unit(result.design.axis)
     columns = [
         doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),

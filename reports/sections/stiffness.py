@@ -12,8 +12,6 @@ from analyses.stiffness import Stiffness, stiffness
 from analyses.stiffness.result import AGREED, READ
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Section, Status
 from reports.numbers import short
 from reports.sections.names import load_unit, output_unit
 
@@ -24,13 +22,12 @@ STATES = {
 }
 
 
-def of_design(design: Design) -> Section:
+def of_design(design: Design) -> doc.Section:
     """Make the section of a report from the linear loops alone."""
     return {**section(stiffness(design, simulated=False)), "status": "info"}
 
 
-def section(result: Stiffness) -> Section:
-    """Make the section from `analyses.stiffness.stiffness`."""
+def section(result: Stiffness) -> doc.Section:
     unit = f"{load_unit(result.design)}/{'m' if result.design.axis == 'linear' else 'rad'}"
     blocks = [*_figure(result, unit), _table(result, unit)]
     if result.lost_motion is not None:
@@ -43,7 +40,7 @@ def section(result: Stiffness) -> Section:
         "Moment on the output over its deflection, the command held: the inverse of the linear response "
         "from the moment to the output. Friction slides; dry friction and play are not in the curves."
     )
-    status: Status = result.verdict.role()
+    status: doc.Status = result.verdict.role()
     return doc.section(
         "stiffness", "Stiffness", blocks, result=_result(result, unit), intro=intro, status=status
     )
@@ -73,11 +70,11 @@ def _compared(result: Stiffness) -> str:
     return f"{words} (relative)"
 
 
-def _figure(result: Stiffness, unit: str) -> list[Block]:
+def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
     shown = [curve for curve in result.curves if np.isfinite(curve.stiffness_Nm_rad).all()]
     if not shown:
         return []
-    chart = Chart(width=style.WIDE, height=420.0)
+    chart = style.Chart(width=style.WIDE, height=420.0)
     top, bottom = chart.column(1.2, 1.0)
     top.y.log, top.y.label, bottom.y.label = True, f"stiffness, {unit}", "phase, deg"
     phases = [np.degrees(np.unwrap(np.angle(curve.stiffness_Nm_rad))) for curve in shown]
@@ -87,30 +84,28 @@ def _figure(result: Stiffness, unit: str) -> list[Block]:
     style.frequency(bottom, shown[0].frequency_hz)
     style.phase_axis(bottom, np.concatenate(phases))
     caption = "Dynamic stiffness of the output, powered and unpowered."
-    return [doc.figure("stiffness", chart, caption=caption, alt=f"Two panels. {caption}")]
+    return [doc.figure("stiffness", chart, caption)]
 
 
-def _table(result: Stiffness, unit: str) -> Block:
+def _table(result: Stiffness, unit: str) -> doc.Block:
     note = "Infinite: the output comes back to its place, or does not move at all."
     static: dict[str, Any] = {"unit": unit, "format": "sig:4", "better": 1}
     columns = [
         doc.of(lambda one: STATES[one.state], "state", "State"),
         doc.of(lambda one: _or_infinite(one.static_Nm_rad), "static", "Static", **static),
         doc.of(lambda one: _or_infinite(one.least[0]), "least", "Least", **static),
-        doc.of(lambda one: _finite(one.least), "at", "at", "Hz", format="sig:4"),
+        doc.of(
+            lambda one: one.least[1] if one.least[0] < math.inf else None, "at", "at", "Hz", format="sig:4"
+        ),
     ]
     return doc.listing("Stiffness by state", result.curves, columns, note)
-
-
-def _finite(least: tuple[float, float]) -> float | None:
-    return least[1] if math.isfinite(least[0]) else None
 
 
 def _or_infinite(stiffness: float) -> float | str:
     return stiffness if math.isfinite(stiffness) else "infinite"
 
 
-def _lost_motion(result: Stiffness) -> Block:
+def _lost_motion(result: Stiffness) -> doc.Block:
     scale, unit = output_unit(result.design.axis)
     lost = result.lost_motion
     assert lost is not None
@@ -128,7 +123,7 @@ def _lost_motion(result: Stiffness) -> Block:
     return doc.table("Lost motion at the output", columns, rows, note)
 
 
-def _at_rest(result: Stiffness, unit: str) -> Block:
+def _at_rest(result: Stiffness, unit: str) -> doc.Block:
     note = (
         "Fundamental of the simulated drive as it is, with its dry friction, play and quantisation, the "
         "command held. No value: the output does not move."
@@ -141,7 +136,7 @@ def _at_rest(result: Stiffness, unit: str) -> Block:
     return doc.listing("At rest, by amplitude", result.at_rest, columns, note)
 
 
-def _checks(result: Stiffness, unit: str) -> Block:
+def _checks(result: Stiffness, unit: str) -> doc.Block:
     note = (
         "The simulator's own derivative from a moment, at rest, without play, counts, dry friction or "
         "friction by load: predicted here is the linear stiffness of that drive, without that "

@@ -6,19 +6,16 @@ from pathlib import Path
 
 from actuator_lti.design import write_design
 from actuator_lti.files.atomic import write_text
-from analyses.specification.verdicts import RequirementVerdict
+from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning import BindingRequirement, TuningResult
 from reports import document as doc
 from reports.charts import style
-from reports.charts.style import Chart
-from reports.document_schema import Block, Section, VerdictItem
 from reports.sections.names import output_unit, unit_words
 
 
-def section(result: TuningResult) -> Section:
-    """Make the section."""
+def section(result: TuningResult) -> doc.Section:
     verdicts = doc.verdicts(_verdict(r) for r in result.requirements)
-    blocks: list[Block] = [
+    blocks: list[doc.Block] = [
         *(verdicts, gains(result)),
         *([confirmed(result)] if result.confirmed else []),
         *([_curve(result)] if result.trade_off else []),
@@ -78,7 +75,7 @@ def _amount(r: BindingRequirement) -> str:
     return f"{abs(r.distance):.3g}{'' if r.unit == '1' else ' ' + r.unit}"
 
 
-def _verdict(r: BindingRequirement) -> VerdictItem:
+def _verdict(r: BindingRequirement) -> doc.VerdictItem:
     return doc.verdict(
         f"tuning/{r.id}", f"{r.label}, worst corner", value=r.value, limit=r.limit, unit=r.unit,
         distance=r.distance, passed=r.relative >= 0.0,
@@ -88,7 +85,7 @@ def _verdict(r: BindingRequirement) -> VerdictItem:
     )  # fmt: skip
 
 
-def gains(result: TuningResult) -> Block:
+def gains(result: TuningResult) -> doc.Block:
     """Gains in SI and in the motion controller's objects."""
     note = (
         "Tuned: rounded to the steps of the motion controller's objects, where the drive is that controller."
@@ -107,7 +104,7 @@ def gains(result: TuningResult) -> Block:
     return doc.listing("Gains", result.gains, columns, note)
 
 
-def confirmed(result: TuningResult) -> Block:
+def confirmed(result: TuningResult) -> doc.Block:
     """The requirements by certified margins."""
 
     def limit(v: RequirementVerdict) -> float | None:
@@ -127,12 +124,12 @@ def _corner(r: BindingRequirement) -> str:
     return "; ".join(f"{path} {value:.4g}" for path, value in r.corner.items()) or "nominal"
 
 
-def _curve(result: TuningResult) -> Block:
+def _curve(result: TuningResult) -> doc.Block:
     limits = {(r.id, r.unit): r.limit for r in result.requirements}
     wanted = [q for q in result.before.requirements if (q.id, q.unit) in limits]
     width = [q.minimum for q in wanted if q.quantity == "bandwidth" and q.loop == "position"]
     margin = [q.minimum for q in wanted if q.quantity == "phase_margin" and q.minimum is not None]
-    chart = Chart(width=style.WIDE, height=350.0, title="What the position loop can trade")
+    chart = style.Chart(width=style.WIDE, height=350.0, title="What the position loop can trade")
     panel = chart.panel("bandwidth of the position loop, Hz", "smallest phase margin of all loops, deg")
     x, y = [p.bandwidth_hz for p in result.trade_off], [p.phase_margin_deg for p in result.trade_off]
     panel.curve(x, y, "best smallest phase margin, worst corner", colour=style.BLUE)
@@ -153,7 +150,7 @@ def _curve(result: TuningResult) -> Block:
     return doc.figure("trade_off", chart, caption)
 
 
-def checks(result: TuningResult) -> Block:
+def checks(result: TuningResult) -> doc.Block:
     """The nonlinear check."""
     scale, unit = output_unit(result.design.axis)
     columns = [

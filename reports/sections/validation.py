@@ -13,19 +13,8 @@ from analyses.motion.settling import waiver_of_rest
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
-from reports.document_schema import Block, Counts, Section, Severity, VerdictItem
-from reports.findings import Finding
 from reports.numbers import capital
-from reports.sections import (
-    conditional,
-    counts,
-    friction_effects,
-    from_rest,
-    in_time,
-    large_signal,
-    specification,
-)
-from reports.sections.conditional import findings_of
+from reports.sections import beyond, friction_effects, in_time, large_signal, specification
 from reports.sections.names import LOOPS, POINTS, QUANTITIES, unit_words
 from reports.terminal import Brief
 
@@ -50,26 +39,21 @@ PLACES = {"command": "Command to output", "load": "Load torque to output", "driv
 NOISE = 1e-9  # of the value: a smaller error changes with the order in which sums are taken
 
 
-def section(validation: Validation) -> list[Section]:
+def section(validation: Validation) -> list[doc.Section]:
     """Make all sections of a validation, verdicts first."""
     made = [summary(validation), *in_time.sections(validation)]
     if validation.rest_sweep is not None:
-        made += from_rest.sections(validation.rest_sweep, validation.design.axis)
+        made += beyond.from_rest(validation.rest_sweep, validation.design.axis)
     if validation.conditional is not None:
-        made.append(conditional.section(validation.conditional, validation.design.axis))
+        made.append(beyond.large_commands(validation.conditional, validation.design.axis))
     if validation.counts:
-        made.append(counts.section(validation.counts, validation.design.axis))
-    return [*made, *_others(validation)]
-
-
-def _others(validation: Validation) -> list[Section]:
-    """Make the sections of large signals, friction and specification, as far as they were asked for."""
-    shown: list[tuple[Callable[[Any], Section], Any]] = [
+        made.append(beyond.counts(validation.counts, validation.design.axis))
+    shown: list[tuple[Callable[[Any], doc.Section], Any]] = [
         (large_signal.section, validation.large_signals),
         (friction_effects.section, validation.friction),
         (specification.section, validation.specification),
     ]
-    return [make(result) for make, result in shown if result is not None]
+    return [*made, *(make(result) for make, result in shown if result is not None)]
 
 
 def brief(validation: Validation) -> Brief:
@@ -86,9 +70,9 @@ def brief(validation: Validation) -> Brief:
     return Brief(validation.words, [*map(doc.text, said), *tables, *map(doc.text, large)], validation.notes)
 
 
-def summary(validation: Validation) -> Section:
+def summary(validation: Validation) -> doc.Section:
     """Make the section of verdicts with every check."""
-    blocks: list[Block] = [doc.verdicts(verdict_items(validation), what="checks")]
+    blocks: list[doc.Block] = [doc.verdicts(verdict_items(validation), what="checks")]
     wrong = [row for row in validation.rows if row.verdict is not Verdict.MET]
     if wrong:
         blocks.append(table(wrong, "Predictions that are not met, or not proven"))
@@ -115,10 +99,10 @@ def result(validation: Validation) -> str:
     return " ".join(f"{capital(each)}." for each in words if each)
 
 
-def findings(validation: Validation) -> list[Finding]:
+def findings(validation: Validation) -> list[doc.Finding]:
     """Name what has to be watched, the gravest first."""
     made = [
-        Finding(severity="fail", text=f"{loop_name(name)}: not stable.", where="validation")
+        doc.Finding(severity="fail", text=f"{loop_name(name)}: not stable.", where="validation")
         for name in validation.unstable
     ]
     for row in validation.rows:
@@ -126,21 +110,23 @@ def findings(validation: Validation) -> list[Finding]:
             grave = row.verdict is Verdict.NOT_MET
             says = "is contradicted by the simulation" if grave else f"is not proven: {row.because}"
             text = f"{loop_name(row.loop)}: {quantity_name(row)} {says}."
-            open_one: Severity = "info" if validation.waived(f"{row.loop}/{row.name}") else "warn"
-            made.append(Finding(severity="fail" if grave else open_one, text=text, where="validation"))
+            open_one: doc.Severity = "info" if validation.waived(f"{row.loop}/{row.name}") else "warn"
+            made.append(doc.Finding(severity="fail" if grave else open_one, text=text, where="validation"))
     if validation.rest_words:
         waived = validation.rest is Verdict.MET or waiver_of_rest(validation.design) is not None
-        told: Severity = "fail" if validation.rest is Verdict.NOT_MET else "info" if waived else "warn"
-        made.insert(0, Finding(severity=told, text=f"{capital(validation.rest_words)}.", where="validation"))
+        told: doc.Severity = "fail" if validation.rest is Verdict.NOT_MET else "info" if waived else "warn"
+        made.insert(
+            0, doc.Finding(severity=told, text=f"{capital(validation.rest_words)}.", where="validation")
+        )
     if validation.conditional is not None:
-        made += findings_of(validation.conditional, validation.design.axis)
+        made += beyond.findings_of(validation.conditional, validation.design.axis)
     if validation.design.coupling is None:
         text = "A rigid drive train is assumed: without a coupling no figure holds its resonance or play."
-        made.append(Finding(severity="info", text=text, where="validation"))
+        made.append(doc.Finding(severity="info", text=text, where="validation"))
     return made
 
 
-def verdict_items(validation: Validation) -> list[VerdictItem]:
+def verdict_items(validation: Validation) -> list[doc.VerdictItem]:
     """One verdict a loop, break point or path, and one for each thing that the drive must not do."""
     items = [_rows_item(validation, name, rows) for name, rows in by_loop(validation.rows).items()]
     if not items:
@@ -158,7 +144,7 @@ def verdict_items(validation: Validation) -> list[VerdictItem]:
     return items
 
 
-def _rows_item(validation: Validation, name: str, rows: Sequence[Check]) -> VerdictItem:
+def _rows_item(validation: Validation, name: str, rows: Sequence[Check]) -> doc.VerdictItem:
     tally = replace(validation, rows=tuple(rows)).tally
     wrong = [row for row in rows if row.verdict is not Verdict.MET]
     words = [f"{quantity_name(row)}: {row.because or 'off'}" for row in wrong[:3]]
@@ -169,10 +155,10 @@ def _rows_item(validation: Validation, name: str, rows: Sequence[Check]) -> Verd
     reason = "; ".join(words) or f"largest error {share:.1g} of what is allowed"
     waiver = f"{tally.waived} of {open_ones} waived" if tally.waived and not tally.not_proven else ""
     item = _item(name, label, passed, reason, value=float(tally.met), limit=float(tally.total))
-    return {**item, "waiver": waiver, "gathers": cast(Counts, asdict(tally))}
+    return {**item, "waiver": waiver, "gathers": cast(doc.Counts, asdict(tally))}
 
 
-def _item(id: str, label: str, passed: bool | None, reason: str, **counts: Any) -> VerdictItem:
+def _item(id: str, label: str, passed: bool | None, reason: str, **counts: Any) -> doc.VerdictItem:
     side = ">=" if "limit" in counts else ""
     return doc.verdict(f"{CHECKS}-{id}", label, passed=passed, reason=reason, comparison=side, **counts)
 
@@ -185,7 +171,7 @@ def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
     return grouped
 
 
-def table(rows: Sequence[Check], caption: str) -> Block:
+def table(rows: Sequence[Check], caption: str) -> doc.Block:
     """Lay checks out as a table."""
     columns = [
         doc.of(quantity_name, "quantity", "Prediction"),

@@ -5,10 +5,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins, sweep, write_design
 from actuator_lti.design import design_hash, parameter_value, read_design_text
-from nonlinear import commands, simulate
+from nonlinear import State, commands, simulate
 
 DESIGN = load_design("ilr33-amber")
 
@@ -52,15 +53,42 @@ BAD = {
     "sweep": lambda: sweep("ilr33-amber", "limits.voltage", 5),
     "load torque": lambda: assemble_loops(DESIGN, load_Nm="4 N*m"),
     "form": lambda: assemble_loops(DESIGN, form=["sampled"]),
+    "loop": lambda: assemble_loops(DESIGN)["speed"],
+    "scipy system": lambda: stability_margins(signal.TransferFunction([1.0], [1.0, 1.0, 0.0])),
+    "a step's unit": lambda: commands.step("5 kg"),
+    "frequencies": lambda: commands.multisine(0.1, "abc", 1.0, 1e-4),
+    "times": lambda: commands.sampled("ab", 3.0),
+    "record": lambda: commands.recorded(3),
+    "stop": lambda: commands.ramp(1.0, stop_s="x"),
+    "command": lambda: simulate(DESIGN, lambda t: 0.1, 0.1),
+    "duration": lambda: simulate(DESIGN, commands.step(0.01), "0.1 s"),
+    "load text": lambda: simulate(DESIGN, commands.step(0.01), 0.1, "x"),
+    "load function": lambda: simulate(DESIGN, commands.step(0.01), 0.1, lambda t: 1.0),
+    "start": lambda: simulate(DESIGN, commands.step(0.01), 0.1, initial={"motor_angle_rad": 0.1}),
+    "start value": lambda: simulate(DESIGN, commands.step(0.01), 0.1, initial=State(voltage_V="12 V")),
+    "bias": lambda: simulate(DESIGN, commands.step(0.01), 0.1, bias=0.1),
+    "supply": lambda: simulate(DESIGN, commands.step(0.01), 0.1, supply=24.0),
+    "disturbance": lambda: simulate(DESIGN, commands.step(0.01), 0.1, disturbance_Nm="x"),
+    "probes": lambda: simulate(DESIGN, commands.step(0.01), 0.1, probes=["u"]),
+    "rows": lambda: simulate(DESIGN, commands.step(0.01), 0.1, record_every=1.5),
+    "events": lambda: simulate(DESIGN, commands.step(0.01), 0.1, max_events=None),
+    "tolerance": lambda: simulate(DESIGN, commands.step(0.01), 0.1, tanh_tolerance="x"),
     "filter": lambda: DESIGN.add_filter("velocity", kind="lowpass", frequency=[1.0]),
 }
 
 
 @pytest.mark.parametrize("name", BAD)
 def test_a_bad_argument_is_an_input_error_that_says_what_is_allowed(name: str) -> None:
-    with pytest.raises(InputError, match=r"allowed: |must be a finite number|one of ") as caught:
+    with pytest.raises(InputError, match=r"allowed: |must be |one of |a StateSpace, ") as caught:
         BAD[name]()
     assert "\n" not in str(caught.value)
+
+
+def test_loops_are_indexed_and_iterated_by_name() -> None:
+    loops = assemble_loops(DESIGN)
+    assert list(loops) == ["current", "velocity", "position", "u", "i_ref", "w_ref", "output"]
+    assert loops["velocity"] is loops.velocity
+    assert loops["output"] is loops.break_points["output"]
 
 
 def test_a_sweep_changes_one_key_and_says_so() -> None:

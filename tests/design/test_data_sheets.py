@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from actuator_lti.design import (
+    load_design,
     parameter_value,
     read_design_text,
     tolerances,
@@ -113,6 +114,27 @@ def test_behind_a_screw_a_speed_constant_is_that_of_the_rotary_motor() -> None:
     assert design.motor.back_emf_constant_Vs_rad == pytest.approx(kE / (5e-3 / (2 * pi)), rel=1e-12)
 
 
+def test_kv_of_a_motor_stated_per_phase_is_line_line() -> None:
+    """kM = 8.27/KV in N m per ampere of a phase (ODrive's documentation): kE and kM are one constant."""
+    changed = {
+        "motor.constants": "peak-phase",
+        "motor.back_emf_constant": "82 KV",
+        "motor.torque_constant": f"{8.27 / 82} N*m/A",
+        "control.current.gain": "1.5 V/A dc",
+        "control.velocity.gain": "0.15 A dc*s/rad",
+    }
+    same = with_overrides(read_design_text(FLAT, "flat"), changed).effective_motor
+    assert same.back_emf_constant_Vs_rad == pytest.approx(same.torque_constant_Nm_A, rel=1e-4)
+
+
+def test_periods_of_a_rotary_motor_behind_a_screw() -> None:
+    """A bare number is per revolution of the motor, as its sheet has it."""
+    base = load_design("ballscrew")
+    design = with_overrides(base, {"motor.cogging_periods": 20, "motor.cogging": "1 mN*m"})
+    assert design.screw is not None
+    assert design.motor.cogging_periods == pytest.approx(20 / design.screw.travel_m_rad, rel=1e-14)
+
+
 def test_an_ac_servo_runs_as_fast_as_its_bus_allows() -> None:
     """U = R i + sqrt(2) k_rms w with i = sqrt(3/2) I_rms, and the torque of friction at that speed."""
     design = read_design_text(SERVO, "servo")
@@ -147,6 +169,8 @@ def test_an_undamped_spring_is_said_and_has_its_forms() -> None:
         ("control.current.gain", "25 V/Arms", 25 / sqrt(1.5)),
         ("motor.torque_constant", "0.93 Nm/Arms", 0.93),
         ("motor.back_emf_constant", "59.9 Vrms/1000rpm", 59.9 * 60 / (2000 * pi)),
+        ("motor.torque_constant", f"{0.93 / sqrt(2)} Nm/Apk", 0.93),
+        ("motor.back_emf_constant", f"{59.9 * sqrt(2)} Vpeak/1000rpm", 59.9 * 60 / (2000 * pi)),
         ("control.period", "16 kHz", 62.5e-6),
     ],
 )
@@ -160,7 +184,7 @@ def test_amperes_rms_and_peak_are_those_of_the_model(path: str, text: str, value
 @pytest.mark.parametrize(
     ("text", "path", "bad"),
     [
-        (SERVO, "motor.torque_constant", "0.93 Nm/Apk"),
+        (FLAT, "motor.torque_constant", "0.1 Nm/Apk"),
         (SERVO, "limits.voltage", "230 Vrms"),
         (FLAT, "limits.peak_current", "5 A rms"),
     ],
@@ -216,6 +240,14 @@ def test_a_filter_is_added_behind_those_that_there_are() -> None:
     ):
         with pytest.raises(InputError, match=words):
             base.add_filter(**bad)
+
+
+def test_a_magnet_pitch_is_the_order_of_the_cogging() -> None:
+    """24 mm a period are 2 pi/0.024 rad per metre."""
+    design = with_overrides(load_design("emps"), {"motor.cogging_periods": "24 mm"})
+    assert design.motor.cogging_periods == pytest.approx(2 * pi / 0.024, rel=1e-14)
+    with pytest.raises(InputError, match=r"cogging_periods.*wrong dimension"):
+        with_overrides(load_design("ilr33-amber"), {"motor.cogging_periods": "24 mm"})
 
 
 def test_gear_sheets_state_arc_minutes_and_torque_per_arc_minute() -> None:
@@ -305,8 +337,26 @@ def test_an_unknown_share_is_a_tolerance_from_none_to_all() -> None:
     assert (
         with_values(drive, {"friction.dry_torque": 0.0}).parameters["friction.dry_torque"].tolerance is None
     )
-    with pytest.raises(InputError, match=r"no_load_current = 1 A: was read into friction\.dry_torque"):
-        with_overrides(drive, {"motor.no_load_current": "1 A"})
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "changes"),
+    [
+        ("137 mA", "1 A", {"motor.no_load_current": "1 A"}),
+        ("30.2 mN*m/A", "29 mN*m/A", {"motor.torque_constant": "29 mN*m/A"}),
+        ("80 %", "60 %", {"gear.first.efficiency": "60 %"}),
+        ("43:1", "12", {"gear.first.ratio": 12}),
+        ("back-drivable", "self-locking", {"load.path": "self-locking"}),
+        ("100 us", "90 us", {"control.period": "90 us"}),
+    ],
+)
+def test_what_a_sheet_states_is_read_again_with_what_is_changed(old: str, new: str, changes: dict) -> None:
+    drive = with_overrides(read_design_text(SHEET, "sheet"), changes)
+    other = read_design_text(SHEET.replace(old, new), "sheet")
+    assert (drive.friction, drive.correlations) == (other.friction, other.correlations)
+    again = with_overrides(drive, {"friction.dry_torque": "5 mN*m", "load.path": "back-drivable"})
+    assert again.friction.dry_torque_Nm == 0.005
+    assert again.friction.viscous_Nms_rad == other.friction.viscous_Nms_rad
 
 
 @pytest.mark.parametrize(
@@ -343,15 +393,41 @@ def test_a_phase_margin_that_no_operating_point_bounds_is_infinite(
     assert "Phase margin, operating ∞" in said
 
 
+def test_a_source_that_only_begins_as_those_of_a_sheet_stays() -> None:
+    own = {"value": "1 N", "source": "from data sheet: maker, 2017"}
+    drive = with_overrides(load_design("emps"), {"friction.dry_torque": own})
+    again = with_overrides(drive, {"limits.voltage": "9 V"})
+    assert again.parameters["friction.dry_torque"] == drive.parameters["friction.dry_torque"]
+
+
+@pytest.mark.parametrize(
+    ("path", "first", "warned"),
+    [("self-locking", "80 %", True), ("self-locking", "50 %", False), ("back-drivable", "80 %", False)],
+)
+def test_a_self_locking_drive_of_good_gears_is_warned_of(path: str, first: str, warned: bool) -> None:
+    """A load drives a stage of efficiency eta with 2 - 1/eta, which is above 0 from one half on."""
+    drive = read_design_text(SHEET.replace("back-drivable", path).replace("80 %", first), "sheet")
+    assert any(line.startswith("load.path: self-locking") for line in warnings_of(drive)) == warned
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (
-            'back_emf_constant = "317',
-            'speed_constant = "317',
-            'back_emf_constant, which takes "317 rpm/V" too',
-        ),
+        ('back_emf_constant = "317', 'speed_constant = "317', 'back_emf_constant, which takes "317 rpm/V"'),
+        ('torque_constant = "30', 'Kt = "30', r"motor.Kt = .* \(it is torque_constant\)\Z"),
+        ("[limits]", '[limits]\nrated_current = "3 A"', r"\(it is continuous_current\)"),
+        ("[control]", '[control]\npwm-frequency = "8 kHz"', "part of computing_delay"),
+        ("[control]", '[control.position]\nKv = "40 1/s"\n[control]', r"position.Kv = .* \(it is gain\)\Z"),
+        ("[load]", '[load]\nfriction = "6 N"', r"allowed: a table, \[load.friction\]"),
+        ("[load]", '[load]\nmass = "6 kg"', r"inertia, in kg on a linear axis"),
+        ('"48 V"', '"48 V"\nspeed = "2 m/s"', 'm/s with design.axis = "linear"'),
+        ('name = "first"', 'name = "GP 32 C"', 'no dot or space, as "GP-32-C"'),
+        ('name = "first"', "", 'name: missing; example: name = "planetary"'),
+        ('"48 V"', '"48 V', "a quote that is opened in this line is not closed"),
+        ('inductance = "0.082 mH"\n', "", "R times the electrical time constant"),
+        ('back_emf_constant = "317 rpm/V"\n', "", r"number of motor.torque_constant in SI, 0\.0302"),
         ("efficiency = 0.9", 'backlash = "0.8 deg"', r"it is play of \[coupling\]"),
+        ("efficiency = 0.9", "self_locking = true", r'it is path = "self-locking" of \[load\]'),
     ],
 )
 def test_a_data_sheets_word_is_answered_with_the_key(old: str, new: str, words: str) -> None:

@@ -1,5 +1,8 @@
 """A measured frequency response is the same numbers however it was written."""
 
+import json
+from pathlib import Path
+
 import control
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from actuator_lti.files.response import read_response
 
 HERTZ = np.array([1.0, 2.0, 5.0, 20.0])
 OMEGA = 2.0 * np.pi * HERTZ
+PAGE = json.loads((Path(__file__).parents[1] / "page" / "responses.json").read_text(encoding="utf-8"))
 L = 40.0 / (1j * OMEGA) / (1.0 + 0.01j * OMEGA)
 DB, DEG = 20.0 * np.log10(np.abs(L)), np.degrees(np.angle(L))
 TABLES = [
@@ -33,6 +37,21 @@ def test_every_spelling_of_a_table(tmp_path, cut, head, columns):
     np.testing.assert_allclose(read.frequency_hz, HERTZ, rtol=1e-11)
     np.testing.assert_allclose(read.response, L, rtol=1e-10)
     assert np.isnan(read.deviation).all()
+
+
+@pytest.mark.parametrize("text", PAGE["read as 3 - 4j at 5 Hz"])
+def test_the_page_reads_the_same(tmp_path, text):
+    (tmp_path / "r.csv").write_text(text)
+    read = read_response(tmp_path / "r.csv")
+    at = np.isclose(read.frequency_hz, 5.0)
+    np.testing.assert_allclose(read.response[at], [3.0 - 4.0j], rtol=1e-12)
+
+
+@pytest.mark.parametrize("text", PAGE["refused"])
+def test_the_page_refuses_the_same(tmp_path, text):
+    (tmp_path / "r.csv").write_text(text)
+    with pytest.raises(InputError):
+        read_response(tmp_path / "r.csv")
 
 
 @pytest.mark.parametrize(

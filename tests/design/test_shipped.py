@@ -60,19 +60,6 @@ def test_the_equivalent_inertia_is_equation_12() -> None:
     assert design.inertia_kgm2 == pytest.approx(expected, rel=1e-14)
 
 
-def test_the_assumed_inertias_carry_half_their_value_as_tolerance() -> None:
-    design = load_design("ilr33-amber")
-    widths = {p.path: p.tolerance.half_width for p in design.parameters.values() if p.tolerance}
-    assert widths == pytest.approx(
-        {
-            "gear.planetary.input_inertia": 0.5e-7,
-            "gear.planetary.output_inertia": 2.5e-7,
-            "gear.worm.input_inertia": 2.5e-7,
-            "load.inertia": 1e-4,
-        }
-    )
-
-
 def test_the_baseline_ships_the_example_requirements() -> None:
     limits = {
         (r.quantity, r.loop): (r.minimum, r.maximum, r.unit, r.load_Nm)
@@ -89,39 +76,35 @@ def test_the_baseline_ships_the_example_requirements() -> None:
     assert all("example" in r.note for r in load_design("ilr33-amber").requirements)
 
 
-def test_the_multirate_design_has_slower_outer_loops() -> None:
-    control = load_design("ilr33-amber-multirate").controller
-    assert (control.velocity.every, control.position.every) == (2, 10)
+PUBLISHED = {
+    "ilr33-amber-multirate": {"control.velocity.every": 2, "control.position.every": 10},
+    "ctms-motor-position": {
+        "motor.rotor_inertia": 3.2284e-6, "motor.torque_constant": 0.0274, "motor.resistance": 4.0,
+        "motor.inductance": 2.75e-6, "friction.viscous": 3.5077e-6,
+    },
+    "emps": {  # Janot, Gautier, Brunot 2019: value, standard deviation
+        "motor.rotor_inertia": (95.1089, 0.1085), "friction.viscous": (203.5034, 1.1460),
+        "friction.dry_torque": (20.3935, 0.1012), "friction.offset_torque": (-3.1648, 0.0444),
+        "control.position.gain": 160.18, "control.velocity.gain": 243.45, "motor.source_gain": 35.15065,
+        "encoder.difference_samples": 2,
+    },
+}  # fmt: skip
 
 
-def test_the_textbook_motor_has_only_a_position_loop() -> None:
-    design = load_design("ctms-motor-position")
-    motor, control = design.motor, design.controller
-    assert (motor.rotor_inertia_kgm2, motor.torque_constant_Nm_A) == (3.2284e-6, 0.0274)
-    assert (motor.resistance_ohm, motor.inductance_H) == (4.0, 2.75e-6)
-    assert design.friction.viscous_Nms_rad == 3.5077e-6
-    assert control.velocity is None
-    assert control.current is None
+@pytest.mark.parametrize("name", PUBLISHED)
+def test_a_design_holds_the_published_figures(name: str) -> None:
+    design = load_design(name)
+    for path, stated in PUBLISHED[name].items():
+        value, std = stated if isinstance(stated, tuple) else (stated, None)
+        assert parameter_value(design, path) == value
+        assert std is None or design.parameters[path].tolerance.std == std
 
 
-def test_emps_holds_the_published_figures() -> None:
-    design = load_design("emps")  # Janot, Gautier, Brunot 2019
-    assert design.axis == "linear"
-    assert not design.motor.has_electrical_dynamics
-    published = {
-        "motor.rotor_inertia": (95.1089, 0.1085),
-        "friction.viscous": (203.5034, 1.1460),
-        "friction.dry_torque": (20.3935, 0.1012),
-        "friction.offset_torque": (-3.1648, 0.0444),
-    }
-    for path, (value, std) in published.items():
-        parameter = design.parameters[path]
-        assert (parameter.value, parameter.tolerance.std) == (value, std)
-    assert parameter_value(design, "control.position.gain") == 160.18
-    assert parameter_value(design, "control.velocity.gain") == 243.45
-    assert parameter_value(design, "motor.source_gain") == 35.15065
-    assert design.parameters["friction.viscous"].unit == "N*s/m"
-    assert design.encoder.difference_samples == 2
+def test_the_stages_of_the_textbook_motor_and_of_the_force_source() -> None:
+    control, emps = load_design("ctms-motor-position").controller, load_design("emps")
+    assert (control.velocity, control.current) == (None, None)
+    assert (emps.axis, emps.motor.has_electrical_dynamics) == ("linear", False)
+    assert emps.parameters["friction.viscous"].unit == "N*s/m"
 
 
 def test_the_shipped_designs_are_these_each_named_like_its_file() -> None:

@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 
 from actuator_lti.compiled.compiler import system_compiler
+from actuator_lti.design.model import Design
+from nonlinear.export.fmu import Version, fmu_bytes
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
 needs_compiler = pytest.mark.skipif(
@@ -24,6 +26,13 @@ needs_compiler = pytest.mark.skipif(
 )
 Refused = pytest.importorskip("fmpy.fmi1").FMICallException
 fmi2, fmi3 = pytest.importorskip("fmpy.fmi2"), pytest.importorskip("fmpy.fmi3")
+
+
+def written(folder: Path, design: Design, version: Version = 2, platform: str = "linux64") -> Path:
+    """The unit of a design in a folder."""
+    path = folder / f"drive{version}.fmu"
+    path.write_bytes(fmu_bytes(design, version, (platform,)))
+    return path
 
 
 @dataclass

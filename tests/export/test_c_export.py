@@ -10,13 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from random_drives import random_drive, random_elastic_drive, random_inputs
-from typer.testing import CliRunner
 
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import compile_files, system_compiler
 from actuator_lti.design import design_hash
-from actuator_lti.design.model import Design, Instruments
-from actuator_lti.errors import InputError
+from actuator_lti.design.model import Design
 from nonlinear import commands, loads, simulate
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.start import retune
@@ -24,7 +22,6 @@ from nonlinear.export import c_export
 from nonlinear.export.c_files import ExportedDesign, exported, spare_parameters
 from nonlinear.export.program import source_hash
 from nonlinear.native import LIBRARY, parameters, tick
-from reports.cli.app import build
 
 ELASTIC = ("ballscrew", "fin", "ilr33-amber-compliant", "joint")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
@@ -241,12 +238,6 @@ def test_every_deviation_from_misra_is_listed(tmp_path) -> None:
     assert "error:" not in done.stderr
 
 
-def test_noise_is_refused_in_single_precision() -> None:
-    design = replace(load_design("ilr33-amber"), instruments=Instruments(current_noise_A=0.1))
-    with pytest.raises(InputError, match="need double precision"):
-        c_export(design, single_precision=True)
-
-
 def test_drive_c_is_the_same_for_every_design_and_has_no_memory_of_its_own() -> None:
     one, other = c_export(load_design("ilr33-amber")), c_export(load_design("emps"))
     assert one["drive.c"] == other["drive.c"]
@@ -256,17 +247,3 @@ def test_drive_c_is_the_same_for_every_design_and_has_no_memory_of_its_own() -> 
         assert word not in code.replace("static double drive_", ""), word
     outside = [line for line in code.splitlines() if line.startswith("static") and "(" not in line]
     assert all(line.startswith("static const ") for line in outside)
-
-
-def test_command_writes_all_files_or_none(tmp_path) -> None:
-    runner, app = CliRunner(), build()
-    out = tmp_path / "c"
-    assert runner.invoke(app, ["export", "c", "emps", "--out", str(out)]).exit_code == 0
-    names = {path.name for path in out.iterdir()}
-    assert names == {"drive.h", "drive.c", "drive_design.h", "drive_design.c", "main.c", "README.md"}
-    again = runner.invoke(app, ["export", "c", "emps", "--out", str(out)])
-    assert isinstance(again.exception, InputError)
-    assert "exists already" in str(again.exception)
-    unknown = runner.invoke(app, ["export", "c", "no-such-design", "--out", str(tmp_path / "d")])
-    assert isinstance(unknown.exception, InputError)
-    assert not (tmp_path / "d").exists()

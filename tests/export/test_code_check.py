@@ -16,7 +16,7 @@ from analyses.linear.code_check import CodeCheck, check_code
 from nonlinear.export import c_export
 from nonlinear.native import LIBRARY
 from reports.cli.app import build
-from reports.export_check import check_text, summary
+from reports.export_documents import check_text, summary
 
 needs_compiler = pytest.mark.skipif(
     system_compiler() is None or not sys.platform.startswith("linux"), reason="no C compiler on this machine"

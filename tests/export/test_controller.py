@@ -11,17 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from random_drives import law_at, random_drive, random_elastic_drive
-from typer.testing import CliRunner
 
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import zig_command
 from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design
 from actuator_lti.design.shipped import shipped_designs
-from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear.export import controller_export
-from reports.cli.app import build
 
 STRICT = (
     "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror", "-Wdouble-promotion",
@@ -242,19 +239,3 @@ def test_counts_of_the_encoder_go_round(tmp_path: Path) -> None:
     gcc(tmp_path, "-std=c99", *STRICT[:6], "round.c", "controller.c", "-o", "round")
     done = subprocess.run([str(tmp_path / "round")], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
-
-
-def test_command_writes_the_files_and_refuses_a_prefix_that_is_no_name(tmp_path: Path) -> None:
-    runner, app = CliRunner(), build()
-    out = tmp_path / "controller"
-    assert runner.invoke(app, ["export", "controller", "emps", "--out", str(out)]).exit_code == 0
-    assert {path.name for path in out.iterdir()} == {
-        "controller.h", "controller.c", "controller.hpp", "vectors.h", "main.c", "README.md",
-    }  # fmt: skip
-    assert "float voltage_V;" in (out / "controller.h").read_text()
-    wrong = runner.invoke(
-        app, ["export", "controller", "emps", "--prefix", "4fin", "--out", str(tmp_path / "b")]
-    )
-    assert isinstance(wrong.exception, InputError)
-    assert "allowed: letters" in str(wrong.exception)
-    assert not (tmp_path / "b").exists()

@@ -90,13 +90,33 @@ def test_what_single_precision_cannot_say(tmp_path, capsys) -> None:
     assert main(["export", "c", str(design), "--no-check", "--out", str(out)]) == 0
 
 
+FILES = {
+    "c": {"drive.h", "drive.c", "drive_design.h", "drive_design.c", "main.c", "README.md"},
+    "controller": {"controller.h", "controller.c", "controller.hpp", "vectors.h", "main.c", "README.md"},
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_folder_holds_all_files_of_its_export(name: str, tmp_path, capsys) -> None:
+    more = ["--no-check"] if name == "c" else []
+    assert main(["export", name, "emps", *more, "--out", str(tmp_path / "out")]) == 0
+    assert {path.name for path in (tmp_path / "out").iterdir()} == FILES[name]
+
+
 @pytest.mark.parametrize(
-    ("more", "said"),
-    [(["--fmi", "4"], "4: allowed: 2 or 3"), (["--platform", "vax"], "allowed: linux64, win64")],
+    ("command", "said"),
+    [
+        (["fmu", "emps", "--fmi", "4"], "4: allowed: 2 or 3"),
+        (["fmu", "emps", "--platform", "vax"], "allowed: linux64, win64"),
+        (["controller", "emps", "--prefix", "4fin"], "allowed: letters"),
+        (["c", "no-such-design"], "no such design; allowed: "),
+    ],
 )
-def test_unknown_versions_and_platforms(more: list[str], said: str, tmp_path, capsys) -> None:
-    out = tmp_path / "drive.fmu"
-    assert said in refused(["export", "fmu", "emps", "--out", str(out), *more], capsys)
+def test_unknown_versions_platforms_prefixes_and_designs(
+    command: list[str], said: str, tmp_path, capsys
+) -> None:
+    out = tmp_path / "out"
+    assert said in refused(["export", *command, "--out", str(out)], capsys)
     assert not out.exists()
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from executed import executed
-from fmu_host import fmpy, hosted, needs_compiler
+from fmu_host import fmpy, hosted, needs_compiler, written
 from typer.testing import CliRunner
 
 from actuator_lti import load_design
@@ -27,15 +27,7 @@ from nonlinear.export.variables import structured
 from nonlinear.row.parameters import design_row
 from reports.cli.app import build
 
-LINUX = ("linux64",)
 OUTPUTS = ["output.angle", "motor.speed", "motor.current", "motor.voltage"]
-
-
-@pytest.fixture(scope="module", params=[2, 3])
-def unit(request, tmp_path_factory) -> Path:
-    path: Path = tmp_path_factory.mktemp("fmu") / f"drive{request.param}.fmu"
-    path.write_bytes(fmu_bytes(load_design("ilr33-amber"), request.param, LINUX))
-    return path
 
 
 def run(path: Path, step_s: float, stop_s: float, start: dict[str, Any] | None = None, **more: Any) -> Any:
@@ -72,8 +64,7 @@ def test_units_of_elastic_designs_are_valid_and_give_the_simulators_bits(name: s
     design = load_design(name)
     step = design.controller.period_s
     for version in (2, 3):
-        path = tmp_path / f"{name}{version}.fmu"
-        path.write_bytes(fmu_bytes(design, version, LINUX))
+        path = written(tmp_path, design, version)
         assert validate_fmu(str(path)) == []
         assert_same(run(path, step, 200 * step, {"command": 0.01, "hinge_moment": 0.1}), design, 0.01, 0.1)
 
@@ -141,18 +132,23 @@ def test_one_hour_in_one_step(unit: Path) -> None:
     assert result["output.angle"][-1] == 0.0
 
 
+def unpacked(folder: Path, design: Design, platform: str) -> str:
+    """Unpacks the unit of a design; its GUID."""
+    path = written(folder, design, platform=platform)
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(folder)
+    return str(fmpy.read_model_description(str(path)).guid)
+
+
 @needs_compiler
 @pytest.mark.parametrize(("step", "save_at"), [(1e-4, 50), (1.0 / 60.0, 7), (2.5e-5, 42), (1e-3, 0)])
 def test_own_host_saves_serialises_and_goes_on(step: float, save_at: int, tmp_path) -> None:
     design = load_design("ilr33-amber-multirate")
-    (tmp_path / "u.fmu").write_bytes(fmu_bytes(design, 2, LINUX))
-    with zipfile.ZipFile(tmp_path / "u.fmu") as archive:
-        archive.extractall(tmp_path)
+    guid = unpacked(tmp_path, design, "linux64")
     compiler = system_compiler()
     assert compiler is not None
     source = Path(__file__).with_name("c_host.c")
     subprocess.run([compiler, str(source), "-o", str(tmp_path / "host"), "-ldl"], check=True)
-    guid = fmpy.read_model_description(str(tmp_path / "u.fmu")).guid
     library = tmp_path / "binaries/linux64/drive.so"
     call = [str(tmp_path / "host"), str(library), guid, "100", repr(step), "0.05"]
     done = subprocess.run([*call, str(save_at)], capture_output=True, text=True, check=True)
@@ -185,8 +181,7 @@ def test_tuning_between_steps_changes_what_follows(name: str, change: dict[str, 
 
     design = load_design(name)
     values = {path: parameter_value(design, path) * factor for path, factor in change.items()}
-    path = tmp_path / "u.fmu"
-    path.write_bytes(fmu_bytes(design, 2, LINUX))
+    path = written(tmp_path, design)
     assert set(change) <= {key.path for key in trace_keys(design).keys if not key.fixed}
     ours = exported(design)
     p, s = parameters(ours.row)
@@ -236,12 +231,9 @@ def test_win64_binary_runs_under_wine(name: str, wine_prefix: Path, tmp_path) ->
     """Another C library's sine and exponential: equal to 1e-11 of full scale, events at the same ticks."""
     design = load_design(name)
     period_s = design.controller.period_s
-    (tmp_path / "u.fmu").write_bytes(fmu_bytes(design, 2, ("win64",)))
-    with zipfile.ZipFile(tmp_path / "u.fmu") as archive:
-        archive.extractall(tmp_path)
+    guid = unpacked(tmp_path, design, "win64")
     source = {"host.c": Path(__file__).with_name("c_host.c").read_text(encoding="utf-8")}
     (tmp_path / "host.exe").write_bytes(compile_files(source, "host.exe", "win64"))
-    guid = fmpy.read_model_description(str(tmp_path / "u.fmu")).guid
     call = ["wine", "host.exe", "binaries/win64/drive.dll", guid, "300", repr(period_s), "0.05", "100"]
     quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(wine_prefix)}
     try:

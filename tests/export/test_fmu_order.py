@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmu_host import Host, Refused, fmpy, hosted, needs_compiler
+from fmu_host import Host, Refused, fmpy, hosted, needs_compiler, written
 
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import zig_command
@@ -15,19 +15,11 @@ from actuator_lti.design.access import parameter_value, with_values
 from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
 from nonlinear import commands, simulate
-from nonlinear.export import fmu_bytes
 from nonlinear.export.trace import trace_keys
 from nonlinear.export.variables import structured
 
 pytestmark = needs_compiler
 PERIOD = 1e-4
-
-
-@pytest.fixture(scope="module", params=[2, 3])
-def unit(request, tmp_path_factory) -> Path:
-    path: Path = tmp_path_factory.mktemp("fmu") / f"drive{request.param}.fmu"
-    path.write_bytes(fmu_bytes(load_design("ilr33-amber"), request.param, ("linux64",)))
-    return path
 
 
 def refused(host: Host, because: str, call: Any, *arguments: Any) -> None:
@@ -140,8 +132,7 @@ def test_keys_that_contradict_each_other_are_refused_as_in_a_design_file(unit: P
 def test_what_no_longer_applies_is_not_refused(tmp_path) -> None:
     """Only a gear error bounds its order: without one, any order is a design and is taken."""
     design = with_values(load_design("ballscrew"), {"load.gear_error": 0.01})
-    path = tmp_path / "u.fmu"
-    path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
+    path = written(tmp_path, design)
     none = {"load.gear_error": 0.0, "load.gear_error_periods": 1e6}
     with_values(design, none)
     with hosted(path) as (host,):
@@ -158,8 +149,7 @@ def test_random_keys_are_refused_with_the_words_of_the_design_file(name: str, tm
     design = replace(
         load_design(name), parameters=FrozenMap({})
     )  # a refusal shows SI, not the file's own text
-    path = tmp_path / "u.fmu"
-    path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
+    path = written(tmp_path, design)
     keys = [key for key in trace_keys(design).keys if not key.whole]
     seen = {"refused": 0, "taken": 0}
     with hosted(path) as (host,):
@@ -194,8 +184,7 @@ def test_random_keys_are_refused_with_the_words_of_the_design_file(name: str, tm
 
 def test_what_the_units_of_the_file_were_turned_by_is_decided(tmp_path) -> None:
     """A screw's lead moves every number that the file gives on the motor's side: it is a constant."""
-    path = tmp_path / "u.fmu"
-    path.write_bytes(fmu_bytes(load_design("ballscrew"), 2, ("linux64",)))
+    path = written(tmp_path, load_design("ballscrew"))
     known = {item.name: item for item in fmpy.read_model_description(str(path)).modelVariables}
     assert known["screw.lead"].variability == "constant"
     assert known["motor.speed"].declaredType is None

@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmu_host import hosted, needs_compiler
+from fmu_host import hosted, needs_compiler, written
 from random_drives import random_drive, random_elastic_drive
 from scipy.optimize import brentq
 
 from actuator_lti import load_design
 from actuator_lti.design.access import with_values
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits
-from nonlinear.export import fmu_bytes
 from nonlinear.rows import Rows
 
 pytestmark = needs_compiler
@@ -104,8 +103,7 @@ def latched(step: float, ticks: int, period: float) -> np.ndarray:
 def test_every_host_step_sees_the_same_motion(name: str, tmp_path) -> None:
     design = drives()[name]
     period = design.controller.period_s
-    path = tmp_path / "u.fmu"
-    path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
+    path = written(tmp_path, design)
     for part in (1, 5, 10, 15, 27) if name in ALL_STEPS else (1, 27):
         step = part / FINE * period
         command = np.asarray(wanted(latched(step, TICKS, period) * step, design))
@@ -128,8 +126,7 @@ def test_a_command_between_ticks_is_seen_at_the_next(tmp_path) -> None:
     """At 0.9 Ts it is that of a run whose command steps at Ts; voltages are of the tick they are in."""
     design = load_design("ilr33-amber")
     period = design.controller.period_s
-    path = tmp_path / "u.fmu"
-    path.write_bytes(fmu_bytes(design, 3, ("linux64",)))
+    path = written(tmp_path, design, 3)
     command = np.full(40, 0.05)
     command[0] = 0.0
     plain = run(design, 40, command)
@@ -211,9 +208,7 @@ def test_an_outer_loop_has_its_critical_gain_at_every_step(parts: int, unfrictio
 
 @pytest.fixture(scope="module")
 def unfriction(tmp_path_factory) -> Path:
-    path: Path = tmp_path_factory.mktemp("emps") / "emps.fmu"
-    path.write_bytes(fmu_bytes(load_design("emps"), 3, ("linux64",)))
-    return path
+    return written(tmp_path_factory.mktemp("emps"), load_design("emps"), 3)
 
 
 def oscillation(path: Path, step: float, gain: float) -> float:

@@ -91,6 +91,15 @@ def test_the_command_is_that_of_the_outermost_stage(version: int) -> None:
 
 
 @pytest.mark.parametrize("version", [2, 3])
+def test_any_step_is_allowed_and_the_period_is_said(version: int) -> None:
+    simulation = described(load_design("joint"), version).find("CoSimulation")
+    assert simulation is not None
+    assert simulation.attrib["canHandleVariableCommunicationStepSize"] == "true"
+    period = repr(load_design("joint").controller.period_s)
+    assert simulation.attrib.get("fixedInternalStepSize") == (period if version == 3 else None)
+
+
+@pytest.mark.parametrize("version", [2, 3])
 def test_units_are_defined_by_the_base_units_of_si(version: int) -> None:
     seen: set[str] = set()
     for name in SIZES:

@@ -9,14 +9,14 @@ import os
 import shutil
 import signal
 import sys
-import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1] / "nightly"))
 
 import ruptures  # noqa: F401 - here, not in every child
-from kill_target import check_history, night
+from kill_target import check_history, child, night
 from site_checks import check_whole
 
 CALLS = ("open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.utime", "os.chmod", "shutil.rmtree")
@@ -39,12 +39,12 @@ def count_calls(tick: Callable[[str], None]) -> None:
     sys.addaudithook(audit)
 
 
-def child(site: Path, round_: int, last: int) -> tuple[int, int]:
+def counted(site: Path, round_: int, last: int) -> tuple[int, int]:
     """A nightly in a process of its own that is killed at call ``last`` (0: not at all); status and calls."""
     read, write = os.pipe()
-    number = os.fork()
-    if number == 0:
-        os.close(read)
+
+    @contextmanager
+    def counting() -> Iterator[None]:
         done = [0]
 
         def tick(_event: str) -> None:
@@ -52,14 +52,11 @@ def child(site: Path, round_: int, last: int) -> tuple[int, int]:
             if done[0] == last:
                 os.kill(os.getpid(), signal.SIGKILL)
 
-        try:
-            count_calls(tick)
-            night(site, round_)
-            os.write(write, str(done[0]).encode())
-        finally:
-            if sys.exc_info()[1] is not None:
-                traceback.print_exc()
-            os._exit(0 if sys.exc_info()[1] is None else 1)
+        count_calls(tick)
+        yield
+        os.write(write, str(done[0]).encode())
+
+    number = child(site, round_, counting)
     os.close(write)
     _, status = os.waitpid(number, 0)
     said = os.read(read, 32)
@@ -74,20 +71,20 @@ def main(site: Path) -> dict[str, int]:
     folders = {path: before / path.name for path in (site, state)}
     for path, copy in folders.items():
         shutil.copytree(path, copy)
-    status, calls = child(site, 1, 0)
+    status, calls = counted(site, 1, 0)
     assert status == 0, status
     killed = 0
     for place in range(1, calls + 1):
         for path, copy in folders.items():
             shutil.rmtree(path)
             shutil.copytree(copy, path)
-        status, _ = child(site, 1, place)
+        status, _ = counted(site, 1, place)
         killed += os.WIFSIGNALED(status)
         assert os.WIFSIGNALED(status) or os.WEXITSTATUS(status) == 0, status
         check_whole(site)
         check_history(state)
         if place % 10 == 0:
-            assert child(site, 2, 0)[0] == 0, place
+            assert counted(site, 2, 0)[0] == 0, place
             check_whole(site)
     return {"calls": calls, "killed": killed}
 

@@ -67,37 +67,41 @@ STUDIES: tuple[Callable[[Path, int, Engine], object], ...] = (kept, reduced, com
 
 
 class Cluster:
-    """A scheduler and two workers, each a process that can be killed and started again."""
+    """A scheduler and workers, each a process that can be killed and started again."""
 
     def __init__(self, folder: Path) -> None:
-        self.file, self.log = folder / "scheduler.json", (folder / "cluster.log").open("ab")
-        self.scheduler = self.workers = None
+        self.file, self.log = folder / "scheduler.json", folder / "cluster.log"
+        self.scheduler: subprocess.Popen[bytes] | None = None
+        self.workers: list[subprocess.Popen[bytes]] = []
 
-    def start(self) -> None:
+    def start(self, workers: int = 2) -> None:
         """Start what is not there."""
         if self.scheduler is None:
             self.end()
             self.file.unlink(missing_ok=True)
-            self.scheduler, self.workers = self._process("dask_scheduler", "--port", "0"), []
-            while not self._address():
+            self.scheduler = self._process({}, "dask_scheduler", "--port", "0")
+            while not self.address:
+                assert self.scheduler.poll() is None
                 time.sleep(0.02)
-        while len(self.workers) < 2:
-            self.workers.append(self._process("dask_worker", "--no-nanny", "--nthreads", "1"))
+        while len(self.workers) < workers:
+            self.add_worker()
+
+    def add_worker(self, **environment: str) -> None:
+        """Start one more; without a nanny, which would set threads by itself."""
+        self.workers.append(self._process(environment, "dask_worker", "--no-nanny", "--nthreads", "1"))
 
     @property
     def address(self) -> str:
-        """Where the scheduler listens."""
-        return self._address()
-
-    def _address(self) -> str:
+        """Where the scheduler listens; empty until it has written all of it."""
         with contextlib.suppress(FileNotFoundError, json.JSONDecodeError):
             return json.loads(self.file.read_text())["address"]
         return ""
 
-    def _process(self, kind: str, *words: str) -> subprocess.Popen[bytes]:
+    def _process(self, environment: dict[str, str], kind: str, *words: str) -> subprocess.Popen[bytes]:
         common = ("--no-dashboard", "--host", "127.0.0.1", "--scheduler-file", str(self.file))
         command = [sys.executable, "-m", f"distributed.cli.{kind}", *common, *words]
-        return subprocess.Popen(command, stdout=self.log, stderr=self.log)
+        with self.log.open("ab") as log:
+            return subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, **environment})
 
     def kill(self, victim: str, draw: random.Random) -> None:
         """Kill the scheduler, or one of the workers."""
@@ -110,11 +114,11 @@ class Cluster:
 
     def end(self) -> None:
         """Kill all that are there."""
-        for process in (self.scheduler, *(self.workers or ())):
+        for process in (self.scheduler, *self.workers):
             if process is not None:
                 process.kill()
                 process.wait()
-        self.scheduler = self.workers = None
+        self.scheduler, self.workers = None, []
 
 
 def child(number: int, folder: Path, engine: Engine) -> int:

@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 import random
+import tomllib
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import tomli_w
 from command_lines import hostile, seeds
 from mutate import damaged, damaged_tree, extreme
 
@@ -26,19 +28,13 @@ from actuator_lti.design.units import parse_quantity
 from actuator_lti.design.writing import design_tree
 from actuator_lti.files.reading import decode
 from actuator_lti.files.response import read_response
-from analyses.linear.outer_loop_file import read_outer_loop
-from analyses.records import (
-    CsvFormat,
-    RecordSpec,
-    SignalColumn,
-    TimeColumn,
-    campaign_file,
-    load_campaign,
-    open_record,
-    read_csv_record,
-    read_mat_record,
-)
-from analyses.records.campaign_import import read_record
+from analyses.linear.outer_loop import read_outer_loop
+from analyses.records import campaign_file
+from analyses.records.campaign_file import load_campaign
+from analyses.records.csv_stream import read_csv_record
+from analyses.records.open_record import open_record
+from analyses.records.readers import read_mat_record, read_record
+from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.studies.sampling import read_table
 from nonlinear.runs.records import read_columns
 from reports.nightly.cache import Cache, CorruptEntry, sealed
@@ -51,26 +47,15 @@ Fault = Callable[[bytes, random.Random], bytes]
 
 @dataclass(frozen=True)
 class Target:
-    """Something that takes a file.
-
-    Attributes
-    ----------
-    name : str
-    seeds : tuple of bytes
-        Valid inputs.
-    attack : callable
-        Gets the path of a damaged file in a folder of its own; InputError is a good end.
-    suffix : str
-    fault : callable
-    share : int
-        Inputs of this target in a round, by what they cost: some 100 us of a loader, a second of a command.
-    """
+    """Something that takes a file."""
 
     name: str
-    seeds: tuple[bytes, ...]
+    seeds: tuple[bytes, ...]  # valid inputs
+    # Gets the path of a damaged file in a folder of its own; InputError is a good end
     attack: Callable[[Path], object]
     suffix: str = ".toml"
     fault: Fault = damaged
+    # Inputs of this target in a round, by what they cost: some 100 us of a loader, a second of a command
     share: int = 500
 
 
@@ -287,6 +272,21 @@ def tree_fault(data: bytes, draw: random.Random) -> bytes:
     return json.dumps(damaged_tree(json.loads(data), draw)).encode("utf-8", "surrogatepass")
 
 
+def toml_fault(data: bytes, draw: random.Random) -> bytes:
+    """A TOML file damaged as a tree; TOML knows no null, and not every text."""
+    made = damaged_tree(tomllib.loads(data.decode()), draw)
+    with contextlib.suppress(TypeError, ValueError, AttributeError):
+        return tomli_w.dumps(without_none(made)).encode()
+    return damaged(data, draw)
+
+
+def without_none(value: Any) -> Any:
+    """Plain data as TOML has it."""
+    if isinstance(value, dict):
+        return {str(k): without_none(v) for k, v in value.items() if v is not None}
+    return [without_none(v) for v in value if v is not None] if isinstance(value, list) else value
+
+
 @cache
 def mat_files() -> tuple[bytes, ...]:
     from scipy.io import savemat
@@ -359,6 +359,7 @@ def targets() -> tuple[Target, ...]:
         Target("response", (RESPONSE,), read_response, ".csv", share=800),
         Target("response in mat", mat_files(), read_response, ".mat", share=1500),
         Target("study", (STUDY,), lambda p: read_study(str(p)), share=200),
+        Target("study tree", (STUDY,), lambda p: read_study(str(p)), fault=toml_fault, share=200),
         Target("campaign", (CAMPAIGN,), load_campaign, share=1000),
         Target("record file", (RECORD,), record, share=800),
         Target("record", (ROWS,), lambda p: read_csv_record(p, SPEC), ".csv", share=600),

@@ -1,8 +1,11 @@
 """What would fill the memory or the night is refused before it is allocated, in one line with its option."""
 
+import itertools
+import math
 import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,7 +15,7 @@ from actuator_lti.errors import InputError, NumericalError
 from analyses.monte_carlo import MonteCarloSettings
 from analyses.studies.sampling import read_table
 from analyses.studies.study import load_study
-from nonlinear import commands, loads, simulate
+from nonlinear import Drive, Run, State, commands, loads, simulate, simulate_many
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.batch import run_rows
 from reports.cli.main import main
@@ -70,6 +73,58 @@ def test_millions_of_tones() -> None:
     refused(lambda: commands.stepped_sine(0.1, [1.0, 1e308], 5, PERIOD_S), "1e+308 Hz", "5000 Hz")
     refused(lambda: commands.stepped_sine(0.1, [5e-324], 5, PERIOD_S), "at most 50000000")
     refused(lambda: commands.stepped_sine(0.1, [1.0], 10**400, PERIOD_S), "--cycles", "at most 50000000")
+
+
+ABSURD = {
+    "a range of 1e12": range(10**12),
+    "a range of 1e20": range(10**20),
+    "a range in a list": [range(10**12)],
+    "400 digits": 10**400,
+    "5000 digits": 10**5000,
+    "not a number": math.nan,
+    "no end": itertools.count(),
+    "a word": "x",
+    "a million words": ["x"] * 10**6,
+    "complex": 1j,
+    "a table": {"x": 1},
+}
+TAKES: dict[str, Callable[[Any], object]] = {
+    "size": commands.step,
+    "end": lambda given: commands.ramp(1.0, 0.0, given),
+    "frequencies": lambda given: commands.stepped_sine(0.1, given, 5, PERIOD_S),
+    "cycles": lambda given: commands.stepped_sine(0.1, [1.0], given, PERIOD_S),
+    "settling": lambda given: commands.stepped_sine(0.1, [1.0], 1, PERIOD_S, settle_cycles=given),
+    "tones": lambda given: commands.multisine(0.1, given, 1.0, PERIOD_S),
+    "times": lambda given: commands.sampled(given, [1.0, 2.0]),
+    "angles": lambda given: commands.sampled([0.0, 1.0], given),
+    "ticks": lambda given: commands.step(0.1).values(PERIOD_S, given),
+    "moment": loads.constant,
+    "moments": lambda given: loads.series([0.0, 1.0], given),
+    "duration": lambda given: simulate(amber(), commands.step(0.1), given),
+    "torque": lambda given: simulate(amber(), commands.step(0.1), 0.01, disturbance_Nm=given),
+    "tolerance": lambda given: simulate(amber(), commands.step(0.1), 0.01, tanh_tolerance=given),
+    "start": lambda given: simulate(amber(), commands.step(0.1), 0.01, initial=State(motor_angle_rad=given)),
+    "law": lambda given: simulate(amber(), commands.step(0.1), 0.01, initial=State(law=given)),
+    "probes": lambda given: simulate(amber(), commands.step(0.1), 0.01, probes=given),
+    "runs": simulate_many,
+    "state": lambda given: Drive(amber()).set(given),
+}
+
+
+@pytest.mark.parametrize("takes", TAKES)
+def test_no_argument_is_laid_out_before_it_is_refused(takes: str) -> None:
+    for given in ABSURD.values():
+        refused(lambda given=given: TAKES[takes](given))
+
+
+@pytest.mark.parametrize("digits", [400, 5000])
+def test_a_count_beyond_every_run_is_as_good_as_all(digits: int) -> None:
+    """Of ticks that are left out, of events, of threads."""
+    count = 10**digits
+    run = simulate(amber(), commands.step(0.1), 0.01, record_every=count, max_events=count)
+    assert run.time_s.size == 1
+    asked = Run(design=amber(), command=commands.step(0.1), duration_s=0.01)
+    assert simulate_many([asked], threads=count).status.tolist() == [0]
 
 
 def test_a_multisine_of_many_lines_is_summed_in_parts() -> None:

@@ -1,7 +1,6 @@
 """Dask without an open door: this machine only, TLS with certificates of the run, no page to look at."""
 
 import contextlib
-import json
 import os
 import signal
 import socket
@@ -10,14 +9,17 @@ import subprocess
 import sys
 import time
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from kill_cluster import Cluster
 from nightly_fakes import CODE, Fakes, job, study
 
 from actuator_lti.errors import InputError, NumericalError
+from analyses.monte_carlo import SampleTask
 from analyses.studies import cluster as clusters
-from analyses.studies import engine, proof
+from analyses.studies import proof
 from analyses.studies.engine import Engine
 from reports.cli.main import main
 from reports.nightly.cache import Cache
@@ -116,7 +118,7 @@ def test_items_come_back_whole_and_an_error_goes_its_way() -> None:
 
 def test_the_version_covers_the_package_of_the_task(monkeypatch, tmp_path) -> None:
     assert proof.packages_of(doubled)[-1] == doubled.__module__.partition(".")[0]
-    assert proof.packages_of(engine._evaluate) == proof.CODE
+    assert proof.packages_of(SampleTask) == proof.CODE
     from reports.nightly.compute import build
 
     assert "reports" in proof.packages_of(build)
@@ -130,44 +132,18 @@ def test_the_version_covers_the_package_of_the_task(monkeypatch, tmp_path) -> No
     assert proof.code_version(("is_not_there",)) != before
 
 
-def started(processes: list, *command: str, **environment: str) -> None:
-    """A process of Dask without a nanny, which would set threads by itself."""
-    wanted = {**os.environ, **environment}
-    processes.append(
-        subprocess.Popen(
-            [sys.executable, "-m", "distributed.cli." + command[0], *command[1:]],
-            env={name: value for name, value in wanted.items() if value}, stderr=subprocess.DEVNULL,
-        )
-    )  # fmt: skip
-
-
-def address_in(file: Path) -> str:
-    """What a scheduler wrote of itself; it puts the file down before it has written all of it."""
-    end = time.monotonic() + 120.0
-    while time.monotonic() < end:
-        with contextlib.suppress(FileNotFoundError, json.JSONDecodeError):
-            return json.loads(file.read_text())["address"]
-        time.sleep(0.05)
-    raise TimeoutError(file)
-
-
 @pytest.fixture
-def bare(tmp_path, monkeypatch):
-    """A scheduler alone, which can be killed; its address, and a function that starts a worker."""
+def bare(tmp_path, monkeypatch) -> Iterator[Cluster]:
+    """A scheduler alone, which can be killed, and to which workers can be added."""
     tests = Path(__file__).parents[1]
     paths = os.pathsep.join(map(str, (tests / "hardness", tests / "nightly", tests.parent)))
     monkeypatch.setenv("PYTHONPATH", paths)
-    processes: list = []
-    file = tmp_path / "scheduler.json"
-    common = ("--no-dashboard", "--host", "127.0.0.1")
-    worker = ("dask_worker", *common, "--no-nanny", "--nthreads", "1", "--scheduler-file", str(file))
+    cluster = Cluster(tmp_path)
     try:
-        started(processes, "dask_scheduler", *common, "--port", "0", "--scheduler-file", str(file))
-        yield address_in(file), processes, lambda **environment: started(processes, *worker, **environment)
+        cluster.start(workers=0)
+        yield cluster
     finally:  # also where it did not come up: a process left behind is seen by the next test
-        for process in processes:
-            process.kill()
-            process.wait()
+        cluster.end()
 
 
 @pytest.mark.parametrize(
@@ -178,41 +154,38 @@ def bare(tmp_path, monkeypatch):
     ],
 )
 def test_a_worker_that_adds_up_otherwise_gets_no_work(bare, environment, words, tmp_path, capsys) -> None:
-    address, _, worker = bare
-    worker(**environment)
+    bare.add_worker(**environment)
     got: list[int] = []
     with pytest.raises(InputError, match=rf"worker tcp://\S+ is refused: .*{words}") as caught:
-        Engine(scheduler=address).map(doubled, range(3), lambda item, _: got.append(item))
+        Engine(scheduler=bare.address).map(doubled, range(3), lambda item, _: got.append(item))
     assert "\n" not in str(caught.value)
     assert got == []
-    command = ["montecarlo", "ilr33-amber", "--out", str(tmp_path / "out"), "--quiet", "--scheduler", address]
-    assert main(command) == 2
+    command = ["montecarlo", "ilr33-amber", "--out", str(tmp_path / "out"), "--quiet"]
+    assert main([*command, "--scheduler", bare.address]) == 2
     assert "is refused" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 
 
 def test_a_worker_that_joins_late_proves_itself_first(bare) -> None:
-    address, _, worker = bare
-    worker()
+    bare.add_worker()
     got: list[int] = []
 
     def take(item: int, _: int) -> None:
         got.append(item)
         if len(got) == 1:
-            worker(OPENBLAS_CORETYPE="Prescott")
+            bare.add_worker(OPENBLAS_CORETYPE="Prescott")
 
     with pytest.raises(InputError, match=r"process \d+ on \S+ is refused: OPENBLAS_CORETYPE is Prescott"):
-        Engine(scheduler=address).map(slowly, range(1000), take)
+        Engine(scheduler=bare.address).map(slowly, range(1000), take)
     assert 0 < len(got) < 1000
 
 
 def test_a_worker_that_is_lost_over_its_proof_is_no_refusal(bare) -> None:
     import distributed
 
-    address, _, worker = bare
-    worker()
+    bare.add_worker()
     got: dict[int, int] = {}
-    with distributed.Client(address) as client:
+    with distributed.Client(bare.address) as client:
 
         class Losing:
             def __getattr__(self, name: str) -> object:
@@ -221,7 +194,7 @@ def test_a_worker_that_is_lost_over_its_proof_is_no_refusal(bare) -> None:
             def run(self, *asked: object, **how: object) -> dict[str, object]:
                 return {**client.run(*asked, **how), "tcp://lost": OSError("closed")}
 
-        clusters.submit(Losing(), engine._applied, doubled, [1, 2], got.__setitem__)
+        clusters.submit(Losing(), doubled, [1, 2], got.__setitem__)
     assert got == {1: 2, 2: 4}
 
 
@@ -262,18 +235,17 @@ def test_every_part_of_a_proof_counts(name: str) -> None:
 
 def test_a_scheduler_that_dies_is_one_line_and_what_is_done_is_kept(bare, tmp_path, capsys) -> None:
     """The command ends with status 3; again, without a cluster, it computes only the rest."""
-    address, processes, worker = bare
-    worker()
+    bare.add_worker()
     out = tmp_path / "out"
     words = ["montecarlo", "ilr33-amber", "--samples", "40000", "--no-worst", "--out", str(out), "--quiet"]
-    command = [str(Path(sys.executable).with_name("actuator-lti")), *words, "--scheduler", address]
+    command = [str(Path(sys.executable).with_name("actuator-lti")), *words, "--scheduler", bare.address]
     study = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     end = time.monotonic() + 120.0
     while len(list(out.rglob("*.parquet"))) < 2:
         assert study.poll() is None
         assert time.monotonic() < end
         time.sleep(0.05)
-    processes[0].kill()
+    bare.scheduler.kill()
     _, said = study.communicate(timeout=120)
     assert study.returncode == 3, said
     assert said.count("\n") == 1
@@ -308,11 +280,45 @@ def test_an_address_that_anybody_can_reach_is_warned_about(address, told, tmp_pa
         ({"scheduler": "tls://h:1"}, "--tls"),
         ({"scheduler": "tcp://h:1", "tls": Path("x")}, "--scheduler tls://"),
         ({"workers": 1, "tls": Path("x")}, "--scheduler tls://"),
+        ({"workers": 2, "scheduler": "tcp://x"}, "one of them"),
+        ({"workers": 0}, "at least 1"),
+        ({"scheduler": "nowhere"}, "tcp://host:8786"),
     ],
 )
-def test_certificates_and_addresses_belong_together(options, words) -> None:
+def test_an_engine_that_cannot_be_is_refused(options, words) -> None:
     with pytest.raises(InputError, match=words):
-        Engine(**options)
+        Engine(**options).map(doubled, [1], lambda *_: None)
+
+
+def test_a_scheduler_that_is_not_there_is_a_clear_failure(monkeypatch):
+    monkeypatch.setattr("analyses.studies.cluster.CONNECT_S", 0.5)
+    with pytest.raises(NumericalError, match="127"):
+        Engine(scheduler="tcp://127.0.0.1:9").map(doubled, [1], lambda *_: None)
+
+
+def test_a_cluster_that_is_slow_to_close_takes_no_result_back(monkeypatch):
+    """Time-outs while the workers stop, after the last result: the study is whole all the same."""
+
+    @contextlib.contextmanager
+    def slow_to_close(self):
+        yield None
+        raise TimeoutError
+
+    def in_place(client, work, todo, sink):
+        for part in todo:
+            sink(part, work(part))
+
+    monkeypatch.setattr(Engine, "_client", slow_to_close)
+    monkeypatch.setattr("analyses.studies.cluster.submit", in_place)
+    sums = {}
+    Engine(workers=1).map(sum, [(1, 2), (3, 4)], sums.__setitem__)
+    assert sums == {(1, 2): 3, (3, 4): 7}
+
+    def lost(item, result):
+        raise TimeoutError
+
+    with pytest.raises(NumericalError, match="no answer in time"):
+        Engine(workers=1).map(sum, [(1, 2)], lost)
 
 
 def test_certificates_that_are_none_are_named(tmp_path) -> None:

@@ -4,7 +4,6 @@ import pytest
 
 from analyses.comparison import variants
 from analyses.comparison.variants import compare
-from analyses.studies.engine import Engine
 from analyses.studies.study import load_study
 
 STUDY = """
@@ -77,10 +76,3 @@ def test_a_damaged_or_foreign_entry_is_computed_again(study, counted, tmp_path) 
     assert compare(study, folder=folder).variants == fresh.variants
     assert len(counted) == 4
     assert len(list(folder.rglob("*.json"))) == 5
-
-
-def test_a_cluster_finds_the_same(study, tmp_path) -> None:
-    here = compare(study)
-    there = compare(study, engine=Engine(workers=1), folder=tmp_path / "designs")
-    assert there.variants == here.variants
-    assert there.variants[0].loops.keys() == here.variants[0].loops.keys()

@@ -40,18 +40,6 @@ def site(tmp_path) -> Path:
     return site
 
 
-def forget_all(site: Path) -> None:
-    shutil.rmtree(state(site))
-
-
-def forget_history(site: Path) -> None:
-    (state(site) / FILE).unlink()
-
-
-def empty_history(site: Path) -> None:
-    (state(site) / FILE).write_bytes(b"")
-
-
 def rewritten(site: Path, change: Callable[[dict[str, Any]], object]) -> None:
     """Change the index, and its checksum with it."""
     path = state(site) / FILE
@@ -64,14 +52,6 @@ def rewritten(site: Path, change: Callable[[dict[str, Any]], object]) -> None:
     path.write_text(json.dumps({**sealed, "sha256": sha256(written)}))
 
 
-def forget_last_night(site: Path) -> None:
-    rewritten(site, lambda index: index["runs"].pop())
-
-
-def forget_baseline(site: Path) -> None:
-    rewritten(site, lambda index: index["baselines"].clear())
-
-
 def take_that_of_another(site: Path) -> None:
     other = site.with_name("other")
     for margin in (1.0, 2.0, 3.0):
@@ -80,13 +60,20 @@ def take_that_of_another(site: Path) -> None:
     shutil.copytree(state(other), state(site))
 
 
-@pytest.mark.parametrize(
-    "lose",
-    [forget_all, forget_history, empty_history, forget_last_night, forget_baseline, take_that_of_another],
-)
-def test_a_lost_history_closes_the_gate_until_somebody_says_so(site, lose) -> None:
+LOSSES: dict[str, Callable[[Path], object]] = {
+    "all": lambda site: shutil.rmtree(state(site)),
+    "the index": lambda site: (state(site) / FILE).unlink(),
+    "what the index holds": lambda site: (state(site) / FILE).write_bytes(b""),
+    "the last night": lambda site: rewritten(site, lambda index: index["runs"].pop()),
+    "the approval": lambda site: rewritten(site, lambda index: index["baselines"].clear()),
+    "its own, for another's": take_that_of_another,
+}
+
+
+@pytest.mark.parametrize("lost", LOSSES)
+def test_a_lost_history_closes_the_gate_until_somebody_says_so(site, lost: str) -> None:
     index = (site / "index.html").read_bytes()
-    lose(site)
+    LOSSES[lost](site)
     for _ in range(2):  # the first refusal must not make the second night pass
         with pytest.raises(HistoryLost, match="--accept-lost-history") as caught:
             night(site, 3.0)
@@ -109,7 +96,7 @@ def test_a_site_of_an_older_version_or_a_damaged_summary_remembers_one_night(sit
         assert result == Memory("", 1, 0), text
     summary.unlink()
     assert remembered(site) == Memory("", 1, 0)
-    forget_history(site)
+    LOSSES["the index"](site)
     with pytest.raises(HistoryLost, match="1 night"):
         night(site, 3.0)
 
@@ -136,7 +123,7 @@ def test_the_history_of_an_earlier_version_is_refused_and_left(site) -> None:
 
 
 def test_any_damage_is_told_or_harmless(site) -> None:
-    """Bytes are overwritten, cut off and inserted; a night never ends otherwise than well or named."""
+    """Bytes are overwritten, cut off and inserted: every text and number is held by a checksum."""
     paths = [state(site) / FILE, *sorted((state(site) / "nights").iterdir())]
     draw, told = random.Random(18), []
     before = everything(site)
@@ -163,7 +150,7 @@ def everything(site: Path) -> list[object]:
     history = open_history(state(site))
     results = [result for run in history.runs for result in history.night(run.id).results]
     figures = [(history.figures(result), history.inputs(result)) for result in results]
-    return [history.index, figures, history.matrix(results, ["GM: value"]).tolist()]
+    return [history.index, results, figures, history.matrix(results, ["GM: value"]).tolist()]
 
 
 @pytest.mark.parametrize("name", ["", "000001.json", "000002.json"])
@@ -173,37 +160,6 @@ def test_a_night_that_is_missing_is_told(site, name: str) -> None:
     for read in (lambda: everything(site), lambda: night(site, 4.0)):
         with pytest.raises(InputError, match=r"\d\.json: is damaged \(is missing\): restore it from a copy"):
             read()
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ('"name":"a"', '"name":"c"'),
-        ('"kind":"design"', '"kind":"desigx"'),
-        ('"status":"pass"', '"status":"fail"'),
-        ('"worst_id":"GM"', '"worst_id":"GX"'),
-        ('"failed":0', '"failed":1'),
-        ('"message":""', '"message":"x"'),
-        ('"dB",1,', '"dB",-1,'),
-        ('"dB"', '"dC"'),
-        ('"GM: value"', '"GM: valux"'),
-        ('"key":"', '"key":"0'),
-        ('"values":"A', '"values":"B'),
-        ("10 1/s", "11 1/s"),
-        ('"host":"', '"host":"x'),
-        ('"finished":"20', '"finished":"21'),
-        ('"by":"x"', '"by":"z"'),
-        ('"run":1,"at"', '"run":2,"at"'),
-        ('"numpy":"2"', '"numpy":"3"'),
-    ],
-)
-def test_a_changed_name_or_status_is_damage(site, old: str, new: str) -> None:
-    """Every text and number of the history is held by a checksum."""
-    paths = [state(site) / FILE, state(site) / "nights" / "000001.json"]
-    path = next(path for path in paths if old in path.read_text())
-    path.write_text(path.read_text().replace(old, new, 1))
-    with pytest.raises(InputError, match=r"is damaged \(is not what was written\)"):
-        everything(site)
 
 
 @pytest.mark.parametrize(

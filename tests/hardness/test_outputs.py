@@ -66,11 +66,11 @@ def test_a_mark_of_direction_is_shown_not_obeyed(mark, capsys) -> None:
     assert mark not in escape(words)
 
 
-@pytest.mark.parametrize("name", ["a\x1b[31mb", "a\u202eb", "a\x85b"])
-def test_names_of_records_may_hold_anything(name, tmp_path, monkeypatch) -> None:
+def test_names_of_records_may_hold_anything(tmp_path, monkeypatch) -> None:
     from reports.cli.main import main
 
     monkeypatch.chdir(tmp_path)
+    name = "a\x1b[31mb\u202ec\x85d"
     record, design = f"{name}.csv", ("--design", "ilr33-amber")
     assert main(["simulate", "ilr33-amber", "--csv", record, "--command", "triangle", "--quiet"]) == 0
     assert main(["correlate", "ilr33-amber", record, "--out", "c", "--quiet"]) in (0, 1)

@@ -13,8 +13,10 @@ from actuator_lti import bounds
 from actuator_lti.bounds import JSON_DEPTH, KEY_PARTS, TEXT_CHARACTERS, TOML_BYTES, TOML_DEPTH, TOML_VALUES
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import parse_json, parse_toml
-from analyses.records import load_campaign, open_record, read_csv_record, read_mat_record
-from analyses.records.campaign_import import read_record
+from analyses.records.campaign_file import load_campaign
+from analyses.records.csv_stream import read_csv_record
+from analyses.records.open_record import open_record
+from analyses.records.readers import read_mat_record, read_record
 from nonlinear import commands
 
 

@@ -2,13 +2,25 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from actuator_lti.design import load_design
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import (
+    Controller,
+    Coupling,
+    CurrentLoop,
+    Design,
+    Encoder,
+    Friction,
+    Instruments,
+    LoadFriction,
+    OutputEncoder,
+)
+from analyses.records.record import Record, RowCounts
 from nonlinear import Trajectory, commands, simulate
 
 Columns = dict[str, np.ndarray]
@@ -54,6 +66,12 @@ def columns_of(run: Trajectory, seed: int = 0, load_Nm: float | None = None) -> 
     return columns
 
 
+def record_of(time: np.ndarray, name: str = "r", **signals: np.ndarray) -> Record:
+    """A record in memory, signals in SI."""
+    rows = RowCounts(rows_in=len(time), rows_out=len(time))
+    return Record(name=name, time_s=time, signals=signals, units={}, counts=rows)
+
+
 def write(
     path: Path,
     columns: Columns,
@@ -79,3 +97,35 @@ def staircase(*speeds: float) -> Trajectory:
     speed = np.interp(time, knots, levels)
     angle = np.concatenate([[0.0], np.cumsum(speed[:-1] * 1e-3)]) / drive.total_ratio
     return simulate(drive, commands.sampled(time, angle), float(time[-1]))
+
+
+HALF_PLAY = 1e-3
+
+
+def two_mass_design() -> Design:
+    """10:1, 2 mrad of play, dry friction, 16-bit and 20-bit encoders, 30 mA rms and 5 mA steps of current."""
+    base = load_design("ilr33-amber")
+    gear = replace(base.gears[0], name="gear", ratio=10.0, input_inertia_kgm2=0.0, output_inertia_kgm2=0.0)
+    motor = replace(
+        base.motor, rotor_inertia_kgm2=2e-5, resistance_ohm=1.0, inductance_H=2e-3,
+        torque_constant_Nm_A=0.05, back_emf_constant_Vs_rad=0.05,
+    )  # fmt: skip
+    load = replace(
+        base.load, path="back-drivable", inertia_kgm2=2e-3, moment_max_Nm=0.0,
+        friction=LoadFriction(viscous_Nms_rad=0.02),
+    )  # fmt: skip
+    limits = replace(
+        base.limits, voltage_V=48.0, speed_rad_s=900.0, peak_current_A=30.0, continuous_current_A=30.0
+    )
+    current = CurrentLoop(gain_V_A=5.0, integral_time_s=2e-3)
+    tools = Instruments(current_noise_A=0.03, current_resolution_A=0.005, output_angle_noise_rad=5e-6)
+    parts = {"gears": (gear,), "motor": motor, "load": load, "limits": limits, "instruments": tools}
+    parts |= {
+        "friction": Friction(dry_torque_Nm=0.004, viscous_Nms_rad=1e-5),
+        "controller": Controller(period_s=1e-4, computing_delay_s=1e-4, current=current),
+        "coupling": Coupling(stiffness_Nm_rad=400.0, damping_Nms_rad=0.02, play_rad=2.0 * HALF_PLAY),
+        "encoder": Encoder(counts_per_rev=65536),
+        "output_encoder": OutputEncoder(counts_per_rev=1 << 20),
+    }
+    bare = {"parameters": {}, "requirements": (), "correlations": (), "facts": ()}
+    return replace(base, name="two-mass", **parts, **bare)

@@ -7,8 +7,9 @@ import pytest
 
 from actuator_lti.design import load_design
 from actuator_lti.errors import InputError
-from analyses.correlation import CorrelationResult, compare_signals, correlate_record
-from analyses.records import open_record
+from analyses.correlation.closed_loop import CorrelationResult, correlate_record
+from analyses.correlation.compare import compare_signals
+from analyses.records.open_record import open_record
 from tests.identification.bench_records import Command, write
 
 
@@ -102,30 +103,7 @@ def test_the_record_s_supply_becomes_the_voltage_limit(tmp_path) -> None:
         for t, r, a in zip(run.time_s, run.reference_rad.tolist(), run.output_angle_rad.tolist(), strict=True)
     ]
     (tmp_path / "r.csv").write_text("time_s,reference_rad,output_angle_rad,supply_V\n" + "\n".join(rows))
-    result = correlate_record(design, open_record(tmp_path / "r.csv"), derive_velocity=False)
+    result = correlate_record(design, open_record(tmp_path / "r.csv"))
     assert result["output_angle"].relative_error > 1e-3
     assert result.limits["voltage"] > 0.0
     assert any("supply" in note for note in result.notes)
-
-
-def test_a_record_file_tells_the_layout(tmp_path) -> None:
-    (tmp_path / "log.csv").write_text(
-        "t;cmd;pos\n" + "".join(f"{k};{k / 10};{k / 10}\n".replace(".", ",") for k in range(50))
-    )
-    (tmp_path / "log.toml").write_text(
-        'file = "log.csv"\nseparator = ";"\ndecimal = ","\ntime = { column = "t", unit = "ms" }\n'
-        'signals.reference = { column = "cmd", unit = "deg" }\n'
-        'signals.output_angle = { column = "pos", unit = "deg" }\n'
-    )
-    record = open_record(tmp_path / "log.toml")
-    assert record.period_s == pytest.approx(1e-3)
-    assert record["reference"][10] == pytest.approx(np.radians(1.0))
-    (tmp_path / "log.toml").write_text('file = "log.csv"\nseperator = ";"\n')
-    with pytest.raises(InputError, match=r'seperator: unknown key; did you mean "separator"'):
-        open_record(tmp_path / "log.toml")
-
-
-def test_an_unknown_layout_is_refused_with_advice(tmp_path) -> None:
-    (tmp_path / "x.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(InputError, match="describe it in a record file"):
-        open_record(tmp_path / "x.csv")

@@ -9,9 +9,9 @@ import pytest
 from actuator_lti.design import load_design
 from actuator_lti.design.model import Coupling, Design, FrictionPoint, Gravity, LoadFriction, PositionLoop
 from actuator_lti.errors import InputError
-from analyses.correlation import correlate_record
+from analyses.correlation.closed_loop import correlate_record
 from analyses.correlation.driving import command_of
-from analyses.records import open_record
+from analyses.records.open_record import open_record
 from nonlinear import Trajectory, commands, loads, simulate
 from nonlinear.commands import Command
 

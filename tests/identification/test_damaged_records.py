@@ -5,20 +5,28 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.identification.asked import Settings
 from analyses.identification.bench import BenchResult, identify_bench
-from analyses.records.record import Record, RowCounts
-from benchmarks.random_records import KINDS, VALUES, random_record
-from tests.identification.bench_records import Columns, columns_of, motion
+from analyses.identification.inverse import fit_records
+from analyses.identification.joint_model import NAMES
+from analyses.records.open_record import open_record
+from analyses.records.record import Record
+from benchmarks.random_records import KINDS, VALUES, random_records
+from nonlinear import commands, simulate
+from tests.identification.bench_records import Columns, columns_of, motion, record_of
 
 BASE = load_design("ilr33-amber")
 TRUTH = {"friction.dry_torque": 3e-3, "friction.viscous": 4e-6, "motor.rotor_inertia": 1.3e-6}
 ALL = ("reference", "angle", "speed", "current")
+WHOLE = (*ALL, "voltage")
 BARE = ("angle", "current")
 Damage = Callable[[Columns], Columns]
 
@@ -30,20 +38,20 @@ def drive() -> Design:
 
 @pytest.fixture(scope="module")
 def columns(drive: Design) -> Columns:
-    table = columns_of(motion(2, design=drive), 1)
+    run = motion(2, design=drive)
+    table = columns_of(run, 1)
     return {
         "time": table["time_s"],
         "reference": np.radians(table["reference_deg"]),
         "angle": table["motor_angle_rad"],
         "speed": table["motor_speed_rpm"] * np.pi / 30.0,
         "current": table["current_A"],
+        "voltage": run.voltage_V[::10],
     }
 
 
 def _record(columns: Columns, names: tuple[str, ...] = ALL) -> Record:
-    signals = {name: columns[name] for name in names}
-    rows = RowCounts(rows_in=len(columns["time"]), rows_out=len(columns["time"]))
-    return Record(name="r", time_s=columns["time"], signals=signals, units={}, counts=rows)
+    return record_of(columns["time"], **{name: columns[name] for name in names})
 
 
 def _later(seconds: float) -> Damage:
@@ -58,71 +66,231 @@ def _clipped(share: float) -> Damage:
     return change
 
 
-def _said(result: BenchResult) -> str:
-    return "; ".join(f"{one.subject}: {one.text}" for one in result.findings["r"] if one.passed is not True)
-
-
-def _is_the_truth(result: BenchResult, drive: Design, near: float) -> bool:
-    friction = drive.friction
-    wanted = {
-        "inertia": drive.inertia_kgm2, "dry": friction.dry_torque_Nm, "viscous": friction.viscous_Nms_rad
-    }  # fmt: skip
-    model = result.model
-    return all(
-        abs(model[name] / value - 1.0) < near and abs(model[name] - value) < 3.5 * model.std(name)
-        for name, value in wanted.items()
-    )
-
-
-@pytest.mark.parametrize("signals", [ALL, BARE], ids=["all", "bare"])
-@pytest.mark.parametrize("late_ms", [10.0, 1.0, -1.0])
-def test_a_lag_is_found_to_a_tenth_of_a_sample_and_taken_back(
-    late_ms: float, signals: tuple[str, ...], columns: Columns, drive: Design
-) -> None:
-    result = identify_bench(BASE, [_record(_later(1e-3 * late_ms)(columns), signals)])
-    found = re.search(r"the current is (\S+) ms .* (later|earlier) than the motion", _said(result))
-    assert found is not None
-    assert float(found[1]) * (1.0 if found[2] == "later" else -1.0) == pytest.approx(late_ms, abs=0.1)
-    assert _is_the_truth(result, drive, 0.01)
-
-
-@pytest.mark.parametrize("signals", [ALL, BARE], ids=["all", "bare"])
-def test_clipped_current_is_left_out(signals: tuple[str, ...], columns: Columns, drive: Design) -> None:
-    result = identify_bench(BASE, [_record(_clipped(0.95)(columns), signals)])
-    assert "clipped" in _said(result)
-    assert _is_the_truth(result, drive, 0.01)
-
-
 def _scaled(factor: float, *names: str) -> Damage:
     return lambda c: {**c, **{name: factor * c[name] for name in names}}
 
 
-WRONG: dict[str, tuple[Damage, dict[str, float], str]] = {
-    "rms of AC as DC": (_scaled(1.5**-0.5, "current"), {}, "root 3/2"),
-    "counts of the encoder": (_scaled(4.0, "angle", "speed"), {}, "the scale of angle and speed"),
-    "torque constant 20 % off": (
-        dict, {"motor.torque_constant": 7.08e-3, "motor.back_emf_constant": 7.08e-3}, "factor 1.2"
-    ),
-    "load friction": (dict, {"friction.load_coefficient": 1.34e-5}, "Load friction is 100 times"),
-}  # fmt: skip
+def _swapped(one: str, other: str) -> Damage:
+    return lambda c: {**c, one: c[other], other: c[one]}
+
+
+def _lost(every: int, *, stamped: bool = False, filled: bool = False) -> Damage:
+    """One row in so many is lost: the time is counted by rows, stamped, or the row before stands twice."""
+
+    def change(columns: Columns) -> Columns:
+        rows = np.arange(len(columns["time"]))
+        kept = rows[rows % every != every - 1]
+        if filled:
+            return {
+                **{n: v[np.where(rows % every == every - 1, rows - 1, rows)] for n, v in columns.items()},
+                "time": columns["time"],
+            }
+        time = columns["time"][kept if stamped else slice(len(kept))]
+        return {**{name: values[kept] for name, values in columns.items()}, "time": time}
+
+    return change
+
+
+def _range_from(share: float, factor: float) -> Damage:
+    """The channel of the current changes its range at a share of the record, and its scale with it."""
+    return lambda c: {
+        **c,
+        "current": np.where(np.arange(len(c["time"])) < share * len(c["time"]), 1.0, factor) * c["current"],
+    }
+
+
+def _of_another_run(name: str) -> Damage:
+    """A signal of the same drive's other motion."""
+
+    def change(columns: Columns) -> Columns:
+        table = columns_of(motion(7, design=with_values(BASE, TRUTH)), 5)
+        other = {"current": table["current_A"], "reference": np.radians(table["reference_deg"])}
+        return {**columns, name: other[name]}
+
+    return change
+
+
+def _said(result: BenchResult) -> str:
+    return "; ".join(f"{one.subject}: {one.text}" for one in result.findings["r"] if one.passed is not True)
+
+
+def _truth(drive: Design) -> dict[str, float]:
+    friction = drive.friction
+    return {
+        "inertia": drive.inertia_kgm2, "dry": friction.dry_torque_Nm, "viscous": friction.viscous_Nms_rad
+    }  # fmt: skip
+
+
+def _is_the_truth(result: BenchResult, drive: Design, near: float) -> bool:
+    model = result.model
+    return all(
+        abs(model[name] / value - 1.0) < near and abs(model[name] - value) < 3.5 * model.std(name)
+        for name, value in _truth(drive).items()
+    )
+
+
+RIGHTED: dict[str, tuple[Damage, float, str]] = {
+    "nothing": (dict, 0.005, r"^(?!.*(at one time|clipped|drift|off, or the scale))"),
+    "clipped": (_clipped(0.95), 0.01, "clipped"),
+    "10 ms late": (_later(1e-2), 0.01, r"the current is (9\.9|10)\S* ms .* later than the motion"),
+    "one row in 100 lost, with its time": (_lost(100, stamped=True), 0.005, r"^(?!.*(missing|at one time))"),
+    "1 ms late": (_later(1e-3), 0.01, r"the current is (0\.9|1\.0|1 )\S* ?ms .* later than the motion"),
+    "1 ms early": (_later(-1e-3), 0.01, r"the current is (0\.9|1\.0|1 )\S* ?ms .* earlier than the motion"),
+}
+"""Damage, how near the truth the values come (and within 3.5 of their errors), and what is said."""
 
 
 @pytest.mark.parametrize("signals", [ALL, BARE], ids=["all", "bare"])
-@pytest.mark.parametrize("name", WRONG)
-def test_what_cannot_be_put_right_gives_no_design(
+@pytest.mark.parametrize("name", RIGHTED)
+def test_what_can_be_put_right_is(
     name: str, signals: tuple[str, ...], columns: Columns, drive: Design
 ) -> None:
-    """The design is the drive's own but for what is wrong in it."""
-    damage, wrong, reason = WRONG[name]
-    records = [_record(damage(columns), signals)]
-    if name == "load friction":
-        loaded = motion(5, load_Nm=5.0, design=drive)
-        table = {"time": loaded.time_s[::10], "angle": loaded.motor_angle_rad[::10]}
-        table |= {"current": loaded.current_A[::10], "torque": np.full(len(table["time"]), 5.0)}
-        records.append(replace(_record(table, ("angle", "current", "torque")), name="loaded"))
-    result = identify_bench(with_values(drive, wrong), records)
+    damage, near, said = RIGHTED[name]
+    result = identify_bench(BASE, [_record(damage(columns), signals)])
+    assert result.passed
+    assert re.search(said, _said(result), re.DOTALL)
+    assert _is_the_truth(result, drive, near)
+
+
+WIDENED: dict[str, tuple[Damage, tuple[str, ...], float, str]] = {
+    "rms, or a warm winding": (_scaled(1.5**-0.5, "current"), WHOLE, 0.2, "a winding .* times the real"),
+    "the same without a speed": (
+        _scaled(1.5**-0.5, "current"), ("angle", "current", "voltage"), 0.2, "times the real"
+    ),
+    "a clock 1 % slow, by the speed": (
+        _scaled(1.01, "time"), (*BARE, "speed"), 0.03, "off, or the scale of one of them, beyond their noise"
+    ),
+    "a clock 1 % slow, by the tick": (_scaled(1.01, "time"), BARE, 0.03, "10.1 ticks.* intervals hold it"),
+    "a clock 1 % slow, by the loops": (_scaled(1.01, "time"), ("reference", *BARE), 0.03, "10.1 ticks"),
+    "range of the current x 1.1 midway": (_range_from(0.5, 1.1), ALL, 0.08, "drift along the record"),
+    "a scale 1 % off, by the loops": (_scaled(1.01, "angle", "speed"), ALL, 0.03, ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WIDENED)
+def test_what_stays_open_is_in_the_intervals(name: str, columns: Columns, drive: Design) -> None:
+    damage, signals, near, said = WIDENED[name]
+    result = identify_bench(BASE, [_record(damage(columns), signals)])
+    assert re.search(said, _said(result))
+    assert _is_the_truth(result, drive, near)
+    right = identify_bench(BASE, [_record(columns, signals)])
+    assert right.model.std("inertia") < 0.5 * result.model.std("inertia")
+    assert not said or said not in _said(right)
+
+
+HELD = {"inertia": ["motor.rotor_inertia=1.3e-6 kg*m^2"], "nothing": None}
+
+
+@pytest.mark.parametrize("held", HELD)
+@pytest.mark.parametrize("signals", [ALL, BARE], ids=["all", "bare"])
+def test_values_hang_on_the_torque_constant_as_stated(
+    signals: tuple[str, ...], held: str, columns: Columns
+) -> None:
+    """The intervals are those at the design's constant: a design with another one gives what was stated."""
+    settings, record = Settings(fix=HELD[held]), _record(columns, signals)
+    result = identify_bench(BASE, [record], settings=settings)
+    kept = result.model.fixed["torque_constant"]
+    (item,) = (one for one in result.items if one.id == "kept-torque_constant")
+    assert item.passed is None
+    assert ("+10 % of every value" in item.reason) == (held == "nothing")
+    assert "at motor.torque_constant = 0.0059 N m/A" in result.text
+    more = with_values(BASE, {"motor.torque_constant": kept.value + 2e-4})
+    held_at = {name: one.value for name, one in result.model.fixed.items() if name in NAMES["symmetric"]}
+    own, other = (fit_records(design, [record], fixed=held_at) for design in (BASE, more))
+    for name in ("viscous", "dry"):
+        assert own[name] - other[name] == pytest.approx(2e-4 * kept.moves[name], rel=0.01)
+
+
+@pytest.mark.parametrize("scale", [0.5**0.5, 2.0**0.5])
+@pytest.mark.parametrize("signals", [ALL, BARE], ids=["all", "bare"])
+def test_a_scale_of_the_current_is_in_what_the_constant_moves(
+    signals: tuple[str, ...], scale: float, columns: Columns, drive: Design
+) -> None:
+    """Peak read as rms, and the reverse: as if the constant were as much smaller; moved so, all is right.
+
+    To half a per cent, as of an undamaged record: the fit's bias is that of a drive of the wrong inertia.
+    """
+    model = identify_bench(BASE, [_record(_scaled(scale, "current")(columns), signals)]).model
+    kept = model.fixed["torque_constant"]
+    for name, truth in _truth(drive).items():
+        assert abs(model[name] - truth) > 20.0 * model.std(name)
+        right = model[name] - kept.moves[name] * kept.value * (1.0 / scale - 1.0)
+        assert right == pytest.approx(truth, rel=0.005)
+
+
+def test_a_voltage_tells_the_torque_constant(columns: Columns) -> None:
+    """By its kE w, unless that is not closely told, as of a voltage of another run."""
+    assert "torque_constant" not in identify_bench(BASE, [_record(columns, WHOLE)]).model.fixed
+    other = {**columns, "voltage": np.roll(columns["voltage"], 1000)}
+    assert "torque_constant" in identify_bench(BASE, [_record(other, WHOLE)]).model.fixed
+
+
+STRONG = {"motor.torque_constant": 7.08e-3, "motor.back_emf_constant": 7.08e-3}
+"""A motor 20 % stronger than it is."""
+WRONG: dict[str, tuple[Damage, tuple[str, ...], dict[str, float], str]] = {
+    "rms of AC as DC": (_scaled(1.5**-0.5, "current"), BARE, TRUTH, "root 3/2"),
+    "rms read as peak": (_scaled(0.5**0.5, "current"), ALL, TRUTH, "root 2"),
+    "mA read as A": (_scaled(1e3, "current"), ALL, {}, "factor 1000"),
+    "A read as mA": (_scaled(1e-3, "current"), ALL, {}, "the design's inertias beside"),
+    "the current's sign turned": (_scaled(-1.0, "current"), ALL, {}, "does not explain"),
+    "rpm read as rad/s": (_scaled(30.0 / np.pi, "speed"), ALL, {}, "60/2 pi"),
+    "degrees read as radians": (_scaled(180.0 / np.pi, "angle"), BARE, {}, "the design's inertias beside"),
+    "degrees as turns": (_scaled(1.0 / 360.0, "angle"), ALL, {}, "times the rate of the angle"),
+    "ms read as s": (_scaled(1e3, "time"), ALL, {}, "factor 1000"),
+    "a clock 5 % off": (_scaled(1.05, "time"), ALL, {}, "a clock +5 % off"),
+    "a clock 3 % off, no speed": (_scaled(1.03, "time"), ("reference", *BARE), {}, "a clock about"),
+    "two columns swapped": (_swapped("speed", "current"), ALL, {}, "columns of speed and current swapped"),
+    "angle and current swapped": (_swapped("angle", "current"), ALL, {}, "they are not alike"),
+    "counts of the encoder": (_scaled(4.0, "angle", "speed"), BARE, TRUTH, "the scale of angle and speed"),
+    "counts, 10 % off": (_scaled(1.1, "angle", "speed"), ALL, {}, "1.1 times that which the loops follow"),
+    "one row in 700 lost, time by rows": (_lost(700), BARE, {}, "rows are missing where the time goes on"),
+    "one row in 10 filled with the one before": (_lost(10, filled=True), BARE, {}, "rows repeat the one"),
+    "encoder the other way round": (_scaled(-1.0, "angle", "speed"), ALL, TRUTH, "the sign is turned"),
+    "the same, no command": (_scaled(-1.0, "angle", "speed"), BARE, TRUTH, "does not explain"),
+    "s read as ms": (_scaled(1e-3, "time"), WHOLE, {}, "is the unit of the time right?"),
+    "radians read as degrees": (_scaled(np.pi / 180.0, "angle"), ALL, {}, "degrees read as radians"),
+    "current of another run": (_of_another_run("current"), BARE, {}, "does not explain"),
+    "command of another run": (
+        _of_another_run("reference"), ALL, TRUTH, "times that of the design's loops"
+    ),
+    "range of the current x 2 midway": (_range_from(0.5, 2.0), BARE, {}, "does not explain"),
+    "torque constant 20 % off": (
+        dict, BARE, TRUTH | STRONG, "factor 1.2"
+    ),
+    "torque constant, by the voltage": (
+        dict, WHOLE, STRONG, "so kM and all"
+    ),
+    "dry friction 1 000 times": (dict, ALL, {"friction.dry_torque": 3.0}, "factor 1000"),
+}  # fmt: skip
+
+
+def _refused(design: Design, record: Record) -> str:
+    """Why no design comes of a record."""
+    try:
+        result = identify_bench(design, [record])
+    except InputError as error:
+        return str(error)
     assert not result.passed
-    assert reason in "; ".join(item.reason for item in result.items)
+    return "; ".join(item.reason for item in result.items)
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_cannot_be_put_right_gives_no_design(name: str, columns: Columns) -> None:
+    damage, signals, wrong, reason = WRONG[name]
+    assert reason in _refused(with_values(BASE, wrong), _record(damage(columns), signals))
+
+
+@pytest.mark.parametrize("factor", [100.0, 1e-3])
+def test_a_load_friction_of_another_size_fails(factor: float, columns: Columns, drive: Design) -> None:
+    """The design's, or a load in another unit."""
+    loaded = motion(5, load_Nm=5.0, design=drive)
+    table = {"time": loaded.time_s[::10], "angle": loaded.motor_angle_rad[::10]}
+    table |= {"current": loaded.current_A[::10], "torque": np.full(len(table["time"]), 5.0)}
+    second = replace(_record(table, ("angle", "current", "torque")), name="loaded")
+    wrong = with_values(drive, {"friction.load_coefficient": factor * drive.friction.load_coefficient})
+    result = identify_bench(wrong, [_record(columns), second])
+    assert not result.passed
+    assert "Load friction is" in next(item.reason for item in result.items if item.id == "size")
 
 
 def test_a_load_that_was_not_recorded_is_named_with_its_size(drive: Design) -> None:
@@ -133,11 +301,32 @@ def test_a_load_that_was_not_recorded_is_named_with_its_size(drive: Design) -> N
     assert "as under a load of 6.0" in "; ".join(item.reason for item in result.items)
 
 
+@pytest.mark.parametrize("added_N", [0.0, 20.0, -5.0])
+def test_a_constant_force_beside_the_one_stated_is_said(added_N: float, emps_file: Path) -> None:
+    """The published axis states -3.16 N; a load that was not recorded comes on top."""
+    record = open_record(emps_file)
+    more = replace(record, signals={**record.signals, "force": record["force"] + added_N})
+    result = identify_bench(load_design("emps"), [more])
+    assert [one.reason.partition(" beside")[0] for one in result.items if one.id == "offset"] == (
+        [f"{added_N:+.3g} N"] if added_N else []
+    )
+
+
+def test_an_offset_that_the_design_does_not_state_is_said(columns: Columns) -> None:
+    """50 mA of a current sensor: kM times that, neither met nor failed."""
+    result = identify_bench(BASE, [_record({**columns, "current": columns["current"] + 0.05})])
+    (item,) = (one for one in result.items if one.id == "offset")
+    assert item.passed is None
+    assert float(item.reason.partition(" ")[0]) == pytest.approx(5.9e-3 * 0.05, rel=0.03)
+    assert not any(one.id == "offset" for one in identify_bench(BASE, [_record(columns)]).items)
+
+
 def test_a_load_friction_that_no_load_excites_is_not_determined(columns: Columns, drive: Design) -> None:
     """1 000 times too large, over a record without a load: neither met nor failed, and it says why."""
     wrong = with_values(drive, {"friction.load_coefficient": 1e3 * drive.friction.load_coefficient})
-    (item,) = (one for one in identify_bench(wrong, [_record(columns)]).items if one.id.startswith("kept-"))
-    assert (item.id, item.passed) == ("kept-load_coefficient", None)
+    kept = {one.id: one for one in identify_bench(wrong, [_record(columns)]).items}
+    item = kept["kept-load_coefficient"]
+    assert item.passed is None
     assert item.reason == "is not excited at all: the design's value kept"
 
 
@@ -150,25 +339,27 @@ def test_a_drift_widens_the_intervals(columns: Columns, drive: Design) -> None:
     assert low < drive.friction.dry_torque_Nm < high
 
 
-def test_a_clock_a_little_off_is_said_and_widens_the_intervals(columns: Columns, drive: Design) -> None:
-    """1 % slow: the inertia is 2 % off, which no torque shows, but the speed beside the angle does."""
-    result = identify_bench(BASE, [_record({**columns, "time": 1.01 * columns["time"]}, (*BARE, "speed"))])
-    assert "off, or the scale of one of them, beyond their noise" in _said(result)
-    low, high = result.model.interval("inertia")
-    assert low < drive.inertia_kgm2 < high < 1.1 * drive.inertia_kgm2
-    right = identify_bench(BASE, [_record(columns, (*BARE, "speed"))])
-    assert "beyond their noise" not in _said(right)
-    assert right.model.std("inertia") < 0.1 * result.model.std("inertia")
-
-
 @pytest.mark.parametrize("signals", [ALL, BARE], ids=["all", "bare"])
-def test_an_undamaged_record_says_nothing(signals: tuple[str, ...], columns: Columns, drive: Design) -> None:
-    result = identify_bench(BASE, [_record(columns, signals)])
-    assert result.passed
-    assert "at one time" not in _said(result)
-    assert "clipped" not in _said(result)
-    assert "drift" not in _said(result)
-    assert _is_the_truth(result, drive, 0.005)
+@pytest.mark.parametrize("amplitude", [4e-4, 1e-3, 2e-3])
+def test_no_lag_is_found_where_the_drive_hardly_moves(
+    amplitude: float, signals: tuple[str, ...], drive: Design
+) -> None:
+    """Sticking and slipping at 1/50 to 1/10 of the motion: no time is taken back, intervals hold the truth.
+
+    Without a command the drive is simulated with one that moves it as recorded, but for its rests: there a
+    lag of 2 to 3 ms was found in records that have none.
+    """
+    run = simulate(drive, commands.multisine(amplitude, [0.7, 1.9, 4.3], 4.0, 1e-4, seed=2), 4.0)
+    table = {"time": run.time_s, "reference": run.reference_rad, "angle": run.motor_angle_rad}
+    table |= {"speed": run.motor_speed_rad_s, "current": run.current_A}
+    noise = 0.02 * np.random.default_rng(1).standard_normal(len(run.time_s[::10]))
+    columns = {name: values[::10] for name, values in table.items()}
+    result = identify_bench(BASE, [_record({**columns, "current": columns["current"] + noise}, signals)])
+    assert "later" not in _said(result)
+    assert "earlier" not in _said(result)
+    model, truth = result.model, _truth(drive)
+    found = [name for name in truth if name in model.names]
+    assert not result.passed or all(abs(model[n] - truth[n]) < 3.5 * model.std(n) for n in found)
 
 
 @pytest.mark.parametrize("kind", [KINDS[0], KINDS[3]])
@@ -176,7 +367,7 @@ def test_intervals_hold_what_they_say(kind: str) -> None:
     """Eight random drives: error over stated error is about one, rms (the benchmark draws a hundred)."""
     errors = []
     for seed in range(8):
-        design, truth, record = random_record(kind, seed)
-        model = identify_bench(design, [record]).model
+        design, truth, records = random_records(kind, seed)
+        model = identify_bench(design, records).model
         errors += [(model[name] - truth[name]) / model.std(name) for name in VALUES]
     assert 0.7 < np.sqrt(np.mean(np.square(errors))) < 1.4

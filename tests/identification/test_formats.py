@@ -11,7 +11,9 @@ import pytest
 from scipy.io import savemat
 
 from actuator_lti.errors import InputError
-from analyses.records import Record, open_record
+from analyses.records.open_record import open_record
+from analyses.records.record import Record
+from tests.identification.bench_records import record_of
 
 TIME = np.arange(0.0, 2.0, 1e-2)
 ANGLE = 3.0 * np.sin(5.0 * TIME)
@@ -200,16 +202,8 @@ def test_rms_and_phase_voltages_become_those_of_the_equivalent_dc_motor(
 
 
 def _uneven(keep: np.ndarray, jitter: float = 0.0) -> Record:
-    from analyses.records.record import RowCounts
-
     time = TIME + jitter * np.random.default_rng(1).uniform(-1.0, 1.0, len(TIME))
-    return Record(
-        name="r",
-        time_s=time[keep],
-        signals={"angle": 3.0 * np.sin(5.0 * time[keep])},
-        units={"angle": "rad"},
-        counts=RowCounts(),
-    )
+    return record_of(time[keep], angle=3.0 * np.sin(5.0 * time[keep]))
 
 
 def test_jitter_is_resampled_with_an_error_that_holds() -> None:
@@ -254,6 +248,8 @@ def test_the_tolerance_is_an_option_of_the_record_file(tmp_path) -> None:
         (lambda p: (p / "r.parquet").write_bytes(b"PAR1PAR1"), "is no Parquet file"),
         (lambda p: (p / "r.csv").write_text("time,current\n1,2\n"), "has no unit in its name"),
         (lambda p: (p / "r.csv").write_text("time_s,banana_A\n1,2\n"), '"banana_A": no name'),
+        (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "describe it in a record file"),
+        (lambda p: (p / "r.toml").write_text('file = "r.csv"\nseperator = ";"\n'), 'mean "separator"'),
     ],
 )
 def test_what_cannot_be_read_says_why(write: object, reason: str, tmp_path) -> None:

@@ -112,7 +112,7 @@ def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(
 
 
 def test_the_example_is_a_campaign_file(tmp_path, command: Command) -> None:
-    from analyses.records import load_campaign
+    from analyses.records.campaign_file import load_campaign
 
     status, out, _ = command("identify", "--example")
     (tmp_path / "c.toml").write_text(out)

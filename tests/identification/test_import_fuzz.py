@@ -7,15 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuator_lti.errors import InputError
-from analyses.records import (
-    CsvFormat,
-    RecordSpec,
-    SignalColumn,
-    TimeColumn,
-    load_campaign,
-    read_csv_record,
-    read_mat_record,
-)
+from analyses.records.campaign_file import load_campaign
+from analyses.records.csv_stream import read_csv_record
+from analyses.records.readers import read_mat_record
+from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 
 CELLS = st.one_of(
     st.integers(-3, 9).map(str),

@@ -16,8 +16,9 @@ from analyses.identification.electrical import electrical_values, fit_electrical
 from analyses.identification.friction_map import fit_map
 from analyses.identification.inverse import fit_records
 from analyses.identification.to_design import design_with_fit, joint_values, with_structure
-from analyses.records.record import Record, RowCounts
+from analyses.records.record import Record
 from analyses.studies.sampling import sampler_of
+from tests.identification.bench_records import record_of
 
 PERIOD = 1e-3
 TIME = np.arange(0.0, 20.0, PERIOD)
@@ -34,7 +35,7 @@ def _waves(order: int, scale: float = 1.0) -> np.ndarray:
 
 
 def _record(**signals: np.ndarray) -> Record:
-    return Record(name="r", time_s=TIME, signals=signals, units={}, counts=RowCounts())
+    return record_of(TIME, **signals)
 
 
 def _joint() -> Design:
@@ -162,7 +163,7 @@ def test_only_what_was_recorded_while_enabled_is_used() -> None:
 
 
 def test_a_design_with_a_friction_map_is_moved_by_the_record_like_any_other() -> None:
-    from analyses.correlation import correlate_record
+    from analyses.correlation.closed_loop import correlate_record
 
     record = _axis_record("map")
     record = replace(record, signals={**record.signals, "position_reference": record["position"]})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuator_lti.errors import InputError
-from analyses.records import open_record
+from analyses.records.open_record import open_record
 from examples.odrive_motor import find_chirp, fit_step, main, predict_chirp
 
 

@@ -7,9 +7,9 @@ import pytest
 
 from actuator_lti import load_design
 from analyses.identification.inverse import fit_records
-from analyses.records import open_record
-from analyses.records.record import Record, RowCounts
-from tests.identification.bench_records import Command
+from analyses.records.open_record import open_record
+from analyses.records.record import Record
+from tests.identification.bench_records import Command, record_of
 
 
 @pytest.fixture(scope="module")
@@ -56,21 +56,13 @@ def test_the_shipped_design_has_the_published_values_and_their_margins(
     assert any(m.frequency_rad_s == pytest.approx(frequency_rad_s, abs=0.5) for m in margins.gain_margins)
 
 
-def _record(position: np.ndarray, force: np.ndarray) -> Record:
-    time = 1e-3 * np.arange(len(position))
-    units = {"position": "m", "force": "N"}
-    counts = RowCounts(rows_in=len(time), rows_out=len(time))
-    signals = {"position": position, "force": force}
-    return Record(name="motion", time_s=time, signals=signals, units=units, counts=counts)
-
-
 def test_a_known_system_is_found_again() -> None:
     time = np.arange(0.0, 6.0, 1e-3)
     position = 0.1 * np.sin(3.0 * time) + 0.03 * np.sin(7.0 * time)
     velocity = 0.3 * np.cos(3.0 * time) + 0.21 * np.cos(7.0 * time)
     acceleration = -0.9 * np.sin(3.0 * time) - 1.47 * np.sin(7.0 * time)
     force = 5.0 * acceleration + 2.0 * velocity + 0.7 * np.sign(velocity) + 0.1
-    model = fit_records(load_design("emps"), [_record(position, force)])
+    model = fit_records(load_design("emps"), [record_of(time, position=position, force=force)])
     assert model["inertia"] == pytest.approx(5.0, rel=2e-3)
     assert model["viscous"] == pytest.approx(2.0, rel=2e-2)
     assert model["dry"] == pytest.approx(0.7, rel=2e-2)

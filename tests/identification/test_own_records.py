@@ -9,12 +9,12 @@ from actuator_lti import load_design
 from actuator_lti.design.model import Tolerance
 from actuator_lti.design.parameters import FrozenMap
 from analyses.identification.inverse import fit_records
-from analyses.records import open_record
 from analyses.records.consistency import check_record
-from analyses.records.record import Record, RowCounts
+from analyses.records.open_record import open_record
+from analyses.records.record import Record
 from analyses.studies.sampling import sampler_of
 from analyses.tuning.problem import loop_requirements, problem_of
-from tests.identification.bench_records import Command, columns_of, motion, write
+from tests.identification.bench_records import Command, columns_of, motion, record_of, write
 
 AMBER = load_design("ilr33-amber")
 
@@ -45,8 +45,7 @@ def _noisy(clock: float = 1.0) -> Record:
     speed = 500.0 * np.sin(np.pi * u) ** 2
     angle = 500.0 * 0.05 * (u / 2.0 - np.sin(2.0 * np.pi * u) / (4.0 * np.pi))
     noisy = speed + 20.0 * np.random.default_rng(3).standard_normal(t.size)
-    signals = {"angle": angle, "speed": noisy}
-    return Record(name="r", time_s=clock * t, signals=signals, units={}, counts=RowCounts())
+    return record_of(clock * t, angle=angle, speed=noisy)
 
 
 def test_noise_in_a_long_rest_is_no_contradiction() -> None:

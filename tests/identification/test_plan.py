@@ -10,9 +10,9 @@ from actuator_lti.design import load_design, with_values
 from actuator_lti.errors import InputError
 from analyses.identification.bench import identify_bench
 from analyses.identification.plan import PERIOD_S, Plan, plan_motions
-from analyses.records.record import Record, RowCounts
+from analyses.records.record import Record
 from nonlinear import commands, simulate
-from tests.identification.bench_records import NOISE_A, Command
+from tests.identification.bench_records import NOISE_A, Command, record_of
 
 BASE = load_design("ilr33-amber")
 VALUES = ("inertia", "viscous", "dry", "offset")
@@ -40,11 +40,10 @@ def _measured(plan: Plan, seed: int) -> tuple[dict[str, float], Record]:
     run = simulate(drive, smooth, float(time[-1]), record_every=10)
     assert all(use.fraction == 0.0 for use in run.limits.values())
     current = run.current_A + NOISE_A * rng.standard_normal(len(run.time_s))
-    signals = {"reference": run.reference_rad, "angle": run.motor_angle_rad, "current": current}
-    rows = RowCounts(rows_in=len(current), rows_out=len(current))
+    record = record_of(run.time_s, reference=run.reference_rad, angle=run.motor_angle_rad, current=current)
     values = (drive.inertia_kgm2, drive.friction.viscous_Nms_rad, drive.friction.dry_torque_Nm, 0.0)
     truth = dict(zip(VALUES, values, strict=True))
-    return truth, Record(name="r", time_s=run.time_s, signals=signals, units={}, counts=rows)
+    return truth, record
 
 
 def test_what_was_promised_is_kept_on_twenty_drives(plan: Plan) -> None:

@@ -16,14 +16,12 @@ from analyses.identification.bench import identify_bench
 from analyses.identification.campaign_design import SuggestedRun, suggest_runs
 from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import refine_by_output_error
-from analyses.identification.points import SteadyPoint
-from analyses.identification.steady import SteadyWindow
-from analyses.identification.surface import fit_surface, gain_matrix, torque_covariance
+from analyses.identification.steady import SteadyPoint, SteadyWindow
+from analyses.identification.surface import fit_surface
 from analyses.identification.surface_fit import SurfaceFit
-from analyses.identification.systematic import effects_of, shared_errors
 from analyses.identification.to_design import design_with_fit, joint_values
-from analyses.records import open_record
 from analyses.records.campaign_file import Instruments
+from analyses.records.open_record import open_record
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
 BOUNDS = Instruments(torque_accuracy=0.005, current_gain=0.005, current_offset_A=0.002)
@@ -80,35 +78,6 @@ def test_too_few_runs_or_no_variety_are_refused() -> None:
         fit_surface([replace(p, speed_rad_s=500.0) for p in points], Instruments(), 5.9e-3)
 
 
-def predicted_covariance(
-    fit: SurfaceFit, runs: Sequence[SuggestedRun], instruments: Instruments
-) -> np.ndarray:
-    """Covariance of the coefficients, shared errors included, once the suggested runs are made."""
-    added = tuple(_as_point(fit.points[0], run, fit) for run in runs)
-    points = (*fit.points, *added)
-    variance = np.concatenate(
-        [fit.residual_stds_Nm**2, np.full(len(added), np.median(fit.residual_stds_Nm**2))]
-    )
-    errors = shared_errors(points, instruments, float(fit.values[2]), 5.9e-3)
-    x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in points])
-    gain = gain_matrix(x, torque_covariance(variance, errors))
-    moved = gain @ effects_of(errors, len(points))
-    return np.asarray((gain * variance) @ gain.T + moved @ moved.T / 3.0)
-
-
-def _as_point(like: SteadyPoint, run: SuggestedRun, fit: SurfaceFit) -> SteadyPoint:
-    torque = float(fit.values @ np.array([1.0, run.speed_rad_s, run.load_Nm]))
-    return replace(
-        like,
-        run=f"suggested {run.order}",
-        direction=1,
-        torque_Nm=torque,
-        speed_rad_s=run.speed_rad_s,
-        load_Nm=run.load_Nm,
-        load_is_zero=run.load_Nm == 0.0,
-    )
-
-
 def test_suggested_runs_shrink_the_margins_spread_more_than_others(fit: SurfaceFit) -> None:
     design = load_design("ilr33-amber")
     result = suggest_runs(design, fit, count=3)
@@ -116,12 +85,16 @@ def test_suggested_runs_shrink_the_margins_spread_more_than_others(fit: SurfaceF
     assert left == sorted(left, reverse=True)
     assert left[0] < 1.0
     slopes = np.array([m.slopes / m.std for m in result.margins])
-    weight = slopes.T @ slopes
+
+    def spread(runs: Sequence[SuggestedRun]) -> float:
+        """Of the margins, relative, by the runs' own scatter."""
+        own = np.append(fit.residual_stds_Nm, np.full(len(runs), np.median(fit.residual_stds_Nm)))
+        x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in (*fit.points, *runs)]) / own[:, None]
+        return float(np.sum(slopes.T @ slopes * np.linalg.inv(x.T @ x)))
+
     worse = [replace(run, speed_rad_s=942.0, load_Nm=8.9) for run in result.runs]
-    good = predicted_covariance(fit, result.runs, BOUNDS)
-    bad = predicted_covariance(fit, worse, BOUNDS)
-    before = float(np.sum(weight * fit.covariance))
-    assert float(np.sum(weight * good)) < float(np.sum(weight * bad)) < before
+    assert spread(result.runs) < spread(worse) < spread([])
+    assert left[-1] == pytest.approx(spread(result.runs) / spread([]))
 
 
 def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -> None:

@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 from actuator_lti.design import load_design
 from analyses.identification.inverse import fit_records
 from analyses.identification.residuals import LEVEL, ResidualTest, residual_tests
-from analyses.records.record import Record, RowCounts
+from tests.identification.bench_records import record_of
 
 TIME = np.arange(0.0, 12.0, 1e-3)
 SPEED = 0.3 * np.cos(3.0 * TIME) + 0.21 * np.cos(7.0 * TIME)
@@ -18,10 +18,7 @@ RATE = -0.9 * np.sin(3.0 * TIME) - 1.47 * np.sin(7.0 * TIME)
 def _tests(rest: np.ndarray) -> dict[str, ResidualTest]:
     """Of a mass of 5 kg with friction, whose force has something more."""
     force = 5.0 * RATE + 2.0 * SPEED + 3.0 * np.sign(SPEED) + rest
-    signals = {"position": PLACE, "force": force}
-    rows = RowCounts(rows_in=len(TIME), rows_out=len(TIME))
-    record = Record(name="r", time_s=TIME, signals=signals, units={}, counts=rows)
-    model = fit_records(load_design("emps"), [record])
+    model = fit_records(load_design("emps"), [record_of(TIME, position=PLACE, force=force)])
     part = model.records[0]
     about_mean = np.linalg.norm(part.drive - part.drive.mean())
     assert part.fit_percent == pytest.approx(100.0 * (1.0 - np.linalg.norm(part.residual) / about_mean))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from actuator_lti.design import load_design, parameter_value, write_design
-from analyses.records import open_records
+from analyses.records.open_record import open_records
 from nonlinear import commands, simulate
 from reports.document import load as load_document
 from tests.identification.bench_records import Command, columns_of, motion, write

@@ -8,7 +8,9 @@ from actuator_lti.errors import InputError
 from analyses.estimation.means import correlated_means, correlation_time
 from analyses.identification.sampled_current import HeldVoltage
 from analyses.identification.steady import SteadyCriterion, find_steady_window
-from analyses.records import Record, RowCounts, join_records
+from analyses.records.clocks import join_records
+from analyses.records.record import Record
+from tests.identification.bench_records import record_of
 
 
 def _run(noise: float) -> tuple[np.ndarray, np.ndarray]:
@@ -108,12 +110,6 @@ def test_the_lead_in_the_limits() -> None:
         assert quick.lead_s == pytest.approx(d - 0.5 * T, abs=2e-3 * T)
 
 
-def _record(name: str, time: np.ndarray, **signals: np.ndarray) -> Record:
-    units = dict.fromkeys(signals, "1")
-    counts = RowCounts(rows_in=len(time), rows_out=len(time))
-    return Record(name=name, time_s=time, signals=signals, units=units, counts=counts)
-
-
 def _happening(t: np.ndarray) -> np.ndarray:
     """A motion from 2 s to 16 s with soft edges."""
     return 1.0 / (1.0 + np.exp(-(t - 2.0) / 0.03)) - 1.0 / (1.0 + np.exp(-(t - 16.0) / 0.05))
@@ -126,7 +122,7 @@ def _pair(offset: float, rate: float, noise: float = 0.01) -> tuple[Record, Reco
     second = np.arange(0.0, (19.0 - offset) / rate, 2.3e-3)
     speed = 500.0 * _happening(first) + 500.0 * noise * rng.standard_normal(len(first))
     torque = -7.0 * _happening(offset + rate * second) + 7.0 * noise * rng.standard_normal(len(second))
-    return _record("drive", first, speed=speed), _record("sensor", second, torque=torque)
+    return record_of(first, "drive", speed=speed), record_of(second, "sensor", torque=torque)
 
 
 @pytest.mark.parametrize("method", ["correlation", "event"])
@@ -164,11 +160,11 @@ def test_the_given_offset_is_used_as_it_is() -> None:
 def test_records_that_do_not_belong_together_are_refused() -> None:
     rng = np.random.default_rng(1)
     time = np.arange(0.0, 5.0, 1e-3)
-    a = _record("a", time, speed=rng.standard_normal(5000))
-    b = _record("b", time, torque=rng.standard_normal(5000))
+    a = record_of(time, "a", speed=rng.standard_normal(5000))
+    b = record_of(time, "b", torque=rng.standard_normal(5000))
     with pytest.raises(InputError, match="not alike"):
         join_records(a, b, first_signal="speed", second_signal="torque")
-    flat = _record("c", time, torque=np.ones(5000))
+    flat = record_of(time, "c", torque=np.ones(5000))
     with pytest.raises(InputError, match="flat"):
         join_records(a, flat, first_signal="speed", second_signal="torque", method="correlation")
     with pytest.raises(InputError, match="flat"):

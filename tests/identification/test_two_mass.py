@@ -6,15 +6,15 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
-from actuator_lti.design import load_design, read_design_text, with_values
-from actuator_lti.design.model import Design
+from actuator_lti.design import read_design_text
+from actuator_lti.design.model import Design, Friction
 from actuator_lti.errors import InputError
 from analyses.identification.frequency import Lines, excited_lines, period_of_excitation
 from analyses.identification.frequency_bench import identify_frequency
 from analyses.identification.two_mass import NAMES, angle_responses, fit_two_mass, start_of
-from analyses.records.record import Record, RowCounts
+from analyses.records.record import Record
+from tests.identification.bench_records import record_of, two_mass_design
 
 TRUTH = {
     "motor_inertia": 2e-5,
@@ -26,28 +26,19 @@ TRUTH = {
 }
 N, RATE, PERIODS, KM = 10.0, 2000, 8, 0.05
 HERTZ = np.arange(2.0, 400.0, 2.0)
-HALF_PLAY = 1e-3
 
 
 def _design() -> Design:
-    """One gear 10:1 without inertia of its own, the rest to be found.
+    """Without coupling and friction, inertias half of what they are; its tick is no part of the log's period.
 
-    No friction grows with the load. Its tick is no part of the log's period, as of a recorder of its own:
-    the records below are of a torque without steps between the samples.
+    As of a recorder of its own: the records below are of a torque without steps between the samples.
     """
-    base = load_design("ilr33-amber")
-    gear = replace(base.gears[0], name="gear", ratio=N, input_inertia_kgm2=0.0, output_inertia_kgm2=0.0)
-    kept = {
-        path: one
-        for path, one in base.parameters.items()
-        if not path.startswith(("gear.", "limits.", "load.", "validation."))
-    }
-    limits = replace(base.limits, voltage_V=48.0, speed_rad_s=900.0, peak_current_A=20.0)
-    load = replace(base.load, path="back-drivable", inertia_kgm2=1e-3, moment_max_Nm=0.0)
-    design = replace(base, gears=(gear,), parameters=kept, limits=limits, load=load, requirements=())
-    values = {"motor.torque_constant": KM, "motor.back_emf_constant": KM, "motor.rotor_inertia": 1e-5}
-    values |= {"control.period": 7e-5, "friction.load_coefficient": 0.0}
-    return with_values(design, values, check=False)
+    base = two_mass_design()
+    motor = replace(base.motor, rotor_inertia_kgm2=1e-5)
+    load = replace(base.load, inertia_kgm2=1e-3, friction=None)
+    control = replace(base.controller, period_s=7e-5)
+    bare = replace(base, friction=Friction(), coupling=None)
+    return replace(bare, motor=motor, load=load, controller=control)
 
 
 @lru_cache(maxsize=1)
@@ -75,7 +66,7 @@ def _record(seed: int) -> Record:
         "output_angle": load + 4.73 * time + 1e-5 * rng.standard_normal(len(time)),
         "current_reference": torque / KM,
     }
-    return Record(name="sweep", time_s=time, signals=signals, units={}, counts=RowCounts())
+    return record_of(time, "sweep", **signals)
 
 
 def _lines(seed: int) -> Lines:
@@ -143,48 +134,3 @@ def test_what_the_design_cannot_hold_is_fixed_or_refused() -> None:
     blind = replace(record, signals={name: v for name, v in record.signals.items() if name != "angle"})
     with pytest.raises(InputError, match="motor angle is needed"):
         identify_frequency(_design(), blind)
-
-
-@lru_cache(maxsize=1)
-def _reversal() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A slow reversing torque across the play, written out and integrated apart from the simulator."""
-    jm, jl, k, c = (TRUTH[name] for name in ("motor_inertia", "load_inertia", "stiffness", "damping"))
-
-    def rates(t: float, s: np.ndarray) -> tuple[float, float, float, float]:
-        th, w, phi, v = s
-        twist, rate = th / N - phi, w / N - v
-        over = twist - np.clip(twist, -HALF_PLAY, HALF_PLAY)
-        spring = np.sign(over) * max(0.0, np.sign(over) * (k * over + c * rate))
-        torque = 0.03 * np.sin(2.0 * np.pi * 1.5 * t) - TRUTH["viscous"] * w - spring / N
-        return w, torque / jm, v, (spring - 0.05 * v) / jl
-
-    time = np.arange(0.0, 3.0, 1e-3)
-    motion = solve_ivp(rates, (0.0, 3.0), np.zeros(4), t_eval=time, rtol=1e-8, atol=1e-10, max_step=5e-4)
-    return time, motion.y[0], motion.y[2]
-
-
-def _play_record(seed: int) -> Record:
-    rng = np.random.default_rng(1000 + seed)
-    time, motor, load = _reversal()
-    quantum = 2.0 * np.pi / 4096
-    angle = np.floor(motor / quantum + rng.uniform()) * quantum
-    output = load + 1e-5 * rng.standard_normal(len(load))
-    return Record(
-        name="reversal", time_s=time, signals={"angle": angle, "output_angle": output}, units={},
-        counts=RowCounts(),
-    )  # fmt: skip
-
-
-def test_the_play_is_within_its_interval() -> None:
-    """Truth: half-play 1 mrad; 20 draws of the instruments' noise."""
-    held = 0
-    for seed in range(20):
-        play = identify_frequency(_design(), _record(seed), play_record=_play_record(seed)).play
-        assert play.half_rad == pytest.approx(HALF_PLAY, rel=0.02)
-        held += abs(play.half_rad - HALF_PLAY) <= 1.96 * play.half_std_rad
-    assert held >= 17
-
-
-def test_a_motion_on_one_flank_does_not_tell_the_play() -> None:
-    with pytest.raises(InputError, match="must reverse"):
-        identify_frequency(_design(), _record(0), play_record=_play_record(0).slice(0, 200))

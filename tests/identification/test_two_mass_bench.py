@@ -7,22 +7,12 @@ import numpy as np
 import pytest
 
 from actuator_lti.design import load_design
-from actuator_lti.design.model import (
-    Controller,
-    Coupling,
-    CurrentLoop,
-    Design,
-    Encoder,
-    Friction,
-    Instruments,
-    LoadFriction,
-    OutputEncoder,
-)
+from actuator_lti.design.model import Coupling, Design
 from actuator_lti.errors import InputError
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
 from examples.virtual_bench import TwoMassPlan, reversal_record, sweep_record
 from examples.virtual_bench.__main__ import main as simulate
-from tests.identification.bench_records import Command
+from tests.identification.bench_records import HALF_PLAY, Command, two_mass_design
 
 TRUTH = {
     "motor_inertia": 2e-5,
@@ -32,47 +22,18 @@ TRUTH = {
     "viscous": 1e-5,
     "load_viscous": 0.02,
 }
-RESONANCE, ANTIRESONANCE, HALF_PLAY = np.sqrt(400.0 * 1000.0), np.sqrt(400.0 / 2e-3), 1e-3
-
-
-def _design() -> Design:
-    """10:1, 2 mrad of play, dry friction, 16-bit and 20-bit encoders, 30 mA rms and 5 mA steps of current."""
-    base = load_design("ilr33-amber")
-    gear = replace(base.gears[0], name="gear", ratio=10.0, input_inertia_kgm2=0.0, output_inertia_kgm2=0.0)
-    motor = replace(
-        base.motor, rotor_inertia_kgm2=2e-5, resistance_ohm=1.0, inductance_H=2e-3,
-        torque_constant_Nm_A=0.05, back_emf_constant_Vs_rad=0.05,
-    )  # fmt: skip
-    load = replace(
-        base.load, path="back-drivable", inertia_kgm2=2e-3, moment_max_Nm=0.0,
-        friction=LoadFriction(viscous_Nms_rad=0.02),
-    )  # fmt: skip
-    limits = replace(
-        base.limits, voltage_V=48.0, speed_rad_s=900.0, peak_current_A=30.0, continuous_current_A=30.0
-    )
-    current = CurrentLoop(gain_V_A=5.0, integral_time_s=2e-3)
-    tools = Instruments(current_noise_A=0.03, current_resolution_A=0.005, output_angle_noise_rad=5e-6)
-    parts = {"gears": (gear,), "motor": motor, "load": load, "limits": limits, "instruments": tools}
-    parts |= {
-        "friction": Friction(dry_torque_Nm=0.004, viscous_Nms_rad=1e-5),
-        "controller": Controller(period_s=1e-4, computing_delay_s=1e-4, current=current),
-        "coupling": Coupling(stiffness_Nm_rad=400.0, damping_Nms_rad=0.02, play_rad=2.0 * HALF_PLAY),
-        "encoder": Encoder(counts_per_rev=65536),
-        "output_encoder": OutputEncoder(counts_per_rev=1 << 20),
-    }
-    bare = {"parameters": {}, "requirements": (), "correlations": (), "facts": ()}
-    return replace(base, name="two-mass", **parts, **bare)
+RESONANCE, ANTIRESONANCE = np.sqrt(400.0 * 1000.0), np.sqrt(400.0 / 2e-3)
 
 
 def _guess() -> Design:
-    design = _design()
+    design = two_mass_design()
     motor = replace(design.motor, rotor_inertia_kgm2=1.5e-5)
     return replace(design, motor=motor, coupling=Coupling(stiffness_Nm_rad=300.0))
 
 
 @cache
 def _identified(seed: int) -> FrequencyResult:
-    design = _design()
+    design = two_mass_design()
     play = reversal_record(design, seed=seed)
     return identify_frequency(_guess(), sweep_record(design, seed=seed), play_record=play)
 
@@ -103,6 +64,14 @@ def test_the_simulated_drive_is_identified_within_its_intervals() -> None:
         assert result.design.coupling.play_rad == pytest.approx(2.0 * HALF_PLAY, rel=0.02)
 
 
+def test_a_motion_on_one_flank_does_not_tell_the_play() -> None:
+    design = two_mass_design()
+    with pytest.raises(InputError, match="must reverse"):
+        identify_frequency(
+            _guess(), sweep_record(design, seed=0), play_record=reversal_record(design, seed=0).slice(0, 200)
+        )
+
+
 def test_a_small_friction_is_not_held_at_zero() -> None:
     """Cv is half to all of its error here: at zero, its part would make the damping 1 % too large.
 
@@ -110,7 +79,7 @@ def test_a_small_friction_is_not_held_at_zero() -> None:
     """
     found = []
     for seed in range(10):
-        fit = identify_frequency(_guess(), sweep_record(_design(), seed=seed)).fit
+        fit = identify_frequency(_guess(), sweep_record(two_mass_design(), seed=seed)).fit
         found.append((fit["damping"] - 0.02) / fit.std("damping"))
     assert abs(np.mean(found)) < 2.6 / np.sqrt(10.0)
     assert np.std(found) < 1.6
@@ -131,14 +100,8 @@ def test_the_errors_of_the_stiffness_are_in_that_of_the_play() -> None:
     assert result.play.half_std_rad > 0.3 * share * torque / 400.0
 
 
-def test_a_motion_on_one_flank_does_not_tell_the_play() -> None:
-    part = reversal_record(_design(), seed=0).slice(0, 100)
-    with pytest.raises(InputError, match="must reverse"):
-        identify_frequency(_guess(), sweep_record(_design(), seed=0), play_record=part)
-
-
 def test_the_bench_says_where_it_cannot_measure() -> None:
-    design = _design()
+    design = two_mass_design()
     with pytest.raises(InputError, match="leaves its flank"):
         sweep_record(design, TwoMassPlan(moment_Nm=0.05))
     with pytest.raises(InputError, match="current loop and a coupling"):

@@ -12,8 +12,7 @@ from actuator_lti.batch.static import drive_figures
 from actuator_lti.design import load_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.loops import assemble_loops
-from actuator_lti.loops.compliance import compliance
-from actuator_lti.loops.stiffness import stiffness_figures
+from actuator_lti.loops.stiffness import compliance, stiffness_figures
 from analyses.specification.requirements import evaluate_requirements
 from nonlinear import commands, simulate
 from tests.loops.two_mass import drive_e

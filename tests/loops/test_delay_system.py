@@ -89,16 +89,6 @@ def test_shapes_follow_python_control() -> None:
     assert system([1j, 2j], squeeze=False).shape == (1, 1, 2)
 
 
-def test_python_control_plots_and_responses_take_it() -> None:
-    system = DelaySystem.from_system(LAG) * DelaySystem.delay(0.1)
-    omega = np.array([1.0, 10.0, 100.0])
-    frd = control.frequency_response(system, omega)
-    np.testing.assert_allclose(frd.complex, system(1j * omega))
-    control.bode_plot(frd)
-    control.bode_plot(control.frequency_response(system))
-    plt.close("all")
-
-
 def test_refusals() -> None:
     with pytest.raises(InputError, match="positive"):
         DelaySystem([], [], [], [], [], [[0]], [[1]], [[1]], [[0]], [-1.0])

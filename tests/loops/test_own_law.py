@@ -22,7 +22,7 @@ from actuator_lti.design.model import Command, Encoder, Limits, OutputEncoder
 from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.writing import design_tree
 from actuator_lti.loops.assemble import loops_at
-from nonlinear import Drive, Rows, tangent
+from nonlinear import Drive, Rows, State, commands, simulate, tangent
 from nonlinear.bench.loop_setup import loop_setup
 
 TICKS = 400
@@ -111,6 +111,22 @@ def test_a_pi_written_as_a_law_is_the_pi(stage: str) -> None:
         rows.step("command", 0.01)
         runs.append(rows.trajectory().output_angle_rad)
     np.testing.assert_allclose(runs[0], runs[1], rtol=0, atol=1e-9 * 0.01)
+
+
+def test_a_run_starts_from_states_of_the_law() -> None:
+    """Those of a PI written as a law are its integral."""
+    design = replace(load_design("ilr33-amber"), encoder=Encoder())
+    starts = State(velocity_integral=0.3), State(law=(0.3,))
+    runs = [
+        simulate(each, commands.step(0.01), 0.1, initial=start, limits_on=False).output_angle_rad
+        for each, start in zip((design, as_law(design, "velocity")), starts, strict=True)
+    ]
+    rested = simulate(design, commands.step(0.01), 0.1, limits_on=False).output_angle_rad
+    assert np.ptp(runs[0] - rested) > 1e-6
+    np.testing.assert_allclose(runs[1], runs[0], rtol=0, atol=1e-11)
+    for wrong in ((1.0, 2.0), (np.nan,)):
+        with pytest.raises(InputError, match=r"initial\.law = .*allowed: 1 numbers"):
+            simulate(as_law(design, "velocity"), commands.step(0.01), 0.1, initial=State(law=wrong))
 
 
 def test_what_a_law_sees_and_how_it_is_limited() -> None:

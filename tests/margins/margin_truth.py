@@ -64,7 +64,7 @@ def truth_of(loop: control.LTI, part: Fraction = Fraction(0)) -> Facts:
             n = max(num.degree(), den.degree())
             both = ((0.0, num[0], den[0]), (math.pi / period if period else math.inf, num[n], den[n]))
             gains += [(w, -float(arb(d) / arb(c))) for w, c, d in both if c * d < 0 and n]
-    return Facts(unstable, sorted(g for g in gains if g[1] <= FARTHEST), phases)
+    return Facts(unstable, sorted(g for g in gains if 1.0 / FARTHEST <= g[1] <= FARTHEST), phases)
 
 
 def behind_delay(loop: control.LTI, delay_s: float) -> Facts:

@@ -9,14 +9,12 @@ import control
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
-from typer.testing import CliRunner
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.bandwidth import peaks
 from actuator_lti.design.model import Design
 from actuator_lti.margins.loop import rational_loop
 from actuator_lti.margins.poles import sorted_poles
-from reports.cli.app import build
 
 SLOPES = (-6000.0, -40.0, -1.0, -1e-3, 1e-3, 1.0)
 
@@ -79,10 +77,3 @@ def test_peaks_of_a_double_integrator_that_rounding_parts() -> None:
     assert found.complementary_rad_s == pytest.approx(v**0.5, rel=1e-6)
     assert found.sensitivity_db == pytest.approx(10 * np.log10(4 / 3), abs=1e-9)  # v^2/(1 - v + v^2), v = 2
     assert found.sensitivity_rad_s == pytest.approx(2.0**0.5, rel=1e-6)
-
-
-def test_the_command_line_prints_them() -> None:
-    changes = ["--set", "load.path=back-drivable", "--set", "load.moment_slope=-1 N*m/rad"]
-    done = CliRunner().invoke(build(), ["margins", "ilr33-amber", "--form", "ideal", *changes])
-    assert done.exit_code == 0, done.output
-    assert "PASS" in done.output

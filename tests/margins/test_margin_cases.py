@@ -3,10 +3,9 @@
 import math
 
 import control
-import numpy as np
 import pytest
 
-from actuator_lti.margins import StabilityMargins, stability_margins
+from actuator_lti.margins import stability_margins
 
 s = control.tf("s")
 A5 = 24 / (s**3 + 6 * s**2 + 11 * s + 6)
@@ -79,26 +78,17 @@ def test_published_margins(name: str, loop: control.LTI) -> None:
     assert [g.ratio for g in m.gain_margins] == pytest.approx([k for k, _ in gains], rel=1e-6)
     assert [p.frequency_rad_s for p in m.phase_margins] == pytest.approx([w for _, w in phases], rel=1e-6)
     assert [p.deg for p in m.phase_margins] == pytest.approx([deg for deg, _ in phases], abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("name", "db", "deg", "delay_s"),
-    [
-        ("A1", 11.1261, 29.1104, 0.2847),
-        ("A3", 6.0206, 21.3864, None),
-        ("A6", 7.1266, 97.5940, None),
-        ("C1", -20.0, 63.8424, None),
-        ("C2", 5.667, 19.7003, 5.0385e-3),
-        ("E1", 12.041, 75.5225, 2.60827e-3),
-        ("E3", 13.9794, 72.7825, 6.34085e-3),
-    ],
-)
-def test_figure_to_quote(name: str, db: float, deg: float, delay_s: float | None) -> None:
-    m = stability_margins(LOOPS[name])
-    assert m.gain_margin_db == pytest.approx(db, abs=1e-3)
-    assert m.phase_margin_deg == pytest.approx(deg, abs=1e-3)
-    if delay_s is not None:
-        assert m.delay_margin_s == pytest.approx(delay_s, rel=1e-4)
+    assert str(m).startswith("closed loop: stable" if stable else "closed loop: UNSTABLE")
+    # the figures to quote: nearest to 0 dB, to 0 deg, the smallest delay
+    db, deg = [20.0 * math.log10(k) for k, _ in gains], [deg for deg, _ in phases]
+    delays = [math.radians(deg % 360.0) / w for deg, w in phases]
+    assert [d.seconds for d in m.delay_margins] == pytest.approx(delays, rel=1e-6)
+    assert [d.samples for d in m.delay_margins] == [
+        d.seconds / loop.dt if loop.dt else None for d in m.delay_margins
+    ]
+    assert m.gain_margin_db == pytest.approx(min(db, key=abs, default=math.inf), abs=1e-5)
+    assert m.phase_margin_deg == pytest.approx(min(deg, key=abs, default=math.inf), abs=1e-6)
+    assert m.delay_margin_s == pytest.approx(min(delays, default=math.inf) if stable else 0.0, rel=1e-6)
 
 
 def test_A1_disk_margin_of_Seiler_Packard_Gahinet_2020() -> None:
@@ -119,26 +109,6 @@ def test_modulus_margin(name: str, modulus: float, omega: float) -> None:
     assert m.modulus_frequency_rad_s == pytest.approx(omega, rel=1e-6)
 
 
-def test_A4_touching_one_at_zero_frequency_is_no_crossover() -> None:
-    m = stability_margins(LOOPS["A4"])
-    assert m.phase_margins == ()
-    assert m.phase_margin_deg == math.inf
-    assert m.delay_margin_s == math.inf
-
-
-def test_delay_margins_in_samples() -> None:
-    m = stability_margins(LOOPS["E3"])
-    assert m.delay_margin.samples == pytest.approx(6.34085, abs=1e-5)
-    assert stability_margins(LOOPS["A1"]).delay_margins[0].samples is None
-
-
-@pytest.mark.parametrize("name", ["B2", "C3", "C5"])
-def test_unstable_is_said_first(name: str) -> None:
-    m = stability_margins(LOOPS[name])
-    assert str(m).splitlines()[0].startswith("closed loop: UNSTABLE")
-    assert m.delay_margin_s == 0.0
-
-
 def test_D1_delay_margins_and_the_list_of_a_band() -> None:
     m = stability_margins(control.tf([100], [1, 0]), delay_s=0.005, band_rad_s=(0.0, 3000.0))
     first = 0.5 * math.pi / 0.005
@@ -152,47 +122,7 @@ def test_D1_delay_margins_and_the_list_of_a_band() -> None:
     assert m.band_rad_s == (0.0, 3000.0)
 
 
-@pytest.mark.parametrize(("KT", "stable"), [(1.5, True), (1.57, True), (1.5716, False), (1.6, False)])
-def test_D2_integrator_with_delay_is_stable_up_to_half_pi(KT: float, stable: bool) -> None:
-    m = stability_margins(control.tf([KT / 0.02], [1, 0]), delay_s=0.02)
-    assert m.stable is stable
-    assert m.agreement.unstable_poles == m.agreement.unstable_nyquist == (0 if stable else 2)
-
-
-def test_order_25_does_not_fail_where_a_polynomial_would() -> None:
-    rng = np.random.default_rng(25)
-    loop = control.ss([], [], [], [[1.0]])
-    for k in range(12):
-        w, zeta = 10.0 ** rng.uniform(0, 5), 10.0 ** rng.uniform(-2.5, -0.5)
-        pair = control.ss([[0.0, w], [-w, -2 * zeta * w]], [[0.0], [w]], [[1.0, 0.2 * (-1) ** k]], [[0.5]])
-        loop = control.series(loop, pair)
-    loop = control.series(loop, control.ss([[0.0]], [[50.0]], [[1.0]], [[0.0]]))
-    assert loop.nstates == 25
-    m = stability_margins(loop)
-    assert m.agreement.agree
-    omega = np.geomspace(1e-2, 1e7, 400_001)
-    L = response(loop, omega)
-    crossed = np.flatnonzero(np.diff(np.abs(L) > 1.0))
-    assert len(m.phase_margins) == crossed.size
-    for margin, k in zip(m.phase_margins, crossed, strict=True):
-        assert omega[k] <= margin.frequency_rad_s <= omega[k + 1]
-    assert m.modulus_margin <= np.abs(1 + L).min() * (1 + 1e-9)
-    assert m.modulus_margin == pytest.approx(float(np.abs(1 + L).min()), rel=1e-3)
-
-
-def response(loop: control.StateSpace, omega: np.ndarray) -> np.ndarray:
-    values, V = np.linalg.eig(loop.A)
-    left = np.linalg.solve(V, loop.B[:, 0])
-    return loop.D[0, 0] + ((loop.C[0] @ V) * left / (1j * omega[:, None] - values)).sum(axis=1)
-
-
 def test_printing_shows_units() -> None:
     text = str(stability_margins(LOOPS["A1"]))
     for part in ("dB", "deg", "rad/s", "Hz", "0.284724 s", "alpha 0.458093"):
         assert part in text
-
-
-def test_result_is_frozen() -> None:
-    m: StabilityMargins = stability_margins(LOOPS["A1"])
-    with pytest.raises(AttributeError):
-        m.stable = False

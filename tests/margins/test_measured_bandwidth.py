@@ -123,9 +123,9 @@ def test_sampled_data_as_the_sampled_system() -> None:
     assert unwrapped_phase_deg(data, asked) == pytest.approx(unwrapped_phase_deg(system, asked), abs=1e-2)
     assert plot_bode(data)[1].lines
     assert plot_nyquist(data).lines
-    beyond = control.FrequencyResponseData(np.ones(3), [1.0, 2.0, 4000.0], period)
-    with pytest.raises(InputError, match="Nyquist"):
-        stability_margins(beyond)
+    for dt, beyond in ((period, 4000.0), (1.0, 4.0), (True, 4.0)):
+        with pytest.raises(InputError, match="Nyquist"):
+            stability_margins(control.FrequencyResponseData(np.ones(3), [1.0, 2.0, beyond], dt))
 
 
 def test_phase_of_data_is_followed_over_whole_turns() -> None:

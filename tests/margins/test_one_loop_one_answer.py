@@ -6,10 +6,8 @@ or the closed forms beside them.
 
 from __future__ import annotations
 
-import math
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import control
 import numpy as np
@@ -32,7 +30,7 @@ class Case:
     deg: tuple[float, ...] | None = None
     delay_s: float = 0.0
     rel: float = 1e-5
-    notes: tuple[str, ...] = field(default=())
+    hidden: int = 0  # modes on the border that the loop does not show
 
 
 def modes(zeta: float) -> control.StateSpace:
@@ -93,11 +91,11 @@ CASES = [
         True, (0.0226928, 0.204161),
     ),
     Case("L12", lambda: control.tf([0.5], [1]), True, (2.0,) * 6, (), delay_s=1.0),
-    Case("L11, one", pi_on_zero, True, (), (141.2739,)),
+    Case("L11, one", pi_on_zero, True, (), (141.2739,), hidden=1),
     Case("L11, two", lambda: pi_on_zero() * control.tf([2, 1], [1, 0]) * control.tf([1, 0], [1, 1]), True, (),
-         (102.1151,)),
+         (102.1151,), hidden=2),
     Case("L11, a pair", lambda: control.tf([1, 0, 4], np.polymul([1, 2, 1, 0], [1, 0, 4])), True, (2.0,),
-         (21.38639,)),
+         (21.38639,), hidden=2),
 ]  # fmt: skip
 
 
@@ -121,16 +119,10 @@ def test_reference_loop(case: Case, form: str, certify: bool) -> None:
     assert near(m) == pytest.approx(list(case.ratios), rel=case.rel)
     if case.deg is not None:
         assert [p.deg for p in m.phase_margins] == pytest.approx(list(case.deg), abs=1e-3)
-
-
-def test_hidden_modes_are_stated_apart() -> None:
-    for name, hidden in (("L11, one", 1), ("L11, two", 2), ("L11, a pair", 2)):
-        m = stability_margins(next(case for case in CASES if case.name == name).given())
-        assert m.stable is True
-        assert m.internally_stable is False
-        assert m.hidden_border_modes == hidden
-        assert any("neither drives nor sees" in note for note in m.notes)
-    assert stability_margins(control.tf([1], [1, 1])).internally_stable is True
+    if form == "tf":
+        assert m.hidden_border_modes == case.hidden
+        assert m.internally_stable is (case.stable and not case.hidden)
+        assert any("neither drives nor sees" in note for note in m.notes) is bool(case.hidden)
 
 
 @pytest.mark.parametrize("below", [1e-10, 5e-10])
@@ -138,21 +130,6 @@ def test_a_gain_that_all_but_reaches_one_is_a_touch_in_those_words(below: float)
     m = stability_margins(control.tf([0.2 * (1.0 - below), 0], [1, 0.2, 1]))
     assert m.stable
     assert not m.phase_margins or ("touch within 1e-9" in str(m) and m.phase_margins[0].tangent)
-
-
-def test_an_integrator_behind_a_long_delay() -> None:
-    loop = control.tf([1], [1, 0])
-    stability_margins(loop, delay_s=1.0)
-    start = time.process_time()
-    m = stability_margins(loop, delay_s=500.0)
-    assert time.process_time() - start < 0.2
-    w = math.pi / 1000.0 * np.arange(1, 4 * 80, 4)  # -pi/2 - 500 w = -pi - 2 pi k
-    found = [(g.frequency_rad_s, g.ratio) for g in m.gain_margins][: w.size]
-    assert found == [(pytest.approx(x, rel=1e-9), pytest.approx(x, rel=1e-9)) for x in w]  # |L| = 1/w
-    # zeros of s + exp(-500 s) right of the axis: two for each lower margin
-    assert m.agreement.unstable_nyquist == 2 * int(
-        np.count_nonzero(np.array([g.ratio for g in m.gain_margins]) < 1)
-    )
 
 
 def test_no_gain_margin_at_rest_where_the_loop_is_zero_there() -> None:
@@ -176,6 +153,7 @@ def test_a_fraction_of_a_sample_goes_to_whole_samples(gain: float, den: list[flo
         for q in [2e-8, 1e-6] if not whole else [1.0 - 2e-8, 1.0 + 2e-8, 1.0 - 1e-6]:
             m = stability_margins(loop, delay_s=q)
             assert m.stable is limit.stable
+            assert m.agreement.unstable_poles is None  # the Nyquist curve alone tells
             assert [g.ratio for g in m.gain_margins] == pytest.approx(
                 [g.ratio for g in limit.gain_margins], rel=1e-4
             )

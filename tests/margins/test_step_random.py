@@ -142,7 +142,7 @@ def test_a_resonance_far_above_the_gain_at_zero_frequency(above_db: float) -> No
     assert f.final_value == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("order", [3, 6, 10])
+@pytest.mark.parametrize("order", [1, 3, 6, 10])
 def test_repeated_poles(order: int) -> None:
     """1/(s + 1)^n: one minus the sum of Poisson probabilities, and the same sampled."""
     f = step_figures(control.tf([1.0], np.poly(-np.ones(order))))
@@ -151,7 +151,7 @@ def test_repeated_poles(order: int) -> None:
         return 1.0 - math.exp(-t) * sum(t**k / math.factorial(k) for k in range(order))
 
     assert y(f.settling_time_s) == pytest.approx(0.98, abs=1e-11)
-    assert f.overshoot_percent == 0.0
+    assert (f.overshoot_percent, f.peak_time_s) == (0.0, math.inf)
     g = step_figures(control.tf([0.5**order], np.poly(np.full(order, 0.5)), 1.0))
     values = [sum(math.comb(k - 1, order - 1) * 0.5**k for k in range(order, n + 1)) for n in range(200)]
     assert g.settling_time_s == next(n for n in range(200) if values[n] >= 0.98)
@@ -186,6 +186,9 @@ def test_an_unseen_mode_near_zero_frequency_does_not_matter() -> None:
     for c in ([1.0, 0.0], [1.0, 1e-17]):
         system = control.StateSpace(A, [[0.5], [0.0]], [c], [[0.0]], 0.01, remove_useless_states=False)
         assert step_figures(system).settling_time_s == pytest.approx(0.06)
+    angle = np.array([[-2.0, 0.0], [1.0, 0.0]])  # that nobody looks at
+    system = control.StateSpace(angle, [[2.0], [0.0]], [[1.0, 0.0]], [[0.0]], remove_useless_states=False)
+    assert step_figures(system).settling_time_s == pytest.approx(0.5 * math.log(50), rel=1e-9)
 
 
 @pytest.mark.parametrize("states", [12, 40])

@@ -11,6 +11,8 @@ import signal
 import sys
 import time
 import traceback
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
 import ruptures  # noqa: F401 - here, not in every child
@@ -33,12 +35,13 @@ def night(site: Path, round_: int) -> None:
     run_night(study(*jobs(round_)), site, INLINE, code=CODE)
 
 
-def child(site: Path, round_: int) -> int:
-    """Start a nightly in a process of its own; its number."""
+def child(site: Path, round_: int, around: Callable[[], AbstractContextManager[None]] = nullcontext) -> int:
+    """Start a nightly, within a context, in a process of its own; its number."""
     number = os.fork()
     if number == 0:
         try:
-            night(site, round_)
+            with around():
+                night(site, round_)
         finally:
             if sys.exc_info()[1] is not None:
                 traceback.print_exc()

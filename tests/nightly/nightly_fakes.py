@@ -13,8 +13,7 @@ from reports.document import column, document, section, table, verdict, verdicts
 from reports.nightly.asked import Settings
 from reports.nightly.code_version import CodeVersion
 from reports.nightly.figures import digest
-from reports.nightly.job import Job
-from reports.nightly.night import Study
+from reports.nightly.source import Job, Study
 from reports.verdict_summary import role
 
 CODE = CodeVersion(sources="s", libraries={"numpy": "2"}, commit="c" * 40)
@@ -56,6 +55,7 @@ def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
         column("phase_margin", "phase margin", "deg", format="fix:1", better=1),
         column("crossover", "crossover", "rad/s", format="sig:4"),
     ]
+    margins = table("Margins", columns, rows)
     return document(
         title=str(payload.get("title", name)),
         subtitle="",
@@ -63,7 +63,7 @@ def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
         provenance={"version": "0", "commit": None, "time": None},
         sections=[
             section("verdicts", "Requirements", [verdicts([item])], status=role(item)),
-            section("margins", "Margins", [table("Margins", columns, rows)]),
+            section("margins", "Margins", [margins], status=payload.get("part", "info")),
         ],
     )
 

@@ -71,6 +71,7 @@ def test_search_and_filters_narrow_the_table_and_say_so(page) -> None:
     search.fill("gear 100")
     assert names(page) == ["gear 100:1"]
     assert page.get_by_role("status").inner_text() == "1 of 7 shown"
+    assert page.get_by_role("button", name="All").inner_text() == "All 7"
     search.fill("<i>")
     assert names(page) == ["<i>odd</i> name"]
     search.fill("nothing like it")

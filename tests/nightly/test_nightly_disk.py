@@ -18,10 +18,10 @@ TOLD = re.compile("No space left on device|disk is full|disk I/O error")
 
 @pytest.fixture
 def small_disk(tmp_path) -> Iterator[Path]:
-    """A file system of 3 MB, where this process may mount one."""
+    """A file system of 16 MB, where this process may mount one."""
     place = tmp_path / "disk"
     place.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(place)]
+    command = ["mount", "-t", "tmpfs", "-o", "size=16m", "tmpfs", str(place)]
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     except OSError as error:
@@ -57,7 +57,7 @@ def test_a_disk_that_fills_up_at_any_point_leaves_the_last_night(small_disk: Pat
     site = small_disk / "site"
     nightly(site, 10.0)
     refused = 0
-    for step, leave in enumerate(range(0, 330_000, 11_000)):
+    for step, leave in enumerate(range(0, 690_000, 23_000)):
         ballast = fill(small_disk, leave)
         before = (site / "index.html").read_bytes()
         words = attempt(site, 11.0 + step)

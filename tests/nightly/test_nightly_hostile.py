@@ -14,7 +14,7 @@ from nightly_fakes import CODE, INLINE, Calendar, fake_document, job, study
 from site_checks import Page, check_whole
 
 from actuator_lti.errors import InputError
-from reports.nightly.charts import line_chart
+from reports.nightly.course import line_chart
 from reports.nightly.night import approve, run_night
 from reports.nightly.source import read_study
 from reports.nightly.text import one_line
@@ -155,58 +155,10 @@ def test_a_chart_is_well_formed_whatever_it_is_called(title: str) -> None:
     assert {e.tag.rpartition("}")[2] for e in root.iter()} <= {"div", *drawn}
 
 
-STUDY_PARTS = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=20),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=12), inner, max_size=3),
-    max_leaves=8,
-)
-
-
-@given(
-    tree=st.dictionaries(
-        st.sampled_from(["study", "variant", "sweep", "grid", "monte_carlo", "nightly", "requirement", "x"]),
-        STUDY_PARTS
-        | st.lists(
-            st.dictionaries(st.sampled_from(["name", "override", "parameter", "values"]), STUDY_PARTS)
-        ),
-        max_size=4,
-    )
-)
-@settings(max_examples=60)
-def test_any_study_file_is_read_or_refused_in_one_line(tmp_path_factory, tree) -> None:
-    import tomli_w
-
-    path = tmp_path_factory.mktemp("fuzz") / "study.toml"
-    tree.setdefault("study", {"base": "ilr33-amber"})
-    try:
-        path.write_bytes(tomli_w.dumps(without_none(tree)).encode("utf-8", "surrogatepass"))
-    except (TypeError, ValueError):
-        return
-    assert all(line.isprintable() and len(line) < 2000 for line in refusal(path).split("\n"))
-
-
-def refusal(path: Path) -> str:
-    """The words with which a study file is refused, empty where it is read."""
-    try:
-        read_study(str(path))
-    except InputError as error:
-        return str(error)
-    return ""
-
-
 @pytest.mark.parametrize("name", ["", " \n", "\ud800"])
 def test_a_name_without_a_sign_or_with_half_of_one_is_refused(tmp_path, name: str) -> None:
     with pytest.raises(InputError, match="a name needs at least one sign"):
         run_night(study(job(name)), tmp_path / "site", INLINE, code=CODE)
-
-
-def without_none(value):
-    """TOML has no null: leave it out."""
-    if isinstance(value, dict):
-        return {k: without_none(v) for k, v in value.items() if v is not None}
-    if isinstance(value, list):
-        return [without_none(v) for v in value if v is not None]
-    return value
 
 
 @pytest.mark.parametrize(

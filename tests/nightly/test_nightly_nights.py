@@ -13,8 +13,8 @@ from actuator_lti.bounds import NIGHTLY_JOBS
 from actuator_lti.errors import InputError
 from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure
-from reports.nightly.job import Job
 from reports.nightly.night import approve, run_night
+from reports.nightly.source import Job
 from reports.nightly.tolerance import Tolerances, read_tolerances
 from reports.nightly.trend import change_points, flaps, missing_nights
 
@@ -59,9 +59,10 @@ def test_the_same_study_is_not_built_again(nights, tmp_path) -> None:
 
 
 def test_the_worst_comes_first_and_a_failed_requirement_fails_the_night(nights) -> None:
-    night = nights(job("good", 12.0), job("bad", 5.0), job("broken", mode="raise"), job("fair", 7.0))
-    assert [d.name for d in night.designs] == ["broken", "bad", "fair", "good"]
-    assert [d.state for d in night.designs] == ["broken", "fail", "pass", "pass"]
+    part = job("only a part", 20.0, part="fail")  # that is no requirement, like the page of a whole study
+    night = nights(job("good", 12.0), job("bad", 5.0), job("broken", mode="raise"), job("fair", 7.0), part)
+    assert [d.name for d in night.designs] == ["broken", "bad", "only a part", "fair", "good"]
+    assert [d.state for d in night.designs] == ["broken", "fail", "fail", "pass", "pass"]
     assert not night.passed
     assert nights(job("good", 12.0)).passed
 

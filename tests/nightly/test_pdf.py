@@ -10,7 +10,19 @@ from test_nightly_hostile import HOSTILE
 
 from actuator_lti.errors import InputError
 from reports.charts.chart import Chart
-from reports.document import details, document, fact, facts, figure, section, text
+from reports.document import (
+    column,
+    details,
+    document,
+    fact,
+    facts,
+    figure,
+    section,
+    table,
+    text,
+    verdict,
+    verdicts,
+)
 from reports.pdf import pdf_bytes, write_pdf
 from reports.pdf.printable import clean
 
@@ -67,8 +79,6 @@ def test_the_cover_names_design_revision_verdicts_and_who_signs(plain) -> None:
 
 
 def test_a_dozen_requirements_still_leave_room_to_sign_on_the_cover() -> None:
-    from reports.document import verdict, verdicts
-
     items = [
         verdict(
             f"r{k}",
@@ -109,6 +119,35 @@ def test_all_fonts_are_embedded(plain) -> None:
                 assert any(key in descriptor for key in ("/FontFile", "/FontFile2", "/FontFile3"))
                 seen += 1
     assert seen > 2
+
+
+def test_type_is_no_smaller_than_8_points_and_what_is_said_is_not_grey() -> None:
+    """A table of a dozen columns with its note, a requirement with its reason, a paragraph."""
+    keys = [f"k{k}" for k in range(12)]
+    wide = table("Wide", [column(key, key) for key in keys], [dict.fromkeys(keys, 1.0)], note="says the note")
+    item = verdict("r", "asked", value=1.0, limit=6.0, unit="dB", passed=False, reason="says the reason")
+    blocks = [verdicts([item]), wide, text("says the text")]
+    colours: list[tuple[float, ...]] = []
+    told: dict[str, tuple[float, ...]] = {}
+    sizes: list[float] = []
+
+    def painted(operator: bytes, operands: list[float], _cm: object, _tm: object) -> None:
+        if operator == b"scn":
+            colours.append(tuple(map(float, operands)))
+
+    def written(words: str, _cm: object, _tm: object, _font: object, size: float) -> None:
+        if words.strip():
+            sizes.append(size)
+            told[words.strip()] = colours[-1]
+
+    parts = [section("s", "Section", blocks)]
+    made = document(title="A drive", subtitle="", design={}, provenance=ORIGIN, sections=parts)
+    for page in read(pdf_bytes(made)).pages:
+        page.extract_text(visitor_operand_before=painted, visitor_text=written)
+    assert min(sizes) >= 8.0
+    said = {told[f"says the {kind}"] for kind in ("note", "reason", "text")}
+    assert len(said) == 1
+    assert max(said.pop()) < 0.25
 
 
 def test_figures_are_vectors_and_their_lettering_is_text(plain) -> None:

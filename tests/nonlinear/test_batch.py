@@ -42,6 +42,21 @@ def test_bits_of_single_runs_for_any_number_of_threads() -> None:
         assert single.events == batches[0].events[k]
 
 
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-tanh", "ballscrew"])
+def test_going_on_gives_the_bits_of_one_run(name: str) -> None:
+    rows = Rows.of(load_design(name), 3)
+    rows.sine("command", [1e-3, 0.01, 0.05], [200.0, 20.0, 7.0])
+    rows.window(400, 2, 3)
+    rows["ticks"] = [1003, 1500, 2100]
+    drives = [rows.running(k) for k in range(3)]
+    assert np.array_equal(rows.run(drives=drives).outs, rows.run().outs)
+    rows["ticks"] += [1111, 900, 5001]
+    first, last = layout.OUT_WINDOWS, layout.OUT_PHASOR
+    whole, on = rows.run(), rows.run(drives=drives)
+    assert np.array_equal(on.outs[:, first:last], whole.outs[:, first:last])
+    assert np.array_equal(on.final_output_rad, whole.final_output_rad)
+
+
 def test_windows_against_the_history() -> None:
     design = load_design("ilr33-amber")
     frequency, ticks, cycles = whole_periods(37.0, design.controller.period_s)
@@ -63,8 +78,8 @@ def test_windows_against_the_history() -> None:
         t = history.time_s[part]
         for name, values in (
             ("motor_speed_rad_s", history.motor_speed_rad_s),
-            ("probe_w_ref_before", history.probe_before),
-            ("probe_w_ref_after", history.probe_after),
+            ("probe_w_ref_before", history.probes["w_ref"].before),
+            ("probe_w_ref_after", history.probes["w_ref"].after),
         ):
             x = values[part]
             assert batch.mean(name, last)[0] == pytest.approx(x.mean(), rel=1e-12)

@@ -56,13 +56,13 @@ def test_gain_and_delay_multiply_the_loop() -> None:
     for delay, tolerance in ((3.0, 0.0), (2.4, 2e-6), (0.5, 2e-3)):
         probe = Probe(point="w_ref", gain=1.5, delay_samples=delay, injection=u)
         run = simulate(design, commands.sine(0.001, 20.0), 0.02, probes=[probe])
-        k = np.arange(200)
-        delayed = np.interp(k - delay, k, run.probe_before) if tolerance else run.probe_before[:-3]
+        k, seen = np.arange(200), run.probes["w_ref"]
+        delayed = np.interp(k - delay, k, seen.before) if tolerance else seen.before[:-3]
         expected = 1.5 * delayed + (u if tolerance else u[3:])
-        got = run.probe_after if tolerance else run.probe_after[3:]
-        scale = np.abs(run.probe_before).max()
+        got = seen.after if tolerance else seen.after[3:]
+        scale = np.abs(seen.before).max()
         assert np.abs(got - expected)[10:].max() <= (tolerance + 0.01 if tolerance else 1e-14) * scale
-        assert np.array_equal(run.speed_command_rad_s, run.probe_after)
+        assert np.array_equal(run.speed_command_rad_s, seen.after)
 
 
 @pytest.mark.parametrize("delay", [0.3, 1.6, 2.5, 7.25])

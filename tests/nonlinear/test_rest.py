@@ -12,7 +12,8 @@ from analyses.friction_effects import friction_effects
 from analyses.motion.settling import settle
 from nonlinear import Rows, State, commands, simulate
 from nonlinear._kernels import layout as at
-from nonlinear.settling.drift import overload
+from nonlinear.bench.on_the_bench import quiet
+from nonlinear.settling.drift import grain, overload
 from nonlinear.settling.rest import first_motion_s, judge
 from tests.nonlinear.rest_agreement import answers
 from tests.validation.random_drives import full_drive, is_stable
@@ -58,7 +59,8 @@ def test_a_slow_stick_slip_cycle_takes_its_own_time_and_little_work() -> None:
     values = {"friction.breakaway_ratio": 1.5, "control.velocity.integral_time": 100.0}
     design = with_values(AMBER, values)
     cycles = friction_effects(design).points[0].cycles
-    rest = cycles.settlings[-1].rest
+    assert cycles.hunting is not None
+    rest = cycles.hunting.rest
     assert rest.verdict == "limit cycle"
     assert rest.frequency_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=0.03)
     assert rest.amplitude == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=0.06)
@@ -152,13 +154,44 @@ def test_the_joint_crosses_its_friction_every_209_s() -> None:
 PLAIN_TICKS = 300_000
 
 
+def test_a_filter_s_rounding_ends_no_leap() -> None:
+    """A notch at 37 Hz sums up rounding at 8 kHz; errors are integrated for minutes between slips."""
+    joint = quiet(load_design("joint"))
+    rest = settle(joint, 0.0, 1e-3 * joint.validation.full_deflection_rad).rest
+    assert rest.verdict == "limit cycle"
+    assert rest.work < 3_000_000
+    drive = Rows.of(joint).running()
+    a1, a2 = drive.p[at.TORQUE_CHAIN + 3 : at.TORQUE_CHAIN + 5]
+    now = before = total = 0.0
+    for k in range(100_000):  # what unit rounding, once, adds up to
+        now, before = float(k == 0) - a1 * now - a2 * before, now
+        total += now
+    assert grain(drive.p, drive.s.size)[at.S_TORQUE_CHAIN] == pytest.approx(total, rel=1e-9)
+
+
+def test_overload_that_stays_is_not_waited_for() -> None:
+    """60 N m ask for more than the continuous current: the protection trips and never releases."""
+    joint = quiet(load_design("joint"))
+    rest = settle(joint, 60.0, 1e-3 * joint.validation.full_deflection_rad).rest
+    assert rest.verdict == "at rest"
+    assert "overload" in rest.limited
+    rows = Rows.of(joint)
+    rows["load"] = 60.0
+    rows.step("command", 1e-3 * joint.validation.full_deflection_rad)
+    rows["ticks"] = 2.0 * rest.after_s / joint.controller.period_s
+    rows.window(1.2 * rest.after_s / joint.controller.period_s, 1, 0)
+    run = rows.run()
+    assert np.ptp(run.span("output_angle_rad")) < 1e-12
+    assert run.window_limit_fraction("overload")[0] == pytest.approx(1.0, abs=0.15)
+
+
 @pytest.mark.parametrize("seed", range(1, 31))
 def test_random_drives_against_a_plain_run(seed: int) -> None:
     """What is said to be at rest by then has stopped; a cycle that it saw often enough has the same size."""
     design = full_drive(seed)
     if not is_stable(design) or design.controller.outermost != "position":
         pytest.skip("no stable position loop")
-    quiet = replace(
+    silent = replace(
         design,
         instruments=replace(
             design.instruments,
@@ -170,7 +203,7 @@ def test_random_drives_against_a_plain_run(seed: int) -> None:
     )
     step = 0.01 * design.validation.full_deflection_rad
     rest = settle(design, 0.0, step).rest
-    rows = Rows.of(quiet)
+    rows = Rows.of(silent)
     rows.step("command", step)
     rows["ticks"] = PLAIN_TICKS
     rows.window(PLAIN_TICKS // 5, 1, 0)

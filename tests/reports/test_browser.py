@@ -4,27 +4,15 @@ from __future__ import annotations
 
 import io
 import unicodedata
-from typing import TYPE_CHECKING, Any
 
-import live_page
 import pypdf
 import pytest
 from built_report import Built
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
-
 
 OPEN_ALL = (
     "document.querySelectorAll('main details, figure[hidden]').forEach((one) => {"
     " one.open = true; one.hidden = false; })"
 )
-
-
-def opened(browser: Browser, built: Built, **context: Any) -> tuple[Page, list[str]]:
-    """Open the report; whatever the browser complains about or asks for is collected."""
-    trouble: list[str] = []
-    return live_page.opened(browser, built.page, trouble, **context), trouble
 
 
 SCREENS = {
@@ -35,16 +23,12 @@ SCREENS = {
 
 
 @pytest.mark.parametrize("screen", SCREENS)
-def test_no_error_no_request_and_no_sideways_scrolling(browser: Browser, built: Built, screen: str) -> None:
-    page, trouble = opened(browser, built, **SCREENS[screen])
-    assert trouble == []
+def test_no_error_no_request_no_sideways_scrolling_and_every_figure_with_ink(
+    opens, built: Built, screen: str
+) -> None:
+    page = opens(built.page, **SCREENS[screen])
     width = page.evaluate("document.documentElement.scrollWidth")
     assert width <= SCREENS[screen]["viewport"]["width"]
-
-
-@pytest.mark.parametrize("screen", SCREENS)
-def test_every_figure_is_seen_with_ink_in_it(browser: Browser, built: Built, screen: str) -> None:
-    page, _ = opened(browser, built, **SCREENS[screen])
     page.evaluate(OPEN_ALL)
     figures = page.locator("figure svg.plot")
     assert figures.count() == built.page.read_text(encoding="utf-8").count('<svg class="plot"') > 10
@@ -55,10 +39,10 @@ def test_every_figure_is_seen_with_ink_in_it(browser: Browser, built: Built, scr
         assert figures.nth(k).locator(".world path, .marks use").count() > 2
 
 
-def test_dark_and_light_differ(browser: Browser, built: Built) -> None:
+def test_dark_and_light_differ(opens, built: Built) -> None:
     colours = set()
     for scheme in ("light", "dark"):
-        page, _ = opened(browser, built, color_scheme=scheme)
+        page = opens(built.page, color_scheme=scheme)
         colours.add(page.locator("figure svg text").first.evaluate("e => getComputedStyle(e).fill"))
         colours.add(page.evaluate("getComputedStyle(document.body).backgroundColor"))
     assert len(colours) == 4
@@ -67,8 +51,8 @@ def test_dark_and_light_differ(browser: Browser, built: Built) -> None:
 FIRST = (".overall", ".weakest", ".said", ".bars", "#answer figure.half", ".findings")
 
 
-def test_the_first_screen_is_one_screen_and_the_open_page_few(browser: Browser, built: Built) -> None:
-    page, _ = opened(browser, built, viewport={"width": 1400, "height": 900})
+def test_the_first_screen_is_one_screen_and_the_open_page_few(opens, built: Built) -> None:
+    page = opens(built.page, viewport={"width": 1400, "height": 900})
     for selector in FIRST:
         for part in page.locator(selector).all():
             box = part.bounding_box()
@@ -79,9 +63,9 @@ def test_the_first_screen_is_one_screen_and_the_open_page_few(browser: Browser, 
     assert built.page.stat().st_size <= 1_300_000
 
 
-def test_a_bar_is_as_long_as_its_figure(browser: Browser, built: Built) -> None:
+def test_a_bar_is_as_long_as_its_figure(opens, built: Built) -> None:
     """Bar and limit stand on one scale from 0: their ratio is that of the numbers."""
-    page, _ = opened(browser, built, viewport={"width": 1400, "height": 900})
+    page = opens(built.page, viewport={"width": 1400, "height": 900})
     bars = next(one for one in built.document["sections"][0]["blocks"] if one["kind"] == "glance")["bars"]
     assert len(bars) == page.locator(".bar-row").count() == 12
     for bar, row in zip(bars, page.locator(".bar-row").all(), strict=True):
@@ -95,20 +79,22 @@ def test_a_bar_is_as_long_as_its_figure(browser: Browser, built: Built) -> None:
         )
 
 
-def test_a_link_opens_the_fold_that_it_leads_into(browser: Browser, built: Built) -> None:
-    page, _ = opened(browser, built, viewport={"width": 1360, "height": 900})
+def test_a_link_opens_the_fold_that_it_leads_into(opens, built: Built) -> None:
+    page = opens(built.page, viewport={"width": 1360, "height": 900})
     assert page.locator("#limits figure").is_hidden()
     assert page.locator("#limits .result").is_visible()
     page.locator('.said a[href="#limits"]').click()
     assert page.locator("#limits figure").is_visible()
+    page.locator('.toc a[href="#margins"]').click()
+    assert abs(page.locator("#margins").bounding_box()["y"]) < 120
     page.goto(built.page.as_uri() + "#margins")
     page.reload()
     assert page.locator("#margins table").first.is_visible()
     assert page.locator("#limits figure").is_hidden()
 
 
-def test_the_summary_prints_on_four_pages(browser: Browser, built: Built) -> None:
-    page, _ = opened(browser, built)
+def test_the_summary_prints_on_four_pages(opens, built: Built) -> None:
+    page = opens(built.page)
     page.emulate_media(media="print")
     sheets = pypdf.PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True))).pages
     assert len(sheets) <= 4
@@ -119,8 +105,8 @@ def test_the_summary_prints_on_four_pages(browser: Browser, built: Built) -> Non
         assert "".join(part["title"].split()) in printed or part["id"] == "answer"
 
 
-def test_the_buttons_choose_what_is_printed_and_put_the_folds_back(browser: Browser, built: Built) -> None:
-    page, _ = opened(browser, built, viewport={"width": 1360, "height": 900})
+def test_the_buttons_choose_what_is_printed_and_put_the_folds_back(opens, built: Built) -> None:
+    page = opens(built.page, viewport={"width": 1360, "height": 900})
     page.evaluate(
         "window.seen = [];"
         "window.print = () => seen.push(document.querySelectorAll('main details[open]').length); null"
@@ -132,23 +118,16 @@ def test_the_buttons_choose_what_is_printed_and_put_the_folds_back(browser: Brow
     assert page.evaluate("seen") == [0, folds]
 
 
-def test_contents_lead_to_the_sections(browser: Browser, built: Built) -> None:
-    page, _ = opened(browser, built, viewport={"width": 1360, "height": 900})
-    page.locator('.toc a[href="#limits"]').click()
-    box = page.locator("#limits").bounding_box()
-    assert abs(box["y"]) < 120
-
-
-def test_the_keyboard_reaches_the_content(browser: Browser, built: Built) -> None:
-    page, _ = opened(browser, built)
+def test_the_keyboard_reaches_the_content(opens, built: Built) -> None:
+    page = opens(built.page)
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.className") == "skip"
     page.keyboard.press("Enter")
     assert page.evaluate("document.activeElement.id") == "content"
 
 
-def test_paper_is_white_short_and_ends_no_page_with_a_heading(browser: Browser, built: Built) -> None:
-    page, trouble = opened(browser, built, color_scheme="dark")
+def test_paper_is_white_short_and_ends_no_page_with_a_heading(opens, built: Built) -> None:
+    page = opens(built.page, color_scheme="dark")
     page.evaluate(OPEN_ALL.replace("main details", ".claim > details"))
     page.emulate_media(media="print", color_scheme="dark")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
@@ -161,4 +140,3 @@ def test_paper_is_white_short_and_ends_no_page_with_a_heading(browser: Browser, 
         last = sheet.extract_text().strip().splitlines()[-1].strip()
         assert last not in titles
         assert last not in results
-    assert trouble == []

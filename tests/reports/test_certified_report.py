@@ -12,8 +12,8 @@ from actuator_lti.loops import assemble_loops
 from actuator_lti.margins import stability_margins
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 from analyses.linear.loop_survey import survey_loops
+from reports.as_json import loop_json
 from reports.cli.main import main
-from reports.loop_json import loop_json
 from reports.sections import loop as loop_section
 from reports.sections import margins
 

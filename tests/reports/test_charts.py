@@ -16,7 +16,8 @@ from reports.charts.axis import Axis, linear_ticks, log_ticks
 from reports.charts.chart import Chart
 from reports.charts.labels import Room
 from reports.charts.svg import page_svg, paper_svg
-from reports.sections.loop_charts import nichols, step
+from reports.sections.loop import step_figures
+from reports.sections.loop_charts import critical_points, nichols_regions
 
 finite = st.floats(-1e9, 1e9, allow_nan=False)
 
@@ -107,9 +108,10 @@ def test_the_points_of_a_curve_are_where_its_values_are() -> None:
     path = re.search(r'class="curve" d="([^"]*)"', svg)
     low, high, a, b = map(float, x_axis.group(2).split())
     bottom, top, c, d = map(float, y_axis.group(2).split())
-    for (x, y), hz in zip(re.findall(r"[ML]([-\d.]+) ([-\d.]+)", path.group(1)), f, strict=True):
-        seen_hz = low * (high / low) ** ((float(x) - a) / (b - a))
-        seen_db = bottom + (float(y) - c) / (d - c) * (top - bottom)
+    steps = np.array(re.findall(r"[Ml]([-\d.]+) ([-\d.]+)", path.group(1)), float)
+    for (x, y), hz in zip(np.cumsum(steps, axis=0), f, strict=True):
+        seen_hz = low * (high / low) ** ((x - a) / (b - a))
+        seen_db = bottom + (y - c) / (d - c) * (top - bottom)
         assert seen_hz == pytest.approx(hz, rel=5e-4)
         assert seen_db == pytest.approx(-20.0 * math.log10(hz), abs=2e-3)
 
@@ -138,7 +140,7 @@ def test_words_keep_off_curves_and_each_other_where_there_is_room(seed: int) -> 
     x = np.linspace(0.0, 400.0, 40)
     y = 150.0 + 60.0 * np.sin(x / rng.uniform(30.0, 90.0) + rng.uniform(0.0, 6.0))
     room.add_line(x, y)
-    boxes = [room.near((float(x[k]), float(y[k])), (60.0, 26.0))[0] for k in (8, 20, 33)]
+    boxes = [room.near((float(x[k]), float(y[k])), (60.0, 26.0)) for k in (8, 20, 33)]
     dense_x = np.linspace(0.0, 400.0, 4000)
     dense_y = np.interp(dense_x, x, y)
     for k, (x0, y0, x1, y1) in enumerate(boxes):
@@ -174,38 +176,26 @@ def test_pictures_and_panels_have_ids_of_their_own() -> None:
     assert len(ids) == len(set(ids)) > 10
 
 
-def nichols_curves(
-    phase_deg: list[float], gain_db: list[float]
-) -> dict[str, list[tuple[np.ndarray, np.ndarray]]]:
-    made = nichols(np.array([1.0, 10.0]), np.array(gain_db), np.array(phase_deg))
-    panel = made.columns[0].panels[0]
-    curves: dict[str, list[tuple[np.ndarray, np.ndarray]]] = {"S": [], "T": [], "+": []}
-    for item in panel.items:
-        if getattr(item, "x", None) is not None:
-            kind = {style.ORANGE: "S", style.PURPLE: "T"}.get(item.look.colour, "")
-            if item.look.marker == "+":
-                kind = "+"
-            if kind:
-                curves[kind].append((item.x, item.y))
-    return curves
+def outlines(centre_deg: float) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    panel = Chart().panel()
+    nichols_regions(panel, centre_deg, named=False)
+    kinds = {style.ORANGE: "S", style.PURPLE: "T", style.INK: "+"}
+    return [(kinds[item.look.colour], item.x, item.y) for item in panel.items]
 
 
-def test_every_point_of_an_outline_has_that_peak() -> None:
-    made = nichols_curves([-90.0, -700.0], [20.0, -30.0])
-    for kind, magnitude in (("S", lambda L: 1 / abs(1 + L)), ("T", lambda L: abs(L / (1 + L)))):
-        assert len(made[kind]) == 2  # about -180 and about -540 degrees
-        for x, y in made[kind]:
-            L = 10 ** (y / 20.0) * np.exp(1j * np.radians(x))
-            np.testing.assert_allclose(20 * np.log10(magnitude(L)), 6.0, atol=1e-9)
-            assert np.abs(np.diff(x)).max() < 60.0  # no jump of a turn
+@pytest.mark.parametrize("centre_deg", [-180.0, -540.0])
+def test_every_point_of_an_outline_has_that_peak(centre_deg: float) -> None:
+    magnitudes = {"S": lambda L: 1 / abs(1 + L), "T": lambda L: abs(L / (1 + L))}
+    made = outlines(centre_deg)
+    assert [kind for kind, _, _ in made] == ["+", "S", "T"]
+    for kind, x, y in made[1:]:
+        L = 10 ** (y / 20.0) * np.exp(1j * np.radians(x))
+        np.testing.assert_allclose(20 * np.log10(magnitudes[kind](L)), 6.0, atol=1e-9)
+        assert np.abs(np.diff(x)).max() < 60.0  # no jump of a turn
 
 
 def test_the_critical_points_are_odd_half_turns() -> None:
-    assert sorted(float(x[0]) for x, _ in nichols_curves([10.0, -700.0], [20.0, -30.0])["+"]) == [
-        -540.0,
-        -180.0,
-        180.0,
-    ]
+    assert critical_points(-700.0, 10.0) == [-540.0, -180.0, 180.0]
 
 
 def test_the_rise_is_marked_where_it_begins_and_ends() -> None:
@@ -215,7 +205,8 @@ def test_the_rise_is_marked_where_it_begins_and_ends() -> None:
         rise_time_s=math.log(9.0), overshoot_percent=0.0, settling_time_s=math.log(50.0), final_value=1.0,
         peak_value=1.0, peak_time_s=math.inf, period_s=None, time_s=kept, response=1.0 - np.exp(-kept),
     )  # fmt: skip
-    panel = step([("", drawn, 1.0 - np.exp(-drawn))], figures, False, "", False).columns[0].panels[0]
+    panel = Chart().panel()
+    step_figures(panel, figures, ("", drawn, 1.0 - np.exp(-drawn)), 1.0, stairs=False)
     marks = [item for item in panel.items if item.kind == "curve" and item.look.marker == "o"]
     assert [float(mark.x[0]) for mark in marks] == pytest.approx([math.log(10 / 9), math.log(10)], abs=1e-3)
     assert [float(mark.y[0]) for mark in marks] == pytest.approx([0.1, 0.9], abs=1e-3)

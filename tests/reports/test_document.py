@@ -16,24 +16,14 @@ from reports.numbers import fixed, show, significant
 from reports.verdict_summary import verdict_lines, verdict_of, verdict_words
 
 
+def judged(id: str, passed: bool | None, value: float | None = None) -> doc.VerdictItem:
+    return doc.verdict(id, id.upper(), value=value, limit=2.0, unit="dB", comparison=">=", passed=passed)
+
+
 def made(**changes: Any) -> dict[str, Any]:
     """Give a small document."""
-    blocks = [
-        doc.verdicts(
-            [
-                doc.verdict("a", "A", value=1.0, limit=2.0, unit="dB", distance=-1.0, passed=False),
-                doc.verdict("b", "B", value=None, limit=2.0, unit="dB", distance=None, passed=None),
-            ]
-        ),
-        doc.details(
-            "More",
-            [
-                doc.verdicts(
-                    [doc.verdict("c", "C", value=3.0, limit=2.0, unit="dB", distance=1.0, passed=True)]
-                )
-            ],
-        ),
-    ]
+    met = doc.details("More", [doc.verdicts([judged("c", True, 3.0)])])
+    blocks = [doc.verdicts([judged("a", False, 1.0), judged("b", None)]), met]
     parts = [doc.section("one", "One", blocks, status="fail")]
     base = doc.document(title="t", subtitle="", design={}, provenance={}, sections=parts)
     return {**base, **changes}
@@ -45,8 +35,8 @@ def test_verdicts_are_counted_wherever_they_stand() -> None:
 
 
 def test_checks_and_requirements_are_told_apart() -> None:
-    check = doc.verdict("d", "D", value=1.0, limit=2.0, unit="", distance=1.0, passed=True)
-    parts = [*made()["sections"], doc.section("two", "Two", [doc.verdicts([check], what="checks")])]
+    check = doc.verdicts([judged("d", True)], what="checks")
+    parts = [*made()["sections"], doc.section("two", "Two", [check])]
     result = verdict_of(parts, "report")
     assert verdict_words(result) == [
         "1 of 3 requirements met, 1 not met, 1 not proven",
@@ -68,10 +58,8 @@ def test_not_proven_is_neither_good_nor_passed_unless_it_is_waived(
     passed: tuple[bool | None, ...], waiver: str, word: str, lines: list[tuple[str, str]]
 ) -> None:
     items = [
-        doc.verdict(f"v{k}", "V", value=None, limit=2.0, unit="", distance=None, passed=one,
-                    waiver=waiver if one is None else "")
-        for k, one in enumerate(passed)
-    ]  # fmt: skip
+        {**judged(f"v{k}", one), "waiver": waiver if one is None else ""} for k, one in enumerate(passed)
+    ]
     result = verdict_of([doc.section("one", "One", [doc.verdicts(items)])], "report")
     assert (result["verdict"], result["passed"]) == (word, word == "met")
     assert verdict_lines(result) == lines

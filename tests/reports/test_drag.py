@@ -104,6 +104,27 @@ def test_the_magnitude_is_dragged_by_decibels_and_undone_in_one_step(page: Page)
     assert read(page)["velocity"] == before
 
 
+MOVED = """() => new Promise((told) => {
+    const seen = () => [document.querySelector('[data-chart="bode"] path.grab').getAttribute("d"),
+        document.querySelector(".hands-run").dataset.last];
+    const field = document.querySelector('.row[data-path="control.velocity.gain"] .field'), before = seen();
+    const changed = () => seen().map((now, k) => now !== before[k]);
+    field.value = "0.2";
+    field.dispatchEvent(new Event("change", { bubbles: true }));
+    requestAnimationFrame(() => { // behind the page's own, before anything else
+        const first = changed(), { dataset } = document.getElementById("hands-on");
+        const wait = () => (dataset.behind === "done" ? told([first, changed()]) : setTimeout(wait, 10));
+        wait();
+    });
+})"""
+
+
+def test_the_curve_that_moves_waits_for_no_run(page: Page) -> None:
+    """The curve is there when the frame ends; the run with limits and friction comes in its own script."""
+    page.wait_for_selector("#hands-on[data-behind=done]")
+    assert page.evaluate(MOVED) == [[True, False], [True, True]]
+
+
 def test_the_nyquist_curve_is_dragged_outwards(page: Page) -> None:
     grab = page.locator('[data-chart="nyquist"] path.grab')
     x, y = grab.evaluate(MIDDLE)

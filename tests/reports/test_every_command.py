@@ -16,14 +16,7 @@ from reports.cli.app import PANELS, build
 from reports.cli.main import main
 from reports.terminal import SideBySide, print_blocks
 
-NO_DESIGN = {
-    "designs",
-    "keys",
-    "pdf",
-    "nightly",
-    "objects import",
-    "init",
-}  # nightly and pdf: a study, a report
+NO_DESIGN = {"designs", "keys", "pdf", "nightly", "objects import", "init"}  # nightly, pdf: a study, a report
 
 
 def leaves(command: Any, path: str = "") -> dict[str, Any]:

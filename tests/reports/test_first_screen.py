@@ -11,8 +11,8 @@ from analyses.corners import corners
 from analyses.large_signal.by_amplitude import AmplitudeMargin
 from reports import document as doc
 from reports.build import design_report
-from reports.findings import Finding, gathered
-from reports.sections.by_amplitude import remark
+from reports.sections.in_time import remark
+from reports.verdict_summary import gathered
 
 
 def glance(document: dict[str, Any]) -> dict[str, Any]:
@@ -72,8 +72,8 @@ def test_the_pictures_are_of_the_weakest_view(built: Built) -> None:
 
 
 def test_findings_come_from_the_sections_gravest_first_and_once() -> None:
-    mild = Finding(severity="info", text="b", where="two")
-    grave = Finding(severity="fail", text="a", where="one")
+    mild = doc.Finding(severity="info", text="b", where="two")
+    grave = doc.Finding(severity="fail", text="a", where="one")
     sections = [
         doc.section("one", "One", [], findings=[mild, grave]),
         doc.section("two", "Two", [], findings=[mild]),

@@ -245,10 +245,9 @@ def test_without_scripts_the_page_is_the_report_alone(browser: Browser, made: Pa
     assert page.locator("#verdicts").is_visible()
 
 
-def test_policy_and_size(made: Path) -> None:
+def test_the_policy_lets_only_the_module_be_compiled(made: Path) -> None:
     text = made.read_text(encoding="utf-8")
     policy = text.split('Content-Security-Policy" content="')[1].split('"')[0]
     assert "'wasm-unsafe-eval'" in policy or "&#39;wasm-unsafe-eval&#39;" in policy
     assert "'unsafe-eval'" not in policy
     assert "http" not in policy
-    assert len(text.encode()) <= 1_300_000

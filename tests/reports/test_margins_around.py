@@ -12,8 +12,7 @@ from actuator_lti import assemble_loops, load_design
 from actuator_lti.compiled.compiler import system_compiler
 from actuator_lti.design.access import with_values
 from actuator_lti.margins import stability_margins
-from analyses.linear.outer_loop import loop_around
-from analyses.linear.outer_loop_file import outer_loop
+from analyses.linear.outer_loop import loop_around, outer_loop
 from reports.cli.main import main
 
 needs_compiler = pytest.mark.skipif(
@@ -127,7 +126,7 @@ def test_the_command_line_judges_it(tmp_path, capsys) -> None:
         ({"name": ""}, "name: allowed: a text"),
         ({"num": None, "den": None, "A": [[1.0, 2.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]]}, "n by n"),
         ({"num": None, "den": None, "A": [[1.0], [1.0, 2.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]]},
-         "rows of different lengths"),
+         "A: allowed: a list of rows"),
         *((text, "airframe.json") for text in ("", "[1, 2]", "{", '{"num": [NaN]}', '{"dt": 0, "dt": 1}')),
     ],
 )  # fmt: skip

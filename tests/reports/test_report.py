@@ -1,6 +1,5 @@
 """The report of a design: page and JSON say the same, nothing comes through unescaped."""
 
-import json
 import math
 import re
 from dataclasses import replace
@@ -8,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from built_report import HOSTILE, SEEN, Built, validated
+from built_report import HOSTILE, SEEN, Built
 
 import actuator_lti
 import analyses
@@ -20,10 +19,10 @@ from reports import document as doc
 from reports.build import design_report
 from reports.certain import certain
 from reports.charts.chart import Chart, Curve, Panel
-from reports.charts.data import chart_data, chart_of
+from reports.charts.data import chart_of
 from reports.cli.main import main
 from reports.drawing import draw_svg
-from reports.html import page, write_report
+from reports.html import page
 from reports.numbers import show
 from reports.sections.names import loop_words
 from tests.nightly.site_checks import Page
@@ -49,12 +48,6 @@ def test_every_section_that_a_review_asks_for_is_there(built: Built) -> None:
     drawn = [block["figure"] for block in doc.figures(built.document)]
     for name, count in {"bode": 4, "closed_bode": 3, "nyquist": 3, "sensitivity": 3, "step": 4}.items():
         assert drawn.count(name) == count  # one Bode and one step on the first screen
-
-
-def test_the_json_is_the_document_and_holds_no_nan(built: Built) -> None:
-    content = built.data.read_text(encoding="utf-8")
-    assert doc.loads(content) == json.loads(json.dumps(built.document))
-    assert "NaN" not in content
 
 
 @pytest.mark.parametrize("name", ["current", "velocity", "position"])
@@ -104,19 +97,12 @@ def test_every_margin_is_marked_on_its_bode_figure(built: Built) -> None:
         assert shown == pytest.approx([m.deg for m in margins.phase_margins], abs=1e-3)
 
 
-def test_the_phase_of_a_figure_does_not_jump(built: Built) -> None:
+def test_the_phase_of_a_figure_does_not_jump_nor_go_back(built: Built) -> None:
     for block in doc.figures(built.document):
         panels = [panel for column in chart_of(block["chart"]).columns for panel in column.panels]
-        for phase in (one.y for panel in panels if panel.y.label == "phase, deg" for one in curves(panel)):
-            assert not (np.abs(np.diff(phase)) >= 90.0).any() or len(phase) == 2
-
-
-def test_forms_and_operating_points_are_all_there(built: Built) -> None:
-    assert len(rows_of(built.document, "forms", "Margins")) == 9
-    points = rows_of(built.document, "operating-points", "PM")
-    assert {row["load"] for row in points} == {"any", 0.0, 8.0}
-    matrix = rows_of(built.document, "break-points", "Break-point")
-    assert len({row["point"] for row in matrix}) == 4
+        for one in (one for panel in panels if panel.y.label == "phase, deg" for one in curves(panel)):
+            assert not (np.abs(np.diff(one.y)) >= 90.0).any() or len(one.y) == 2
+            assert (np.diff(one.x) >= 0.0).all()  # a line goes from each frequency to the next
 
 
 def test_parameters_come_with_source_and_grade(built: Built) -> None:
@@ -124,14 +110,6 @@ def test_parameters_come_with_source_and_grade(built: Built) -> None:
     assert rows["friction.dry_torque"]["grade"] == "A"
     assert "Table 1" in rows["friction.dry_torque"]["source"]
     assert rows["load.inertia"]["tolerance"] == "±50 %"
-
-
-def test_the_same_input_gives_the_same_bytes(built: Built, tmp_path, monkeypatch) -> None:
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-    document = design_report(load_design("ilr33-amber"), validated())
-    page_path, data = write_report(document, tmp_path)
-    assert data.read_bytes() == built.data.read_bytes()
-    assert page_path.read_bytes() == built.page.read_bytes()
 
 
 def test_report_in_python_is_the_command(tmp_path, monkeypatch) -> None:
@@ -170,7 +148,8 @@ def test_the_page_asks_no_network_and_is_small(built: Built) -> None:
         for key in ("src", "href", "xlink:href", "action", "data"):
             value = attributes.get(key)
             assert value is None or value.startswith(("#", "data:,")), (tag, key, value)
-    outside = re.sub(r'xmlns(:\w+)?="[^"]*"', "", content)
+    names_of_xml = r'"http://www\.w3\.org/(1999|2000|XML)/\w+/?\w*"'
+    outside = re.sub(names_of_xml, "", content)
     assert not re.search(r"https?://|@import|url\((?!#)", outside)
 
 
@@ -238,27 +217,6 @@ def test_names_in_a_figure_stay_text(on_page: bool) -> None:
     words = ["".join(node.itertext()) for node in ElementTree.fromstring(svg).iter()]
     assert words.count(SEEN) >= 6
     assert ("var(--" in svg) is on_page
-
-
-@pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        ("width", "wide"),
-        ("width", 1e300),
-        ("height", 0.0),
-        ("columns", [{"panels": 3}]),
-        ("items", [{"kind": "pie"}]),
-        ("x", [{}]),
-    ],
-)
-def test_what_is_no_chart_is_refused_with_its_place(path: str, value: Any) -> None:
-    chart = Chart()
-    chart.panel().curve([1, 2], [3, 4], "k")
-    data = chart_data(chart)
-    panel = data["columns"][0]["panels"][0]
-    {"items": panel, "x": panel["items"][0]}.get(path, data)[path] = value
-    with pytest.raises(InputError, match=f"{path}"):
-        chart_of(data)
 
 
 @pytest.mark.parametrize("name", ["ctms-motor-position", "ilr33-amber-multirate", "emps"])

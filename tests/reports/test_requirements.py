@@ -35,19 +35,21 @@ def test_every_shipped_requirement_is_met_with_its_distance(amber: Design) -> No
     assert result.distance == pytest.approx(margins.phase_margin_deg - 45.0, rel=1e-12)
 
 
-def test_a_missed_limit_fails_with_a_negative_distance(amber: Design) -> None:
-    wanted = with_requirement(amber, quantity="bandwidth", unit="Hz", minimum=30.0, loop="position")
-    (verdict,) = evaluate_requirements(wanted)
-    assert verdict.verdict == "not met"
-    assert verdict.distance == pytest.approx(verdict.value - 30.0)
-    assert tally((verdict,)).verdict == "not met"
-
-
-def test_a_maximum_counts_the_other_way(amber: Design) -> None:
-    wanted = with_requirement(amber, quantity="overshoot", unit="%", maximum=5.0, loop="velocity")
-    (verdict,) = evaluate_requirements(wanted)
-    assert verdict.verdict == "not met"
-    assert verdict.distance == pytest.approx(5.0 - verdict.value)
+@pytest.mark.parametrize(
+    ("keys", "sign"),
+    [
+        ({"quantity": "bandwidth", "unit": "Hz", "minimum": 30.0, "loop": "position"}, 1.0),
+        ({"quantity": "overshoot", "unit": "%", "maximum": 5.0, "loop": "velocity"}, -1.0),
+    ],
+)
+def test_a_missed_limit_fails_with_a_negative_distance(
+    amber: Design, keys: dict[str, Any], sign: float
+) -> None:
+    (verdict,) = evaluate_requirements(with_requirement(amber, **keys))
+    limit = keys.get("minimum", keys.get("maximum"))
+    assert verdict.verdict == tally((verdict,)).verdict == "not met"
+    assert verdict.distance == pytest.approx(sign * (verdict.value - limit))
+    assert verdict.distance < 0.0
 
 
 def test_exactly_at_the_limit_is_met(amber: Design) -> None:

@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 import analyses.linear.loop_survey
+from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import design_hash, load_design, read_design_text, write_design
 from actuator_lti.design.model import Design, Requirement, Waiver
@@ -97,12 +98,6 @@ def test_a_loop_whose_stability_is_not_known_is_no_pass(monkeypatch, capsys) -> 
     assert main(["margins", "ilr33-amber"]) == 1
     first = capsys.readouterr().out.splitlines()[0]
     assert first.startswith("NOT PROVEN  ilr33-amber: stability not known: Current loop.")
-
-
-def test_a_design_without_requirements_says_so(tmp_path, capsys) -> None:
-    code, said = status(tmp_path / "d.toml", asking(requirements=()), capsys, "margins")
-    assert code == 0
-    assert "The design states no requirements." in said
 
 
 def test_a_waiver_is_read_written_and_hashed_where_there_is_one() -> None:
@@ -224,3 +219,19 @@ def test_a_missing_part_is_in_headline_and_json(tmp_path, monkeypatch) -> None:
     assert "failed: Missing parts" in (tmp_path / "report.html").read_text()
     titles = [part["title"] for part in document["sections"]]
     assert "Sampled, continuous, ideal" in titles  # of the sampled form alone
+
+
+def test_without_requirements_margins_below_custom_are_named(tmp_path, capsys) -> None:
+    """Times 10^((m - 3)/20) of its gain, a loop keeps 3 dB of its gain margin m."""
+    design = asking(requirements=())
+    text = status(tmp_path / "d.toml", design, capsys, "margins")[1]
+    assert "The design states no requirements." in text
+    assert "customary" not in text
+    position = design.controller.position_loop
+    room_db = stability_margins(assemble_loops(design)["position"].open_loop).gain_margin_db
+    assert room_db is not None
+    nearer = replace(position, gain=position.gain * 10.0 ** ((room_db - 3.0) / 20.0))
+    design = replace(design, controller=replace(design.controller, position=nearer))
+    code, text = status(tmp_path / "d.toml", design, capsys, "margins")
+    assert code == 0
+    assert "position loop, gain margin 3 dB (of 6 dB)" in " ".join(text.split())

@@ -16,7 +16,7 @@ from analyses.studies.study import Variant, study_of
 from reports import document as doc
 from reports.sections.compare import brief
 from reports.sections.compare import section as sections
-from reports.sections.compare_many import MANY, choice, table_text
+from reports.sections.compare_best import MANY, choice, table_text
 from reports.verdict_summary import verdict_of
 
 COUNT = 3_000

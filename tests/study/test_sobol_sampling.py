@@ -12,8 +12,7 @@ from actuator_lti.batch import Population
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.model import Tolerance
 from actuator_lti.errors import InputError
-from analyses.monte_carlo.sketch import MOST, Sketch, merged
-from analyses.monte_carlo.statistics import SHARES, clopper_pearson, column_statistics
+from analyses.monte_carlo.statistics import MOST, SHARES, Sketch, clopper_pearson, column_statistics, merged
 from analyses.monte_carlo.stepping import StepCheck, step_columns, step_rows, step_units
 from analyses.studies.sampling import Factor, Sampler, read_table, sampler_of
 from nonlinear import commands
@@ -75,13 +74,6 @@ def test_normal_and_truncated_normal_have_their_moments():
 def test_correlated_normals_have_their_coefficient():
     pair = sampler(normal(R), normal(L), correlation=-0.8).draw(0, 8192)
     assert np.corrcoef(pair.T)[0, 1] == pytest.approx(-0.8, abs=2e-3)
-
-
-def test_contradicting_correlations_are_refused():
-    factors = tuple(normal(path) for path in (R, L, "load.inertia"))
-    matrix = np.array([[1.0, 0.9, -0.9], [0.9, 1.0, 0.9], [-0.9, 0.9, 1.0]])
-    with pytest.raises(InputError, match="contradict"):
-        Sampler(factors, matrix).draw(0, 2)
 
 
 def test_identified_samples_keep_their_rows_together(tmp_path):
@@ -177,7 +169,7 @@ def test_sketches_of_parts_are_that_of_the_whole_in_any_order(values, cuts, seed
     column = np.array(values)
     parts = np.split(column, sorted({cut for cut in cuts if cut < len(column)}))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("analyses.monte_carlo.sketch.MOST", 16)
+        patch.setattr("analyses.monte_carlo.statistics.MOST", 16)
         whole = Sketch.of(column)
         shuffled = [Sketch.of(parts[k]) for k in np.random.default_rng(seed).permutation(len(parts))]
         made = merged(shuffled)

@@ -21,18 +21,17 @@ from actuator_lti.design.model import (
     Validation,
 )
 from actuator_lti.errors import InputError
-from analyses.tuning import (
-    TuningSettings,
+from analyses.tuning import TuningSettings, tune
+from analyses.tuning.asked_requirement import read_requirement
+from analyses.tuning.problem import loop_requirements, problem_of
+from analyses.tuning.rules import (
     integrator_gain,
     magnitude_optimum,
     pi_for_crossover,
     rule_gains,
     symmetric_optimum,
-    tune,
 )
-from analyses.tuning.asked_requirement import read_requirement
-from analyses.tuning.problem import loop_requirements, problem_of
-from analyses.tuning.program import maximise
+from analyses.tuning.solve import maximise
 
 PERIOD, DELAY = 1e-3, 3e-3
 QUICK = TuningSettings(curve=False, check=False)

@@ -94,6 +94,29 @@ def test_a_requirement_that_only_a_notch_meets():
     assert notch.kind == "notch"
     assert notch.frequency_rad_s / (2 * np.pi) == pytest.approx(700.0, rel=0.3)
     assert all(v.verdict == "met" for v in tuned.confirmed)
+    assert nearest_drawn(design, 1.3 * distance_of(tuned)) >= 0.999 * distance_of(tuned)
+
+
+def distance_of(tuned):
+    """Squares of the ln ratios of gain and depth, and of the width of the notch over its frequency."""
+    velocity = tuned.design.controller.velocity
+    notch = velocity.filters[-1]
+    ratios = np.log([velocity.gain / 0.02, notch.depth])
+    return ratios @ ratios + (notch.width_rad_s / notch.frequency_rad_s) ** 2
+
+
+def nearest_drawn(design, most):
+    """Of many notches about the resonance, with any gain and depth: the nearest that does, below a change."""
+    placed = place(design, ("notch",))
+    problem = problem_of(placed.design, loop_requirements(design), {}, placed.variables)
+    rng, size = np.random.default_rng(5), 60_000
+    frequency = 2 * np.pi * 700.0 * np.exp(rng.uniform(-0.3, 0.3, size))
+    gain, depth = 0.02 * np.exp(rng.uniform(0.0, 1.5, size)), np.exp(rng.uniform(-1.5, 0.0, size))
+    rows = np.column_stack([gain, frequency, frequency * rng.uniform(0.0, 1.5, size), depth])
+    rows = rows[problem.change(rows) < most]
+    met = problem.distances(rows, problem.all_corners).min(axis=(1, 2)) >= 0.0
+    assert met.any()
+    return problem.change(rows)[met].min()
 
 
 def test_no_smaller_change_of_two_gains_meets_the_requirements():

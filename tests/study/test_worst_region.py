@@ -1,5 +1,7 @@
 """The worst case in a region of tolerances, of tied parameters too."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2, norm
@@ -9,6 +11,7 @@ from actuator_lti.design.model import Correlation, Design, Tolerance
 from actuator_lti.errors import InputError
 from analyses.estimation.fit import Fit
 from analyses.identification.to_design import design_with_fit
+from analyses.monte_carlo import MonteCarloSettings, monte_carlo
 from analyses.monte_carlo.region import Region
 from analyses.studies.sampling import Factor, Sampler, Table, correlation_of, sampler_of, semidefinite_root
 from analyses.tuning.problem import loop_requirements, problem_of
@@ -91,13 +94,6 @@ def test_samples_of_a_table_are_taken_whole() -> None:
 
 def test_a_worst_case_of_correlated_parameters_is_one_that_occurs(tmp_path) -> None:
     """The friction and inertia of a drive, correlated at -0.95: the search does not leave their ellipse."""
-    from dataclasses import replace
-
-    from actuator_lti.design import load_design
-    from actuator_lti.design.model import Correlation
-    from analyses.monte_carlo import MonteCarloSettings, monte_carlo
-    from analyses.studies.sampling import sampler_of
-
     base = load_design("ilr33-amber")
     names = sampler_of(base).paths[:2]
     tied = replace(base, correlations=(Correlation(first=names[0], second=names[1], coefficient=-0.95),))
@@ -113,10 +109,7 @@ KM, KE = "motor.torque_constant", "motor.back_emf_constant"
 
 
 def _tied(coefficient: float = 1.0) -> Design:
-    text = write_design(load_design("ilr33-amber"))
-    design = read_design_text(text)
-    from dataclasses import replace
-
+    design = read_design_text(write_design(load_design("ilr33-amber")))
     tolerance = Tolerance(kind="normal", std=1e-4)
     parameters = {
         path: replace(one, tolerance=tolerance) if path in (KM, KE) else one
@@ -127,17 +120,12 @@ def _tied(coefficient: float = 1.0) -> Design:
     return read_design_text(write_design(tied))
 
 
-def test_one_constant_is_drawn_as_one() -> None:
-    sampler = sampler_of(_tied())
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_one_constant_is_drawn_as_one_and_opposite_ones_opposite(sign: float) -> None:
+    sampler = sampler_of(_tied(sign))
     draws = dict(zip(sampler.paths, sampler.draw(0, 512).T, strict=True))
-    assert draws[KM] == pytest.approx(draws[KE], rel=1e-12)
+    assert draws[KM] - 5.9e-3 == pytest.approx(sign * (draws[KE] - 5.9e-3), rel=1e-9, abs=1e-15)
     assert np.std(draws[KM]) == pytest.approx(1e-4, rel=0.05)
-
-
-def test_opposite_parameters_are_drawn_opposite() -> None:
-    sampler = sampler_of(_tied(-1.0))
-    draws = dict(zip(sampler.paths, sampler.draw(0, 64).T, strict=True))
-    assert draws[KM] - 5.9e-3 == pytest.approx(5.9e-3 - draws[KE], rel=1e-9)
 
 
 def test_three_that_are_one_and_what_contradicts() -> None:

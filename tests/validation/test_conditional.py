@@ -19,7 +19,7 @@ from analyses.large_signal.conditional import (
 from analyses.large_signal.settling_ticks import settling_ticks_of
 from analyses.validation import QUICK, validate
 from nonlinear import commands, simulate
-from reports.sections.conditional import section
+from reports.sections.beyond import large_commands as section
 
 FILE = Path(__file__).with_name("conditional.toml")
 

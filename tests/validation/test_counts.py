@@ -17,7 +17,7 @@ from analyses.large_signal.settling_ticks import settling_ticks_of
 from analyses.limit_cycles.counts import Counts, counted_gain, counts_of, linear_ratio
 from analyses.limit_cycles.describing import cycles_of_quantisation, without_nonlinearities
 from nonlinear import commands, simulate
-from reports.sections.counts import section
+from reports.sections.beyond import counts as section
 from tests.validation.random_drives import full_drive
 
 AMBER = load_design("ilr33-amber")

@@ -1,6 +1,7 @@
 """Dry friction at small signals: threshold, lost motion, standing error, limit cycles."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +11,15 @@ from actuator_lti import load_design
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from analyses.friction_effects import friction_effects
+from analyses.friction_effects.breakaway import threshold
 from analyses.friction_effects.cycles import limit_cycles
+from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
 from analyses.linear.static_threshold import static_threshold
 from analyses.motion.settling import settle
+from nonlinear.bench.on_the_bench import quiet
 from reports.sections.friction_effects import section
+
+FIN = 1.0 / 60.0 + 1.7e-3  # motor torque per torque on the fin: what passes, and 10 % of it lost
 
 
 @pytest.fixture(scope="module")
@@ -31,27 +37,76 @@ def test_threshold_of_a_force_source_is_friction_over_stiffness() -> None:
     assert result.simulated_rad == pytest.approx(result.static.forward_rad, rel=1.1 * result.resolution)
 
 
-def test_lost_motion_of_a_force_source_and_the_error_that_stays() -> None:
+def _joint_rate(loop: Hysteresis) -> float:
+    """0.6 s of integral time behind 15 % of the torque of gravity, which grows at that rate."""
+    rate = 4.0 * loop.amplitude_rad * loop.frequency_hz
+    return 2.0 * 0.6 / 14.4 * 1.5e-3 * 6.0 * 9.80665 * 0.3 * rate
+
+
+@pytest.mark.parametrize(
+    ("name", "expected", "within"),
+    [
+        ("ilr33-amber", lambda loop: 0.0, 0.0),
+        ("emps", lambda loop: 2.0 * 20.3935 / (35.15065 * 243.45 * 160.18), 1e-9),
+        ("ilr33-amber-compliant", lambda loop: 2.0 * 0.05 / 1500.0 + 1e-3, 1e-9),  # at rest in the play
+        ("ballscrew", lambda loop: 2.0 * 30.0 / 1e8, 1e-9),
+        ("joint", _joint_rate, 1e-4),
+        # (T0 + C0_l f)/(gain + 30 f), f the motor's torque per torque on the fin, which the moment relieves
+        ("fin", lambda loop: 2.0 * (0.008 + 0.05 * FIN) / (60 * 0.03 * 0.12 * 110 + 30 * FIN), 2e-3),
+    ],
+)
+def test_what_a_reversal_loses_is_predicted(
+    name: str, expected: Callable[[Hysteresis], float], within: float
+) -> None:
+    """Behind a motor's sensor 2 C0_l/k and the play; in front of it the error that friction asks for."""
+    design = quiet(load_design(name))
+    loop = hysteresis(design, 0.0, threshold(design, 0.0).static, 150_000 if name == "joint" else 3000)
+    rounding = 1e-12 * loop.amplitude_rad
+    assert loop.predicted_rad == pytest.approx(expected(loop), rel=1e-6 + within, abs=rounding)
+    assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=within, abs=rounding)
+
+
+def test_lost_motion_under_a_load_is_the_twist_alone() -> None:
+    """8 N m keep the play on one side: 2 C0_l/k is lost."""
+    design = quiet(load_design("ilr33-amber-compliant"))
+    loop = hysteresis(design, 8.0, threshold(design, 8.0).static, 3000)
+    assert loop.predicted_rad == pytest.approx(2.0 * 0.05 / 1500.0, rel=1e-9)
+    assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=1e-9)
+
+
+def test_the_error_that_stays_of_a_force_source_is_less_than_its_threshold() -> None:
+    """And the largest one is what the section says, though a smaller step leaves a larger share of itself."""
     design = load_design("emps")
-    point = friction_effects(design).points[0]
-    loop = point.hysteresis
-    assert loop.predicted_rad == pytest.approx(2.0 * 20.3935 / (35.15065 * 243.45 * 160.18), rel=1e-12)
-    assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=1e-6)
-    threshold = static_threshold(design)
-    for one in point.cycles.settlings:
-        assert one.rest.verdict == "at rest"
-        assert 0.0 < abs(one.rest.error) <= max(threshold.forward_rad, threshold.backward_rad)
+    static, result = static_threshold(design), friction_effects(design)
+    errors = [abs(one.rest.error) for one in result.points[0].cycles.settlings]
+    assert {one.rest.verdict for one in result.points[0].cycles.settlings} == {"at rest"}
+    assert all(0.0 < error <= max(static.forward_rad, static.backward_rad) for error in errors)
+    assert f"an error of up to {1e6 * max(errors):.3g} µm is left" in section(result)["result"]
 
 
-def test_a_small_step_waits_for_the_integral(amber: Design) -> None:
-    """Tn (A0/A - 1), and a few ticks until the current follows; the threshold is Tc/(kM Kp Kv N)."""
-    for point in friction_effects(amber).points:
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-compliant"])
+def test_a_small_step_waits_for_the_integral(name: str) -> None:
+    """Tn (A0/A - 1), and a few ticks until the current follows; the threshold is Tc/(kM Kp Kv N).
+
+    Behind a spring too: it carries the load before the step comes.
+    """
+    for point in friction_effects(load_design(name)).points:
         result = point.threshold
         expected = point.dry_torque_Nm / (5.9e-3 * 0.12 * 120.0 * 2376.0)
         assert result.static.forward_rad == pytest.approx(expected, rel=1e-12)
         for wait in result.waiting:
             assert wait.simulated_s is not None
             assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=6e-4)
+
+
+def test_a_small_step_waits_at_the_angle_where_it_stands(amber: Design) -> None:
+    """Cogging of 1 mN m that turns forward, half of it where the drive stands, leaves less to overcome."""
+    cogging = {"motor.cogging": 1e-3, "motor.cogging_periods": 4.0, "motor.cogging_phase": math.pi / 6.0}
+    result = threshold(quiet(with_values(amber, cogging)), 0.0)
+    expected = (2.25e-3 - 0.5e-3) / (5.9e-3 * 0.12 * 120.0 * 2376.0)
+    assert result.static.forward_rad == pytest.approx(expected, rel=1e-12)
+    for wait in result.waiting:
+        assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=6e-4)
 
 
 def test_breakaway_above_friction_counts_in_the_threshold(amber: Design) -> None:
@@ -129,8 +184,8 @@ def test_stick_slip_is_foreseen(amber: Design, integral_time: float, gain: float
     cycles = friction_effects(with_values(amber, values)).points[0].cycles
     assert cycles.stick_slip.stable
     assert cycles.as_predicted
-    swing = cycles.settlings[-1]
-    assert swing.hunting
+    swing = cycles.hunting
+    assert swing is not None
     assert swing.swing_rad == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=0.06)
     assert swing.rest.frequency_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=0.03)
 
@@ -141,6 +196,14 @@ def test_stick_slip_needs_breakaway_above_friction_and_an_integral(amber: Design
         assert point.cycles.as_predicted
     emps = with_values(load_design("emps"), {"friction.breakaway_ratio": 2.0})
     assert friction_effects(emps).points[0].cycles.stick_slip is None
+
+
+def test_a_smoothed_law_is_not_said_to_have_a_threshold() -> None:
+    result = friction_effects(load_design("ilr33-amber-tanh"))
+    (threshold,) = [b for b in section(result)["blocks"] if b.get("caption", "").startswith("Threshold")]
+    assert all(row["threshold"] is None and row["width"] is None for row in threshold["rows"])
+    assert "no threshold" in threshold["note"]
+    assert "below the threshold" not in threshold["note"]
 
 
 def test_not_applicable_without_dry_friction() -> None:

@@ -9,9 +9,9 @@ import pytest
 from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
-from analyses.large_signal.border import limit_shift
+from analyses.large_signal.border import ROUNDS, limit_shift
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
-from analyses.large_signal.grid import LEAST_UPDATES, amplitudes, tone
+from analyses.large_signal.grid import LEAST_UPDATES, amplitudes, tone, work_ticks
 from analyses.large_signal.map import AmplitudeMap, amplitude_map
 from analyses.large_signal.steady_start import PLACES, linear_steady_state
 from analyses.large_signal.tones_run import run_tones
@@ -108,7 +108,7 @@ def test_what_the_map_shows(amber: Design, amber_map: AmplitudeMap) -> None:
     changed = amber_map.response[middle, 0] / amber_map.linear[0]
     assert abs(20.0 * np.log10(abs(changed))) < 0.1
     assert abs(np.degrees(np.angle(changed))) < 2.0
-    assert amber_map.share(("speed", "current", "acceleration")) > 0.3
+    assert amber_map.share("speed", "current", "acceleration") > 0.3
     assert "parabola" in {WAVEFORMS[k] for k in waveform.ravel()}
 
 
@@ -142,7 +142,7 @@ def test_a_drive_without_limits_has_no_border(amber: Design) -> None:
     loops = assemble_loops(design)
     assert limit_shift(design, loops, count=3) is None
     map_ = amplitude_map(design, loops, counts=(6, 4))
-    assert map_.share(("speed", "acceleration", "current", "voltage")) == 0.0
+    assert map_.share("speed", "acceleration", "current", "voltage") == 0.0
 
 
 def test_an_unstable_loop_has_no_border_and_still_a_map(amber: Design) -> None:
@@ -167,9 +167,18 @@ def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(
     amber: Design, amber_map: AmplitudeMap, monkeypatch
 ) -> None:
     """Work is counted in ticks, so the same drive has the same map on every machine."""
+    loops = assemble_loops(amber)
+    whole = limit_shift(amber, loops, count=6)
     assert not amber_map.coarser
+    assert not whole.coarser
     monkeypatch.setattr("analyses.large_signal.map.MOST_TICKS", amber_map.ticks // 9)
-    small = amplitude_map(amber, assemble_loops(amber), counts=(17, 16))
+    two_thirds = (ROUNDS + 2) * work_ticks(amber, loops, 6) * 2 // 3 + 1
+    monkeypatch.setattr("analyses.large_signal.border.MOST_TICKS", two_thirds)
+    shift = limit_shift(amber, loops, count=6)
+    assert shift.coarser
+    assert shift.frequency_hz.size == 4
+    assert shift.frequency_hz[[0, -1]] == pytest.approx(whole.frequency_hz[[0, -1]], rel=1e-12)
+    small = amplitude_map(amber, loops, counts=(17, 16))
     assert small.coarser
     assert small.cause.size < 0.2 * amber_map.cause.size
     assert small.ticks < amber_map.ticks / 4  # what is not steady is run again, longer

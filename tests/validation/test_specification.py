@@ -14,8 +14,7 @@ from analyses.friction_effects import friction_effects
 from analyses.large_signal import large_signals
 from analyses.specification import Specification, specification
 from analyses.specification.drive_figures import drive_figures
-from analyses.specification.manoeuvres import thermal_duty
-from analyses.specification.plane import torque_speed_plane
+from analyses.specification.manoeuvres import thermal_duty, torque_speed_plane
 from nonlinear import commands, simulate
 from nonlinear.bench.on_the_bench import on_the_bench
 from reports import document as doc
@@ -118,6 +117,18 @@ def test_sections_are_plain_and_their_figures_can_be_drawn(name: str) -> None:
         svg = draw_svg(block, page=False)
         assert svg.startswith("<svg")
         assert "nan" not in svg.lower().replace("nano", "")
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_note_speaks_of_no_column_and_no_controller_that_is_not_there(name: str) -> None:
+    design = load_design(name)
+    (table,) = [
+        b
+        for b in specification_section.section(specification(design))["blocks"]
+        if "Rate," in b.get("caption", "")
+    ]
+    assert ("Duty" in table["note"]) == any(column["key"] == "duty" for column in table["columns"])
+    assert "current controller" not in table["note"]
 
 
 def test_a_hunting_drive_fails_its_verdict() -> None:

@@ -9,8 +9,7 @@ import pytest
 
 from actuator_lti.design import load_design, with_overrides, write_design
 from actuator_lti.design.model import Load
-from actuator_lti.loops.compliance import compliance
-from actuator_lti.loops.stiffness import lost_motion_rad, stiffness_at
+from actuator_lti.loops.stiffness import compliance, lost_motion_rad, stiffness_at
 from analyses.stiffness import (
     check_stiffness,
     lost_motion_seen,

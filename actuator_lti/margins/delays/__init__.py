@@ -1,1 +1,1 @@
-"""Loops with exact delays: form, poles by collocation, certified intervals."""
+"""Loops with exact delays: form, certified intervals."""

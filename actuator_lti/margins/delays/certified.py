@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
-
 from flint import acb, arb, ctx
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
 from actuator_lti.margins.delays.axis import GAIN, IMAGINARY, Axis, turn, zeros
 from actuator_lti.margins.delays.exact import ExactDelayLoop
-from actuator_lti.margins.delays.nearest import smallest
+from actuator_lti.margins.delays.response import NOWHERE, smallest
 from actuator_lti.margins.distances import DISK, MODULUS
+from actuator_lti.margins.exact.certified import difference
 from actuator_lti.margins.exact.crossings import Crossing
-from actuator_lti.margins.exact.determined import difference
 from actuator_lti.margins.given import ULP
-from actuator_lti.margins.results import Agreement, StabilityMargins
+from actuator_lti.margins.results import StabilityMargins
+from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import TOUCH
 
 _BITS = 128
@@ -32,21 +31,10 @@ def certified_delayed_margins(
     band: tuple[float, float] | None,
     start: StabilityMargins | None = None,
 ) -> StabilityMargins:
-    """All margins of a loop with exact delays, by certified intervals.
+    """All margins of a loop with exact delays and its neighbours 8 ulp away, by certified intervals.
 
-    Parameters
-    ----------
-    loops : tuple of ExactDelayLoop
-        The loop, and its neighbours 8 ulp away.
-    delay_s : float
-        The delay in series, for the result.
-    start : StabilityMargins, optional
-        The answer in double precision: its distances are where the search for smaller ones begins.
-
-    Raises
-    ------
-    NumericalError
-        Something could not be determined.
+    ``delay_s`` is that in series, for the result; the distances of ``start``, an answer in double precision,
+    are where the search for smaller ones begins. `NumericalError`: something could not be determined.
     """
     with ctx.workprec(_BITS):
         answer, problem = _compared(loops, band, merge=False)
@@ -88,7 +76,7 @@ def certified_delayed_margins(
 def _known(start: StabilityMargins | None) -> list[tuple[float, float]]:
     """Both distances as double precision has them, each with its frequency."""
     if start is None or start.modulus_frequency_rad_s is None:
-        return [(math.inf, math.inf)] * 2
+        return [NOWHERE] * 2
     assert start.modulus_margin is not None
     assert start.disk_margin is not None
     return [

@@ -101,13 +101,7 @@ class ExactDelayLoop:
         return 0.1 * min(sizes[1:] or sizes)
 
     def beyond(self, gain: float) -> float:
-        """A frequency above which |L| < gain: the leading power against all other coefficients together.
-
-        Raises
-        ------
-        NumericalError
-            There is none.
-        """
+        """A frequency above which |L| < gain: the leading power against all other coefficients together."""
 
         def holds(x: float) -> bool:
             above = sum((_size(p, x) for p, _ in self.N.terms), arb(0))
@@ -136,12 +130,9 @@ def neighbour(form: DelayForm, way: float) -> DelayForm:
 
     def moved(entries: Any) -> Any:
         x = np.asarray(entries, dtype=float)
-        y = x + way * ULP * np.spacing(x) * rng.choice([-1.0, 1.0], x.shape) * (x != 0.0)
-        return y if y.ndim else float(y)
+        return x + way * ULP * np.spacing(x) * rng.choice([-1.0, 1.0], x.shape) * (x != 0.0)
 
-    names = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays_s", "series_s")
-    values = {name: getattr(form, name) for name in DelayForm.__dataclass_fields__}
-    return DelayForm(**{**values, **{name: moved(values[name]) for name in names}})
+    return DelayForm(moved(form.whole), moved(form.delays_s), float(moved(form.series_s)))
 
 
 def exact_behind_delay(given: Given, delay_s: float) -> tuple[ExactDelayLoop, ...]:
@@ -178,17 +169,17 @@ def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop
     InputError
         Too many delays, or a neutral loop.
     """
-    q, n = form.delays_s.size, form.B1.size
+    q, n = form.delays_s.size, form.states
     if q > _MOST_DELAYS:
         raise InputError(f"exact arithmetic takes at most {_MOST_DELAYS} inner delays; this loop has {q}")
     delays = [_exact(tau) for tau in form.delays_s]
     late = [sum((tau for k, tau in enumerate(delays) if mask >> k & 1), fmpq(0)) for mask in range(1 << q)]
-    whole = _exact_matrix(np.block([[form.A, form.B2], [form.C2, form.D22]]))
-    column = _exact_matrix(np.concatenate((form.B1, form.D21))[:, None])
-    row = _exact_matrix(np.concatenate((form.C1, form.D12))[None])
+    m = n + q
+    whole, column = _exact_matrix(form.whole[:m, :m]), _exact_matrix(form.whole[:m, m:])
+    row, through = _exact_matrix(form.whole[m:, :m]), _exact(form.whole[m, m])
     below = list(zip(_determinants(whole, n), late, strict=True))
     fed_back = _determinants(whole - column * row, n)
-    above = [(p + (_exact(form.D11) - 1) * d, tau) for p, (d, tau) in zip(fed_back, below, strict=True)]
+    above = [(p + (through - 1) * d, tau) for p, (d, tau) in zip(fed_back, below, strict=True)]
     if any(p.degree() >= n for p, _ in below[1:]) or any(p.degree() >= n for p, _ in above):
         raise InputError(
             "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"

@@ -1,4 +1,4 @@
-"""Crossings and closed-loop poles of an exact loop: every one, each from a certified root."""
+"""Crossings, closed-loop poles, smallest distances of an exact loop: each from a certified root."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
-from flint import acb, arb, ctx, fmpz, fmpz_poly
+from flint import acb, arb, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.loop import ExactLoop
 from actuator_lti.margins.exact.roots import (
     HalfPlanes,
     Split,
     all_roots,
+    at_enough_bits,
     free_of,
     half_planes,
     positive_roots,
@@ -23,9 +25,10 @@ from actuator_lti.margins.exact.roots import (
 from actuator_lti.margins.single import GainMargin, PhaseMargin
 from actuator_lti.margins.trust import TOUCH
 
-_FIRST_BITS, _MOST_BITS = 96, 1 << 14
+_FIRST_BITS = 96
 _ACCURATE = 56  # bits of a figure
 _NEAR = 1e-3  # relative: a pair this close may be a touch
+_ZERO = 1e-18  # of a distance
 
 
 @dataclass(frozen=True)
@@ -81,16 +84,8 @@ class Findings:
 def crossings(loop: ExactLoop, merge: bool = False) -> tuple[tuple[Crossing, ...], tuple[Crossing, ...]]:
     """Every crossing of the unit circle, and of the negative real axis.
 
-    Parameters
-    ----------
-    merge : bool
-        Take a gain within `TOUCH` of one at an end of the axis for one, which is no crossing; between two
-        crossings L that stays so close to the line only touches it in any case.
-
-    Raises
-    ------
-    NumericalError
-        The gain is one at every frequency.
+    With ``merge`` a gain within `TOUCH` of one at an end of the axis is one, which is no crossing; between
+    two crossings L that stays so close to the line only touches it in any case.
     """
     N, D = split(loop.N), split(loop.D)
     gain = N.square - D.square
@@ -139,20 +134,17 @@ def _crossings(
     touched_ends: tuple[bool, bool] = (False, False),
 ) -> list[Crossing]:
     """The positive roots of p, touches merged; ``off`` is the distance to the line."""
-    bits = _FIRST_BITS
-    while bits <= _MOST_BITS:
-        with ctx.workprec(bits):
-            roots = all_roots(p)
-            met = [(v, times % 2 == 0) for v, times in positive_roots(roots)]
-            met = _merged(met, roots, off, touched_ends)
-            values = [N.at(v) / D.at(v) for v, _ in met]
-            if all(L.rel_accuracy_bits() >= _ACCURATE for L in values):
-                return [
-                    Crossing(float(v.sqrt().mid()), complex(L), touch)
-                    for (v, touch), L in zip(met, values, strict=True)
-                ]
-        bits *= 2
-    raise NumericalError("a crossing of the loop could not be separated from a zero or a pole beside it")
+
+    def accurate() -> list[Crossing] | None:
+        roots = all_roots(p)
+        met = [(v, times % 2 == 0) for v, times in positive_roots(roots)]
+        met = _merged(met, roots, off, touched_ends)
+        values = [(v, N.at(v) / D.at(v), touch) for v, touch in met]
+        if not all(L.rel_accuracy_bits() >= _ACCURATE for _, L, _ in values):
+            return None
+        return [Crossing(float(v.sqrt().mid()), complex(L), touch) for v, L, touch in values]
+
+    return at_enough_bits(accurate, _FIRST_BITS, "a crossing of the loop")
 
 
 def _merged(
@@ -187,3 +179,47 @@ def _touches(v: arb, off: Callable[[arb], arb]) -> bool:
 
 def _close(a: arb, b: arb) -> bool:
     return float(((b - a) / b).mid()) < _NEAR
+
+
+def smallest(loop: ExactLoop, distance: Distance) -> tuple[float, float]:
+    """Smallest value of a distance and its w."""
+    above, below = distance.over(loop.N, loop.D)
+    return least(split(above).square, split(below).square)
+
+
+def least(above: fmpz_poly, below: fmpz_poly) -> tuple[float, float]:
+    """Smallest sqrt(above/below) over v >= 0, infinity included, and w = sqrt(v)."""
+    if below.degree() < 0:
+        return math.inf, 0.0
+    candidates = [(_ratio(above, below, lowest=True), 0.0), (_ratio(above, below, lowest=False), math.inf)]
+    slope = above.derivative() * below - above * below.derivative()
+
+    def stationary() -> list[tuple[float, float]] | None:
+        values = [(above(v) / below(v), v) for v, _ in positive_roots(all_roots(slope))]
+        if not all(_settled(value) for value, _ in values):
+            return None
+        return [
+            (math.sqrt(max(float(value.mid()), 0.0)), float(v.sqrt().mid()))
+            for value, v in values
+            if value.is_finite()
+        ]
+
+    value, w = min([*candidates, *at_enough_bits(stationary, _FIRST_BITS, "the smallest distance to -1")])
+    return (value, w) if value > _ZERO else (0.0, w)
+
+
+def _settled(value: arb) -> bool:
+    return value.rel_accuracy_bits() >= 53 or not value.is_finite() or float(value.abs_upper()) < _ZERO**2
+
+
+def _ratio(above: fmpz_poly, below: fmpz_poly, lowest: bool) -> float:
+    if above.degree() < 0:
+        return 0.0
+    k, m = (_lowest(above), _lowest(below)) if lowest else (-above.degree(), -below.degree())
+    if k != m:
+        return 0.0 if k > m else math.inf
+    return float((arb(above[abs(k)]) / arb(below[abs(m)])).sqrt())
+
+
+def _lowest(p: fmpz_poly) -> int:
+    return next(k for k in range(p.degree() + 1) if p[k] != 0)

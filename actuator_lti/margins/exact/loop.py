@@ -20,27 +20,14 @@ class ExactLoop:
 
     A sampled loop is held in the s-plane of z = (1 + s)/(1 - s), exactly: the unit circle is the imaginary
     axis, z = -1 lies at infinity.
-
-    Attributes
-    ----------
-    N, D : fmpz_poly
-        Coprime numerator and denominator in s.
-    hidden : fmpz_poly
-        What they had in common: modes that the loop does not drive or does not see.
-    degree : int
-        Number of poles of L, those at infinity (z = -1) counted.
-    hidden_degree : int
-        The same for the hidden modes.
-    sampled : bool
-        Whether s comes from z.
     """
 
-    N: fmpz_poly
+    N: fmpz_poly  # coprime numerator and denominator in s
     D: fmpz_poly
-    hidden: fmpz_poly
-    degree: int
-    hidden_degree: int
-    sampled: bool
+    hidden: fmpz_poly  # what they had in common: modes that the loop does not drive or does not see
+    degree: int  # number of poles of L, those at infinity (z = -1) counted
+    hidden_degree: int  # the same for the hidden modes
+    sampled: bool  # whether s comes from z
 
     @property
     def closed(self) -> fmpz_poly:
@@ -99,7 +86,7 @@ def exact_polynomials(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
     return _by_coefficients(given) if given.A is None else _by_matrices(given)
 
 
-def _integers(*arrays: Any) -> tuple[list[list[int]], int]:
+def integers(*arrays: Any) -> tuple[list[list[int]], int]:
     """All entries times one power of two, as integers, and that power."""
     ratios = [[float(x).as_integer_ratio() for x in np.ravel(array)] for array in arrays]
     shift = max((below.bit_length() - 1 for part in ratios for _, below in part), default=0)
@@ -107,16 +94,16 @@ def _integers(*arrays: Any) -> tuple[list[list[int]], int]:
 
 
 def _by_coefficients(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
-    (num, den), _ = _integers(given.numerator, given.denominator)
+    (num, den), _ = integers(given.numerator, given.denominator)
     return fmpz_poly(num[::-1]), fmpz_poly(den[::-1])
 
 
 def _by_matrices(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
     """D = det(sI - A), N = c adj(sI - A) b + d D."""
     n = given.b.size
-    (A, d), shift = _integers(given.A, given.d)
-    (b,), shift_b = _integers(given.b)
-    (c,), shift_c = _integers(given.c)
+    (A, d), shift = integers(given.A, given.d)
+    (b,), shift_b = integers(given.b)
+    (c,), shift_c = integers(given.c)
     if not n:
         return fmpz_poly(d), fmpz_poly([1 << shift])
     whole = [A[k * n : k * n + n] for k in range(n)]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, TypeVar
 
 from flint import acb, arb, arb_poly, ctx, fmpq_poly, fmpz_poly
@@ -14,6 +15,7 @@ _MOST_BITS = 1 << 15
 _SQUARE = fmpz_poly([0, 0, -1])  # v = -s^2
 V = fmpz_poly([0, 1])
 Polynomial = TypeVar("Polynomial", fmpz_poly, fmpq_poly)
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True)
@@ -73,24 +75,12 @@ def positive_roots(roots: list[tuple[acb, int]]) -> list[tuple[arb, int]]:
 
 @dataclass(frozen=True)
 class HalfPlanes:
-    """Where the roots of a polynomial lie.
+    """Where the roots of a polynomial lie."""
 
-    Attributes
-    ----------
-    right : int
-        Roots with a positive real part, multiplicities counted.
-    at_zero : int
-        Multiplicity of the root zero.
-    border : tuple of (arb, int)
-        w > 0 of the roots +-j w, with their multiplicity.
-    values : tuple of complex
-        All of them, in double precision.
-    """
-
-    right: int
-    at_zero: int
-    border: tuple[tuple[arb, int], ...]
-    values: tuple[complex, ...]
+    right: int  # roots with a positive real part, multiplicities counted
+    at_zero: int  # multiplicity of the root zero
+    border: tuple[tuple[arb, int], ...]  # w > 0 of the roots +-j w, with their multiplicity
+    values: tuple[complex, ...]  # all of them, in double precision
 
     @property
     def pairs(self) -> tuple[tuple[float, int], ...]:
@@ -125,7 +115,7 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
         right = symmetric.degree() - sum(times for _, times in border)
         values += _in_doubles(all_roots(mirrored))
         p = p // mirrored
-    roots = _told_from_axis(p)
+    roots = at_enough_bits(partial(_told_from_axis, p), ctx.prec, "a closed-loop pole")
     right += sum(times for root, times in roots if root.real > 0)
     return HalfPlanes(right, at_zero, tuple(border), (*values, *_in_doubles(roots)))
 
@@ -138,13 +128,17 @@ def _exact(p: fmpz_poly) -> fmpz_poly:
     return p // p.content()
 
 
-def _told_from_axis(p: fmpz_poly) -> list[tuple[acb, int]]:
+def _told_from_axis(p: fmpz_poly) -> list[tuple[acb, int]] | None:
     """All roots of a polynomial that has none on the axis, each known to lie left or right of it."""
-    bits = ctx.prec
+    roots = all_roots(p)
+    return roots if all(root.real > 0 or root.real < 0 for root, _ in roots) else None
+
+
+def at_enough_bits(find: Callable[[], Answer | None], bits: int, what: str) -> Answer:
+    """The first answer that is not ``None``, the working precision doubled each time."""
     while bits <= _MOST_BITS:
         with ctx.workprec(bits):
-            roots = all_roots(p)
-            if all(root.real > 0 or root.real < 0 for root, _ in roots):
-                return roots
+            if (answer := find()) is not None:
+                return answer
         bits *= 2
-    raise NumericalError("a closed-loop pole could not be separated from the stability boundary")
+    raise NumericalError(f"{what} could not be separated from what lies beside it")

@@ -1,4 +1,4 @@
-"""Between which values a measured response lies, point by point and between the points."""
+"""Between which values a measured response lies, point by point and between the points; how near to -1."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.margins.loop import Complex, Mask, Real
+from actuator_lti.margins.measured.data import at_once
 
 _LARGE_TURN = np.radians(60.0)
 _LARGE_STEP = np.log(10.0) / 2.0  # 10 dB
@@ -14,24 +15,18 @@ _JUMP = np.radians(25.0)
 _STANDS_OUT = 4.0  # a turn this many times that of both neighbours is no smooth curve's
 _FLIP = np.radians(140.0)  # a turn that may as well be its complement the other way round
 _CURVATURE = 3.0  # times the largest second difference nearby
+_PIECES = 32  # of an interval between two points
+Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Strip:
-    """A real function of log frequency, between a lower and an upper chord in each interval.
+    """A real function of log frequency, between a lower and an upper chord in each interval."""
 
-    Attributes
-    ----------
-    middle, down, up : arrays (m,)
-        Value at the points, and how far below and above the true one may lie.
-    low, high : array (m - 1, 2)
-        At both ends of each interval; straight in between.
-    """
-
-    middle: Real
+    middle: Real  # (m,): value at the points, and how far below and above the true one may lie
     down: Real
     up: Real
-    low: Real
+    low: Real  # (m - 1, 2): at both ends of each interval; straight in between
     high: Real
 
     def meets(self, level: float) -> tuple[Real, Real]:
@@ -67,24 +62,13 @@ class Bounds:
     Between two points it is taken as no more curved, over log frequency, than three times what the second
     differences of the points about them say. Where the phase turns in one interval as no smooth curve does,
     a resonance (turn < 0) or an antiresonance lies in it: the gain in between is not known at all.
-
-    Attributes
-    ----------
-    log_gain, phase : Strip
-        ln |L|, and the phase in rad, followed from point to point.
-    unresolved : array (m - 1,), bool
-        Intervals that hide a resonance or change by more than 60 deg or 10 dB.
-    turn : array (m - 1,)
-        Measured phase from point to point, rad, without the extra delay.
-    lost : array (m,), bool
-        Points whose phase is lost in noise.
     """
 
-    log_gain: Strip
+    log_gain: Strip  # ln |L|, and the phase in rad, followed from point to point
     phase: Strip
-    unresolved: Mask
-    turn: Real
-    lost: Mask
+    unresolved: Mask  # (m - 1,): intervals that hide a resonance or change by more than 60 deg or 10 dB
+    turn: Real  # (m - 1,): measured phase from point to point, rad, without the extra delay
+    lost: Mask  # (m,): points whose phase is lost in noise
 
 
 def bounds(omega: Real, L: Complex, radius: Real, delay_s: float) -> Bounds:
@@ -158,3 +142,63 @@ def _open_phase(strip: Strip, unresolved: Mask, turn: Real) -> None:
 
 def _ambiguous(turn: Real) -> Mask:
     return np.asarray(np.abs(turn) > _FLIP)
+
+
+def distance_ranges(L: Complex, radius: Real, known: Bounds) -> tuple[Range, Range]:
+    """Ranges of min |1 + L| and of min |2 (1 + L)/(1 - L)| over the measured band.
+
+    From below: the nearest place of every strip between two points, a piece of a ring about the origin. From
+    above: the circle of a measured point, which holds the true value; all of them at once, as the
+    lowest is taken.
+    """
+    low, high = _pieces(known.log_gain)
+    first, last = _pieces(known.phase)
+    with np.errstate(over="ignore"):
+        a, b = np.exp(low), np.exp(high)
+    cos = np.cos(_from_minus_one(first, last))
+    near = np.clip(cos, a, b)
+    least = np.sqrt(np.maximum(near * near - 2.0 * near * cos + 1.0, 0.0))
+    together = at_once(radius)
+    d, e = np.abs(1.0 + L) + together, np.abs(1.0 - L) - together
+    with np.errstate(divide="ignore"):
+        above = np.where(e > 0.0, 2.0 * d / e, np.inf)
+    return (float(least.min()), float(d.min())), (float(_least_alpha(a, b, cos).min()), float(above.min()))
+
+
+def _pieces(strip: Strip) -> tuple[Real, Real]:
+    """Smallest and largest value over each piece of each interval."""
+    t = np.linspace(0.0, 1.0, _PIECES + 1)
+
+    def along(side: Real) -> Real:
+        start, end = side[:, :1], side[:, 1:]
+        with np.errstate(invalid="ignore"):
+            inside = start + t * (end - start)
+        return np.where(start == end, start, inside)  # infinity at both ends
+
+    low, high = along(strip.low), along(strip.high)
+    return np.minimum(low[:, :-1], low[:, 1:]), np.maximum(high[:, :-1], high[:, 1:])
+
+
+def _from_minus_one(first: Real, last: Real) -> Real:
+    """Smallest angle between the negative real axis and a phase in a range."""
+    turns = np.floor((last - np.pi) / (2.0 * np.pi))
+    inside = first <= np.pi + 2.0 * np.pi * turns
+
+    def off(phase: Real) -> Real:
+        return np.abs(np.mod(phase, 2.0 * np.pi) - np.pi)
+
+    return np.where(inside, 0.0, np.minimum(off(first), off(last)))
+
+
+def _least_alpha(a: Real, b: Real, cos: Real) -> Real:
+    """Smallest 2 sqrt((x - cos)/(x + cos)) with x = (r + 1/r)/2 over a <= r <= b."""
+
+    def mean(r: Real) -> Real:
+        with np.errstate(divide="ignore", over="ignore"):
+            return 0.5 * (r + 1.0 / r)
+
+    towards_one, away = mean(np.clip(1.0, a, b)), np.maximum(mean(a), mean(b))
+    x = np.where(cos > 0.0, towards_one, away)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        squared = np.where(np.isinf(x), 1.0, np.maximum(x - cos, 0.0) / (x + cos))
+    return 2.0 * np.sqrt(squared)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
+from actuator_lti.margins.given import period_of
 from actuator_lti.margins.loop import Complex, Real
 
 CONFIDENCE = 0.99
@@ -38,6 +39,9 @@ class MeasuredResponse:
     source : str
         Where the radius comes from.
     """
+
+    ninputs: ClassVar[int] = 1
+    noutputs: ClassVar[int] = 1
 
     omega: Real
     frdata: Complex
@@ -130,16 +134,6 @@ class MeasuredResponse:
         radius = sigma * _student(n - 1, _checked(confidence))
         return cls(omega, values.mean(axis=0), radius, dt, f"scatter of {n} repeats")
 
-    @property
-    def ninputs(self) -> int:
-        """One."""
-        return 1
-
-    @property
-    def noutputs(self) -> int:
-        """One."""
-        return 1
-
 
 def is_measured(system: Any) -> bool:
     """Whether this is frequency-response data, of either kind."""
@@ -158,13 +152,7 @@ def refuse_measured(system: Any) -> None:
 
 
 def measured_response(data: Any) -> MeasuredResponse:
-    """Bring data of either kind into this form; the noise of plain ones is estimated from their scatter.
-
-    Raises
-    ------
-    InputError
-        More than one input or output, or frequencies beyond Nyquist.
-    """
+    """Bring data of either kind into this form; the noise of plain ones is estimated from their scatter."""
     if isinstance(data, MeasuredResponse):
         return data
     omega, L, dt = _read(data)
@@ -208,7 +196,7 @@ def at_once(radius: Real) -> Real:
 def _read(data: Any) -> tuple[Real, Complex, float | None]:
     if data.ninputs != 1 or data.noutputs != 1:
         raise InputError(f"a loop has one input and one output; this has {data.ninputs} and {data.noutputs}")
-    dt = float(data.dt) if data.dt not in (None, 0, True) else None
+    dt = period_of(data)
     omega, L = np.asarray(data.omega, dtype=float), np.asarray(data.frdata, dtype=complex).reshape(-1)
     if dt is not None and (omega > math.pi / dt * (1.0 + 1e-9)).any():
         raise InputError(

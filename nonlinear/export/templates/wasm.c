@@ -87,6 +87,7 @@ static double q[P_MOST];
 static double other_s[S_MOST];
 static double other_io[DRIVE_IO_LENGTH];
 static double places[MOST];
+static double seen[MOST_TICKS * SEEN * (MOST + 1)];
 static double column[2 * MOST_STATES];
 static double blocks[MOST_PHASES * BLOCK];
 static double keep[2 * MOST_PHASES * MOST];
@@ -104,7 +105,6 @@ static double imaginary[MOST_STATES];
 static double given_a[MOST_STATES * MOST_STATES];
 static double given_b[MOST_STATES];
 static double given_c[MOST_STATES];
-static double lent[MOST_STATES * MOST_STATES];
 static double x[MOST_OUT];
 static double y[2 * MOST_OUT];
 
@@ -135,11 +135,8 @@ static int one(int stage, double lead, int timed)
     for (int k = 0; k < COLUMNS; k += 1) {
         it->row[k] = NAN;
     }
-    int n = drive_assembled(p, q, other_s, other_io, stage, it->a, it->b, it->c, places, column);
-    if (n == PERIODIC) {
-        n = drive_periodic_assembled(
-            p, q, other_s, other_io, stage, blocks, places, column, keep, it->a, it->b, it->c);
-    }
+    const int n = drive_assembled(
+        p, q, other_s, other_io, stage, blocks, places, column, keep, seen, it->a, it->b, it->c);
     if (n <= 0) {
         return n;
     }
@@ -162,14 +159,8 @@ static int one(int stage, double lead, int timed)
             it->a[k * n + k] -= 1.0;
         }
     }
-    it->doubtful = 0;
-    if (!isnan(lead)) {
-        drive_corrected_at_rest(
-            n, given_a, given_b, given_c, it->row, work, state, column, exchanged, lent, real, imaginary);
-        it->doubtful =
-            drive_rounding_decides(n, given_a, given_b, given_c, poles, it->row, work, state, lent, column)
-            || drive_crossover_missed(n, given_a, given_b, given_c, it->row, work, state);
-    }
+    it->doubtful = !isnan(lead)
+        && drive_rounding_decides(n, given_a, given_b, given_c, poles, it->row, work, state, exchanged);
     drive_quoted(it->row, it->period, it->quoted);
     it->n = n;
     return n;
@@ -224,9 +215,9 @@ EXPORT("step_of") int step_of(int stage, int count)
     return count;
 }
 
-static double seen[MOST_TICKS * SEEN * (MOST + 1)];
 static double whole_a[MOST * MOST];
 static double whole_b[MOST];
+static double whole_c[MOST];
 
 /*
  * Gains from the command to speed command, current command and voltage, in front of their limits, at count angles
@@ -238,10 +229,11 @@ EXPORT("limiters") int limiters(int count)
     if (2 * SHOWN * count > 2 * MOST_OUT) {
         return 0;
     }
-    const int n = drive_limiters_assembled(p, q, other_s, other_io, whole_a, whole_b, places, column, seen);
+    const int n = drive_limiters_assembled(
+        p, q, other_s, other_io, blocks, places, column, keep, seen, whole_a, whole_b, whole_c);
     if (n <= 0) {
         return n;
     }
-    drive_limiter_sizes(q, n, whole_a, whole_b, seen, drive_outer_interval(q), count, x, y, work, state);
+    drive_limiter_sizes(q, n, whole_a, whole_b, seen, drive_interval(q, COMMAND), count, x, y, work, state);
     return n;
 }

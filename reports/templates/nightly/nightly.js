@@ -1,9 +1,6 @@
 "use strict";
 (() => {
   const table = document.getElementById("designs");
-  if (!table) {
-    return;
-  }
   const body = table.tBodies[0];
   const rows = [...body.rows];
   const search = document.getElementById("search");

@@ -1,60 +1,48 @@
 // An axis of a panel: what it is said to be in the SVG, values to places on it, and what of it is seen.
-import { degreeTicks, linearTicks, logTicks } from "./ticks.js";
-import { reading } from "./words.js";
+import { range, scaleLinear, scaleLog, zoomIdentity } from "./d3.js";
+import { raised, reading, show } from "./words.js";
+
+const TURN = [15, 30, 45, 90, 180, 360, 720, 1440, 2880]; // a phase is read in parts of a turn
+const decade = (value) => (value >= 1e6 && value < 1e9 ? value / 1e6 + "M" : value >= 1e3 && value < 1e9 ? value / 1e3 + "k" : value >= 1e-4 ? String(+value.toPrecision(6)) : Math.log10(value) % 1 ? show(value) : "10" + raised(Math.log10(value)));
 
 export class Axis {
-  low = 0; // ends of the axis, and their places
-  high = 1;
-  from = 0;
-  to = 1;
-  scale = 1; // the view: a place p is seen at scale p + shift
-  shift = 0;
-  first = 0;
-  last = 1;
+  view = zoomIdentity; // a place p is seen at k p + x
   /** @type {any} */
   drawn = null; // the ends that the SVG has, once they are others
   constructor(words, label, fixed) {
-    const [kind, ...ends] = words.split(" ");
+    const [kind, ...ends] = words.split(" "), [low, high, from, to] = ends.map(Number);
     this.log = kind === "log";
     this.days = kind === "days"; // since 1970
-    [this.low, this.high, this.from, this.to] = ends.map(Number);
-    this.first = Math.min(this.from, this.to);
-    this.last = Math.max(this.from, this.to);
+    this.px = (this.log ? scaleLog() : scaleLinear()).domain([low, high]).range([from, to]).unknown(NaN);
+    this.first = Math.min(from, to);
+    this.last = Math.max(from, to);
     const cut = label.lastIndexOf(", ");
     this.name = cut < 0 ? label : label.slice(0, cut);
     this.unit = cut < 0 ? "" : label.slice(cut + 2).split(" (")[0];
     this.fixed = fixed && this.unit !== "deg";
   }
-  px(value) {
-    const part = this.log ? Math.log(value / this.low) / Math.log(this.high / this.low) : (value - this.low) / (this.high - this.low);
-    return this.from + part * (this.to - this.from);
-  }
-  value(px) {
-    const part = (px - this.from) / (this.to - this.from);
-    return this.log ? this.low * (this.high / this.low) ** part : this.low + part * (this.high - this.low);
-  }
-  seen(px) { return this.scale * px + this.shift; }
-  back(px) { return (px - this.shift) / this.scale; }
+  value(px) { return this.px.invert(px); }
+  seen(px) { return this.view.applyX(px); }
+  back(px) { return this.view.invertX(px); }
   holds(px, slack = 3) { return px >= this.first - slack && px <= this.last + slack; }
   get middle() { return (this.first + this.last) / 2; }
-  get whole() { return this.scale === 1 && this.shift === 0; }
-  view(scale = 1, shift = 0) { [this.scale, this.shift] = [scale, shift]; }
-  // zooms about a place, and moves on
-  move(px, factor, by) { this.view(this.scale * factor, px - factor * (px - this.shift) + by); }
-  rescale([low, high]) {
-    this.drawn ??= [this.low, this.high];
-    [this.low, this.high] = [low, high];
+  get whole() { return this.view.k === 1 && this.view.x === 0; }
+  rescale(ends = this.px.domain()) {
+    this.drawn ??= this.px.domain();
+    this.px.domain(ends);
   }
   // how what the SVG has goes to its place on the ends of now: scale and shift
   get moved() {
-    const [low, high] = (this.drawn ?? [this.low, this.high]).map((end) => this.px(end)), scale = (high - low) / (this.to - this.from);
-    return [scale, low - scale * this.from];
+    const [low, high] = (this.drawn ?? this.px.domain()).map((end) => this.px(end)), [from, to] = this.px.range(), scale = (high - low) / (to - from);
+    return [scale, low - scale * from];
   }
   // places and words of the ticks that are seen
   ticks(space, least) {
-    const [low, high] = [this.from, this.to].map((end) => this.value(this.back(end))).sort((a, b) => a - b);
-    const list = this.log ? logTicks : this.unit === "deg" ? degreeTicks : linearTicks;
-    return list(low, high, Math.max(least, Math.floor((this.last - this.first) / space))).map(([value, words]) => [this.seen(this.px(value)), words]);
+    const seen = this.view.rescaleX(this.px), count = Math.max(least, Math.floor((this.last - this.first) / space));
+    const [low, high] = seen.domain().sort((a, b) => a - b), most = Math.max(-low, high), turn = TURN.find((step) => (high - low) / step <= count);
+    const values = turn && !this.log && this.unit === "deg" && high - low >= 60 ? range(Math.ceil(low / turn) * turn, high + 1e-9 * turn, turn) : seen.ticks(count);
+    const plain = most >= 1e6 || most < 1e-3 ? show : seen.tickFormat(count, "f"), words = this.log ? seen.tickFormat(count, /** @type {any} */ (decade)) : (value) => (value ? plain(value) : "0");
+    return values.map((value) => [seen(value), words(value)]).filter(([, text]) => text);
   }
   // seconds in its unit, of an axis of time
   get seconds() { return this.name === "time" ? { s: 1, ms: 1e-3, "µs": 1e-6 }[this.unit] : undefined; }

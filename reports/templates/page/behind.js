@@ -1,12 +1,12 @@
 // What takes too long for a moving slider: once nothing has moved for a moment, one piece at a time.
 import { border } from "./border.js";
-import { BEHIND, PLACE, STABLE, chart, data, desk, find, outer, root, tell } from "./desk.js";
+import { BEHIND, PLACE, STABLE, chart, colourOf, data, desk, find, outer, root, tell } from "./desk.js";
 import { figures, stageOf, view, x } from "./module.js";
 import { state } from "./requirements.js";
 import { cell, linearAt, startUp, toneOf } from "./sines.js";
 import { table } from "./table.js";
 import { sideBySide } from "./variants.js";
-import { html } from "./words.js";
+import { html, swatch } from "./words.js";
 
 const QUIET = 150, SLICE = 12; // ms
 let pieces = [], waits = 0, inView = false;
@@ -53,10 +53,10 @@ const drawMap = (cells) => {
   const edges = (list, k) => { const half = Math.sqrt(list[1] / list[0]); return [list[k] / half, list[k] * half]; };
   const { hertz, amplitude } = border.map;
   tell("border", "cells", { panel: 0, cells: cells.filter(({ cause }) => cause !== "none").map(({ j, k, cause }) => ({
-    x: edges(hertz, k), y: edges(amplitude, j).map((value) => value / data.step.factor), colour: data.map.colours[cause], words: data.map.words[cause],
+    x: edges(hertz, k), y: edges(amplitude, j).map((value) => value / data.step.factor), colour: colourOf(cause), words: data.map.words[cause],
   })) });
-  const seen = [...new Set(cells.map(({ cause }) => cause))], box = (cause) => (cause === "none" ? [] : [html("i", { style: `background:var(--${data.map.colours[cause]})` })]);
-  find(".map-keys").replaceChildren(...(seen.length ? ["Sine from rest, simulated: "] : []), ...seen.map((cause) => html("span", "map-key", ...box(cause), data.map.words[cause])));
+  const seen = [...new Set(cells.map(({ cause }) => cause))];
+  find(".map-keys").replaceChildren(...(seen.length ? ["Sine from rest, simulated: "] : []), ...seen.map((cause) => (cause === "none" ? html("span", "map-key", data.map.words[cause]) : swatch(colourOf(cause), data.map.words[cause]))));
   root.dataset.cells = JSON.stringify(cells.map(({ cause, ticks, tone, amplitude }) => [cause, ticks, tone.hertz, tone.count, amplitude]));
 };
 // figures of the loops, or of the break points, that were left

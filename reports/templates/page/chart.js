@@ -1,9 +1,10 @@
 // A figure that lives: curves on and off, zoom and pan of linked panels, curves redrawn, crossings shown.
 // The SVG is the data: a panel says its axes (data-x, data-y: kind, ends, pixels), a curve is its path.
+import { select, zoomIdentity } from "./d3.js";
 import { holdCurve, putMarks } from "./grips.js";
 import { Panel } from "./panel.js";
 import { saveAs } from "./picture.js";
-import { key, listen, wheel } from "./pointer.js";
+import { gestures, key, listen } from "./pointer.js";
 import { all, button, html, make } from "./words.js";
 
 export const closest = (list, value) => list.reduce((best, one, k) => (Math.abs(one - value) < Math.abs(list[best] - value) ? k : best), 0);
@@ -26,7 +27,7 @@ export class Chart {
     Object.assign(this.plots, { tabIndex: 0, role: "group", ariaLabel: "Figure with read-out: arrow keys move the cursor, plus and minus zoom, shift and arrow keys pan, 0 shows everything" });
     for (const picture of this.pictures) listen(this, picture);
     this.plots.addEventListener("keydown", (event) => key(this, event));
-    this.plots.addEventListener("wheel", (event) => wheel(this, event), { passive: false });
+    for (const panel of this.panels) gestures(this, panel);
     this.plots.addEventListener("blur", () => this.leave());
     const does = { redraw: this.redraw, cells: this.cells, hold: holdCurve, marks: putMarks, cursor: this.show, axes: this.rescale };
     for (const name in does) root.addEventListener(`chart:${name}`, (event) => does[name].call(this, event.detail, this));
@@ -56,15 +57,14 @@ export class Chart {
     for (const kind in saveAs) menu.append(named(kind, `Save this figure as ${kind}`, () => { menu.open = false; saveAs[kind](this); }));
     this.root.append(html("div", "tools", named("+", "Zoom in", () => this.step(1.5)), named("−", "Zoom out", () => this.step(1 / 1.5)), named("⤢", "Show everything", () => this.reset()), menu));
   }
-  step(factor) { for (const { panels: [p] } of this.pictures) this.move(p, p.x.middle, p.y.middle, factor); }
+  step(factor) { for (const { panels: [p] } of this.pictures) p.zoom.scaleBy(select(p.group), factor); }
   linked(panel) { return this.panels.filter((p) => p === panel || (p.shared === panel.shared && !p.byPoint)); }
-  // zooms about a place and moves on; panels on the same axis follow along it
-  move(panel, px, py, factor, dx = 0, dy = 0) {
-    const scale = panel.x.scale * factor;
-    if (scale < 0.2 || scale > 5000) return;
-    panel.y.move(py, factor, dy);
+  // gives a panel d3's view of it; panels on the same axis follow along it
+  move(panel, to) {
+    const was = panel.x.view, { view } = panel.y, by = to.k / was.k;
+    panel.y.view = zoomIdentity.translate(by * view.x + to.y - by * was.y, 0).scale(by * view.k);
     for (const p of this.linked(panel)) {
-      p.x.move(px, factor, dx);
+      p.x.view = p.group.__zoom = to;
       p.update();
     }
     this.root.classList.toggle("moved", this.panels.some((p) => !p.whole));
@@ -73,8 +73,7 @@ export class Chart {
   }
   reset() {
     for (const p of this.panels) {
-      p.x.view();
-      p.y.view();
+      p.x.view = p.y.view = p.group.__zoom = zoomIdentity;
       p.update();
     }
     this.root.classList.remove("moved");
@@ -114,8 +113,8 @@ export class Chart {
   // gives the axes of a panel new ends: {panel, x: [low, high], y: [low, high], words}; curves are redrawn after it
   rescale({ panel, x, y, words }) {
     const p = this.panels[panel];
-    p.x.rescale(x ?? [p.x.low, p.x.high]);
-    p.y.rescale(y ?? [p.y.low, p.y.high]);
+    p.x.rescale(x);
+    p.y.rescale(y);
     p.follow();
     p.update();
     if (!words) return;

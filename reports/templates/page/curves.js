@@ -23,7 +23,7 @@ export const unwrapped = (re, im, hertz) => {
   return phase;
 };
 const db = (value) => 20 * Math.log10(value);
-export const curvesOf = (name, hertz) => {
+const curvesOf = (name, hertz) => {
   const found = respond(name, hertz);
   if (!found) return null;
   const { re, im } = found, s = [], t = [];

@@ -13,6 +13,8 @@ export const PLACE = Object.fromEntries(data.quantities.map((name, k) => [name, 
 export const STABLE = data.quantities.length;
 export const LOOP_NAMES = { current: "Current loop", velocity: "Velocity loop", position: "Position loop" };
 export const POINT_NAMES = { "at w_ref": "Cut at the speed command", "at i_ref": "Cut at the current command", "at u": "Cut at the voltage" };
+// of a limit, in the map, in the run, and on the motor that is played
+export const colourOf = (name) => data.map?.colours[name] ?? "c5";
 export const BEHIND = -9; // a loop that follows in a moment, and one whose stability rounding decides
 export const DOUBT = -3;
 // as designed, as changed, the loop whose curves are seen, measured data, the limits that acted in the last run (bits)

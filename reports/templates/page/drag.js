@@ -18,7 +18,7 @@ const done = () => {
   commit();
 };
 
-export const decibels = (by) => factor(gainOf(), 10 ** (by / 20));
+const decibels = (by) => factor(gainOf(), 10 ** (by / 20));
 export const stepGain = (by) => {
   decibels(by);
   done();
@@ -30,7 +30,7 @@ export const holdCurves = () => {
 };
 
 // where a curve passes a level, as [hertz, other curve there]
-export const crossings = (hertz, curve, level, other) => {
+const crossings = (hertz, curve, level, other) => {
   const found = [];
   for (let k = 1; k < curve.length; k++) {
     const a = curve[k - 1] - level, b = curve[k] - level;

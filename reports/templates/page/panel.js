@@ -1,12 +1,25 @@
 // One panel of a figure: its curves, its view, its ticks, and what is read from it.
 import { Axis } from "./axis.js";
+import { bisector } from "./d3.js";
 import { make } from "./words.js";
+
+// the points of a path, each with whether the pen comes down there; from one to the next it is said how far
+const pointsOf = (path) => {
+  let x = 0, y = 0;
+  return [...path.matchAll(/([Ml])([-\d.]+) ([-\d.]+)/g)].map(([, does, a, b]) => {
+    [x, y] = does === "M" ? [+a, +b] : [x + +a, y + +b];
+    return [x, y, does === "M"];
+  });
+};
+const after = bisector((/** @type {number[]} */ q) => q[0]).right;
 
 export class Panel {
   /** @type {any} */
   again = null; // what is to be done once the view has changed
   /** @type {any} */
   live = null; // marks that are drawn anew with the curves
+  /** @type {any} */
+  zoom = null; // d3's zoom of it
   constructor(group) {
     this.group = group;
     const d = group.dataset, part = (name) => group.querySelector(`.${name}`);
@@ -21,12 +34,14 @@ export class Panel {
     this.words = [this.x, this.y].map((axis, k) => ({ holder: part(k ? "yt" : "xt"), axis, across: !k })).map((one) => ({ ...one, first: [...one.holder.childNodes] }));
     this.curves = [...group.querySelectorAll(".curve:not(.mute), .dots:not(.mute)")].map((node) => this.curve(node));
     this.over = make("g", { class: "over" }, group);
+    const { x, y } = this;
+    group.prepend(make("rect", { x: x.first, y: y.first, width: x.last - x.first, height: y.last - y.first, fill: "none", "pointer-events": "all" })); // what a hand is over
   }
   curve(node) {
     const dots = node.classList.contains("dots");
     const points = dots
       ? [...node.querySelectorAll("use")].map((u) => [+u.getAttribute("x"), +u.getAttribute("y"), false])
-      : [...node.getAttribute("d").matchAll(/([ML])([-\d.]+) ([-\d.]+)/g)].map((m) => [+m[2], +m[3], m[1] === "M"]);
+      : pointsOf(node.getAttribute("d"));
     const parameter = node.dataset.p ? node.dataset.p.split(" ").map(Number) : null;
     return { node, points, dots, parameter, key: node.dataset.k };
   }
@@ -39,7 +54,7 @@ export class Panel {
     const { x, y } = this;
     this.group.classList.toggle("zoomed", !this.whole);
     if (this.whole) this.world.removeAttribute("transform");
-    else this.world.setAttribute("transform", `matrix(${x.scale} 0 0 ${y.scale} ${x.shift} ${y.shift})`);
+    else this.world.setAttribute("transform", `matrix(${x.view.k} 0 0 ${y.view.k} ${x.view.x} ${y.view.x})`);
     for (const { node, at } of this.uses) this.place(at).forEach((value, k) => node.setAttribute("xy"[k], value.toFixed(2)));
     for (const { node, at } of this.notes) {
       const place = this.place(at);
@@ -73,7 +88,7 @@ export class Panel {
         holder.replaceChildren(...first.map((node) => this.slide(node, axis, across)));
         continue;
       }
-      const ticks = across ? axis.ticks(axis.log ? 45 : 58, 3) : axis.ticks(30, 2);
+      const ticks = across ? axis.ticks(axis.log ? 60 : 80, 3) : axis.ticks(36, 3);
       grid += ticks.map(([p]) => (across ? `M${p.toFixed(1)} ${y.first}V${y.last}` : `M${x.first} ${p.toFixed(1)}H${x.last}`)).join("");
       const named = across && this.group.dataset.hide ? [] : ticks;
       holder.replaceChildren(...named.map(([p, text]) => {
@@ -100,15 +115,10 @@ export class Panel {
     if (!p.length) return null;
     if (curve.dots) {
       const best = p.reduce((near, q) => (Math.abs(q[0] - px) < Math.abs(near[0] - px) ? q : near));
-      return Math.abs(best[0] - px) * this.x.scale < 9 ? best : null;
+      return Math.abs(best[0] - px) * this.x.view.k < 9 ? best : null;
     }
-    let low = 0, high = p.length - 1;
-    if (px < p[0][0] - 0.6 || px > p[high][0] + 0.6) return null;
-    while (high - low > 1) {
-      const middle = (low + high) >> 1;
-      if (p[middle][0] <= px) low = middle; else high = middle;
-    }
-    const a = p[low], b = p[high];
+    const last = p.length - 1, right = Math.min(after(p, px, 1), last), a = p[Math.max(right - 1, 0)], b = p[right];
+    if (px < p[0][0] - 0.6 || px > p[last][0] + 0.6) return null;
     if (b[2]) return Math.abs(a[0] - px) < 1 ? a : null;
     const t = b[0] === a[0] ? 0 : Math.min(1, Math.max(0, (px - a[0]) / (b[0] - a[0])));
     return [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];

@@ -3,7 +3,7 @@ import { give, make } from "./words.js";
 
 const MARGIN = 10, KEY = 16, DENSE = 2; // DENSE: points of the PNG for one of the page
 // pictures side by side and the legend below, with the colours of now in place of their names
-export const svgOf = (chart) => {
+const svgOf = (chart) => {
   const colours = getComputedStyle(document.documentElement);
   const put = (node, attributes) => { for (const name in attributes) node.setAttribute(name, attributes[name]); };
   const ink = colours.getPropertyValue("--ink").trim(), whole = make("svg", { "font-family": "sans-serif" });
@@ -49,7 +49,7 @@ const png = (text, name) => {
 };
 const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
 // every curve that is switched on, a point a row, to the hundredth of a point to which it is drawn
-export const csvOf = (chart) => {
+const csvOf = (chart) => {
   const rows = [["panel", "curve", "x", "y", "x is", "y is"]];
   chart.panels.forEach((panel, k) => {
     const named = (axis) => axis.name + (axis.unit ? `, ${axis.unit}` : "");

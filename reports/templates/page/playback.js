@@ -1,5 +1,5 @@
 // Playback of a run: motor, shaft or spring, and load, drawn as they stand at a time.
-import { chart, data, find, tell } from "./desk.js";
+import { chart, colourOf, data, find, tell } from "./desk.js";
 import { unitOf } from "./trial.js";
 import { button, digits, html, make } from "./words.js";
 
@@ -24,7 +24,7 @@ const draw = () => {
   on.rotor.setAttribute("transform", `rotate(${-TURN * part.angle[k] / part.ratio / farthest} 70 60)`);
   on.load.setAttribute("transform", linear ? `translate(${SHIFT * out} 0)` : `rotate(${-TURN * out} 300 60)`);
   on.shaft.setAttribute("d", between(linear ? 258 + SHIFT * out : 264, 16 * twistAt(k) / widest));
-  on.motor.style.stroke = `var(--${acting.length ? data.map?.colours[acting[0][0]] ?? "c5" : "ink"})`;
+  on.motor.style.stroke = `var(--${acting.length ? colourOf(acting[0][0]) : "ink"})`;
   on.motor.style.strokeDasharray = sticks ? "4 3" : "";
   on.range.value = 1000 * share;
   const said = `${digits(k * part.T * unit, 3)} ${words}: output ${digits(part.output[k] / length, 3)} ${angle}`;

@@ -1,13 +1,11 @@
 // What a figure says of the place that is pointed at.
+import { pointer } from "./d3.js";
 import { html, show } from "./words.js";
 
 // From the pointer to a panel and the place on it, in the units of the picture.
 export const placeOf = (picture, event) => {
-  const matrix = picture.svg.getScreenCTM();
-  if (!matrix) return null;
-  const point = new DOMPoint(event.clientX, event.clientY).matrixTransform(matrix.inverse());
-  const panel = picture.panels.find((p) => p.holds(point.x, point.y));
-  return panel ? { panel, x: point.x, y: point.y, scale: matrix.a } : null;
+  const [x, y] = pointer(event, picture.svg), panel = picture.panels.find((p) => p.holds(x, y));
+  return panel ? { panel, x, y } : null;
 };
 export const read = (chart, picture, event) => {
   const found = placeOf(picture, event);

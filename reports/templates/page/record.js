@@ -41,7 +41,7 @@ const show = (name, table, chosen) => {
   for (const [role, { words, units, free }] of Object.entries(rolesOf(kind, measured))) {
     const none = free || chosen.columns[role] < 0 ? [[-1, free ? "none" : "choose"]] : [];
     box.append(pick(words, [...none, ...table.head.map((word, k) => [k, word])], chosen.columns, role, Number));
-    if (Object.keys(units).length > 1) box.append(pick(`${words} in`, plain(Object.keys(units)), chosen.units, role));
+    if (Object.keys(units).length > 1) box.append(pick(`${words} in`, plain([...(chosen.units[role] === "" ? [""] : []), ...Object.keys(units)]), chosen.units, role));
   }
   box.append(button("Remove", () => { forget(kind); desk.follow(); }), " ", html("span", "told"));
   boxes[kind]?.remove();

@@ -2,10 +2,10 @@
 import { fitOf } from "./columns.js";
 import { KINDS, commandOf, lengthOf, spansOf } from "./commands.js";
 import { thinned } from "./curves.js";
-import { PLACE, STABLE, data, desk, find, outer, tell } from "./desk.js";
+import { PLACE, STABLE, colourOf, data, desk, find, outer, tell } from "./desk.js";
 import { start } from "./history.js";
 import { compute, run, view, x } from "./module.js";
-import { choice, digits, html, labelled, typed } from "./words.js";
+import { choice, digits, html, labelled, swatch, typed } from "./words.js";
 
 const { size: usual, unit: unitIn, factor } = data.step;
 /** @type {any} */
@@ -51,8 +51,9 @@ const measure = () => { // how long the run takes: that of a step, as designed, 
   const T = desk.before.row[data.places.period];
   view(x.p_at(), desk.before.row.length).set(desk.before.row);
   const y = run(Math.min(Math.ceil(6 / T), 6000), () => trial.size, trial.size, trial.moment)?.y || [];
+  const end = y[y.length - 1]; // dry friction may hold it beside the command
   let last = 0;
-  for (let k = 0; k < y.length; k++) if (Math.abs(y[k] - 1) > 0.02) last = k;
+  for (let k = 0; k < y.length; k++) if (Math.abs(y[k] - end) > 0.02) last = k;
   const settled = Math.max(1.4 * last, 60) * T;
   trial.before = trial.moving ? settled : 0;
   trial.length = desk.record ? desk.record.time[desk.record.time.length - 1] : trial.chosen || Math.min(lengthOf(trial, settled), MOST * T);
@@ -70,15 +71,22 @@ const draw = (curve, part, panel, values) => {
   tell("run", "redraw", { panel, curve, x: at.map((k) => k * part.T * unitOf()[0]), y: at.map((k) => values[k]) });
 };
 // where a limit acts is shaded in the panel of what it limits, where the motor sticks in that of the speed
-const PLACES = { w_ref: "speed", i_ref: "current", i: "current", u: "voltage" };
+const STICK = ["stiction", data.places.stick, "motor sticks", "w_ref"], PLACES = { w_ref: "speed", i_ref: "current", i: "current", u: "voltage" };
 const shade = (part, ends) => {
   const over = part.T * unitOf()[0], gap = Math.ceil(part.flags.length / 400);
-  const acting = [...data.limiters, ["stick", data.places.stick, "motor sticks", "w_ref"]].map(([name, bit, words, signal]) => ({
-    bit, words, colour: name === "stick" ? "muted" : data.map?.colours[name] ?? "c5", panel: name === "profile" ? 0 : Math.max(TRACES.indexOf(PLACES[signal]), 1),
+  const acting = [...data.limiters, STICK].map(([name, bit, words, signal]) => ({
+    bit, words, colour: colourOf(name), panel: name === "profile" ? 0 : Math.max(TRACES.indexOf(PLACES[signal]), 1),
   }));
   ends.forEach((y, panel) => tell("run", "cells", { panel, cells: acting.filter((one) => one.panel === panel).flatMap(({ bit, words, colour }) => spansOf(part.flags, bit, gap).map((span) => ({ x: span.map((at) => at * over), y, colour, words }))) }));
 };
+// what the shades of a run stand for, in words
+const told = ({ flags = [] }) => {
+  const acting = data.limiters.filter(([, bit]) => desk.acted & bit), sticks = flags.some((flag, k) => k && flag & data.places.stick) ? [STICK] : [];
+  const words = acting.length ? "Limits that act as changed: " : "No limit acts as changed. ";
+  find(".acting").replaceChildren(words, ...[...acting, ...sticks].flatMap(([name, , limit]) => [swatch(colourOf(name), limit), " "]));
+};
 export const drawRuns = (part) => {
+  told(part);
   const { designed } = trial;
   if (!part.y?.length || !designed.y?.length) return;
   trial.span = Math.max(trial.length, part.y.length * part.T, designed.y.length * designed.T);

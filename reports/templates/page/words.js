@@ -30,6 +30,8 @@ export const fill = (box, headings, rows) => box.replaceChildren(box.querySelect
 export const unfold = (target) => {
   for (let node = target; node; node = node.parentElement) if (node.tagName === "DETAILS") node.open = true;
 };
+// what a colour stands for
+export const swatch = (colour, words) => html("span", "map-key", html("i", { style: `background:var(--${colour})` }), words);
 export const minus = (text) => text.replace(/-/g, "−");
 export const raised = (power) => minus(String(power)).replace(/[−\d]/g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["−0123456789".indexOf(c)]);
 const powerOf = (value) => Math.floor(Math.log10(Math.abs(value)));

@@ -1,0 +1,139 @@
+"""Files of named columns (Parquet, JSON, MATLAB up to 7.2), and a record of any file by its ending."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS
+from actuator_lti.errors import InputError
+from actuator_lti.files.mat5 import MatContent, read_mat5
+from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
+from actuator_lti.start.extras import need
+from analyses.estimation.arrays import FloatArray
+from analyses.records.csv_stream import read_csv_record
+from analyses.records.record import Record
+from analyses.records.spec import CsvFormat, RecordSpec
+from analyses.records.table_record import record_of_columns
+
+
+def load_parquet(path: Path) -> tuple[Mapping[str, FloatArray], str]:
+    """The columns of numbers by name, NaN where a value is missing, and the file's SHA-256."""
+    need("pyarrow", "tables", "a Parquet file")
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    where = shown_path(path)
+    data = read_bytes(path, "Parquet file", TABLE_BYTES)
+    try:
+        file = pq.ParquetFile(BytesIO(data))
+        TABLE_ROWS.check(file.metadata.num_rows, where)
+        CSV_COLUMNS.check(file.metadata.num_columns, where)
+        table = file.read()
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as error:  # the last of names of columns
+        raise InputError(f"is no Parquet file: {error}", where=where) from None
+    result = {}
+    for field in table.schema:
+        if pa.types.is_integer(field.type) or pa.types.is_floating(field.type):
+            column = table.column(field.name).cast(pa.float64(), safe=False)
+            result[field.name] = np.asarray(column.to_numpy(), dtype=np.float64)
+        elif pa.types.is_timestamp(field.type):
+            stamps = table.column(field.name).cast(pa.timestamp("ns")).to_numpy()
+            since = (stamps - stamps[:1]) / np.timedelta64(1, "ns")
+            result[f"{field.name} [s]"] = 1e-9 * np.asarray(since, dtype=np.float64)
+    return result, hashlib.sha256(data).hexdigest()
+
+
+def load_json(path: Path) -> tuple[Mapping[str, FloatArray], str]:
+    """The columns of numbers by name (``group.name`` in groups), NaN for null, and the file's SHA-256."""
+    where = shown_path(path)
+    data = read_bytes(path, "JSON record", TABLE_BYTES)
+    tree = parse_json(decode(data, where), where)
+    if isinstance(tree, list) and all(isinstance(row, dict) for row in tree):
+        names = dict.fromkeys(name for row in tree for name in row)
+        CSV_COLUMNS.check(len(names), where)
+        tree = {name: [row.get(name) for row in tree] for name in names}
+    if not isinstance(tree, dict):
+        raise InputError("no record; allowed: columns by name, or a list of rows by name", where=where)
+    return dict(_columns(tree, "")), hashlib.sha256(data).hexdigest()
+
+
+def _columns(tree: Mapping[str, Any], group: str) -> Iterator[tuple[str, FloatArray]]:
+    for name, value in tree.items():
+        if isinstance(value, dict):
+            yield from _columns(value, f"{group}{name}.")
+        elif isinstance(value, list) and {type(one) for one in value} <= {int, float, type(None)}:
+            yield group + name, np.array(value, dtype=np.float64)
+
+
+def read_mat_record(path: str | Path, spec: RecordSpec) -> Record:
+    """Read vectors of a MATLAB file into a record; its scalars become ``constants``.
+
+    The columns of the spec are variable names (``group.field`` for those of a structure), or columns of the
+    matrix that ``spec.format.matrix`` names.
+    """
+    path = Path(path)
+    content, digest = load_mat(path)
+    vectors = columns_of(content, spec.format, path)
+    constants = {k: float(v.ravel()[0]) for k, v in content.arrays.items() if v.size == 1}
+    return record_of_columns(vectors, spec, path, digest, constants=constants)
+
+
+def load_mat(path: Path) -> tuple[MatContent, str]:
+    """The content of a file, without its empty arrays, and its SHA-256."""
+    data = read_bytes(path, ".mat file", MAT_BYTES)
+    try:
+        content = read_mat5(data)
+    except InputError as error:
+        raise InputError(error.message, where=str(path)) from None
+    content.arrays = {key: value for key, value in content.arrays.items() if value.size}
+    return content, hashlib.sha256(data).hexdigest()
+
+
+def columns_of(content: MatContent, layout: CsvFormat, path: Path) -> Mapping[str, FloatArray]:
+    """The vectors of a file by name; where the layout names a matrix, its columns.
+
+    The columns of a matrix are named by the layout's ``names``, or by the only list of texts in the file
+    that has as many entries.
+    """
+    if not layout.matrix:
+        return {key: value for key, value in content.arrays.items() if value.size > 1}
+    matrix = content.arrays.get(layout.matrix)
+    if matrix is None or matrix.ndim != 2:
+        there = ", ".join(f'"{k}" {"x".join(map(str, v.shape))}' for k, v in content.arrays.items())
+        raise InputError(
+            f'matrix = "{layout.matrix}": no such matrix; there are: {there or "none"}', where=str(path)
+        )
+    names = layout.names or names_in(content, matrix.shape[1])
+    if len(names) != matrix.shape[1]:
+        raise InputError(
+            f'matrix "{layout.matrix}" has {matrix.shape[1]} columns, {len(names)} names are given: '
+            "names = [...] must name each",
+            where=str(path),
+        )
+    return {name: matrix[:, k] for k, name in enumerate(names)}
+
+
+def names_in(content: MatContent, count: int) -> tuple[str, ...]:
+    """The only list of so many texts in a file; empty where there is none or more than one."""
+    lists = [texts for texts in content.texts.values() if len(texts) == count]
+    return tuple(lists[0]) if len(lists) == 1 else ()
+
+
+TABLES = {".parquet": load_parquet, ".pq": load_parquet, ".json": load_json}
+"""What gives the columns of a file by name, and its SHA-256, by its ending."""
+
+
+def read_record(path: Path, spec: RecordSpec) -> Record:
+    """A record of either kind, by the file's ending."""
+    if path.suffix.lower() == ".mat":
+        return read_mat_record(path, spec)
+    if (load := TABLES.get(path.suffix.lower())) is not None:
+        vectors, digest = load(path)
+        return record_of_columns(vectors, spec, path, digest)
+    return read_csv_record(path, spec)

@@ -1,0 +1,227 @@
+"""The sampled loops, their figures and curves out of the running tick; emitted only, for the live page.
+
+Each update of the signal within one period of the loop has its own A, b, c; mostly there is one.  Where there
+are more, the loop is periodic, as `actuator_lti.loops.periodic` has it: the fundamental of the closed loop is
+the time-invariant system whose m-th part holds the response seen at the m-th update, and L = T/S is that
+system with its feedback taken away.  Margins read from it are those of the fundamental; its poles are the
+M-th roots of those of the true loop, so the verdict on stability is the truth.
+"""
+
+# mypy: disallow-untyped-defs=False
+from __future__ import annotations
+
+import math
+
+from actuator_lti.batch._eigen import eigenvalues
+from actuator_lti.batch._response import evaluate
+from actuator_lti.batch._run import one_loop
+from actuator_lti.compiled.kernel import kernel
+from nonlinear._kernels import layout
+from nonlinear.export.linear import (
+    LOST,
+    MOST,
+    NO_LOOP,
+    TOO_LONG,
+    block,
+    cut_of,
+    interval,
+    listed,
+    prepared,
+    repeats,
+    runs_closed,
+)
+from nonlinear.export.linear_row import linear_row
+
+MOST_PHASES = 32  # updates of the signal within one period
+MOST_STATES = 160  # of all phases together
+BLOCK = MOST * (MOST + 2)  # numbers of one phase: A, b, c
+
+
+@kernel
+def phases_of(p, q, s, io, stage, blocks, places, column, a, b, c, seen):
+    """A, b, c of each phase into ``blocks``; the states, or what stands in the way.
+
+    Closed, but for the only phase of a loop that is cut: that one stays open.
+    """
+    linear_row(p, q)
+    every, whole = interval(q, stage), repeats(q, stage)
+    if every <= 0:
+        return NO_LOOP
+    if whole > every * MOST_PHASES:
+        return TOO_LONG
+    ready = prepared(q, s, stage)
+    if ready == 0:
+        return TOO_LONG
+    n, angles = listed(q, places)
+    if n > MOST:
+        return TOO_LONG
+    cut = cut_of(q, stage)
+    closing = 1.0 if whole > every and not runs_closed(cut) else 0.0
+    for m in range(int(whole / every)):
+        done = block(q, s, io, cut, m * every, every, places, n, angles, a, b, c, column, seen)
+        if done == 0:
+            return LOST
+        at = m * BLOCK
+        for i in range(n):
+            for j in range(n):
+                blocks[at + i * n + j] = a[i * n + j] - closing * b[i] * c[j]
+            blocks[at + n * n + i], blocks[at + n * n + n + i] = b[i], c[i]
+    return n
+
+
+@kernel
+def next_phase(m, count):
+    """The phase after one."""
+    return m + 1 if m + 1 < count else 0
+
+
+@kernel
+def spread(n, count, blocks, keep):
+    """Mark, phase by phase, the states that the output sees and the input reaches."""
+    total = n * count
+    for m in range(count):
+        at = m * BLOCK + n * n
+        for i in range(n):
+            keep[m * n + i] = 1.0 if blocks[at + n + i] != 0.0 else 0.0
+            keep[total + next_phase(m, count) * n + i] = 1.0 if blocks[at + i] != 0.0 else 0.0
+    changed = 1
+    while changed > 0:
+        changed = 0
+        for m in range(count):
+            after = next_phase(m, count) * n
+            for i in range(n):
+                for j in range(n):
+                    if blocks[m * BLOCK + i * n + j] == 0.0:
+                        continue
+                    if keep[after + i] > 0.0 and keep[m * n + j] <= 0.0:
+                        keep[m * n + j] = 1.0
+                        changed = 1
+                    if keep[total + m * n + j] > 0.0 and keep[total + after + i] <= 0.0:
+                        keep[total + after + i] = 1.0
+                        changed = 1
+    kept = 0
+    for k in range(total):
+        there = keep[k] > 0.0 and keep[total + k] > 0.0
+        keep[k] = float(kept) if there else -1.0  # its place
+        kept += 1 if there else 0
+    return kept
+
+
+@kernel
+def joined(n, count, kept, blocks, keep, a, b, c):
+    """A, b, c of all phases as one system, over the states that are kept."""
+    for k in range(kept * kept):
+        a[k] = 0.0
+    for k in range(kept):
+        b[k], c[k] = 0.0, 0.0
+    for m in range(count):
+        at, after = m * BLOCK, next_phase(m, count) * n
+        for i in range(n):
+            row = int(keep[after + i])
+            if row >= 0:
+                b[row] = blocks[at + n * n + i]
+                for j in range(n):
+                    if keep[m * n + j] >= 0.0:
+                        a[row * kept + int(keep[m * n + j])] = blocks[at + i * n + j]
+            if keep[m * n + i] >= 0.0:
+                c[int(keep[m * n + i])] = blocks[at + n * n + n + i] / count
+
+
+@kernel
+def assembled(p, q, s, io, stage, blocks, places, column, keep, seen, a, b, c):
+    """A, b, c of a loop of the drive with the parameters p; the number of states, or what stands in the way.
+
+    ``q``, ``s`` and ``io`` are rows of a second drive that is run here; ``q[PERIOD]`` and ``interval`` give
+    the period.
+    """
+    n = phases_of(p, q, s, io, stage, blocks, places, column, a, b, c, seen)
+    if n <= 0:
+        return n
+    count = int(repeats(q, stage) / interval(q, stage))
+    kept = spread(n, count, blocks, keep)
+    if kept > MOST_STATES:
+        return TOO_LONG
+    joined(n, count, kept, blocks, keep, a, b, c)
+    if count > 1 or runs_closed(cut_of(q, stage)):
+        for i in range(kept):
+            for j in range(kept):
+                a[i * kept + j] += b[i] * c[j]
+    return kept
+
+
+@kernel
+def lead_of(p):
+    """Feed-forward in front of a position loop as k_ff/(Kv T), NaN where it is more than that."""
+    if p[layout.ELASTIC_DRIVE] > 0.0 and p[layout.RIGID] <= 0.0 and p[layout.OUTPUT_SENSOR] <= 0.0:
+        return math.nan  # the loop feeds back another angle than the output's
+    if p[layout.POSITION_INTEGRAL] != 0.0 or p[layout.DERIVATIVE] != 0.0:
+        return math.nan
+    if p[layout.OWN_STAGE] == layout.OWN_POSITION:
+        return math.nan
+    if p[layout.ACCELERATION_FEEDFORWARD] != 0.0 or p[layout.COMMAND_FILTERS] > 0.0:
+        return math.nan
+    period = p[layout.EVERY_POSITION] * p[layout.PERIOD]
+    return p[layout.FEEDFORWARD] / (p[layout.POSITION_GAIN] * period)
+
+
+@kernel
+def poles_of(n, a, b, c, fed_back, poles, work, lent, lent_too, real, imaginary):
+    """Poles of a loop, open and closed; 0 where they were not found."""
+    for side in range(2):
+        closed = fed_back * side
+        for i in range(n):
+            for j in range(n):
+                work[i * n + j] = a[i * n + j] - closed * b[i] * c[j]
+        result = eigenvalues(n, work, lent, lent_too, real, imaginary)
+        if result == 0:
+            return 0
+        for i in range(n):
+            poles[2 * side * n + i] = real[i]
+            poles[(2 * side + 1) * n + i] = imaginary[i]
+    return 1
+
+
+@kernel
+def figures(
+    n, a, b, c, lead, time_figures, row, poles, points, stack, xs, rs, ss, work, state, exchanged,
+    real, imaginary,
+):  # fmt: skip
+    """Figures of a loop that was assembled (see ``one_loop``); the points scanned, `LOST` without poles."""
+    fed_back = 0.0 if math.isnan(lead) else 1.0
+    result = poles_of(n, a, b, c, fed_back, poles, work, exchanged, state, real, imaginary)
+    if result == 0:
+        return LOST
+    return one_loop(
+        n, a, b, c, poles, lead, time_figures > 0, row, points, stack, xs, rs, ss, work, state, exchanged
+    )
+
+
+@kernel
+def stepped(n, h, b, c, lead, count, y, state, after):
+    """Step response of a closed loop at its samples; h is A - I. Lead NaN: of A, b, c as they are."""
+    fed_back = 0.0 if math.isnan(lead) else 1.0
+    for i in range(n):
+        state[i] = 0.0
+    y[0] = 0.0
+    for k in range(1, count):
+        error = 1.0 - fed_back * y[k - 1]
+        if k == 1 and lead > 0.0:
+            error += lead
+        for i in range(n):
+            value = state[i] + b[i] * error
+            for j in range(n):
+                value += h[i * n + j] * state[j]
+            after[i] = value
+        total = 0.0
+        for i in range(n):
+            state[i] = after[i]
+            total += c[i] * after[i]
+        y[k] = total
+
+
+@kernel
+def responded(n, h, b, c, count, xs, rs, work, state, exchanged):
+    """Response of a loop at angles per sample, as pairs."""
+    for k in range(count):
+        rr, ri, _slope_r, _slope_i = evaluate(n, h, b, c, xs[k], work, state, exchanged)
+        rs[2 * k], rs[2 * k + 1] = rr, ri

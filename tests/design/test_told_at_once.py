@@ -1,0 +1,142 @@
+"""Mistakes of all kinds are told in one run: what cannot be read hides no relation that does not need it."""
+
+import copy
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from actuator_lti.design import design_tree, load_design, read_design_text
+from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.loader import design_from_tree, design_text
+from actuator_lti.design.sections import template_of
+from actuator_lti.design.writing import _override
+from actuator_lti.errors import InputError, Mistakes
+
+AMBER = load_design("ilr33-amber")
+RATIO = {"gear.planetary.ratio", "gear.worm.ratio"}
+TOP_SPEED = {"limits.speed", "limits.voltage", "motor.back_emf_constant"}
+FILTER = "control.velocity.filter"
+LAW = {"inputs": ["error"], "D": [60.0], "period": "1 ms"}
+
+# what is written, what is then refused, and all keys that decide it (docs/model.md)
+RELATIONS: list[tuple[dict[str, Any], str, set[str]]] = [
+    ({"control.velocity.every": 2, "control.position.every": 3}, "control.position.every",
+     {"control.velocity.every", "control.position.every"}),
+    ({"control.computing_delay": "20 ms"}, "control.computing_delay",
+     {"control.computing_delay", "control.period"}),
+    ({"limits.continuous_current": "14 A"}, "limits.continuous_current",
+     {"limits.continuous_current", "limits.peak_current"}),
+    ({"limits.peak_time": "1 s"}, "limits.peak_time",
+     {"limits.peak_time", "limits.continuous_current", "limits.peak_current"}),
+    ({"limits.speed": "30000 rpm"}, "limits.speed", TOP_SPEED),
+    ({"load.gear_error": "1 N*m", "load.gear_error_periods": 1e6}, "load.gear_error_periods",
+     {"load.gear_error", "load.gear_error_periods", "control.period", *TOP_SPEED, *RATIO}),
+    ({"command.rate": "900 deg/s"}, "command.rate", {"command.rate", "limits.speed", *RATIO}),
+    ({"command.jerk": "1 rad/s^3"}, "command.jerk", {"command.jerk"}),
+    ({"supply.brake_voltage": "5 V"}, "supply.brake_voltage", {"supply.brake_voltage", "limits.voltage"}),
+    ({"supply.regenerative": False}, "supply.regenerative", {"supply.regenerative"}),
+    ({"encoder.speed": "tracking", "encoder.bandwidth": "9 kHz"}, "encoder.bandwidth",
+     {"encoder.speed", "encoder.bandwidth", "control.velocity.every", "control.period"}),
+    ({FILTER: [{"kind": "lowpass", "frequency": "10 kHz"}, {"kind": "notch", "frequency": "1 Hz"}]},
+     f"{FILTER}.1.frequency",
+     {f"{FILTER}.1.frequency", f"{FILTER}.1.kind", "control.velocity.every", "control.period"}),
+    ({}, f"{FILTER}.2.width", {f"{FILTER}.2.kind"}),
+    ({"instruments.jitter": "50 us"}, "instruments.jitter", {"instruments.jitter", "control.period"}),
+    ({"coupling.stiffness": "100 N*m/rad", "friction.load_coefficient": 1e-9}, "friction.load_coefficient",
+     {"friction.load_coefficient", "load.path", *RATIO}),
+    ({"coupling.torque_1": "1 N*m"}, "coupling.torque_1", {"coupling.torque_1"}),
+    ({"control.position.law": LAW}, "control.position.law.period",
+     {"control.position.law.period", "control.position.every", "control.period"}),
+]  # fmt: skip
+
+
+def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any, str]]:
+    """Each key of a tree that is a number with a unit or a word of a few: path, its table, its key there."""
+    for key, value in tree.items():
+        here = f"{path}.{key}".lstrip(".")
+        if isinstance(value, list) and all(isinstance(item, dict) for item in value):
+            for number, item in enumerate(value, 1):
+                yield from _leaves(item, f"{here}.{item.get('name', number)}")
+        elif (field := FIELDS.get(template_of(here))) is not None:
+            if field.kind in ("quantity", "integer", "choice", "flag") and here != "design.axis":
+                yield here, tree, key
+        elif isinstance(value, dict):
+            yield from _leaves(value, here)
+
+
+def _told(tree: Any) -> set[str]:
+    with pytest.raises(InputError) as caught:
+        design_from_tree(tree, "my.toml")
+    errors = caught.value.mistakes if isinstance(caught.value, Mistakes) else (caught.value,)
+    return {error.message.partition(" = ")[0].partition(":")[0] for error in errors}
+
+
+@pytest.fixture(scope="module")
+def contradicted() -> Any:
+    tree = design_tree(AMBER)
+    for written, *_ in RELATIONS:
+        for path, value in written.items():
+            _override(tree, path, value, AMBER)
+    del tree["control"]["position"]["gain"]
+    assert _told(tree) == {path for _, path, _ in RELATIONS}
+    return tree
+
+
+@pytest.mark.parametrize("manner", ["unreadable", "misspelled"])
+def test_what_is_not_read_hides_what_needs_it_and_nothing_else(contradicted: Any, manner: str) -> None:
+    for path, *_ in _leaves(contradicted):
+        tree = copy.deepcopy(contradicted)
+        _, table, key = next(leaf for leaf in _leaves(tree) if leaf[0] == path)
+        wrong = key if manner == "unreadable" else f"{key[0]}{key}"
+        table[wrong] = table.pop(key) if manner == "misspelled" else [{}]
+        others = {relation for _, relation, needs in RELATIONS if path not in needs}
+        assert _told(tree) == {path.removesuffix(key) + wrong} | others, path
+
+
+def test_three_unreadable_values_and_three_contradictions_are_told_in_one_run() -> None:
+    text = design_text("ilr33-amber")
+    mistakes = {
+        "motor.inductance": ('value = "6 uH"', 'value = "6 ohm"'),
+        "gear.worm.ratio": ("value = 36", "value = -36"),
+        "control.velocity.gain": ('"0.12 A*s/rad"', '"0.12 A"'),
+        "motor.back_emf_constant": ('"5.9 mV*s/rad"', '"7 mV*s/rad"'),
+        "limits.continuous_current": ('value = "4 A", source', 'value = "14 A", source'),
+        "control.computing_delay": ('delay = { value = "100 us"', 'delay = { value = "20 ms"'),
+    }
+    for old, new in mistakes.values():
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    lines = text.split("\n")
+    told = _told_lines(text)
+    assert {line.split(" = ")[0] for line in told} == {
+        f"my.toml: line {next(k for k, line in enumerate(lines, 1) if new in line)}: {path}"
+        for path, (_, new) in mistakes.items()
+    }
+    assert told == sorted(told, key=lambda line: int(line.split(":")[1].split()[1]))
+
+
+def _told_lines(text: str) -> list[str]:
+    with pytest.raises(InputError) as caught:
+        read_design_text(text, "my.toml")
+    return str(caught.value).split("\n")
+
+
+GEAR = "[[gear]]\nratio = 2\nefficiency = 0.8\n\n[limits]"
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "only"),
+    [
+        ("emps", "[limits]", GEAR, "gear[1].name: missing"),
+        ("ilr33-amber", "[limits]", "[temperature]\nmagnet = '1000 degC'\n[limits]", "temperature.magnet"),
+        ("emps", 'axis = "linear"', 'axis = "lineare"', "design.axis"),
+        ("ilr33-amber", "[control.current]", "[control.curent]", "control.curent"),
+        ("ballscrew", "torque_constant", "torque_const", "motor.torque_const"),
+    ],
+)
+def test_one_mistake_is_told_as_one(name: str, old: str, new: str, only: str) -> None:
+    text = design_text(name)
+    assert old in text
+    lines = _told_lines(text.replace(old, new, 1))
+    assert [only in line for line in lines] == [True], lines
