@@ -16,9 +16,13 @@ const nextPiece = () => {
   if (!pieces.length) { root.dataset.behind = "done"; return; }
   waits = setTimeout(nextPiece, 0);
 };
-export const fillBehind = () => {
+export const emptyBehind = () => { // something moved: what was listed for the values before is not started
   clearTimeout(waits);
+  pieces = [];
   root.dataset.behind = "waits";
+};
+export const fillBehind = () => {
+  emptyBehind();
   pieces = [...(desk.late ? [runLate] : []), ...timed(desk.now), ...[...new Set([desk.before, desk.now])].flatMap(periodic), table, sideBySide, ...mapPieces(desk.now)];
   waits = setTimeout(nextPiece, QUIET);
 };

@@ -1,5 +1,5 @@
 // The sliders: keys of the design -> row of the simulator -> loops, margins, curves and a run, all in the module.
-import { fillBehind, watchMap } from "./behind.js";
+import { emptyBehind, fillBehind, watchMap } from "./behind.js";
 import { border, borderStart, drawBorder } from "./border.js";
 import { beside, designed, draw, frame, kept } from "./curves.js";
 import { LOOP_NAMES, chart, data, desk, find, root } from "./desk.js";
@@ -47,6 +47,7 @@ const update = () => {
   const began = performance.now();
   desk.refused = "";
   desk.late = null;
+  emptyBehind();
   drawPins();
   const why = refusalOf(past.values), apart = why && `Refused, nothing follows: ${why}.`, found = apart ? null : compute(past.values);
   if (found && data.loops.every((name) => found.loops[name].n !== 0)) { desk.now = found; lastGood = past.values; } else {
@@ -61,7 +62,6 @@ const update = () => {
   drawLoop(desk.shown);
   drawBorder("as changed", borderOf(desk.now.row, border.grid));
   root.dataset.ms = (performance.now() - began).toFixed(1);
-  root.dataset.behind = "waits";
   clearTimeout(followUp);
   followUp = setTimeout(answered, 0);
 };
