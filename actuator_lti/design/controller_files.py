@@ -34,7 +34,8 @@ Stage = Literal["velocity", "-velocity", "current", "-current"]
 Value = float | Callable[..., float]
 A_dc, V_dc, TURN, RPM = sqrt(3.0) / 2.0, sqrt(3.0), 2.0 * pi, 2.0 * pi / 60.0
 _DCF = re.compile(r"^\s*\[([0-9A-F]{4})(?:sub([0-9A-F]{1,2}))?\]|^\s*ParameterValue\s*=\s*(\S+)", re.I | re.M)
-_ASSIGNED = re.compile(r"^\s*\w+\.([\w.]+)\s*=\s*([^;\n]+);", re.M)
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
+_ASSIGNED = re.compile(r"(?:^|(?<=;))\s*\w+\.([\w.]+)\s*=\s*([^;\n]+);", re.M)
 
 
 class Setting:
@@ -167,7 +168,8 @@ FORMATS = (
     ),
     Format(
         "SimpleFOC settings", re.compile(r"\.(PID_velocity|P_angle|PID_current_q)\."),
-        lambda text, where: {name: value.strip().rstrip("fF") for name, value in _ASSIGNED.findall(text)},
+        lambda text, where: {name: value.strip().rstrip("fF")
+                             for name, value in _ASSIGNED.findall(_COMMENT.sub("", text))},
         (
             Setting("control.position.gain", "1/s", 1.0, "P_angle.P"),
             Setting("control.velocity.gain", "A*s/rad", A_dc, "PID_velocity.P", when="current"),
@@ -213,7 +215,7 @@ def import_controller_file(path: Path, base: Design) -> Imported | None:
     left = [name for name in given if name not in (*used, *found.also)]
     words = f"not understood, of {len(given)} settings: {', '.join(left) or 'none'}"
     design = with_overrides(base, {**fixed, **overrides})
-    changed = tuple(key for key in (*fixed, *overrides) if key in design.parameters)
+    changed = tuple(key for key in {**fixed, **overrides} if key in design.parameters)
     return Imported(design=design, changed=changed, kept=(), notes=(f"read as {found.words}", *notes, words))
 
 

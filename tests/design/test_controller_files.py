@@ -33,9 +33,9 @@ VESC = """<?xml version="1.0"?><MCConfiguration><foc_current_kp>0.0138</foc_curr
 <foc_f_zv>25000</foc_f_zv></MCConfiguration>"""
 SIMPLEFOC = """
   motor.torque_controller = TorqueControlType::foc_current;
-  // motor.PID_velocity.P = 9;
-  motor.PID_velocity.P = 0.5f;
-  motor.PID_velocity.I = 10;
+  motor.PID_velocity.P = 0.5f; motor.PID_velocity.I = 10; // motor.PID_velocity.P = 9; motor.P_angle.P = 1;
+  /* motor.PID_velocity.I = 9;
+  motor.P_angle.P = 7; */
   motor.LPF_velocity.Tf = 0.005f;
   motor.P_angle.P = 20;
   motor.PID_current_q.P = 3;
