@@ -165,27 +165,22 @@ def write_pages(app: Any) -> None:
             path.write_text(text, encoding="utf-8")
 
 
-def write_pictures(app: Any) -> None:
-    """Write the landing page's pictures: the position loop with its margins, and the limiter map."""
+def write_picture(app: Any) -> None:
+    """Draw the landing page's map of the limiters."""
     import matplotlib as mpl
 
     mpl.use("Agg")
     from actuator_lti import assemble_loops, load_design
     from analyses.large_signal.map import amplitude_map
 
-    folder, design = Path(app.srcdir) / "generated", load_design("ilr33-amber")
-    loops = assemble_loops(design)
-    drawn = {
-        "bode": loops.position.plot_bode(),
-        "map": amplitude_map(design, loops, counts=(14, 24)).plot_map(),
-    }
-    for name, axes in drawn.items():
-        first = axes[0] if hasattr(axes, "__len__") else axes
-        first.figure.savefig(folder / f"{name}.svg", bbox_inches="tight", metadata={"Date": None})
+    design = load_design("ilr33-amber")
+    axes = amplitude_map(design, assemble_loops(design), counts=(14, 24)).plot_map()
+    path = Path(app.srcdir) / "generated" / "map.svg"
+    axes.figure.savefig(path, bbox_inches="tight", metadata={"Date": None})
 
 
 def setup(app: Any) -> dict[str, Any]:
     """Tell Sphinx to write the pages before it looks for pages."""
     app.connect("builder-inited", write_pages)
-    app.connect("builder-inited", write_pictures)
+    app.connect("builder-inited", write_picture)
     return {"parallel_read_safe": True}
