@@ -59,7 +59,8 @@ def _cycle_verdict(
     cycles, swing = point.cycles, noticed(design, point.cycles.settlings)
     predicted = _predicted_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
-        result = f"at rest after steps of {len(cycles.settlings)} sizes"
+        sizes = len(cycles.settlings)
+        result = f"at rest after steps of {sizes} sizes" if sizes > 1 else "at rest after a step of one size"
     else:
         result = told(design, swing, fine, small)
     agree = "as predicted" if cycles.as_predicted else "not as predicted"

@@ -16,7 +16,7 @@ from analyses.friction_effects.breakaway import threshold
 from analyses.friction_effects.cycles import limit_cycles
 from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
 from analyses.linear.static_threshold import static_threshold
-from analyses.motion.settling import settle
+from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
 from nonlinear.bench.on_the_bench import quiet
 from nonlinear.settling.rest import first_motion_s
@@ -330,3 +330,16 @@ def test_a_step_that_kicks_does_not_wait_for_the_integral(amber: Design, kick: t
     words = json.dumps(section(result), default=str)
     assert "at once by its own kick" in words
     assert "Tn (A0/A" not in words
+
+
+def test_friction_alone_is_asked_at_every_size_where_counts_hunt() -> None:
+    """The joint hunts by its counts after a full step; without them that one rests, a small one does not."""
+    design = load_design("joint")
+    known = settlings_of(design, loads_Nm=(0.0,))
+    assert [one.rest.verdict for one in known] == ["limit cycle"]
+    found = limit_cycles(design, 0.0, (), settlings=known)
+    sizes = sorted({SMALL, *design.validation.amplitude_fractions})
+    full = design.validation.full_deflection_rad
+    assert [one.amplitude_rad for one in found.settlings] == [full * x for x in sizes]
+    assert found.settlings[-1].rest.comes_to_rest
+    assert found.hunting == found.settlings[0]
