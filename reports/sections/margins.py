@@ -91,7 +91,7 @@ def section(result: Margins) -> list[doc.Section]:
     made = _loops(known, result.operating_points, f"{FORMS[asked.form].capitalize()}; {_where(result)}. ")
     made["blocks"] += [doc.text(note) for note in _notes(result, known)]
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
-    said = f"{_stability(known)}. {judged['result']}{_below_custom(result)}"
+    said = f"{_stability(known)}. {judged['result']}{_judged_on(result)}{_below_custom(result)}"
     return [{**made, "result": said}, judged]
 
 
@@ -109,6 +109,13 @@ def brief(result: Margins) -> Brief:
     told = [] if result.measured is None else [measured.words(result.measured)]
     notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
     return Brief(first["result"], [SideBySide(head, tables), *crossings, *judged["blocks"]], notes)
+
+
+def _judged_on(result: Margins) -> str:
+    """On which loops the requirements are judged, where others are shown."""
+    asked = result.asked
+    alike = (asked.form, asked.operating_point) == ("sampled", "sliding")
+    return "" if alike or not result.requirements else " Judged on the sampled loops with sliding friction."
 
 
 def _below_custom(result: Margins) -> str:

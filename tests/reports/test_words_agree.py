@@ -11,6 +11,7 @@ from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import operating_points
 from analyses.specification.weakest import spread
 from reports import document as doc
+from reports.cli.main import main
 from reports.sections.answer import believed
 from reports.sections.margins import DOWNWARDS, margin_table, result, spread_table
 
@@ -35,6 +36,17 @@ def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
     assert table["note"].endswith(DOWNWARDS)
     assert quoted["note"].endswith(DOWNWARDS)
     assert DOWNWARDS not in margin_table(points[0].figures)["note"]
+
+
+@pytest.mark.parametrize(("point", "other"), [("rest", True), ("sliding", False)])
+def test_requirements_beside_other_loops_say_on_which_they_are_judged(
+    point: str, other: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At rest under 8 N m the loop has 3.6 dB and 5.3 deg; sliding, as it is judged, 27 dB and 75 deg."""
+    slow = ["--set", "control.position.integral_time=0.12 s"]
+    assert main(["margins", "ilr33-amber", *slow, "--operating-point", point, "--load", "8"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert ("12 of 12 requirements met. Judged on the sampled loops with sliding friction." in said) is other
 
 
 def test_a_loop_that_is_known_to_be_unstable_is_said_to_be() -> None:
