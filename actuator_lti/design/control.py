@@ -222,6 +222,10 @@ class VelocityLoop:
         return tuple(item for item in self.filters if item.on == place)
 
 
+FEED_FORWARD = ("feedforward", "acceleration_feedforward", "friction_feedforward")
+"""What a position loop takes of the command itself, past its error."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class PositionLoop:
     """Position P, PI or PID, every ``every`` ticks (model.md section 7).
@@ -257,6 +261,11 @@ class PositionLoop:
         "friction_feedforward", "{drive}", "i_fr",
         "added to the torque command in the direction of the command's motion", example="0.4 A")] = 0.0
     law: Law | None = None
+
+    @property
+    def kicks(self) -> bool:
+        """Whether a step's own change acts at once, by a derivative or a feed-forward."""
+        return any(getattr(self, name) > 0.0 for name in ("derivative_time_s", *FEED_FORWARD))
 
 
 @dataclass(frozen=True, kw_only=True)

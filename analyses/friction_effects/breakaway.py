@@ -35,7 +35,7 @@ class Threshold:
     static : StaticThreshold
         What the gains predict.
     waiting : tuple of Waiting
-        Steps below the threshold, where a controller integrates and none differentiates the step.
+        Steps below the threshold, where a controller integrates and no kick of a step moves it at once.
     simulated_rad : float or None
         Smallest forward step that ever moves the output, where nothing integrates.
     resolution : float
@@ -59,13 +59,7 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
     static = static_threshold(_motor_alone(design), moment)
     if not 0.0 < static.forward_rad < math.inf:
         return None
-    place = design.controller.position_loop
-    if (
-        place.derivative_time_s
-        or place.feedforward
-        or place.acceleration_feedforward
-        or place.friction_feedforward
-    ):
+    if design.controller.position_loop.kicks:
         return Threshold(static, (), None, 0.0)  # a step's own kick moves it at once
     if static.integral_time_s is not None:
         return Threshold(static, _waiting(design, load_Nm, static), None, 0.0)

@@ -14,7 +14,7 @@ from analyses.limit_cycles.friction import cycles_of_friction, dry_Nm
 from analyses.limit_cycles.result import Confirmation, Cycle
 from analyses.limit_cycles.run import confirm
 from analyses.limit_cycles.stick_slip import StickSlipCycle, stick_slip_cycle
-from analyses.motion.settling import Settling, noticed, settle, settlings_of
+from analyses.motion.settling import Settling, noticed, settlings_of
 from analyses.specification.drive_figures import drive_figures
 from nonlinear import Rows
 from nonlinear.bench.on_the_bench import quiet
@@ -91,11 +91,9 @@ def limit_cycles(
         predicted = described_cycles(design, load_Nm)
     checked = tuple(confirm(design, cycle) for cycle in predicted)
     slips = stick_slip_cycle(design, load_Nm, loops)
-    known = [one for one in settlings or () if one.load_Nm == load_Nm]
-    steps = tuple(
-        one if alike or not one.hunting else settle(design, load_Nm, one.amplitude_rad) for one in known
-    )
-    return LimitCycles(design, checked, slips, steps or settlings_of(design, loops, (load_Nm,)))
+    known = tuple(one for one in settlings or () if one.load_Nm == load_Nm)
+    steps = known if known and alike else settlings_of(design, loops, (load_Nm,), known)
+    return LimitCycles(design, checked, slips, steps)
 
 
 def described_cycles(design: Design, load_Nm: float) -> tuple[Cycle, ...]:

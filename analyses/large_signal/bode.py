@@ -29,7 +29,7 @@ class AmplitudeBode:
     load_Nm : float
     frequency_hz : ndarray, shape (f,)
     fractions : tuple of float
-        Of full deflection.
+        Of full deflection; those of the design that the map has.
     amplitude_rad : ndarray, shape (k,)
     gain_db, phase_deg : ndarray, shape (k, f)
         Of the fundamental; -inf and NaN where nothing moves, NaN where it did not settle.
@@ -70,8 +70,8 @@ class AmplitudeBode:
 def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) -> AmplitudeBode:
     """Read the responses at the design's amplitude fractions, and the bandwidths at all, from a map."""
     full = design.validation.full_deflection_rad
-    fractions = tuple(sorted(design.validation.amplitude_fractions))
-    places = [int(np.argmin(np.abs(amplitude_map.amplitude_rad - fraction * full))) for fraction in fractions]
+    asked = sorted(design.validation.amplitude_fractions)
+    fractions, places = _on_the_map(asked, amplitude_map.amplitude_rad / full)
     hz, unsteady = amplitude_map.frequency_hz, amplitude_map.waveform == WAVEFORMS.index("not steady")
     gain = np.where(unsteady, np.nan, amplitude_map.gain_db)
     phase = np.where(unsteady, np.nan, amplitude_map.phase_deg)
@@ -107,6 +107,17 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
         linear_minus90deg_hz=_number(_crossing(fine, fine_deg, -90.0)),
         level_db=level,
     )
+
+
+def _on_the_map(asked: list[float], there: np.ndarray) -> tuple[tuple[float, ...], list[int]]:
+    """Which of the fractions a map has, and where: a coarse one has not all."""
+    nearest = [int(np.argmin(np.abs(there - fraction))) for fraction in asked]
+    kept = [
+        (fraction, k)
+        for fraction, k in zip(asked, nearest, strict=True)
+        if math.isclose(there[k], fraction, rel_tol=1e-9)
+    ]
+    return tuple(fraction for fraction, _ in kept), [k for _, k in kept]
 
 
 def _linear(loops: Loops, hz: np.ndarray) -> np.ndarray:

@@ -73,7 +73,10 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
 
 
 def settlings_of(
-    design: Design, loops: Loops | None = None, loads_Nm: Iterable[float] | None = None
+    design: Design,
+    loops: Loops | None = None,
+    loads_Nm: Iterable[float] | None = None,
+    known: Iterable[Settling] = (),
 ) -> tuple[Settling, ...]:
     """What steps of the drive as it is end in, small to full, without load and at every named one.
 
@@ -87,22 +90,27 @@ def settlings_of(
         Sampled and sliding, of this design, if they are there already.
     loads_Nm : iterable of float, optional
         Other loads.
+    known : iterable of Settling, optional
+        Steps of which those at rest are not asked again.
     """
-    settings = design.validation
+    settings, resting = design.validation, [one for one in known if not one.hunting]
     sizes = {settings.full_deflection_rad * share for share in (SMALL, *settings.amplitude_fractions)}
     found: list[Settling] = []
     for load in dict.fromkeys((0.0, *settings.loads_Nm) if loads_Nm is None else loads_Nm):
         slip = stick_slip_cycle(design, load, loops)
         whole = sizes if slip is None else {*sizes, slip.output_amplitude_rad}
-        asked = _until_known(design, load, sorted(whole, reverse=True))
+        asked = _until_known(design, load, sorted(whole, reverse=True), resting)
         found += reversed(list(asked))
     return tuple(found)
 
 
-def _until_known(design: Design, load_Nm: float, sizes_rad: Iterable[float]) -> Iterator[Settling]:
+def _until_known(
+    design: Design, load_Nm: float, sizes_rad: Iterable[float], resting: Iterable[Settling]
+) -> Iterator[Settling]:
     """Steps in this order, up to the one after which the verdict of the load is known."""
+    known = {one.amplitude_rad: one for one in resting if one.load_Nm == load_Nm}
     for size in sizes_rad:
-        one = settle(design, load_Nm, size)
+        one = known[size] if size in known else settle(design, load_Nm, size)
         yield one
         if accepted(design) is None and verdict_of(design, noticed(design, [one])) is Verdict.NOT_MET:
             return
@@ -188,6 +196,8 @@ def words(rest: Rest, factor: float, unit: str) -> str:
         return "comes to rest"
     if rest.verdict == "diverging":
         return "diverges"
+    if rest.verdict == "still moving" and not (rest.amplitude or rest.motor_amplitude):
+        return f"stands still {rest.after_s:.3g} s later; whether it stays is not known"
     size = f"±{factor * rest.amplitude:.3g} {unit}"
     if rest.motor_amplitude > 1.05 * rest.amplitude:
         size += f" (motor ±{factor * rest.motor_amplitude:.3g} {unit})"

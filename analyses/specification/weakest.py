@@ -99,9 +99,14 @@ def _at_break_point(name: str, point: BreakPoint) -> View:
 
 
 def figures_of(margins: StabilityMargins) -> dict[str, float]:
-    """The margins that custom limits, by name; those that there are."""
+    """The margins that custom limits, by name and size; those that there are."""
+    return {name: abs(value) for name, value in _signed(margins).items()}
+
+
+def _signed(margins: StabilityMargins) -> dict[str, float]:
+    """As the margins are written: downwards, and of a lead, below zero."""
     found = {name: getattr(margins, QUANTITIES[name].reader.partition(".")[2]) for name in CUSTOMARY}
-    return {name: abs(float(value)) for name, value in found.items() if value is not None}
+    return {name: float(value) for name, value in found.items() if value is not None}
 
 
 def _points(view: View, design: Design) -> Iterator[WeakPoint]:
@@ -131,7 +136,10 @@ def limit_of(design: Design, quantity: str, view: View) -> tuple[float, bool]:
 
 @dataclass(frozen=True)
 class Spread:
-    """A margin of a loop over the operating points of a drive: least and most, and where it is least."""
+    """A margin of a loop over the operating points of a drive: least and most in size, and where it is least.
+
+    With its sign, as margins are written: a gain margin downwards is negative.
+    """
 
     least: float
     most: float
@@ -150,10 +158,10 @@ def spread(
     for loop, seen in stable.items():
         if not all(point.figures[loop].judged.stable for point in seen):
             continue
-        rows = [(point.place or "sliding", figures_of(point.figures[loop].judged.margins)) for point in seen]
+        rows = [(point.place or "sliding", _signed(point.figures[loop].judged.margins)) for point in seen]
         for name in names:
             values = [(figures[name], place) for place, figures in rows if name in figures]
             if values:
-                least, most = min(values, key=lambda v: v[0]), max(values, key=lambda v: v[0])
+                least, most = min(values, key=lambda v: abs(v[0])), max(values, key=lambda v: abs(v[0]))
                 made.setdefault(loop, {})[name] = Spread(least[0], most[0], least[1])
     return made

@@ -16,6 +16,7 @@ from math import inf, lcm
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.design.control import FEED_FORWARD
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
@@ -267,7 +268,6 @@ class LoopSetup:
         return ranges[self.point]
 
 
-FEED_FORWARD = ("feedforward", "acceleration_feedforward", "friction_feedforward")
 PATHS = ("command", "load")  # of the whole drive, to its output
 GAINS = {
     "current": ("current_gain", "current_integral", "back_emf_feedforward", "resistance_feedforward"),

@@ -29,7 +29,10 @@ GROUPS = {**LOOPS, "drive": "Drive", "large": "Large signals"}
 COLUMNS = 4  # variants beside the base in one table: what reads on one screen
 _MOST_MOVERS = 3
 _TERMINAL = ("gain_margin", "phase_margin", "modulus_margin", "bandwidth", "overshoot", "settling_time")
-_MARKS = "In brackets the difference from the base. ▲ best and ▽ worst of all designs."
+_MARKS = (
+    "In brackets the difference from the base. ▲ best and ▽ worst of all designs. Margins by their size: one "
+    "downwards counts as one upwards."
+)
 _SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 
 

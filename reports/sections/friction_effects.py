@@ -59,7 +59,8 @@ def _cycle_verdict(
     cycles, swing = point.cycles, noticed(design, point.cycles.settlings)
     predicted = _predicted_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
     if swing is None:
-        result = f"at rest after steps of {len(cycles.settlings)} sizes"
+        sizes = len(cycles.settlings)
+        result = f"at rest after steps of {sizes} sizes" if sizes > 1 else "at rest after a step of one size"
     else:
         result = told(design, swing, fine, small)
     agree = "as predicted" if cycles.as_predicted else "not as predicted"
@@ -118,11 +119,11 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
         doc.of("hysteresis.largest_rad", "largest", f"Largest effect of {_cause(result)}", **size),
     ]
     note = (
-        f"The {result.integrator} controller integrates: a step below the threshold moves the output later"
-        f"{_after(result)}, and motion lost in front of its sensor is recovered{_behind(result)}. The effect "
+        f"The {result.integrator} controller integrates: a step below the threshold moves the output "
+        f"{_when(result)}, and motion lost in front of its sensor is recovered{_behind(result)}. The effect "
         "is largest just after a reversal."
         if result.integrator
-        else "No controller integrates: a step below the threshold never moves the output. Each reversal "
+        else f"No controller integrates: a step below the threshold {_never(result)}. Each reversal "
         f"loses the torque that sliding takes, both ways, over the stiffness{_behind(result)}."
     )
     if not any(point.threshold for point in result.points):
@@ -134,12 +135,19 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
     )
 
 
-def _after(result: FrictionEffects) -> str:
-    """How much later a step below the threshold moves the output."""
+def _when(result: FrictionEffects) -> str:
+    """When a step below the threshold moves the output, where a controller integrates."""
+    if result.design.controller.position_loop.kicks:
+        return "at once by its own kick, or later"
     known = [point.threshold.static for point in result.points if point.threshold is not None]
     alone = all(static.outer_integral_time_s is None for static in known)
-    kicks = result.design.controller.position_loop.derivative_time_s > 0.0
-    return ", after Tn (A0/A − 1)" if alone and not kicks else ""
+    return "later, after Tn (A0/A − 1)" if alone else "later"
+
+
+def _never(result: FrictionEffects) -> str:
+    """What a step below the threshold does where nothing integrates."""
+    kicks = result.design.controller.position_loop.kicks
+    return "moves the output by its own kick or never" if kicks else "never moves the output"
 
 
 def _cause(result: FrictionEffects) -> str:

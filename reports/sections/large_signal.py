@@ -40,7 +40,7 @@ def section(result: LargeSignals) -> doc.Section:
         blocks.append(doc.details("The linear limit in numbers", [table]))
     blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
     blocks += [
-        _bode_table(result.bode, scale, unit, _linear(design)),
+        _bode_table(result.bode, scale, unit, design),
         *_sawtooth_blocks(result.sawtooth, design, scale, unit),
     ]
     intro = (
@@ -55,7 +55,12 @@ def section(result: LargeSignals) -> doc.Section:
 
 
 def _linear(design: Design) -> str:
-    """Which linear response the map is beside: friction by load that changes sign with the motion is out."""
+    """Which linear response the map is beside: friction by load that changes sign with the motion is out.
+
+    A map of friction has a slope of its own at every speed.
+    """
+    if design.friction.points:
+        return "linear, on the validation's operating motion"
     by_load = design.friction.load_coefficient > 0.0 and bool(design.coupling or design.load.acting())
     return "linear, without friction by load" if by_load else "linear"
 
@@ -210,7 +215,7 @@ def _bandwidths(panel: style.Panel, result: AmplitudeBode, scale: float, unit: s
     panel.rule_x(full * scale, dash=2)
 
 
-def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str) -> doc.Block:
+def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, design: Design) -> doc.Block:
     columns = [
         doc.column("fraction", "of full deflection", "%", format="sig:3"),
         doc.column("amplitude", "Amplitude", unit, format="sig:3"),
@@ -228,8 +233,11 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: s
         corners = (amplitude_bode.minus3db_hz[k], amplitude_bode.minus90deg_hz[k])
         rows.append((100.0 * fraction, scale * amplitude, *corners, note))
     corners = (amplitude_bode.linear_minus3db_hz, amplitude_bode.linear_minus90deg_hz)
-    rows.append((None, None, *corners, model))
-    return doc.table("Bandwidth against amplitude", columns, rows)
+    rows.append((None, None, *corners, _linear(design)))
+    left_out = sorted({*design.validation.amplitude_fractions} - {*amplitude_bode.fractions})
+    shares = ", ".join(f"{100.0 * fraction:g} %" for fraction in left_out)
+    note = f"Not on the coarser grid of the map: {shares}." if left_out else ""
+    return doc.table("Bandwidth against amplitude", columns, rows, note)
 
 
 def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[doc.Block]:

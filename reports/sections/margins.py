@@ -30,6 +30,10 @@ MEANING = {
     "withheld": "the numbers of the loop do not determine the answer",
 }
 
+DOWNWARDS = (
+    " A negative gain margin is downwards: the gain may fall by so much. Limits and compare take its size."
+)
+
 
 def _figure(quantity: str, key: str, format: str) -> doc.Shown:
     of = QUANTITIES[quantity]
@@ -87,7 +91,7 @@ def section(result: Margins) -> list[doc.Section]:
     made = _loops(known, result.operating_points, f"{FORMS[asked.form].capitalize()}; {_where(result)}. ")
     made["blocks"] += [doc.text(note) for note in _notes(result, known)]
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
-    said = f"{_stability(known)}. {judged['result']}{_below_custom(result)}"
+    said = f"{_stability(known)}. {judged['result']}{_judged_on(result)}{_below_custom(result)}"
     return [{**made, "result": said}, judged]
 
 
@@ -105,6 +109,13 @@ def brief(result: Margins) -> Brief:
     told = [] if result.measured is None else [measured.words(result.measured)]
     notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
     return Brief(first["result"], [SideBySide(head, tables), *crossings, *judged["blocks"]], notes)
+
+
+def _judged_on(result: Margins) -> str:
+    """On which loops the requirements are judged, where others are shown."""
+    asked = result.asked
+    alike = (asked.form, asked.operating_point) == ("sampled", "sliding")
+    return "" if alike or not result.requirements else " Judged on the sampled loops with sliding friction."
 
 
 def _below_custom(result: Margins) -> str:
@@ -178,18 +189,22 @@ def _loops(
 
 def result(figures: Mapping[str, LoopFigures]) -> str:
     """Say whether all loops are stable, and which has the smallest margins."""
-    unstable = [LOOPS[name].lower() for name, one in figures.items() if one.sound is not True]
-    if unstable:
-        return f"Not known to be stable: {', '.join(unstable)}."
+    doubts = [
+        f"{words}: {', '.join(names)}."
+        for words, sound in (("Not stable", False), ("Not known to be stable", None))
+        if (names := [LOOPS[name].lower() for name, one in figures.items() if one.sound is sound])
+    ]
+    if doubts:
+        return " ".join(doubts)
     rows = {loop_words(name, one.rotor).lower(): margin_row(one.judged) for name, one in figures.items()}
     words = []
     for margins, what, unit in (
         ({name: row["gain_margin_db"] for name, row in rows.items()}, "gain margin", "dB"),
         ({name: row["phase_margin_deg"] for name, row in rows.items()}, "phase margin", "deg"),
     ):
-        known = {name: abs(margin) for name, margin in margins.items() if margin is not None}
+        known = {name: margin for name, margin in margins.items() if margin is not None}
         if known:
-            name = min(known, key=lambda n: known[n])
+            name = min(known, key=lambda n: abs(known[n]))
             words.append(f"the smallest {what} is {known[name]:.1f} {unit} ({name})")
     count = {1: "The loop is", 2: "Both loops are"}.get(len(rows), f"All {len(rows)} loops are")
     count = f"{count} stable, {evidence_words(figures)}"
@@ -231,6 +246,7 @@ def margin_table(named: Mapping[str, LoopFigures]) -> doc.Block:
         "is not stable and has no margins. Disk margin: α, balanced (S + T)."
     )
     rows = [{"loop": name, **margin_row(loop_figures)} for name, loop_figures in named.items()]
+    note += DOWNWARDS if any((row["gain_margin_db"] or 0.0) < 0.0 for row in rows) else ""
     return doc.table("Stability margins", MARGIN_COLUMNS, rows, note)
 
 
@@ -266,13 +282,15 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
         doubts = [p.place or "sliding" for p in seen if name in p.figures and not p.figures[name].sound]
         row |= {"gain": f"not stable {'; '.join(doubts)}"} if doubts else {}
         rows += [row] if len(row) > 1 else []
+    gains = [own["gain_margin"] for own in spread(seen).values() if "gain_margin" in own]
     note = f"Operating points: {places}."
+    note += DOWNWARDS if any(min(one.least, one.most) < 0.0 for one in gains) else ""
     return doc.table("Margins over the operating points", SPREAD_COLUMNS, rows, note)
 
 
 def range_words(range_: Spread) -> str:
     """Say between which values a figure lies over the operating points; empty where they agree."""
-    least, most = ("∞" if math.isinf(end) else short(end, 3) for end in (range_.least, range_.most))
+    least, most = ("∞" if math.isinf(end) else to_minus(short(end, 3)) for end in (range_.least, range_.most))
     return least if least == most else f"{least} ({range_.where}) to {most}"
 
 

@@ -61,6 +61,18 @@ def test_limits_take_bandwidth_away_as_the_amplitude_grows() -> None:
     assert result.below_from_start[asked].tolist() == (~known).tolist()
 
 
+def test_a_coarse_map_shows_no_amplitude_as_another() -> None:
+    """Four amplitudes for five fractions: what is shown as 50 % is 50 %; full deflection is among them."""
+    design = load_design("emps")
+    loops = assemble_loops(design)
+    coarse = amplitude_bode(design, loops, amplitude_map(design, loops, counts=(4, 4)))
+    full = design.validation.full_deflection_rad
+    np.testing.assert_allclose(coarse.amplitude_rad, np.array(coarse.fractions) * full, rtol=1e-9)
+    assert len(coarse.fractions) == 4
+    assert coarse.fractions[-1] == 1.0
+    assert coarse.gain_db.shape == (4, 4)
+
+
 HZ = np.array([1.0, 2.0, 4.0, 8.0])
 
 

@@ -1,5 +1,6 @@
 """Dry friction at small signals: threshold, lost motion, standing error, limit cycles."""
 
+import json
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,8 +16,10 @@ from analyses.friction_effects.breakaway import threshold
 from analyses.friction_effects.cycles import limit_cycles
 from analyses.friction_effects.hysteresis import Hysteresis, hysteresis
 from analyses.linear.static_threshold import static_threshold
-from analyses.motion.settling import settle
+from analyses.motion.settling import SMALL, settle, settlings_of
+from nonlinear import Rows
 from nonlinear.bench.on_the_bench import quiet
+from nonlinear.settling.rest import first_motion_s
 from reports.sections.friction_effects import section
 
 FIN = 1.0 / 60.0 + 1.7e-3  # motor torque per torque on the fin: what passes, and 10 % of it lost
@@ -302,3 +305,41 @@ def test_two_integrals_one_behind_the_other(tmp_path) -> None:
             t += dt
         assert wait.predicted_s == pytest.approx(t, rel=1e-3, abs=1e-4)
         assert wait.simulated_s == pytest.approx(t, rel=1e-2, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    "kick",
+    [
+        ("feedforward", 1.0),
+        ("acceleration_feedforward", 1.0),
+        ("derivative_time", 1e-3),
+        ("friction_feedforward", 2.0),
+    ],
+    ids=lambda kick: kick[0],
+)
+def test_a_step_that_kicks_does_not_wait_for_the_integral(amber: Design, kick: tuple[str, float]) -> None:
+    """Of half the threshold the integral alone takes Tn = 15 ms; each kick takes less than 1 ms."""
+    design = quiet(with_values(amber, {f"control.position.{kick[0]}": kick[1]}))
+    assert design.controller.position_loop.kicks
+    half = 0.5 * 2.25e-3 / (5.9e-3 * 0.12 * 120.0 * 2376.0)
+    rows = Rows.of(design)
+    rows.step("command", half)
+    assert first_motion_s(rows.running()) < 1e-3
+    result = friction_effects(replace(design, validation=replace(design.validation, loads_Nm=(0.0,))))
+    assert result.points[0].threshold.waiting == ()
+    words = json.dumps(section(result), default=str)
+    assert "at once by its own kick" in words
+    assert "Tn (A0/A" not in words
+
+
+def test_friction_alone_is_asked_at_every_size_where_counts_hunt() -> None:
+    """The joint hunts by its counts after a full step; without them that one rests, a small one does not."""
+    design = load_design("joint")
+    known = settlings_of(design, loads_Nm=(0.0,))
+    assert [one.rest.verdict for one in known] == ["limit cycle"]
+    found = limit_cycles(design, 0.0, (), settlings=known)
+    sizes = sorted({SMALL, *design.validation.amplitude_fractions})
+    full = design.validation.full_deflection_rad
+    assert [one.amplitude_rad for one in found.settlings] == [full * x for x in sizes]
+    assert found.settlings[-1].rest.comes_to_rest
+    assert found.hunting == found.settlings[0]

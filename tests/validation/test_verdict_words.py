@@ -15,6 +15,7 @@ from analyses.large_signal.at_rest import RestSweep
 from analyses.limit_cycles import LimitCycles
 from analyses.motion.settling import SMALL, Settling, noticed, settlings_of
 from analyses.motion.settling import verdict_of as verdict_of_swing
+from analyses.motion.settling import words as end_words
 from analyses.specification import asked_figures
 from analyses.specification.requirements import evaluate_requirements
 from analyses.validation import CHECKS, Validation, validate
@@ -148,6 +149,19 @@ def test_a_swing_that_nothing_shows_fails_nothing(part: float, hunts: bool) -> N
     swing = hunting(size, size, 3.0)
     found = Validation(design=EMPS, rows=(), figures={}, settlings=(swing,)).hunting
     assert (found is not None) is hunts
+
+
+@pytest.mark.parametrize(
+    ("swing_rad", "said"),
+    [
+        (0.0, "stands still 40 s later; whether it stays is not known"),
+        (1e-5, "still moving 40 s later, by ±0.000573 deg"),
+    ],
+)
+def test_what_does_not_move_is_not_said_to_be_moving(swing_rad: float, said: str) -> None:
+    """1e-5 rad are 5.73e-4 deg; nothing is no motion."""
+    rest = replace(hunting(0.1, swing_rad, 3.0).rest, verdict="still moving", frequency_hz=None, after_s=40.0)
+    assert end_words(rest, degrees(1.0), "deg") == said
 
 
 def test_nothing_judged_is_not_proven() -> None:

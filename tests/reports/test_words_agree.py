@@ -1,0 +1,65 @@
+"""Two places of a report that speak of one thing say the same."""
+
+from __future__ import annotations
+
+import pytest
+
+from actuator_lti import assemble_loops, load_design
+from actuator_lti.design import with_values
+from actuator_lti.margins import stability_margins
+from analyses.linear.loop_figures import all_loop_figures
+from analyses.linear.loop_survey import operating_points
+from analyses.specification.weakest import spread
+from reports import document as doc
+from reports.cli.main import main
+from reports.sections.answer import believed
+from reports.sections.margins import DOWNWARDS, margin_table, result, spread_table
+
+
+def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
+    """A slow position integral: held by the load's friction, the gain may fall by 3.6 dB, not rise."""
+    design = with_values(load_design("ilr33-amber"), {"control.position.integral_time": 0.12})
+    loop = assemble_loops(design, operating_point="rest", load_Nm=8.0).position
+    downwards = stability_margins(loop.open_loop).gain_margin_db
+    assert downwards == pytest.approx(-3.64, abs=0.005)
+    points = operating_points(design, [], described=False, certify=False)
+    found = spread(points)["position"]["gain_margin"]
+    assert (found.least, found.where) == (pytest.approx(downwards), "at rest, load 8 N m")
+    table = spread_table(points, points[0].figures)
+    row = next(row for row in table["rows"] if row["loop"] == "position")
+    assert row["gain"] == "−3.64 (at rest, load 8 N m) to 43.3"
+    held = next(one for one in points if one.place == "at rest, load 8 N m").figures
+    quoted = margin_table(held)
+    own = next(row for row in quoted["rows"] if row["loop"] == "position")
+    assert own["gain_margin_db"] == pytest.approx(downwards)
+    assert "the smallest gain margin is −3.6 dB (position loop)" in result(held)
+    assert table["note"].endswith(DOWNWARDS)
+    assert quoted["note"].endswith(DOWNWARDS)
+    assert DOWNWARDS not in margin_table(points[0].figures)["note"]
+
+
+@pytest.mark.parametrize(("point", "other"), [("rest", True), ("sliding", False)])
+def test_requirements_beside_other_loops_say_on_which_they_are_judged(
+    point: str, other: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At rest under 8 N m the loop has 3.6 dB and 5.3 deg; sliding, as it is judged, 27 dB and 75 deg."""
+    slow = ["--set", "control.position.integral_time=0.12 s"]
+    assert main(["margins", "ilr33-amber", *slow, "--operating-point", point, "--load", "8"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert ("12 of 12 requirements met. Judged on the sampled loops with sliding friction." in said) is other
+
+
+def test_a_loop_that_is_known_to_be_unstable_is_said_to_be() -> None:
+    design = load_design("ilr33-amber")
+    gain = 30.0 * design.controller.velocity.gain  # the upper gain margin is 23.1 dB, a factor of 14.3
+    figures = all_loop_figures(assemble_loops(with_values(design, {"control.velocity.gain": gain})))
+    assert result(figures).startswith("Not stable: velocity loop")
+
+
+def test_the_first_screen_counts_what_is_not_met() -> None:
+    items = [
+        doc.verdict(str(k), "check", value=None, limit=None, unit="", passed=passed)
+        for k, passed in enumerate((True, False, None))
+    ]
+    part = doc.section("any", "Any", [doc.verdicts(items, what="checks")])
+    assert believed([part]) == "1 of 3 checks by simulation met; 1 not met; 1 not proven."
