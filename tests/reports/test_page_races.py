@@ -211,6 +211,31 @@ def test_a_handle_that_vanishes_is_let_go(page: Page) -> None:
     page.wait_for_function("() => !document.querySelector('[data-do=\"undo\"]').disabled")
 
 
+PLACE = """() => { const node = document.querySelector('[data-chart="bode"] path.grab');
+    for (let part = 0.3; part < 0.9; part += 0.05) {
+      const at = node.getPointAtLength(part * node.getTotalLength()).matrixTransform(node.getScreenCTM());
+      if (document.elementFromPoint(at.x, at.y) === node) return [Math.round(at.x), Math.round(at.y)];
+    } }"""
+PAGE_UP = """find('[data-chart="bode"] .plots').dispatchEvent(
+    new KeyboardEvent("keydown", { key: "PageUp", bubbles: true }));"""
+
+
+@pytest.mark.parametrize("between", ["", PAGE_UP])
+def test_a_curve_that_is_held_moves_from_where_it_was_taken(page: Page, between: str) -> None:
+    """Whatever else moved it meanwhile: there and back is where it was."""
+    page.locator('[data-chart="bode"]').scroll_into_view_if_needed()
+    x, y = page.evaluate(PLACE)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - 6)
+    at_once(page, between)
+    page.mouse.move(x, y - 9)
+    settled(page, lambda: page.mouse.move(x, y))
+    page.mouse.up()
+    page.wait_for_selector("#hands-on[data-behind=done]")
+    assert page.input_value(f'.row[data-path="{GAIN}"] .field') == "120.0"
+
+
 def test_rows_of_one_drive_are_not_named_by_another(opens) -> None:
     """Break points of the drive as written follow later than the values of the link, which update at once."""
     link = "#hands-on?control.velocity.every=1&control.position.every=1"
