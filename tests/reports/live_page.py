@@ -40,11 +40,19 @@ def written(design: Design, folder: Path) -> Path:
 
 
 def opened(
-    browser: Browser, path: Path, trouble: list[str], fragment: str = "", *, live: bool = True, **options: Any
+    browser: Browser,
+    path: Path,
+    trouble: list[str],
+    fragment: str = "",
+    *,
+    live: bool = True,
+    first: str = "",
+    **options: Any,
 ) -> Page:
-    """Open a page from disk, offline; complaints and requests are collected."""
+    """Open a page from disk, offline, behind a script of one's own; complaints and requests are collected."""
     chosen = {"viewport": {"width": 1400, "height": 1000}, **options}
     page = browser.new_context(offline=True, accept_downloads=True, **chosen).new_page()
+    page.add_init_script(first)
     own = path.as_uri()
     page.on("console", lambda message: trouble.append(message.text))
     page.on("pageerror", lambda error: trouble.append(str(error)))

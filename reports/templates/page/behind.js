@@ -1,6 +1,7 @@
 // What takes too long for a moving slider: once nothing has moved for a moment, one piece at a time.
 import { border } from "./border.js";
 import { BEHIND, PLACE, STABLE, chart, colourOf, data, desk, find, outer, root, tell } from "./desk.js";
+import { moves } from "./history.js";
 import { figures, stageOf, view, x } from "./module.js";
 import { state } from "./requirements.js";
 import { cell, linearAt, startUp, toneOf } from "./sines.js";
@@ -16,14 +17,16 @@ const nextPiece = () => {
   if (!pieces.length) { root.dataset.behind = "done"; return; }
   waits = setTimeout(nextPiece, 0);
 };
-export const emptyBehind = () => { // something moved: what was listed for the values before is not started
+export const emptyBehind = () => {
   clearTimeout(waits);
   pieces = [];
   root.dataset.behind = "waits";
 };
 export const fillBehind = () => {
   emptyBehind();
-  pieces = [...(desk.late ? [runLate] : []), ...timed(desk.now), ...[...new Set([desk.before, desk.now])].flatMap(periodic), table, sideBySide, ...mapPieces(desk.now)];
+  if (moves()) return; // listed once the page has followed
+  pieces = [...(desk.late ? [runLate] : []), ...timed(desk.now), ...[...new Set([desk.before, desk.now])].flatMap(periodic), table, sideBySide, () => pieces.push(...mapPieces(desk.now))]; // the map waits as long as a step settles
+  drawMap(desk.now.cells ?? []);
   waits = setTimeout(nextPiece, QUIET);
 };
 const runLate = () => { // taken when it runs: what waits may be listed anew before
@@ -33,9 +36,7 @@ const runLate = () => { // taken when it runs: what waits may be listed anew bef
 };
 const mapPieces = (found) => {
   const loop = found.loops[outer];
-  if (found.cells) { drawMap(found.cells); return []; }
-  drawMap([]);
-  if (!border.map || !inView || !loop.figures || loop.figures[STABLE] !== 1) return [];
+  if (found.cells || !border.map || !inView || !loop.figures || loop.figures[STABLE] !== 1) return [];
   const { hertz, amplitude } = border.map, { row } = found, cells = [];
   const tones = hertz.map((f) => toneOf(f, row[data.places.outer] * row[data.places.period]));
   const settling = loop.figures[PLACE.settling_time], wait = 1.5 * (Number.isFinite(settling) ? settling : 400 * loop.period);
@@ -73,9 +74,10 @@ const timed = (found) => left(found, "loops", ({ waits }) => waits, stageOf, 1);
 const periodic = (found) => left(found, "points", ({ n }) => n === BEHIND, (name) => data.points[name], 0);
 // the map is computed only where somebody may see it
 export const watchMap = () => {
-  new IntersectionObserver(([entry]) => {
-    if (entry.isIntersecting === inView) return;
-    inView = entry.isIntersecting;
-    if (inView && root.dataset.ready) fillBehind();
+  new IntersectionObserver((entries) => { // a busy page is told of several at once: the last is how it is
+    const seen = entries[entries.length - 1].isIntersecting;
+    if (seen === inView) return;
+    inView = seen;
+    if (inView) fillBehind();
   }, { rootMargin: "200px" }).observe(chart("border"));
 };

@@ -19,4 +19,4 @@ export const BEHIND = -9; // a loop that follows in a moment, and one whose stab
 export const DOUBT = -3;
 // as designed, as changed, the loop whose curves are seen, measured data, the limits that acted in the last run (bits)
 /** @type {any} */
-export const desk = { before: null, now: null, shown: outer, record: null, response: null, acted: 0, late: null, refused: "", follow: () => {} };
+export const desk = { before: null, now: null, shown: outer, record: null, response: null, acted: 0, late: null, refused: "", follow: () => {}, leave: () => {} };

@@ -6,27 +6,22 @@ import { digits } from "./words.js";
 
 const find = (path) => keys.findIndex((key) => key.path === path);
 const gainOf = () => find(`control.${desk.shown}.gain`);
-// keys that are a factor of what they were when they were taken hold of
-let held = [];
-const factor = (k, by) => {
+const held = new WeakMap(); // values as they were when something was taken hold of, by the place it was taken at
+const factor = (from, k, by) => {
   if (k < 0) return;
-  const from = (held[k] ??= past.values[k]), { low, high } = keys[k];
-  preview(k, Math.min(Math.max(from * by, low), high));
+  if (!held.has(from)) held.set(from, past.values);
+  const { low, high } = keys[k];
+  preview(k, Math.min(Math.max(held.get(from)[k] * by, low), high));
 };
-const done = () => {
-  held = [];
+const decibels = (from, by) => factor(from, gainOf(), 10 ** (by / 20));
+export const stepGain = (by) => {
+  decibels({}, by);
   commit();
 };
-
-const decibels = (by) => factor(gainOf(), 10 ** (by / 20));
-export const stepGain = (by) => {
-  decibels(by);
-  done();
-};
 export const holdCurves = () => {
-  tell("bode", "hold", { panel: 0, curve: "as changed", words: "drag up or down: gain of the loop", moved: (from, to) => decibels(to.y - from.y), done });
+  tell("bode", "hold", { panel: 0, curve: "as changed", words: "drag up or down: gain of the loop", moved: (from, to) => decibels(from, to.y - from.y), done: commit });
   tell("nyquist", "hold", { panel: 0, curve: "as changed", across: true, words: "drag out or in: gain of the loop",
-    moved: (from, to) => factor(gainOf(), Math.hypot(to.x, to.y) / Math.hypot(from.x, from.y)), done });
+    moved: (from, to) => factor(from, gainOf(), Math.hypot(to.x, to.y) / Math.hypot(from.x, from.y)), done: commit });
 };
 
 // where a curve passes a level, as [hertz, other curve there]
@@ -70,18 +65,18 @@ const handles = (hertz, gain) => {
   const made = [], corner = find(`control.${desk.shown}.integral_time`);
   if (corner >= 0 && past.values[corner] > 0) {
     const f = 1 / (2 * Math.PI * past.values[corner]);
-    made.push({ x: f, y: at(f), name: `corner of ${desk.shown}`, colour: "c3", words: `corner of the PI, ${digits(f, 3)} Hz: drag left or right`, moved: (from, to) => factor(corner, from.x / to.x), done });
+    made.push({ x: f, y: at(f), name: `corner of ${desk.shown}`, colour: "c3", words: `corner of the PI, ${digits(f, 3)} Hz: drag left or right`, moved: (from, to) => factor(from, corner, from.x / to.x), done: commit });
   }
   if (desk.shown !== "velocity") return made;
   keys.forEach((key, k) => {
     const own = /^(control\.velocity\.filter\.[^.]+)\.frequency$/.exec(key.path);
     if (!own) return;
     const f = past.values[k] / (2 * Math.PI), depth = find(`${own[1]}.depth`), width = find(`${own[1]}.width`);
-    made.push({ x: f, y: at(f), name: own[1], colour: "c4", words: `filter, ${digits(f, 3)} Hz: drag left or right; up or down its depth; with shift its width`, done,
+    made.push({ x: f, y: at(f), name: own[1], colour: "c4", words: `filter, ${digits(f, 3)} Hz: drag left or right; up or down its depth; with shift its width`, done: commit,
       moved: (from, to) => {
-        if (to.shift) { factor(width, to.x / from.x); return; }
-        factor(k, to.x / from.x);
-        factor(depth, 10 ** ((to.y - from.y) / 20));
+        if (to.shift) { factor(from, width, to.x / from.x); return; }
+        factor(from, k, to.x / from.x);
+        factor(from, depth, 10 ** ((to.y - from.y) / 20));
       } });
   });
   return made;

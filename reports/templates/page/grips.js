@@ -13,12 +13,15 @@ const listenTo = (panel, node, { moved, done }) => {
     from = null;
     done();
   };
+  // a handle that is drawn no more is let go
+  const lost = () => { if (from && !node.isConnected) release(); };
   const does = {
     pointerdown: (event) => {
       event.preventDefault();
       node.setPointerCapture(event.pointerId);
       back = node.ownerSVGElement.getScreenCTM().inverse();
       from = values(event);
+      document.addEventListener("lostpointercapture", lost, { once: true });
     },
     pointermove: (event) => moved(from, values(event)), pointerup: release, pointercancel: release,
   };

@@ -43,11 +43,15 @@ const answered = () => { // a script of its own: the curve that moves does not w
   fillBehind();
   root.dataset.count = String(+(root.dataset.count || 0) + 1);
 };
+const leave = () => { // something moves: what was for the values before is not started
+  clearTimeout(followUp);
+  emptyBehind();
+};
 const update = () => {
   const began = performance.now();
   desk.refused = "";
   desk.late = null;
-  emptyBehind();
+  leave();
   drawPins();
   const why = refusalOf(past.values), apart = why && `Refused, nothing follows: ${why}.`, found = apart ? null : compute(past.values);
   if (found && data.loops.every((name) => found.loops[name].n !== 0)) { desk.now = found; lastGood = past.values; } else {
@@ -62,7 +66,6 @@ const update = () => {
   drawLoop(desk.shown);
   drawBorder("as changed", borderOf(desk.now.row, border.grid));
   root.dataset.ms = (performance.now() - began).toFixed(1);
-  clearTimeout(followUp);
   followUp = setTimeout(answered, 0);
 };
 const choose = (name) => {
@@ -131,7 +134,7 @@ if (typeof WebAssembly === "object") {
   const bytes = Uint8Array.from(atob(document.getElementById("live-module").textContent.trim()), (letter) => letter.charCodeAt(0));
   WebAssembly.instantiate(bytes, {}).then(({ instance }) => {
     load(instance);
-    desk.follow = update;
+    Object.assign(desk, { follow: update, leave });
     begin();
   });
 }

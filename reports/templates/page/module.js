@@ -31,7 +31,7 @@ export const figures = (stage, timed) => {
   if (n <= 0) return { n };
   if (x.doubtful(stage)) return { n: DOUBT };
   const found = Array.from(view(x.figures_at(stage), STABLE + 1));
-  return { n, figures: found, period: x.period_of(stage) };
+  return { n, figures: found, period: x.period_of(stage), phases: x.phases_of(stage) };
 };
 
 export const respond = (name, hertz) => {

@@ -6,7 +6,7 @@ import { button, digits, html, make } from "./words.js";
 const LASTS = 4000, TURN = 60, SHIFT = 42; // ms of a playback; degrees, and widths, at which the farthest place is drawn
 const elastic = [...data.keys, ...data.fixed].some(({ path }) => path === "coupling.stiffness"), linear = data.axis === "linear";
 const [angle, length, small, fine] = linear ? ["mm", 1e-3, "µm", 1e-6] : ["deg", Math.PI / 180, "deg", Math.PI / 180];
-let part = null, share = 0, last = 0, farthest = 1, widest = 1;
+let part = null, share = 0, last = 0, frame = 0, farthest = 1, widest = 1;
 /** @type {any} */
 const on = {};
 const largest = (list) => list.reduce((most, value) => Math.max(most, Math.abs(value)), 0) || 1;
@@ -45,7 +45,8 @@ const step = (now) => {
 const going = (since) => {
   last = since;
   on.play.textContent = last ? "Pause" : "Play";
-  if (last) requestAnimationFrame(step);
+  cancelAnimationFrame(frame); // of a playback that was paused within it
+  if (last) frame = requestAnimationFrame(step);
 };
 // another run is there
 export const follow = (made) => {

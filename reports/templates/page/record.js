@@ -49,7 +49,7 @@ const show = (name, table, chosen) => {
   find(".record").append(box);
   again();
 };
-export const take = async (file) => {
+const taken = async (file) => {
   const wrong = find(".record > .wrong");
   try {
     if (file.size > LARGEST) throw new Error("larger than 50 MB");
@@ -60,6 +60,8 @@ export const take = async (file) => {
     wrong.textContent = `${file.name}: ${error.message}.`;
   }
 };
+let reading = Promise.resolve();
+export const take = (file) => { reading = reading.then(() => taken(file)); }; // the last one dropped is the last one read
 
 const leftOut = ({ left }) => (left ? ` ${left} rows without numbers left out.` : "");
 // what a record leaves over, as changed and as designed

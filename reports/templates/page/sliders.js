@@ -29,7 +29,7 @@ const makeSlider = (key, k) => {
   field.setAttribute("aria-describedby", was.id);
   track.append(html("i", { className: "origin", style: `left:${100 * share(key, key.value)}%` }), range);
   range.addEventListener("input", () => preview(k, valueAt(key, range.value / 1000)));
-  range.addEventListener("change", () => commit());
+  range.addEventListener("change", () => set(k, valueAt(key, range.value / 1000))); // an undo may have come in between
   range.addEventListener("keydown", (event) => {
     const move = MOVES[event.key];
     if (!move) return;

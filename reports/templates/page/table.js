@@ -1,6 +1,5 @@
 // The table of loops and break points: every figure, and what it was.
 import { BEHIND, DOUBT, LOOP_NAMES, PLACE, POINT_NAMES, STABLE, data, desk, find } from "./desk.js";
-import { stageOf, x } from "./module.js";
 import { calm, unmet } from "./requirements.js";
 import { digits, fill, heading, html } from "./words.js";
 
@@ -13,7 +12,7 @@ const rowOf = (name, bad) => {
     return row;
   }
   const stable = own.figures[STABLE] === 1;
-  if (x.phases_of(stageOf(name) ?? data.points[name]) > 1) th.append(" ", html("span", "unit", "fundamental"));
+  if (own.phases > 1) th.append(" ", html("span", "unit", "fundamental"));
   if (!stable) th.append(" ", html("span", "mark fail", "unstable"));
   Object.assign(th.dataset, { loop: name, stable: own.figures[STABLE] });
   row.append(...data.figures.map(({ name: figure, unit, factor, timed, response }) => {

@@ -29,9 +29,9 @@ export const sideBySide = () => {
   box.closest(".scroll").hidden = !known.length;
   if (!known.length) return;
   const parts = [desk.before, desk.now, ...known.map((letter) => found.get(past.pins[letter]))], bad = parts.map(unmet);
-  const rows = data.figures.map(({ name: quantity, label, unit, factor }) => html("tr", {}, heading(`${label}, ${unit}`, "left", "row"), ...parts.map(({ loops }, k) => {
+  const rows = data.figures.map(({ name: quantity, label, unit, factor, timed }) => html("tr", {}, heading(`${label}, ${unit}`, "left", "row"), ...parts.map(({ loops }, k) => {
     const own = loops[name].figures, value = own && own[STABLE] === 1 ? calm(own[PLACE[quantity]] * factor, unit) : NaN;
-    return html("td", { className: bad[k](name, quantity) ? "right bad" : "right", dataset: { variant: value } }, digits(value, 4));
+    return html("td", { className: bad[k](name, quantity) ? "right bad" : "right", dataset: { variant: value } }, timed && loops[name].waits ? "…" : digits(value, 4));
   })));
   const counts = parts.map(judged).map((all) => `${all.filter(({ met }) => met).length} of ${all.length}`);
   if (data.requirements.length) rows.push(html("tr", {}, heading("Requirements met, all loops", "left", "row"), ...counts.map((words) => html("td", "right", words))));
