@@ -34,11 +34,9 @@ def known(values: Iterable[float | None]) -> list[float]:
     return [value for value in values if value is not None and math.isfinite(value)]
 
 
-def frequency(
-    panel: Panel, ends: Sequence[float] | np.ndarray | None = None, label: str = "frequency, Hz"
-) -> None:
+def frequency(panel: Panel, ends: Sequence[float] | np.ndarray | None = None) -> None:
     """Make x a logarithmic frequency."""
-    panel.x.log, panel.x.label = True, label
+    panel.x.log, panel.x.label = True, "frequency, Hz"
     if ends is not None:
         panel.x.limits(ends[0], ends[-1])
 
@@ -52,11 +50,9 @@ def bound(panel: Panel, values: Iterable[float | None], *, span: float, top_room
     panel.y.limits(low - 0.04 * height, high + top_room * height)
 
 
-def phase_axis(
-    panel: Panel, values: Iterable[float | None], *, span: float = 900.0, room: float = 0.08
-) -> None:
+def phase_axis(panel: Panel, values: Iterable[float | None], *, span: float = 900.0) -> None:
     """Set limits and ticks of a phase: multiples of 15, 45, 90, ... degrees."""
-    bound(panel, values, span=span, top_room=room)
+    bound(panel, values, span=span, top_room=0.08)
     low, high = panel.y.span()
     step = next((s for s in (15.0, 45.0, 90.0, 180.0, 360.0, 720.0) if (high - low) / s <= 7), 1440.0)
     panel.y.ticks = multiples(step, low, high)
