@@ -54,36 +54,32 @@ def _named(value: Any) -> Any:
     return {name: as_json(getattr(value, name)) for name in dict.fromkeys(names)}
 
 
+_OF_MARGINS = (
+    "stable", "verdict", "evidence", "evidence_reason", "gain_margin_db", "phase_margin_deg",
+    "delay_margin_s", "modulus_margin", "modulus_frequency_rad_s",
+)  # fmt: skip
+_OF_STEP = ("rise_time_s", "overshoot_percent", "settling_time_s")
+
+
+def _fields(of: Any, *names: str) -> Tree:
+    return {name: getattr(of, name) for name in names}
+
+
 def loop_json(figures: LoopFigures) -> Tree:
     """Give everything known of one loop; a figure that does not exist is null."""
     m, band, peaks, step = figures.margins, figures.bandwidth, figures.peaks, figures.step
     return {
-        "stable": m.stable,
-        "verdict": m.verdict,
-        "evidence": m.evidence,
-        "evidence_reason": m.evidence_reason,
-        "gain_margin_db": m.gain_margin_db,
-        "phase_margin_deg": m.phase_margin_deg,
-        "delay_margin_s": m.delay_margin_s,
-        "modulus_margin": m.modulus_margin,
-        "modulus_frequency_rad_s": m.modulus_frequency_rad_s,
+        **_fields(m, *_OF_MARGINS),
         "disk_margin": m.disk_margin.alpha if m.disk_margin else None,
-        "gain_margins": [
-            {"ratio": g.ratio, "db": g.db, "frequency_rad_s": g.frequency_rad_s} for g in m.gain_margins
-        ],
-        "phase_margins": [{"deg": p.deg, "frequency_rad_s": p.frequency_rad_s} for p in m.phase_margins],
-        "delay_margins": [
-            {"seconds": d.seconds, "samples": d.samples, "frequency_rad_s": d.frequency_rad_s}
-            for d in m.delay_margins
-        ],
+        "gain_margins": [_fields(one, "ratio", "db", "frequency_rad_s") for one in m.gain_margins],
+        "phase_margins": [_fields(one, "deg", "frequency_rad_s") for one in m.phase_margins],
+        "delay_margins": [_fields(one, "seconds", "samples", "frequency_rad_s") for one in m.delay_margins],
         "bandwidth_hz": band.minus3db_hz if band else None,
         "bandwidth_90deg_hz": band.minus90deg_hz if band else None,
         "resonance_peak_db": band.resonance_peak_db if band else None,
         "sensitivity_peak_db": m.sensitivity_peak_db,
         "complementary_peak_db": peaks.complementary_db if peaks else None,
-        "rise_time_s": step.rise_time_s if step else None,
-        "overshoot_percent": step.overshoot_percent if step else None,
-        "settling_time_s": step.settling_time_s if step else None,
+        **{name: getattr(step, name, None) for name in _OF_STEP},
         "period_s": m.period_s,
         "band_rad_s": list(m.band_rad_s),
         "notes": [*m.notes, *figures.notes],

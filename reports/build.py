@@ -134,7 +134,7 @@ def design_report(
     """
     from reports.live import live_model
     from reports.provenance import provenance
-    from reports.sections import answer
+    from reports.sections import answer, parameters
 
     origin, head = provenance(design_hash(design)), design_head(design)
     with isolated() as missing:
@@ -146,7 +146,8 @@ def design_report(
         *first,
         *loops[1:],
         *(part for part in validation if part not in first),
-        *closing_sections(design, head, origin, warnings_of(design), checked=bool(first)),
+        parameters.section(design, warnings_of(design)),
+        parameters.provenance(head, origin, () if first else (answer.unchecked(),)),
     ]
     doc.waived(sections, design)
     with isolated() as unanswered:
@@ -167,15 +168,11 @@ def design_report(
         provenance=origin,
         sections=sections,
     )
-    live = attempt("sliders", lambda: live_model(design, _held(figures), source), None)
+    held = [name for name, one in figures.items() if one.held is not None]
+    live = attempt("sliders", lambda: live_model(design, held, source), None)
     if live and figures:
         made["live"] = live
     return made
-
-
-def _held(figures: Mapping[str, LoopFigures]) -> list[str]:
-    """Name the loops that are judged held, see `analyses.linear.held_loops`."""
-    return [name for name, one in figures.items() if one.held is not None]
 
 
 def _views(
@@ -224,7 +221,6 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
     InputError
         For a name that is none.
     """
-
     for name in names:
         if name not in FURTHER:
             raise InputError(f"also = {name!r}: allowed: {', '.join(FURTHER)}, all")
@@ -272,15 +268,7 @@ def notices(missing: Sequence[Missing], id: str) -> list[doc.Section]:
 
 def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) -> list[doc.Section]:
     """Make the sections about the linear loops, verdicts first."""
-    from reports.sections import (
-        delays,
-        forms,
-        limits,
-        loop,
-        margins,
-        requirements,
-        stiffness,
-    )
+    from reports.sections import delays, forms, limits, loop, margins, requirements, stiffness
     from reports.sections.names import load_unit
 
     design, figures, onset = survey.design, survey.figures, survey.onset
@@ -301,21 +289,6 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
         makers["Limits"] = lambda: limits.section(design, onset)
     made = [attempt(f"section {name}", make, None) for name, make in makers.items()]
     return [part for part in made if part is not None]
-
-
-def closing_sections(
-    design: Design,
-    head: Mapping[str, Any],
-    origin: Mapping[str, Any],
-    warnings: Sequence[str],
-    *,
-    checked: bool = True,
-) -> list[doc.Section]:
-    """Make the sections that every report of a design ends with; ``checked``: by simulation too."""
-    from reports.sections import answer, parameters
-
-    findings = () if checked else (answer.unchecked(),)
-    return [parameters.section(design, warnings), parameters.provenance(head, origin, findings)]
 
 
 def design_head(design: Design) -> Tree:

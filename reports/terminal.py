@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -100,15 +100,14 @@ def table(block: Mapping[str, Any], wrapped: int, *, narrow: bool = False) -> Ta
     """Lay a table block out; ``narrow``: each word of a heading longer than its column on its own line."""
     made = _empty(block["caption"])
     for column in block["columns"]:
-        label = " ".join(
-            part for part in (column["label"], f"[{column['unit']}]" if column["unit"] else "") if part
-        )
+        unit = f"[{column['unit']}]" if column["unit"] else ""
+        label = " ".join(filter(None, (column["label"], unit)))
         cells = [_cell(row.get(column["key"]), column["format"]) for row in block["rows"]]
         longest = max((cell.cell_len for cell in cells), default=0)
         least = longest if column["align"] == "right" else min(longest, wrapped)
         least = max(least, *map(len, label.split(" ")))
         label = label.replace(" ", "\n") if narrow and len(label) > least else label
-        made.add_column(Text(label), justify=_side(column["align"]), min_width=least)
+        made.add_column(Text(label), justify=column["align"], min_width=least)
     for row in block["rows"]:
         made.add_row(*(_cell(row.get(column["key"]), column["format"]) for column in block["columns"]))
     return made
@@ -224,7 +223,3 @@ def _cell(value: Any, format: str) -> Text:
     if isinstance(value, Mapping):
         return Text(show(value["text"], format), style=COLOURS.get(value.get("status") or "", ""))
     return Text(show(value, format))
-
-
-def _side(align: str) -> Literal["left", "center", "right"]:
-    return "right" if align == "right" else "center" if align == "center" else "left"

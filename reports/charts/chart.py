@@ -222,14 +222,12 @@ class Chart:
     legend_title: str = ""
     loop: str = ""
 
-    def column(
-        self, *heights: float, width: float = 1.0, title: str = "", shared: bool = True
-    ) -> list[Panel]:
+    def column(self, *heights: float, width: float = 1.0, title: str = "") -> list[Panel]:
         """Add a column with a panel for each height (one, without any) and give its panels."""
         sizes = heights or (1.0,)
         axis = Axis()
-        panels = [Panel(x=axis if shared else Axis()) for _ in sizes]
-        self.columns.append(Column(panels=panels, heights=sizes, width=width, title=title, shared=shared))
+        panels = [Panel(x=axis) for _ in sizes]
+        self.columns.append(Column(panels=panels, heights=sizes, width=width, title=title))
         return panels
 
     def panel(

@@ -10,7 +10,7 @@ import numpy as np
 
 NARROW, BROAD = set("iljtfrI.,:;|!'()[] "), set("mwMW%@—≥≤→")
 LINE_EM = 1.28
-PAD = 2.0
+PAD, INSET = 2.0, 6.0
 COVERED, CROSSED, AWAY = 400.0, 6.0, 0.22  # what each fault of a place costs
 DISTANCES = (7.0, 16.0, 30.0, 48.0, 70.0, 105.0, 150.0)
 DIRECTIONS = tuple((math.cos(math.radians(a)), math.sin(math.radians(a))) for a in range(-60, 300, 30))
@@ -67,12 +67,12 @@ class Room:
         """Take the best place near a point; ``over`` it, if free."""
         return self._best((box, distance(box, at)) for box in _around(at, size, over))
 
-    def corner(self, wanted: str, size: tuple[float, float], inset: float = 6.0) -> Box:
+    def corner(self, wanted: str, size: tuple[float, float]) -> Box:
         """Take the best corner, the one asked for where it is free."""
         x0, y0, x1, y1 = self.frame
         w, h = size
-        across = {"left": x0 + inset, "right": x1 - inset - w, "middle": (x0 + x1 - w) / 2.0}
-        up = {"top": y0 + inset, "bottom": y1 - inset - h, "center": (y0 + y1 - h) / 2.0}
+        across = {"left": x0 + INSET, "right": x1 - INSET - w, "middle": (x0 + x1 - w) / 2.0}
+        up = {"top": y0 + INSET, "bottom": y1 - INSET - h, "center": (y0 + y1 - h) / 2.0}
         first_up, first_across = wanted.split()
         tops = [up.pop(first_up), *up.values()]
         lefts = [across.pop(first_across), *across.values()]
@@ -118,7 +118,7 @@ def _around(at: tuple[float, float], size: tuple[float, float], over: bool) -> I
         yield (at[0] - w / 2.0, at[1] - h / 2.0, at[0] + w / 2.0, at[1] + h / 2.0)
     for distance in DISTANCES:
         for dx, dy in DIRECTIONS:
-            x = at[0] + distance * dx + (w / 2.0) * dx * 1.0
+            x = at[0] + distance * dx + (w / 2.0) * dx
             y = at[1] + distance * dy + (h / 2.0) * dy
             # the box stands beside the point, not on it
             x = x if abs(dx) < 0.3 else at[0] + math.copysign(distance, dx) + math.copysign(w / 2.0, dx)

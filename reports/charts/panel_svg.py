@@ -58,20 +58,16 @@ def _data(panel: Panel, frame: Frame, hide_x: bool) -> str:
 
 
 def _axes(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
-    xs, ys = (
-        panel.x.named_ticks(max(3, int(frame.width / (40 if panel.x.log else 58)))),
-        panel.y.named_ticks(room_y(panel, frame.height)),
-    )
+    xs = panel.x.named_ticks(max(3, int(frame.width / (40 if panel.x.log else 58))))
+    ys = panel.y.named_ticks(room_y(panel, frame.height))
     px, py = frame.x(panel.x, [v for v, _ in xs]), frame.y(panel.y, [v for v, _ in ys])
     across = "".join(f"M{x:.1f} {frame.top:.1f}V{frame.bottom:.1f}" for x in px) if panel.x.grid else ""
     up = "".join(f"M{frame.left:.1f} {y:.1f}H{frame.right:.1f}" for y in py) if panel.y.grid else ""
-    small = "".join(
-        f"M{x:.1f} {frame.bottom:.1f}v-3" for x in frame.x(panel.x, minor_ticks(panel.x))
-    ) + "".join(f"M{frame.left:.1f} {y:.1f}h3" for y in frame.y(panel.y, minor_ticks(panel.y)))
+    small = "".join(f"M{x:.1f} {frame.bottom:.1f}v-3" for x in frame.x(panel.x, minor_ticks(panel.x)))
+    small += "".join(f"M{frame.left:.1f} {y:.1f}h3" for y in frame.y(panel.y, minor_ticks(panel.y)))
     thin = pen.style(fill="none", stroke="grid", stroke_width="0.8")
     edge = pen.style(fill="none", stroke="muted", stroke_width="0.9")
     box = f"M{frame.left:.1f} {frame.top:.1f}V{frame.bottom:.1f}H{frame.right:.1f}"
-    rotated = (frame.top + frame.bottom) / 2.0
     parts = [f'<path class="grid" d="{across}{up}" {thin}/>', f'<path class="edge" d="{box}{small}" {edge}/>']
     low = frame.bottom + 14.0
     named = [] if hide_x else list(zip(px, xs, strict=True))
@@ -86,6 +82,7 @@ def _axes(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
         low = frame.bottom + (17.0 if xs else 3.0) + LABEL
         parts.append(pen.words(panel.x.label, middle, low, size=LABEL, anchor="middle"))
     if panel.y.label:
+        rotated = (frame.top + frame.bottom) / 2.0
         turn = f' transform="rotate(-90 11 {rotated:.1f})"'
         parts.append(pen.words(panel.y.label, 11.0, rotated, size=LABEL, anchor="middle", more=turn))
     if panel.title:
@@ -128,14 +125,12 @@ def _curve(item: Curve, panel: Panel, frame: Frame, pen: Pen, room: Room, key: s
     drawn, dots = "", ""
     if item.line:
         px, py = _stairs(x, y) if item.stairs else (x, y)
-        more = f' class="curve{"" if item.read else " mute"}"{key}' + (
-            ' data-stairs="1"' if item.stairs else ""
-        )
+        more = f' class="curve{"" if item.read else " mute"}"{key}'
+        more += ' data-stairs="1"' if item.stairs else ""
         more += f' data-id="{escape(item.id)}"' if item.id else ""
         if item.parameter is not None and pen.page:
-            more += (
-                f' data-p="{" ".join(f"{v:.5g}" for v in item.parameter[np.isfinite(x) & np.isfinite(y)])}"'
-            )
+            there = item.parameter[np.isfinite(x) & np.isfinite(y)]
+            more += f' data-p="{" ".join(f"{v:.5g}" for v in there)}"'
         drawn = pen.line(_path(px, py), item.look, more if pen.page else "")
         room.add_line(px, py)
     if item.look.marker:

@@ -15,6 +15,8 @@ from reports.numbers import hertz, time_unit, to_minus
 SMALL, HALF, WIDE = 340.0, 430.0, 900.0
 BLUE, ORANGE, GREEN, PURPLE, RED, SKY, BROWN = SERIES = ("c1", "c2", "c3", "c4", "c5", "c6", "c7")
 INK, MUTED = "ink", "muted"
+FRAME = 1.6  # of a Nyquist figure, about -1
+TURN = np.exp(2j * np.pi * np.arange(73) / 72)  # the unit circle
 __all__ = ["Chart", "Panel", "hertz", "time_unit", "to_minus"]  # besides what stands here
 Style = dict[str, Any]  # how an item is drawn: fields of `reports.charts.chart.Look` and of a curve, by name
 
@@ -34,11 +36,9 @@ def known(values: Iterable[float | None]) -> list[float]:
     return [value for value in values if value is not None and math.isfinite(value)]
 
 
-def frequency(
-    panel: Panel, ends: Sequence[float] | np.ndarray | None = None, label: str = "frequency, Hz"
-) -> None:
+def frequency(panel: Panel, ends: Sequence[float] | np.ndarray | None = None) -> None:
     """Make x a logarithmic frequency."""
-    panel.x.log, panel.x.label = True, label
+    panel.x.log, panel.x.label = True, "frequency, Hz"
     if ends is not None:
         panel.x.limits(ends[0], ends[-1])
 
@@ -52,11 +52,9 @@ def bound(panel: Panel, values: Iterable[float | None], *, span: float, top_room
     panel.y.limits(low - 0.04 * height, high + top_room * height)
 
 
-def phase_axis(
-    panel: Panel, values: Iterable[float | None], *, span: float = 900.0, room: float = 0.08
-) -> None:
+def phase_axis(panel: Panel, values: Iterable[float | None], *, span: float = 900.0) -> None:
     """Set limits and ticks of a phase: multiples of 15, 45, 90, ... degrees."""
-    bound(panel, values, span=span, top_room=room)
+    bound(panel, values, span=span, top_room=0.08)
     low, high = panel.y.span()
     step = next((s for s in (15.0, 45.0, 90.0, 180.0, 360.0, 720.0) if (high - low) / s <= 7), 1440.0)
     panel.y.ticks = multiples(step, low, high)
@@ -66,6 +64,24 @@ def multiples(step: float, low: float, high: float) -> list[tuple[float, str]]:
     """Give a tick at every multiple of a step."""
     levels = [step * k for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
     return [(level, to_minus(f"{level:.0f}")) for level in levels]
+
+
+def nyquist_plane(chart: Chart) -> Panel:
+    """Add the plane of L with its axes and the unit circle."""
+    panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
+    panel.equal = True
+    panel.rule_y(0.0)
+    panel.rule_x(0.0)
+    panel.curve(TURN.real, TURN.imag, colour=MUTED, dash=2, width=1.0, read=False)
+    return panel
+
+
+def critical_point(panel: Panel) -> None:
+    """Mark -1, and show what lies about it."""
+    panel.points([-1.0], [0.0], marker="+", colour=INK, size=14.0, read=False)
+    panel.note("−1", (-1.0, 0.0))
+    panel.x.limits(-1.0 - FRAME, FRAME - 0.35)
+    panel.y.limits(-FRAME, FRAME)
 
 
 def rows(panel: Panel, names: Sequence[str]) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import accumulate
 
-from reports.charts.chart import Chart, Column, Curve, Item, Look, Note, Panel
+from reports.charts.chart import Band, Chart, Column, Curve, Item, Note, Panel, Shape
 from reports.charts.labels import LINE_EM, text_width
 from reports.charts.panel_svg import LABEL, TICK, TITLE, panel_svg, room_y
 from reports.charts.pen import Frame, Pen
@@ -71,7 +71,7 @@ def paper_svg(chart: Chart, prefix: str) -> str:
 
 def _column(column: Column, width: float, height: float, pen: Pen) -> str:
     """Write the panels of a column on common edges."""
-    above = [_above(panel) for panel in column.panels]
+    above = [22.0 if panel.title else 8.0 for panel in column.panels]
     below = [_below(panel, _hides(column, k)) for k, panel in enumerate(column.panels)]
     head = 16.0 if column.title else 0.0
     free = height - head - sum(above) - sum(below)
@@ -85,8 +85,7 @@ def _column(column: Column, width: float, height: float, pen: Pen) -> str:
         frame = Frame(left, top + above[k], width - GAP, top + above[k] + tall[k])
         if panel.equal:
             _make_equal(panel, frame)
-        body = panel_svg(panel, frame, pen.within(k), hide_x=_hides(column, k))
-        parts.append(body)
+        parts.append(panel_svg(panel, frame, pen.within(k), hide_x=_hides(column, k)))
     return "".join(parts)
 
 
@@ -100,10 +99,6 @@ def _left(panel: Panel, height: float) -> float:
     widest = max((text_width(words, TICK) for _, words in ticks), default=0.0)
     lines = panel.y.label.count("\n") + 1 if panel.y.label else 0
     return 8.0 + widest + lines * LINE_EM * LABEL + (4.0 if lines else 0.0)
-
-
-def _above(panel: Panel) -> float:
-    return 22.0 if panel.title else 8.0
 
 
 def _below(panel: Panel, hidden: bool) -> float:
@@ -174,13 +169,11 @@ def _paper_keys(rows: list[list[tuple[str, Item, float]]], top: float, pen: Pen)
 
 def _swatch(item: Item, pen: Pen) -> str:
     """Draw the sample of a legend entry, 26 by 12."""
-    look: Look = getattr(item, "look")  # noqa: B009
-    if isinstance(item, Curve):
-        line = pen.line("M1 6H25", look) if item.line else ""
-        return line + (pen.marker(look, 13.0, 6.0) if look.marker else "")
     if isinstance(item, Note):
         return ""
-    if hasattr(item, "rings") or hasattr(item, "low"):
-        return pen.filled("M3 1H23V11H3z", look)
-    upright = getattr(item, "across", "y") == "x"
-    return pen.line("M13 0V12" if upright else "M1 6H25", look)
+    if isinstance(item, Curve):
+        line = pen.line("M1 6H25", item.look) if item.line else ""
+        return line + (pen.marker(item.look, 13.0, 6.0) if item.look.marker else "")
+    if isinstance(item, Shape | Band):
+        return pen.filled("M3 1H23V11H3z", item.look)
+    return pen.line("M13 0V12" if item.across == "x" else "M1 6H25", item.look)

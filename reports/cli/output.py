@@ -22,11 +22,8 @@ def print_json(data: Any) -> None:
 
     from reports.document import plain
 
-    print_json_text(json.dumps(plain(data), ensure_ascii=False, allow_nan=False, indent=2))
-
-
-def print_json_text(text: str) -> None:
-    """Print JSON; what a terminal would obey, or is no Unicode (a path of other bytes), stays escaped."""
+    text = json.dumps(plain(data), ensure_ascii=False, allow_nan=False, indent=2)
+    # what a terminal would obey, or is no Unicode (a path of other bytes), stays escaped
     sys.stdout.write(_OBEYED.sub(lambda found: f"\\u{ord(found[0]):04x}", text) + "\n")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from actuator_lti.design.model import Axis
@@ -16,7 +15,6 @@ from reports.sections.limits import COLOURS
 NOW = {"colour": style.BLUE, "width": 2.0}
 BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}
 PINNED = tuple(zip("ABC", style.SERIES[1:], strict=False))
-FRAME = 1.6
 HERTZ = (1.0, 1000.0)
 FOLLOWED = "live"  # the loop whose figures share a cursor
 BORDERS = {one.words: COLOURS[name] for name, one in LIMITERS.items() if line_of(one) is not None}
@@ -31,10 +29,7 @@ def live_charts(unit: str, axis: Axis = "rotary", *, electrical: bool = True) ->
         "sensitivity": (_sensitivity(), f"Sensitivity S and closed loop T, {both}."),
         "step": (_step(), f"Step response of the linear loop, {both}."),
         "difference": (_difference(), "Measured frequency response over the model as changed."),
-        "run": (
-            _run(unit, axis, electrical),
-            f"Run with limits and friction, {both}, and a record.",
-        ),
+        "run": (_run(unit, axis, electrical), f"Run with limits and friction, {both}, and a record."),
         "border": (_border(unit), f"Command amplitude at which a limit is reached, {both}."),
     }
     return {name: page_svg(made, f"live-{name}", words) for name, (made, words) in drawn.items()}
@@ -72,18 +67,9 @@ def _bode() -> Chart:
 
 def _nyquist() -> Chart:
     chart = Chart(width=style.HALF, height=370.0, loop=FOLLOWED)
-    panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
-    panel.equal = True
-    panel.rule_y(0.0)
-    panel.rule_x(0.0)
-    angles = [2.0 * math.pi * k / 72 for k in range(73)]
-    circle = [math.cos(a) for a in angles], [math.sin(a) for a in angles]
-    panel.curve(*circle, colour=style.MUTED, dash=2, width=1.0, read=False)
+    panel = style.nyquist_plane(chart)
     _both(panel, measured=True)
-    panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
-    panel.note("−1", (-1.0, 0.0))
-    panel.x.limits(-1.0 - FRAME, FRAME - 0.35)
-    panel.y.limits(-FRAME, FRAME)
+    style.critical_point(panel)
     return chart
 
 

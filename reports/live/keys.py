@@ -148,11 +148,9 @@ def _range(design: Design, path: str, value: float) -> tuple[float, float]:
         return max(1.0, math.ceil(value / SLIDER_FACTOR)), max(COUNTED, value * SLIDER_FACTOR)
     if value == 0.0:
         return 0.0, _top(design, path)
-    return (
-        (value * SLIDER_FACTOR, -value * SLIDER_FACTOR)
-        if value < 0.0
-        else (value / SLIDER_FACTOR, value * SLIDER_FACTOR)
-    )
+    if value < 0.0:
+        return value * SLIDER_FACTOR, -value * SLIDER_FACTOR
+    return value / SLIDER_FACTOR, value * SLIDER_FACTOR
 
 
 def _band(value: float, tolerance: Tolerance) -> list[float] | None:

@@ -9,7 +9,7 @@ night is there whole, or not at all.
 from __future__ import annotations
 
 import secrets
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -143,16 +143,14 @@ class History:
 
     def results(self, name: str, last: int | None = None) -> list[Result]:
         """Results of a design in the order of the nights; only of the last so many that have one."""
-        found = (night.by_name[name] for night in self._from_last() if name in night.by_name)
+        from_last = (self.night(run.id).by_name for run in reversed(self.runs))
+        found = (by_name[name] for by_name in from_last if name in by_name)
         return list(islice(found, last))[::-1]
 
     def result(self, run: int, name: str) -> Result | None:
         """What a design came to in a night; None where it has no figures of it."""
         found = self.night(run).by_name.get(name)
         return found if found is not None and found.home is not None else None
-
-    def _from_last(self) -> Iterator[Night]:
-        return (self.night(run.id) for run in reversed(self.runs))
 
     def _content(self, result: Result) -> Content:
         content = self.night(result.home or 0).by_name[result.name].content

@@ -140,8 +140,9 @@ def _block(block: Mapping[str, Any], drawings: Mapping[int, str]) -> Tree:
     if kind == "figure":
         return _figure(block, drawings[id(block)])
     if kind == "facts":
-        items = [[clean(i["label"], 200), _with_unit(i["value"], i["unit"])] for i in block["items"]]
-        return {"kind": kind, "items": items}
+        values = [f"{clean(show(i['value']), 300)} {clean(i['unit'], 30)}".strip() for i in block["items"]]
+        labels = [clean(i["label"], 200) for i in block["items"]]
+        return {"kind": kind, "items": [list(pair) for pair in zip(labels, values, strict=True)]}
     if kind == "verdicts":
         return {"kind": kind, "items": [_verdict(item) for item in block["items"]]}
     if kind == "glance":
@@ -180,10 +181,6 @@ def _figure(block: Mapping[str, Any], svg: str) -> Tree:
     width = min(most, SCALE * float(size[1])) if size else most
     texts = {"caption": clean(block["caption"], 2000), "alt": clean(block["alt"], 2000)}
     return {"kind": "figure", "svg": visible(svg), "width": width, **texts}
-
-
-def _with_unit(value: Any, unit: object) -> str:
-    return f"{clean(show(value), 300)} {clean(unit, 30)}".strip()
 
 
 def _table(block: Mapping[str, Any]) -> Tree:

@@ -19,7 +19,7 @@ from reports import document as doc
 from reports.as_json import as_json
 from reports.numbers import capital, significant
 from reports.sections import compare_best, compare_figures
-from reports.sections.compare_best import number
+from reports.sections.compare_best import SEEN, number
 from reports.sections.names import LOOPS, unit_words
 from reports.sections.requirements import item, label, limit_words
 from reports.sections.validation import loop_name, quantity_name
@@ -29,6 +29,8 @@ GROUPS = {**LOOPS, "drive": "Drive", "large": "Large signals"}
 COLUMNS = 4  # variants beside the base in one table: what reads on one screen
 _MOST_MOVERS = 3
 _TERMINAL = ("gain_margin", "phase_margin", "modulus_margin", "bandwidth", "overshoot", "settling_time")
+_OF_GROUP = doc.of(lambda name: f"{GROUPS[name.group]}: {name.label}", "figure", "Figure")
+_UNIT = doc.of(lambda name: "ms" if name.unit == "s" else name.unit.replace("^2", "²"), "unit", "Unit")
 _MARKS = (
     "In brackets the difference from the base. ▲ best and ▽ worst of all designs. Margins by their size: one "
     "downwards counts as one upwards."
@@ -80,12 +82,15 @@ def result(comparison: Comparison) -> str:
     said = f"{comparison.tally.words('requirements')}, over {len(everything.all)} designs."
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
         of = [(one, v) for one in everything.all for v in one.verdicts if v.verdict == word and not v.waiver]
-        more = f", and {len(of) - 1} more" if len(of) > 1 else ""
-        said += f" {word.capitalize()}: {of[0][0].variant.name}, {label(of[0][1])}{more}." if of else ""
-    refused = [variant.name for variant in comparison.refused]
-    more = f", and {len(refused) - 1} more" if len(refused) > 1 else ""
-    said += f" No design: {refused[0]}{more}." if refused else ""
+        said += _first_of(word.capitalize(), [f"{one.variant.name}, {label(v)}" for one, v in of])
+    said += _first_of("No design", [variant.name for variant in comparison.refused])
     return said + " A prediction is not confirmed by the simulator." * comparison.unconfirmed
+
+
+def _first_of(what: str, names: Sequence[str]) -> str:
+    """Name the first, and count the others; nothing where there is none."""
+    more = f", and {len(names) - 1} more" if len(names) > 1 else ""
+    return f" {what}: {names[0]}{more}." if names else ""
 
 
 def verdicts(comparison: Comparison) -> doc.Section:
@@ -145,19 +150,18 @@ def _verdict_cell(one: Compared, wanted: RequirementVerdict) -> doc.Cell:
     verdict = next((v for v in one.verdicts if v.id == wanted.id), None)
     if verdict is None or verdict.value is None:
         return {"text": "none", "status": verdict.role if verdict else "info"}
-    words = number(verdict.value) or ""
     change = 0.0 if wanted.value is None else verdict.value - wanted.value
-    if abs(change) > _SEEN * abs(verdict.value):
-        words += f" ({_signed(change)})"
-    return {"text": words, "status": verdict.role}
+    return {"text": _with_change(verdict.value, change), "status": verdict.role}
+
+
+def _with_change(value: float, change: float) -> str:
+    """Write a value, in brackets how far it is from the base where that is seen."""
+    return (number(value) or "") + (f" ({_signed(change)})" if abs(change) > SEEN * abs(value) else "")
 
 
 def figures(comparison: Comparison) -> doc.Section:
     """Every figure of every design, a table a group; best and worst marked."""
-    heads = [
-        doc.of(lambda name: capital(name.label), "figure", "Figure"),
-        doc.of(lambda name: "ms" if name.unit == "s" else name.unit.replace("^2", "²"), "unit", "Unit"),
-    ]
+    heads = [doc.of(lambda name: capital(name.label), "figure", "Figure"), _UNIT]
     blocks: list[doc.Block] = []
     for group, title in GROUPS.items():
         if names := [name for name in comparison.names if name.group == group]:
@@ -176,11 +180,8 @@ def _moved_loops(comparison: Comparison) -> list[doc.Block]:
         if name.group in LOOPS and name.key.removeprefix(f"{name.group}.") in _TERMINAL
         if any(name.key in one.differences for one in comparison.variants)
     ]
-    heads = [
-        doc.of(lambda name: f"{GROUPS[name.group]}: {name.label}", "figure", "Figure"),
-        doc.of(lambda name: "ms" if name.unit == "s" else name.unit, "unit", "Unit"),
-    ]
-    made = _side_by_side("Loops", names, heads, batches(comparison)[:1], partial(_cell, comparison), _MARKS)
+    heads, first = [_OF_GROUP, _UNIT], batches(comparison)[:1]
+    made = _side_by_side("Loops", names, heads, first, partial(_cell, comparison), _MARKS)
     return made if names else []
 
 
@@ -189,9 +190,7 @@ def _cell(comparison: Comparison, one: Compared, name: FigureName) -> str | None
     if value is None:
         return None
     scale = 1e3 if name.unit == "s" else 1.0
-    words = number(scale * value) or ""
-    if abs(one.differences.get(name.key, 0.0)) > _SEEN * abs(value):
-        words += f" ({_signed(scale * one.differences[name.key])})"
+    words = _with_change(scale * value, scale * one.differences.get(name.key, 0.0))
     ends = comparison.ends(name)
     if ends is not None and value in ends:
         words += " ▲" if value == ends[0] else " ▽"
@@ -219,7 +218,7 @@ def differences(comparison: Comparison) -> doc.Section:
 
 def _moved_table(one: Compared, comparison: Comparison) -> doc.Block:
     columns = [
-        doc.of(lambda name: f"{GROUPS[name.group]}: {name.label}", "figure", "Figure"),
+        _OF_GROUP,
         doc.of("unit", "unit", "Unit"),
         doc.of(lambda name: comparison.base.figures[name.key], "base", "Base", format="sig:4"),
         doc.of(lambda name: one.figures[name.key], "value", "Variant", format="sig:4"),

@@ -19,7 +19,7 @@ from reports.nightly.text import csv_text
 from reports.numbers import significant
 from reports.sections.requirements import item, label, limit_words
 
-_SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
+SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 _MOST = 3
 _NOTE = "Gains and losses are changes of the distance to the limit, in percent of the limit."
 
@@ -108,7 +108,7 @@ def _changes(one: Compared, comparison: Comparison, sign: int) -> str:
         for v in one.verdicts
         if (near := nearness(v)) is not None
         and (before := base.get(v.id)) is not None
-        and sign * (near - before) > _SEEN
+        and sign * (near - before) > SEEN
     ]
     return _words(sorted(moved, key=lambda pair: -abs(pair[1])))
 
@@ -145,7 +145,7 @@ def _best(comparison: Comparison) -> doc.Block:
         row = {"what": label(wanted), "limit": limit_words(wanted.requirement), "base": number(wanted.value)}
         if ranked:
             high, low = max(ranked, key=lambda r: r[0]), min(ranked, key=lambda r: r[0])
-            seen = _SEEN * max(abs(high[0]), 1e-9)
+            seen = SEEN * max(abs(high[0]), 1e-9)
             same = high[0] - low[0] <= seen
             alike = [name for near, name, _ in ranked if high[0] - near <= seen]  # the base is first
             row |= {

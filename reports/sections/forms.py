@@ -198,13 +198,10 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
 
 def _spread(points: Sequence[OperatingPointFigures]) -> str:
     """Say the smallest phase margin over all operating points."""
-    unstable = [_where(point) for point in points if any(f.sound is False for f in point.figures.values())]
-    if unstable:
-        return f"Unstable at {len(unstable)} of {len(points)} operating points: {'; '.join(unstable)}."
-    unknown = [_where(point) for point in points if any(f.sound is None for f in point.figures.values())]
-    if unknown:
-        count = f"{len(unknown)} of {len(points)} operating points"
-        return f"Stability is not known at {count}: {'; '.join(unknown)}."
+    for sound, words in ((False, "Unstable"), (None, "Stability is not known")):
+        here = [_where(point) for point in points if any(f.sound is sound for f in point.figures.values())]
+        if here:
+            return f"{words} at {len(here)} of {len(points)} operating points: {'; '.join(here)}."
     result = [
         (row["phase_margin_deg"], name, _where(point))
         for point in points

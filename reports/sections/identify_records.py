@@ -205,14 +205,13 @@ def _figures(part: RecordFit, tests: Sequence[ResidualTest], axis: str) -> list[
     own = [test for test in tests if test.record == part.name]
     unit, rate = ("N", "m/s") if axis == "linear" else ("N m", "rad/s")
     return [
-        _figure("time", _over_time(part, unit), f"{part.name}: residual over time, and its spectrum"),
-        _figure("correlation", _correlation(own), f"{part.name}: correlations of the residual, with bounds"),
-        _figure("friction", _friction(part, unit, rate), f"{part.name}: friction over speed, rows and model"),
+        doc.figure(f"residual_{name}", chart, f"{part.name}: {words}")
+        for name, chart, words in (
+            ("time", _over_time(part, unit), "residual over time, and its spectrum"),
+            ("correlation", _correlation(own), "correlations of the residual, with bounds"),
+            ("friction", _friction(part, unit, rate), "friction over speed, rows and model"),
+        )
     ]
-
-
-def _figure(name: str, chart: style.Chart, caption: str) -> doc.Block:
-    return doc.figure(f"residual_{name}", chart, caption)
 
 
 def _over_time(part: RecordFit, unit: str) -> style.Chart:

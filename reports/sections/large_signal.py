@@ -93,11 +93,7 @@ def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
     if amplitude_bode.below_from_start[place]:
         return f"below {high:.3g} Hz"
     if low == 0.0:
-        return (
-            "not known: no point below it is steady"
-            if math.isfinite(high)
-            else "not known: no point is steady"
-        )
+        return f"not known: no point {'below it ' if math.isfinite(high) else ''}is steady"
     hz = amplitude_bode.frequency_hz
     unsteady = ", the points between are not steady" if np.any((hz > low) & (hz < high)) else ""
     return f"between {low:.3g} and {high:.3g} Hz{unsteady}" if math.isfinite(high) else f"above {low:.3g} Hz"
@@ -176,14 +172,13 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
         (gain, amplitude_bode.linear_db, amplitude_bode.gain_db),
         (phase, amplitude_bode.linear_deg, amplitude_bode.phase_deg),
     )
+    sizes = zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True)
+    labels = [f"{100.0 * fraction:g} % ({scale * amplitude:.3g} {unit})" for fraction, amplitude in sizes]
     for panel, linear, values in both:
         look: style.Style = {"colour": style.MUTED, "width": 4.2, "opacity": 0.45}
         panel.curve(amplitude_bode.frequency_hz, linear, "linear", **look)
-        for k, (fraction, amplitude) in enumerate(
-            zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True)
-        ):
+        for k, label in enumerate(labels):
             look = {**style.series(k), **style.marked(k, 4.4), "every": 6}
-            label = f"{100.0 * fraction:g} % ({scale * amplitude:.3g} {unit})"
             panel.curve(amplitude_bode.frequency_hz, values[k], label, **look)
     style.bound(gain, np.ravel(amplitude_bode.gain_db), span=45.0, top_room=0.12)
     phases = style.known([*np.ravel(amplitude_bode.phase_deg), *amplitude_bode.linear_deg])

@@ -17,7 +17,6 @@ from reports.sections.margins import finite, margin_row
 
 Curves = Sequence[tuple[str, Curve]]
 LABELLED = 3  # margins with words
-FRAME = 1.6  # of the Nyquist figure, about -1
 NICHOLS_DB, NICHOLS_SPAN_DB = 6.0, 60.0  # peak of S that most standards allow, and a usual one of T
 RED, GREEN, ORANGE = style.RED, style.GREEN, style.ORANGE
 
@@ -160,19 +159,14 @@ def _mark(panel: style.Panel, at: tuple[float, float], words: str, colour: str, 
 def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
     """Draw the curve, its mirror image, the circle about -1 that it touches, and every crossing."""
     margins, system = figures.margins, figures.loop.plain_open
-    omega, L = nyquist_curve(system, grid, FRAME)
+    omega, L = nyquist_curve(system, grid, style.FRAME)
     chart = style.Chart(width=style.HALF, height=430.0)
-    panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
-    panel.equal = True
-    panel.rule_y(0.0)
-    panel.rule_x(0.0)
-    turn = np.exp(2j * np.pi * np.arange(73) / 72)
-    panel.curve(turn.real, turn.imag, colour=style.MUTED, dash=2, width=1.0, read=False)
+    panel = style.nyquist_plane(chart)
     panel.curve(L.real, L.imag, "L(jω), ω > 0", parameter=omega / (2.0 * np.pi))
     panel.curve(L.real, -L.imag, "ω < 0", dash=1, width=1.1, read=False)
     distance = margins.modulus_margin
     if distance is not None and distance > 0:
-        circle = distance * turn - 1.0
+        circle = distance * style.TURN - 1.0
         look: style.Style = {"colour": style.ORANGE, "read": False}
         panel.shape([(circle.real, circle.imag)], colour=style.ORANGE, opacity=0.1)
         panel.curve(circle.real, circle.imag, f"modulus margin {distance:.3f}", width=1.4, **look)
@@ -186,10 +180,7 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
     phases = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0]
     for point in response_at(system, np.array(phases)) if phases else ():
         panel.points([point.real], [point.imag], colour=GREEN, size=6.5, read=False)
-    panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
-    panel.note("−1", (-1.0, 0.0))
-    panel.x.limits(-1.0 - FRAME, FRAME - 0.35)
-    panel.y.limits(-FRAME, FRAME)
+    style.critical_point(panel)
     modulus = "withheld" if distance is None else f"{distance:.3f}"
     caption = (
         f"{title}, Nyquist curve near −1: it keeps a distance of {modulus} "

@@ -86,9 +86,9 @@ CROSSING_COLUMNS = [
 
 def section(result: Margins) -> list[doc.Section]:
     """Make the sections from `analyses.margins.margins`: the loops as asked for, the requirements."""
-    asked, judged = result.asked, requirements.section(result.requirements, load_unit(result.design))
-    known = {**{LOOPS[name]: one for name, one in result.loops.items()}, **result.around}
-    made = _loops(known, result.operating_points, f"{FORMS[asked.form].capitalize()}; {_where(result)}. ")
+    judged, known = requirements.section(result.requirements, load_unit(result.design)), _named(result)
+    how = f"{FORMS[result.asked.form].capitalize()}; {_where(result)}. "
+    made = _loops(known, result.operating_points, how)
     made["blocks"] += [doc.text(note) for note in _notes(result, known)]
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
     said = f"{_stability(known)}. {judged['result']}{_judged_on(result)}{_below_custom(result)}"
@@ -98,7 +98,7 @@ def section(result: Margins) -> list[doc.Section]:
 def brief(result: Margins) -> Brief:
     """The tables as one, a column a loop."""
     first, judged = section(result)
-    known = {**{LOOPS[name]: one for name, one in result.loops.items()}, **result.around}
+    known = _named(result)
     every, own = with_held(known), with_own_margins(with_held(known))
     head = f"{result.design.name}: {result.asked.form}, {_where(result)}"
     tables = [margin_table(own), spread_table(result.operating_points, known), response_table(every)]
@@ -118,17 +118,27 @@ def _judged_on(result: Margins) -> str:
     return "" if alike or not result.requirements else " Judged on the sampled loops with sliding friction."
 
 
+def _named(result: Margins) -> dict[str, LoopFigures]:
+    """The loops and the places around them by the words of their rows."""
+    return {**{LOOPS[name]: one for name, one in result.loops.items()}, **result.around}
+
+
 def _below_custom(result: Margins) -> str:
     """Of a design without requirements: margins below what is customary, which nothing else would name."""
+    sound = {} if result.requirements else {name: one for name, one in result.loops.items() if one.sound}
     low = [
-        f"{LOOPS[name].lower()}, {QUANTITIES[quantity].words} {value:.3g}{unit} (of {limit:g}{unit})"
-        for name, one in result.loops.items()
-        if one.sound and not result.requirements
+        f"{LOOPS[name].lower()}, {_against_custom(quantity, value)}"
+        for name, one in sound.items()
         for quantity, value in figures_of(one.judged.margins).items()
-        for limit, unit in [(CUSTOMARY[quantity], f" {unit_words(QUANTITIES[quantity].unit)}".rstrip())]
-        if value < limit
+        if value < CUSTOMARY[quantity]
     ]
     return f" Below what is customary: {'; '.join(low)}." if low else ""
+
+
+def _against_custom(quantity: str, value: float) -> str:
+    """Say a margin beside what is customary, both with their unit."""
+    unit = f" {unit_words(QUANTITIES[quantity].unit)}".rstrip()
+    return f"{QUANTITIES[quantity].words} {value:.3g}{unit} (of {CUSTOMARY[quantity]:g}{unit})"
 
 
 def _where(result: Margins) -> str:
@@ -198,11 +208,9 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
         return " ".join(doubts)
     rows = {loop_words(name, one.rotor).lower(): margin_row(one.judged) for name, one in figures.items()}
     words = []
-    for margins, what, unit in (
-        ({name: row["gain_margin_db"] for name, row in rows.items()}, "gain margin", "dB"),
-        ({name: row["phase_margin_deg"] for name, row in rows.items()}, "phase margin", "deg"),
-    ):
-        known = {name: margin for name, margin in margins.items() if margin is not None}
+    both = (("gain_margin_db", "gain margin", "dB"), ("phase_margin_deg", "phase margin", "deg"))
+    for key, what, unit in both:
+        known = {name: row[key] for name, row in rows.items() if row[key] is not None}
         if known:
             name = min(known, key=lambda n: abs(known[n]))
             words.append(f"the smallest {what} is {known[name]:.1f} {unit} ({name})")
