@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from actuator_lti.errors import InputError
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Bound:
     """The most of something that is taken in."""
 
@@ -69,118 +69,74 @@ def _readable(value: float, unit: str) -> str:
     return f"{text} {unit}".strip()
 
 
+# fmt: off
 # ---- files -----------------------------------------------------------------------------------------------
 
-TOML_BYTES = Bound(
-    what="of a design, study or settings file", most=1 << 20, unit="bytes",
-    reason="two hundred times the largest shipped design",
-)  # fmt: skip
-CAMPAIGN_BYTES = Bound(
-    what="of a campaign or record file", most=1 << 23, unit="bytes",
-    reason="a campaign lists its runs: 20000 of them in 400 bytes each",
-)  # fmt: skip
-REPORT_BYTES = Bound(
-    what="of a report.json", most=1 << 28, unit="bytes",
-    reason="a comparison of 10000 designs fits; read whole into memory",
-)  # fmt: skip
-TOML_DEPTH = Bound(what="levels of tables in a TOML file", most=8, reason="a design needs five")
-JSON_DEPTH = Bound(what="levels of a JSON file", most=40, reason="details within details of a report")
-TOML_VALUES = Bound(what="values in a TOML file", most=20_000, reason="a design has a few hundred")
-CAMPAIGN_VALUES = Bound(what="values in a campaign file", most=250_000, reason="12 values for each run")
-TEXT_CHARACTERS = Bound(what="characters of a text in a file", most=10_000, reason="a page of description")
-KEY_PARTS = Bound(
-    what="parts of a dotted key", most=64, reason="the time of the TOML reader grows with their square"
-)
-CSV_LINE_BYTES = Bound(
-    what="of one line of a CSV file", most=1 << 20, unit="bytes", reason="a table of numbers has short lines"
-)
-CSV_COLUMNS = Bound(what="columns of a CSV file", most=4096, reason="no recorder writes more")
-CSV_ROWS = Bound(
-    what="rows of a record kept at full rate", most=4_000_000,
-    reason="longer records are averaged over neighbours while they are read; the record says so",
-)  # fmt: skip
-TABLE_BYTES = Bound(
-    what="of a CSV file of a command, load or samples", most=1 << 28, unit="bytes",
-    asked_by="--record, --load-file", reason="read whole into memory",
-)  # fmt: skip
-TABLE_ROWS = Bound(
-    what="rows of a command, load or sample file", most=5_000_000, asked_by="--record, --load-file",
-    reason="eight minutes at the drive's 100 us",
-)  # fmt: skip
-MAT_BYTES = Bound(what="of a .mat file", most=1 << 28, unit="bytes", reason="read whole into memory")
-MAT_VALUES = Bound(
-    what="numbers of a .mat or Parquet file, unpacked", most=50_000_000,
-    reason="400 MB as floats; a compressed file of a megabyte can hold a thousand times its size",
-)  # fmt: skip
-MAT_DIMENSIONS = Bound(what="dimensions of an array in a .mat file", most=32, reason="numpy holds no more")
-CAMPAIGN_RUNS = Bound(
-    what="runs of a campaign", most=20_000, asked_by="[[run]]", reason="54 are a week at the bench"
-)
+TOML_BYTES = Bound("of a design, study or settings file", 1 << 20,
+    "two hundred times the largest shipped design", unit="bytes")
+CAMPAIGN_BYTES = Bound("of a campaign or record file", 1 << 23,
+    "a campaign lists its runs: 20000 of them in 400 bytes each", unit="bytes")
+REPORT_BYTES = Bound("of a report.json", 1 << 28,
+    "a comparison of 10000 designs fits; read whole into memory", unit="bytes")
+TOML_DEPTH = Bound("levels of tables in a TOML file", 8, "a design needs five")
+JSON_DEPTH = Bound("levels of a JSON file", 40, "details within details of a report")
+TOML_VALUES = Bound("values in a TOML file", 20_000, "a design has a few hundred")
+CAMPAIGN_VALUES = Bound("values in a campaign file", 250_000, "12 values for each run")
+TEXT_CHARACTERS = Bound("characters of a text in a file", 10_000, "a page of description")
+KEY_PARTS = Bound("parts of a dotted key", 64, "the time of the TOML reader grows with their square")
+CSV_LINE_BYTES = Bound("of one line of a CSV file", 1 << 20, "a table of numbers has short lines",
+    unit="bytes")
+CSV_COLUMNS = Bound("columns of a CSV file", 4096, "no recorder writes more")
+CSV_ROWS = Bound("rows of a record kept at full rate", 4_000_000,
+    "longer records are averaged over neighbours while they are read; the record says so")
+TABLE_BYTES = Bound("of a CSV file of a command, load or samples", 1 << 28, "read whole into memory",
+    unit="bytes", asked_by="--record, --load-file")
+TABLE_ROWS = Bound("rows of a command, load or sample file", 5_000_000, "eight minutes at the drive's 100 us",
+    asked_by="--record, --load-file")
+MAT_BYTES = Bound("of a .mat file", 1 << 28, "read whole into memory", unit="bytes")
+MAT_VALUES = Bound("numbers of a .mat or Parquet file, unpacked", 50_000_000,
+    "400 MB as floats; a compressed file of a megabyte can hold a thousand times its size")
+MAT_DIMENSIONS = Bound("dimensions of an array in a .mat file", 32, "numpy holds no more")
+CAMPAIGN_RUNS = Bound("runs of a campaign", 20_000, "54 are a week at the bench", asked_by="[[run]]")
 
 # ---- simulation ------------------------------------------------------------------------------------------
 
-RUN_TICKS = Bound(
-    what="ticks of one run", most=1_000_000_000, asked_by="--duration",
-    reason="28 hours of motion at 100 us, some minutes to compute; a hole of years in a record asks for more",
-)  # fmt: skip
-BATCH_TICKS = Bound(
-    what="ticks of all runs of a batch", most=20_000_000_000,
-    reason="an hour on two cores; a design that moves a million times slower than it samples asks for more",
-)  # fmt: skip
-HISTORY_BYTES = Bound(
-    what="of one run's history", most=4_000_000_000, unit="bytes", asked_by="--duration, --every",
-    reason="it is held in memory",
-)  # fmt: skip
-SIGNAL_ROWS = Bound(
-    what="ticks of a tabled command", most=50_000_000, asked_by="--duration, --frequency, --cycles",
-    reason="400 MB, held in memory beside the history",
-)  # fmt: skip
-TONES = Bound(
-    what="tones of a signal", most=10_000, asked_by="--count",
-    reason="a decade in steps of a fifth of a per mille",
-)  # fmt: skip
-TONE_TICKS = Bound(
-    what="lines times ticks of a multisine", most=20_000_000_000, asked_by="--count, --duration",
-    reason="each line is summed at each tick: minutes",
-)  # fmt: skip
+RUN_TICKS = Bound("ticks of one run", 1_000_000_000,
+    "28 hours of motion at 100 us, some minutes to compute; a hole of years in a record asks for more",
+    asked_by="--duration")
+BATCH_TICKS = Bound("ticks of all runs of a batch", 20_000_000_000,
+    "an hour on two cores; a design that moves a million times slower than it samples asks for more")
+HISTORY_BYTES = Bound("of one run's history", 4_000_000_000, "it is held in memory", unit="bytes",
+    asked_by="--duration, --every")
+SIGNAL_ROWS = Bound("ticks of a tabled command", 50_000_000, "400 MB, held in memory beside the history",
+    asked_by="--duration, --frequency, --cycles")
+TONES = Bound("tones of a signal", 10_000, "a decade in steps of a fifth of a per mille", asked_by="--count")
+TONE_TICKS = Bound("lines times ticks of a multisine", 20_000_000_000,
+    "each line is summed at each tick: minutes", asked_by="--count, --duration")
 
 # ---- studies ---------------------------------------------------------------------------------------------
 
-STUDY_VARIANTS = Bound(
-    what="variants of a study", most=10_000, asked_by="[[variant]], [[sweep]], [[grid]]",
-    reason="a night on a cluster; each is a design of its own",
-)  # fmt: skip
-GRID_AXES = Bound(
-    what="axes of a grid", most=20, asked_by="grid.axes", reason="two values each are a million"
-)
-AXIS_POINTS = Bound(
-    what="values of an axis", most=1000, asked_by="points", reason="as many as a picture shows"
-)
-SAMPLES = Bound(
-    what="Monte Carlo samples", most=1_000_000_000, asked_by="--samples", reason="three days of one processor"
-)
-NIGHTLY_JOBS = Bound(
-    what="reports of a night", most=20_000, reason="every variant of the largest study, twice"
-)
-JOB_BYTES = Bound(
-    what="of one job's description", most=256_000_000, unit="bytes",
-    reason="a comparison carries the text of all its designs",
-)  # fmt: skip
-JOB_MEMORY = Bound(
-    what="of memory of a nightly job", most=4_000_000_000, unit="bytes", asked_by="--memory-limit",
-    reason="ten times what the largest shipped design takes; a job that asks for more is ended and named",
-)  # fmt: skip
+STUDY_VARIANTS = Bound("variants of a study", 10_000, "a night on a cluster; each is a design of its own",
+    asked_by="[[variant]], [[sweep]], [[grid]]")
+GRID_AXES = Bound("axes of a grid", 20, "two values each are a million", asked_by="grid.axes")
+AXIS_POINTS = Bound("values of an axis", 1000, "as many as a picture shows", asked_by="points")
+SAMPLES = Bound("Monte Carlo samples", 1_000_000_000, "three days of one processor", asked_by="--samples")
+NIGHTLY_JOBS = Bound("reports of a night", 20_000, "every variant of the largest study, twice")
+JOB_BYTES = Bound("of one job's description", 256_000_000, "a comparison carries the text of all its designs",
+    unit="bytes")
+JOB_MEMORY = Bound("of memory of a nightly job", 4_000_000_000,
+    "ten times what the largest shipped design takes; a job that asks for more is ended and named",
+    unit="bytes", asked_by="--memory-limit")
 
 # ---- time ------------------------------------------------------------------------------------------------
 
-COMMAND_SECONDS = Bound(
-    what="of one command", most=3600, unit="s", asked_by="--time-limit",
-    reason="sixty times the slowest command on a shipped design; it ends with status 3 and says so",
-)  # fmt: skip
-STUDY_SECONDS = Bound(
-    what="of compare, montecarlo, nightly or tune", most=7 * 86400, unit="s", asked_by="--time-limit",
-    reason="their work is as large as what is asked for; a nightly job has its own --time-limit",
-)  # fmt: skip
+COMMAND_SECONDS = Bound("of one command", 3600,
+    "sixty times the slowest command on a shipped design; it ends with status 3 and says so", unit="s",
+    asked_by="--time-limit")
+STUDY_SECONDS = Bound("of compare, montecarlo, nightly or tune", 7 * 86400,
+    "their work is as large as what is asked for; a nightly job has its own --time-limit", unit="s",
+    asked_by="--time-limit")
+# fmt: on
 
 
 def table() -> dict[str, Bound]:

@@ -38,10 +38,7 @@ class InputError(ValueError):
 class Mistakes(InputError):
     """Several mistakes of one file, each on a line of its own as its `InputError` has it.
 
-    Attributes
-    ----------
-    mistakes : tuple of InputError
-        At least two, in the order of the file.
+    ``mistakes``: at least two, in the order of the file.
     """
 
     def __init__(self, mistakes: Sequence[InputError]) -> None:

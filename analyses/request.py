@@ -7,7 +7,7 @@ without its unit; the default that of the dataclass, or of ``Request.of(design, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
@@ -18,12 +18,13 @@ Kind = Literal["plain", "output", "load", "command"]
 UNITS = ("_rad_s", "_rad", "_hz", "_Nm", "_s", "_degC", "_V", "_A")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Option:
     """A field as an option of a command."""
 
     words: str  # what it is, and its default where the design gives it
     metavar: str = ""  # what stands for the value in the help
+    _: KW_ONLY
     flag: str = ""  # the option, without dashes; the field's name without its unit where empty
     # ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without;
     # ``"command"``: of the command of the outermost loop, with or without
@@ -61,31 +62,27 @@ def given(*layers: Mapping[str, Any]) -> dict[str, Any]:
 
 
 LOAD = Option(
-    words='Load torque at the output, such as "4 N*m" or 4 (N m; linear axis: N); 0.',
-    metavar="LOAD",
+    'Load torque at the output, such as "4 N*m" or 4 (N m; linear axis: N); 0.',
+    "LOAD",
     kind="load",
 )
 POINT = Option(
-    words="Friction: sliding, rest or describing-function; behind a coupling also driving and driven (the "
+    "Friction: sliding, rest or describing-function; behind a coupling also driving and driven (the "
     "load's share of the friction) and gap (in the play); sliding.",
-    metavar="POINT",
+    "POINT",
 )
 
 
-FORCE = Option(words="Overwrite files that exist.")
+FORCE = Option("Overwrite files that exist.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class OnMachines:
     """Where a study is computed, a part of its request."""
 
-    workers: Annotated[int | None, Option(words="Processes of a local Dask cluster.", metavar="N")] = None
-    scheduler: Annotated[str | None, Option(words="A Dask scheduler that is running.", metavar="ADDRESS")] = (
-        None
-    )
-    tls: Annotated[
-        Path | None, Option(words="ca.pem, cert.pem and key.pem for a tls:// scheduler.", metavar="DIR")
-    ] = None
+    workers: Annotated[int | None, Option("Processes of a local Dask cluster.", "N")] = None
+    scheduler: Annotated[str | None, Option("A Dask scheduler that is running.", "ADDRESS")] = None
+    tls: Annotated[Path | None, Option("ca.pem, cert.pem and key.pem for a tls:// scheduler.", "DIR")] = None
 
     @property
     def engine(self) -> Engine:

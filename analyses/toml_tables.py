@@ -17,8 +17,6 @@ from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_t
 
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import read_campaign_toml
-from actuator_lti.files.tree import Tree
 from analyses.request import UNITS
 
 T = TypeVar("T")
@@ -30,11 +28,6 @@ WANTED: Mapping[frozenset[type], str] = {
     frozenset({float}): "a number is wanted",
     frozenset({str, int}): "a column name, or a number from 1",
 }
-
-
-def read_toml(path: Path) -> Tree:
-    """The file as a dictionary, or one line that says where it is broken."""
-    return read_campaign_toml(path, "campaign or record file")
 
 
 def key_of(name: str) -> str:

@@ -15,28 +15,19 @@ Range = tuple[float, float]
 class Bandwidth:
     """Bandwidths of a closed-loop response T.
 
-    Attributes
-    ----------
-    minus3db_rad_s : float or None
-        Where |T| first falls below ``level`` times its value at zero frequency; ``None``: never. Where it
-        comes back above later (a resonance beyond), the first fall is still the one that is meant.
-    crossings_rad_s : tuple of float
-        Every frequency at which |T| passes that level, falls and rises in turn: the first is
-        ``minus3db_rad_s``.
-    minus90deg_rad_s : float or None
-        Where the unwrapped phase of T first falls below -90 deg against zero frequency.
-    resonance_peak_db : float
-        Largest |T| over its value at zero frequency, dB (0: no resonance).
-    resonance_rad_s : float
-        Where it is reached; 0 where there is no resonance.
-    dc_gain : float
-        T at zero frequency, with its sign.
-    definition : str
-        What "-3 dB" means here: 1/sqrt(2) (half the power) or -3 dB exactly.
-    minus3db_range_rad_s, minus90deg_range_rad_s, resonance_range_db : tuple of float or None
-        Measured data: where these figures lie, between the points and within the noise.
-    notes : tuple of str
-        What else has to be known to read the figures.
+    ``minus3db_rad_s``: where |T| first falls below ``level`` times its value at zero frequency; ``None``:
+    never. Where it comes back above later (a resonance beyond), the first fall is still the one that is
+    meant.
+    ``crossings_rad_s``: every frequency at which |T| passes that level, falls and rises in turn: the first is
+    ``minus3db_rad_s``.
+    ``minus90deg_rad_s``: where the unwrapped phase of T first falls below -90 deg against zero frequency.
+    ``resonance_peak_db``: largest |T| over its value at zero frequency, dB (0: no resonance).
+    ``resonance_rad_s``: where it is reached; 0 where there is no resonance.
+    ``dc_gain``: T at zero frequency, with its sign.
+    ``definition``: what "-3 dB" means here: 1/sqrt(2) (half the power) or -3 dB exactly.
+    ``minus3db_range_rad_s``, ``minus90deg_range_rad_s``, ``resonance_range_db``: measured data: where these
+    figures lie, between the points and within the noise.
+    ``notes``: what else has to be known to read the figures.
     """
 
     minus3db_rad_s: float | None
@@ -95,12 +86,8 @@ def _text(rad_s: float | None, known: Range | None = None) -> str:
 class Peaks:
     """Peaks of the sensitivity S = 1/(1 + L) and of the complementary sensitivity T = L/(1 + L).
 
-    Attributes
-    ----------
-    sensitivity_db, complementary_db : float
-        Peak gains, dB.
-    sensitivity_rad_s, complementary_rad_s : float
-        Where they are reached (0 and infinity are possible).
+    ``sensitivity_db``, ``complementary_db``: peak gains, dB.
+    ``sensitivity_rad_s``, ``complementary_rad_s``: where they are reached (0 and infinity are possible).
     """
 
     sensitivity_db: float

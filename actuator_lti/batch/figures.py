@@ -28,12 +28,9 @@ _MOST_ORDER = 80
 class Crossovers:
     """Crossovers of one loop of many designs, in order of frequency; NaN past the last one.
 
-    Attributes
-    ----------
-    frequency_rad_s, margin : ndarray, shape (count, 6)
-        Margin in deg (gain crossovers) or as ratio (phase crossovers).
-    crossings : ndarray of int, shape (count,)
-        How many there are; where it is more than 6 the rest is not listed.
+    ``frequency_rad_s``, ``margin``, shape (count, 6): margin in deg (gain crossovers) or as ratio (phase
+    crossovers).
+    ``crossings``, shape (count,): how many there are; where it is more than 6 the rest is not listed.
     """
 
     frequency_rad_s: np.ndarray
@@ -51,15 +48,10 @@ class LinearFigures:
     are NaN, its delay margin is 0.
     Closed-loop figures of the position loop are from command to output, feed-forward included.
 
-    Attributes
-    ----------
-    loops : tuple of str
-        The loops that the structure has.
-    count : int
-    raw : ndarray, shape (count, 3, columns)
-        What the compiled code wrote (see ``_figures``); angles are radians per sample.
-    period_s : ndarray, shape (count, 3)
-        Sampling period of each loop.
+    ``loops``: the loops that the structure has.
+    ``raw``, shape (count, 3, columns): what the compiled code wrote (see ``_figures``); angles are radians
+    per sample.
+    ``period_s``, shape (count, 3): sampling period of each loop.
     """
 
     loops: tuple[str, ...]

@@ -36,12 +36,7 @@ def variable_paths(design: Design) -> tuple[str, ...]:
 class Population:
     """Many designs of one structure: a nominal design and, for some keys, an array of SI values.
 
-    Attributes
-    ----------
-    design : Design
-    values : mapping of str to ndarray, shape (count,)
-        By dotted key; a key that is not there has its nominal value.
-    count : int
+    ``values``, shape (count,): by dotted key; a key that is not there has its nominal value.
     """
 
     design: Design

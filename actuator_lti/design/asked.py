@@ -33,29 +33,24 @@ class Failure:
 
     stop_rad: Annotated[float | None, positive(
         "stop", "{angle}", "", "mechanical stop; default the full deflection", example="25 deg")] = None
-    deflection_rad: Annotated[float | None, positive(
-        "deflection", "{angle}", "", "deflection to which the time is taken; default a tenth of the stop",
-        example="2 deg")] = None
-    detection_s: Annotated[float | None, positive(
-        "detection_time", "s", "", "from a failure to its detection; default 0.1 s", high=1e4,
-        example="50 ms")] = None
-    load_Nm: Annotated[float | None, quantity(
-        "load", "{torque}", "", "load torque that pushes the output forward; default none",
-        example="4 N*m")] = None
+    deflection_rad: Annotated[float | None, positive("deflection", "{angle}", "",
+        "deflection to which the time is taken; default a tenth of the stop", example="2 deg")] = None
+    detection_s: Annotated[float | None, positive("detection_time", "s", "",
+        "from a failure to its detection; default 0.1 s", high=1e4, example="50 ms")] = None
+    load_Nm: Annotated[float | None, quantity("load", "{torque}", "",
+        "load torque that pushes the output forward; default none", example="4 N*m")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class DutyCycle:
     """The duty within the continuous rating; ``None`` is what `analyses.duty.Asked` takes for it."""
 
-    amplitude_rad: Annotated[float | None, positive(
-        "amplitude", "{angle}", "", "peak of the sine, output side; default half the full deflection",
-        example="5 deg")] = None
+    amplitude_rad: Annotated[float | None, positive("amplitude", "{angle}", "",
+        "peak of the sine, output side; default half the full deflection", example="5 deg")] = None
     frequency_rad_s: Annotated[float | None, positive(
         "frequency", "rad/s", "", "of the sine; default 1 Hz", example="0.5 Hz")] = None
-    load_Nm: Annotated[float | None, quantity(
-        "load", "{torque}", "", "load torque, all the time; default the largest of validation.loads",
-        example="4 N*m")] = None
+    load_Nm: Annotated[float | None, quantity("load", "{torque}", "",
+        "load torque, all the time; default the largest of validation.loads", example="4 N*m")] = None
     share: Annotated[float | None, positive(
         "share", "1", "", "share of the time in motion; default 1", high=1.0, example="0.4")] = None
     cycle_s: Annotated[float | None, positive(
@@ -73,9 +68,8 @@ class Validation:
 
     full_deflection_rad: Annotated[float, positive(
         "full_deflection", "{angle}", "", "largest amplitude to look at, output side", example="10 deg")]
-    amplitude_fractions: Annotated[tuple[float, ...], quantities(
-        "amplitude_fractions", "1", "amplitudes as fractions of the full deflection", low=1e-09,
-        high=1.0)] = (0.05, 0.1, 0.25, 0.5, 1.0)
+    amplitude_fractions: Annotated[tuple[float, ...], quantities("amplitude_fractions", "1",
+        "amplitudes as fractions of the full deflection", low=1e-09, high=1.0)] = (0.05, 0.1, 0.25, 0.5, 1.0)
     loads_Nm: Annotated[tuple[float, ...], quantities(
         "loads", "{torque}", "load torques to look at", low=-BIG, high=BIG)] = (0.0,)
 

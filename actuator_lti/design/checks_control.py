@@ -9,7 +9,7 @@ from typing import Any
 
 from actuator_lti.design.control import stable_pair
 from actuator_lti.design.fields import FIELDS, Field, fields_in
-from actuator_lti.design.law import MOST_STATES, Law
+from actuator_lti.design.law import BESIDE_A_LAW, MOST_STATES, Law
 from actuator_lti.design.mistakes import Refusal
 from actuator_lti.design.model import FILTER_KEYS, Design, Filter, FilterPlace
 from actuator_lti.design.unread import UNREAD, readable
@@ -242,11 +242,11 @@ def _own_inputs(design: Design, stage: str, law: Law) -> Iterator[Refusal]:
 
 def _replaced(design: Design, stage: str) -> Iterator[Refusal]:
     """Keys of the stage that its law takes the place of."""
-    part, kept = getattr(design.controller, stage), ("every", "sensor", *_FED)
+    part = getattr(design.controller, stage)
     for field in fields_in(f"control.{stage}"):
         fresh = next(item.default for item in part_fields(part) if item.name == field.attribute)
         value = getattr(part, field.attribute)
-        if field.key not in kept and value is not UNREAD and value != fresh:
+        if field.key not in BESIDE_A_LAW and value is not UNREAD and value != fresh:
             yield f"control.{stage}.{field.key}", f"{value}", f"not allowed beside control.{stage}.law"
     if getattr(part, "filters", ()):
         allowed = f"not allowed beside control.{stage}.law, which may have it"
@@ -264,9 +264,6 @@ def _matrices(law: Law, path: str) -> Iterator[Refusal]:
         for key, (shape, fits) in ({} if part is None else part.sizes(m)).items():
             if not fits:
                 yield f"{path}{place}.{key}", "other sizes", f"allowed: {shape}"
-
-
-_FED = ("back_emf_feedforward", "resistance_feedforward")
 
 
 def _gravity(design: Design) -> Iterator[Refusal]:
@@ -307,7 +304,6 @@ def _instruments(design: Design) -> Iterator[Refusal]:
 
 CONTROL_CHECKS = (
     _filters, _filter_count, _speed_sensor, _anti_windup, _windup, _position, _overload, _supply, _brake,
-    _regenerative, _winding, _command, _laws, _gravity, _friction_map, _friction_points,
-    _instruments,
+    _regenerative, _winding, _command, _laws, _gravity, _friction_map, _friction_points, _instruments,
 )  # fmt: skip
 """Each gives the settings that contradict each other: key, value, what is allowed."""

@@ -43,8 +43,7 @@ class Encoder:
     encoder without quantisation.  ``bandwidth_rad_s`` is w0 of the tracking loop (model.md section 7).
     """
 
-    counts_per_rev: Annotated[int | None, integer(
-        "counts_per_rev", 2**32, "",
+    counts_per_rev: Annotated[int | None, integer("counts_per_rev", 2**32, "",
         "counts per motor revolution after quadrature (linear axis without a screw: per metre)")] = None
     speed: Annotated[SpeedSource, choice(
         "speed", "the speed itself, a difference of angles, or a tracking loop (observer)")] = "ideal"
@@ -60,8 +59,7 @@ class Encoder:
 class OutputEncoder:
     """The angle sensor at the output shaft; counts per output revolution (linear axis: per metre)."""
 
-    counts_per_rev: Annotated[int | None, integer(
-        "counts_per_rev", 2**32, "",
+    counts_per_rev: Annotated[int | None, integer("counts_per_rev", 2**32, "",
         "counts per output revolution after quadrature (linear axis: per metre)")] = None
 
 
@@ -120,8 +118,7 @@ class Filter:
     frequency_rad_s: Annotated[float | None, positive(
         "frequency", "rad/s", "w0", "corner of a low-pass, centre of a notch", example="100 Hz")] = None
     order: Annotated[int, integer("order", 2, "", "order of a low-pass, 1 or 2")] = 1
-    damping: Annotated[float, positive(
-        "damping", "1", "", "damping of a low-pass of order 2", high=10.0,
+    damping: Annotated[float, positive("damping", "1", "", "damping of a low-pass of order 2", high=10.0,
         example="0.7")] = 0.7071067811865476
     width_rad_s: Annotated[float | None, positive(
         "width", "rad/s", "", "width of a notch", example="50 Hz")] = None
@@ -177,20 +174,16 @@ class CurrentLoop:
 
     gain_V_A: Annotated[float, positive(
         "gain", "V/A", "Kp_i", "gain of the current PI", example="20 mohm", required=True)] = ABSENT
-    integral_time_s: Annotated[float | None, positive(
-        "integral_time", "s", "Tn_i", "integral time of the current PI; without it a P controller",
-        example="150 us")] = None
-    back_emf_feedforward: Annotated[float, quantity(
-        "back_emf_feedforward", "1", "", "share of the back-EMF kE w added to the voltage", low=0.0, high=2.0,
-        example="1")] = 0.0
-    resistance_feedforward: Annotated[float, quantity(
-        "resistance_feedforward", "1", "", "share of R i_ref added to the voltage", low=0.0, high=2.0,
-        example="1")] = 0.0
+    integral_time_s: Annotated[float | None, positive("integral_time", "s", "Tn_i",
+        "integral time of the current PI; without it a P controller", example="150 us")] = None
+    back_emf_feedforward: Annotated[float, quantity("back_emf_feedforward", "1", "",
+        "share of the back-EMF kE w added to the voltage", low=0.0, high=2.0, example="1")] = 0.0
+    resistance_feedforward: Annotated[float, quantity("resistance_feedforward", "1", "",
+        "share of R i_ref added to the voltage", low=0.0, high=2.0, example="1")] = 0.0
     anti_windup: Annotated[AntiWindup, choice(
         "anti_windup", "what the integral does while the output is at its limit")] = "conditional"
-    tracking_time_s: Annotated[float | None, positive(
-        "tracking_time", "s", "Tt", "time constant of back-calculation; default the integral time",
-        example="10 ms")] = None
+    tracking_time_s: Annotated[float | None, positive("tracking_time", "s", "Tt",
+        "time constant of back-calculation; default the integral time", example="10 ms")] = None
     law: Law | None = None
 
 
@@ -201,19 +194,16 @@ class VelocityLoop:
     The gain is in A s/rad where a current loop follows, in V s/rad where the voltage does.
     """
 
-    gain: Annotated[float, positive(
-        "gain", "{drive}*s/{angle}", "Kp_w", "gain of the velocity PI", example="0.12 A*s/rad",
-        required=True)] = ABSENT
-    integral_time_s: Annotated[float | None, positive(
-        "integral_time", "s", "Tn_w", "integral time of the velocity PI; without it a P controller",
-        example="15 ms")] = None
+    gain: Annotated[float, positive("gain", "{drive}*s/{angle}", "Kp_w", "gain of the velocity PI",
+        example="0.12 A*s/rad", required=True)] = ABSENT
+    integral_time_s: Annotated[float | None, positive("integral_time", "s", "Tn_w",
+        "integral time of the velocity PI; without it a P controller", example="15 ms")] = None
     every: Annotated[int, integer("every", 1000, "n_v", "the velocity loop runs every so many ticks")] = 1
     sensor: Annotated[Sensor, choice("sensor", "where the speed is measured", choices=("motor",))] = "motor"
     anti_windup: Annotated[AntiWindup, choice(
         "anti_windup", "what the integral does while the output is at its limit")] = "conditional"
-    tracking_time_s: Annotated[float | None, positive(
-        "tracking_time", "s", "Tt", "time constant of back-calculation; default the integral time",
-        example="10 ms")] = None
+    tracking_time_s: Annotated[float | None, positive("tracking_time", "s", "Tt",
+        "time constant of back-calculation; default the integral time", example="10 ms")] = None
     filters: tuple[Filter, ...] = ()
     law: Law | None = None
 
@@ -235,30 +225,23 @@ class PositionLoop:
     (A; V without a current loop) whose sign follows the command's motion.
     """
 
-    gain: Annotated[float, positive(
-        "gain", "{drive}/{angle}", "Kv", "gain of the position P controller", example="120 1/s",
-        required=True)] = ABSENT
-    every: Annotated[int, integer(
-        "every", 10000, "n_p",
+    gain: Annotated[float, positive("gain", "{drive}/{angle}", "Kv", "gain of the position P controller",
+        example="120 1/s", required=True)] = ABSENT
+    every: Annotated[int, integer("every", 10000, "n_p",
         "the position loop runs every so many ticks, a multiple of control.velocity.every")] = 1
-    feedforward: Annotated[float, not_negative(
-        "feedforward", "1", "k_ff", "share of the reference's rate added to the speed command", high=10.0,
-        example="0")] = 0.0
+    feedforward: Annotated[float, not_negative("feedforward", "1", "k_ff",
+        "share of the reference's rate added to the speed command", high=10.0, example="0")] = 0.0
     sensor: Annotated[Sensor, choice("sensor", "whose angle is fed back")] = "motor"
-    integral_time_s: Annotated[float | None, positive(
-        "integral_time", "s", "Ti", "integral time of the position controller; without it no integral",
-        example="0.5 s")] = None
-    derivative_time_s: Annotated[float, not_negative(
-        "derivative_time", "s", "Td", "derivative time of the position controller", high=100.0,
-        example="1 ms")] = 0.0
+    integral_time_s: Annotated[float | None, positive("integral_time", "s", "Ti",
+        "integral time of the position controller; without it no integral", example="0.5 s")] = None
+    derivative_time_s: Annotated[float, not_negative("derivative_time", "s", "Td",
+        "derivative time of the position controller", high=100.0, example="1 ms")] = 0.0
     derivative_filter_s: Annotated[float, not_negative(
         "derivative_filter", "s", "TD", "filter time of the derivative", high=100.0, example="0.2 ms")] = 0.0
-    acceleration_feedforward: Annotated[float, not_negative(
-        "acceleration_feedforward", "1", "k_aff",
+    acceleration_feedforward: Annotated[float, not_negative("acceleration_feedforward", "1", "k_aff",
         "share of J/kM times the command's acceleration added to the torque command", high=10.0,
         example="1")] = 0.0
-    friction_feedforward: Annotated[float, not_negative(
-        "friction_feedforward", "{drive}", "i_fr",
+    friction_feedforward: Annotated[float, not_negative("friction_feedforward", "{drive}", "i_fr",
         "added to the torque command in the direction of the command's motion", example="0.4 A")] = 0.0
     law: Law | None = None
 
@@ -283,9 +266,8 @@ class Command:
         "filter_damping", "1", "", "damping of a filter of order 2", high=10.0, example="1")] = 1.0
     rate_rad_s: Annotated[float, positive(
         "rate", "{angle}/s", "", "largest rate of the command, output side", example="20 deg/s")] = inf
-    acceleration_rad_s2: Annotated[float, positive(
-        "acceleration", "{angle}/s^2", "", "largest acceleration of the command, output side",
-        example="400 deg/s^2")] = inf
+    acceleration_rad_s2: Annotated[float, positive("acceleration", "{angle}/s^2", "",
+        "largest acceleration of the command, output side", example="400 deg/s^2")] = inf
     jerk_rad_s3: Annotated[float, positive(
         "jerk", "{angle}/s^3", "", "largest jerk of the command, output side", example="8000 deg/s^3")] = inf
 
@@ -350,23 +332,19 @@ class Limits:
         "voltage", "V", "U_bus", "supply, and so the largest motor voltage", example="12 V")]
     speed_rad_s: Annotated[float, positive(
         "speed", "{angle}/s", "w_max", "largest speed command at the motor", example="9000 rpm")] = inf
-    acceleration_rad_s2: Annotated[float, positive(
-        "acceleration", "{angle}/s^2", "a_max", "largest change of the speed command",
-        example="30000 rev/s^2")] = inf
+    acceleration_rad_s2: Annotated[float, positive("acceleration", "{angle}/s^2", "a_max",
+        "largest change of the speed command", example="30000 rev/s^2")] = inf
     peak_current_A: Annotated[float, positive(
         "peak_current", "A", "i_peak", "clamp of the current command", example="12 A")] = inf
-    current_rate_A_s: Annotated[float, positive(
-        "current_rate", "A/s", "", "largest change of the current command (torque slope)",
-        example="2000 A/s")] = inf
+    current_rate_A_s: Annotated[float, positive("current_rate", "A/s", "",
+        "largest change of the current command (torque slope)", example="2000 A/s")] = inf
     continuous_current_A: Annotated[float, positive(
         "continuous_current", "A", "i_cont", "current allowed continuously (no clamp)", example="4 A")] = inf
-    peak_time_s: Annotated[float | None, positive(
-        "peak_time", "s", "t_peak",
+    peak_time_s: Annotated[float | None, positive("peak_time", "s", "t_peak",
         "time that the peak current is allowed for, from cold; then the overload protection (I2t) acts",
         high=1e6, example="1 s")] = None
-    release: Annotated[float, positive(
-        "release", "1", "", "overload state below which the peak is allowed again", high=1.0,
-        example="0.9")] = 0.9
+    release: Annotated[float, positive("release", "1", "",
+        "overload state below which the peak is allowed again", high=1.0, example="0.9")] = 0.9
     overload: Annotated[Overload, choice(
         "overload", "what the peak time means: a thermal model, or (i_peak^2 - i_cont^2) t")] = "thermal"
 
@@ -392,6 +370,5 @@ class Supply:
     regenerative: Annotated[bool, flag("regenerative", "whether the source takes braking energy back")] = True
     capacitance_F: Annotated[float | None, positive(
         "capacitance", "F", "C", "capacitance of the bus", example="2 mF")] = None
-    brake_voltage_V: Annotated[float | None, positive(
-        "brake_voltage", "V", "U_brake", "bus voltage at which the brake resistor holds it",
-        example="60 V")] = None
+    brake_voltage_V: Annotated[float | None, positive("brake_voltage", "V", "U_brake",
+        "bus voltage at which the brake resistor holds it", example="60 V")] = None

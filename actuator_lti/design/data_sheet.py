@@ -52,30 +52,29 @@ def as_stated(tree: Tree, changed: Collection[str]) -> None:
     So that it is read again from what is changed besides: a ratio, the load's path, the torque constant.
     """
     friction, pairs = tree.get("friction", {}), tree.get("correlation", [])
+    tables = {"motor": tree.get("motor"), **{f"gear.{gear['name']}": gear for gear in tree.get("gear", ())}}
     for keys in _TAKEN.values():
         paths = {f"friction.{key}" for key in keys}
         if any(path.startswith((*paths, "correlation")) or path == "friction" for path in changed):
             continue
         read = {key: friction[key] for key in keys if key in friction}
-        if all(_is_read(entry, tree) for entry in read.values()):
+        if all(_is_read(entry, tables) for entry in read.values()):
             for key, entry in read.items():
-                _put_back(tree, entry)
+                _put_back(tables, entry)
                 del friction[key]
             pairs[:] = [pair for pair in pairs if not {pair["first"], pair["second"]} <= paths]
 
 
-def _is_read(entry: Any, tree: Tree) -> bool:
+def _is_read(entry: Any, tables: Collection[str]) -> bool:
     """Whether a value of friction and its tolerance are as a sheet's keys were read: no words of a user."""
     source = entry.get("source", "") if isinstance(entry, dict) else ""
-    tables = {"motor", *(f"gear.{gear['name']}" for gear in tree.get("gear", ()))}
     words = [_WORD.fullmatch(word) for word in source.removeprefix(FROM).partition("; ")[0].split(", ")]
     read = source.startswith(FROM) and entry.get("tolerance", _OPEN) == _OPEN
     return read and all(word is not None and word["table"] in tables for word in words)
 
 
-def _put_back(tree: Tree, entry: Tree) -> None:
+def _put_back(tables: dict[str, Tree], entry: Tree) -> None:
     words, _, source = entry["source"].removeprefix(FROM).partition("; ")
-    tables = {"motor": tree["motor"], **{f"gear.{gear['name']}": gear for gear in tree.get("gear", ())}}
     for word in map(_WORD.fullmatch, words.split(", ")):
         assert word is not None
         stated = {"value": word["text"], "source": source, "grade": entry.get("grade", "")}

@@ -14,14 +14,9 @@ from actuator_lti.design.model import Design
 class Explained:
     """One number of a file.
 
-    Attributes
-    ----------
-    path : str
-        Its dotted key.
-    written, read : str
-        As the file has it, and in SI.
-    model : str
-        As the equations have it: symbol and value, of the equivalent DC motor at its temperature.
+    ``path``: its dotted key.
+    ``written``, ``read``: as the file has it, and in SI.
+    ``model``: as the equations have it: symbol and value, of the equivalent DC motor at its temperature.
     """
 
     path: Annotated[str, "Key"]

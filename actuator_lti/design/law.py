@@ -16,6 +16,8 @@ from actuator_lti.design.field import BIG, matrix, names, positive, quantities, 
 
 LawInput = Literal["command", "error", "speed", "angle", "current", "output_angle", "output_speed"]
 LAW_INPUTS: tuple[str, ...] = get_args(LawInput)
+BESIDE_A_LAW = ("every", "sensor", "back_emf_feedforward", "resistance_feedforward")
+"""Keys of a stage that its law does not take the place of."""
 MOST_STATES = 16
 """Order of a law that the running drive has room for."""
 SINGULAR = 1e12  # condition of I - A beyond which a law integrates
@@ -78,9 +80,8 @@ class Law(StateSpace):
         "L", "1", "anti-windup: n numbers that the states take of u - v; zeros where left out", **_LIST)] = ()
     gain: Annotated[float, quantity(
         "gain", "1", "", "factor on the law; its tolerance is that of the whole law", example="1")] = 1.0
-    period_s: Annotated[float | None, positive(
-        "period", "s", "", "period that the law was made for: must be that of its stage", high=1e4,
-        example="1 ms")] = None
+    period_s: Annotated[float | None, positive("period", "s", "",
+        "period that the law was made for: must be that of its stage", high=1e4, example="1 ms")] = None
     continuous: StateSpace | None = None
 
     @property

@@ -14,11 +14,8 @@ ROUNDED = 1e-15  # a slope of so small a part of its terms, and of the angle's o
 class Wave:
     """``peak sin(order angle + phase)``; numbers, or arrays of shape (K,) of stacked designs.
 
-    Attributes
-    ----------
-    peak_Nm, order, phase_rad : float or ndarray
-    averages : bool
-        Whether a drive in motion passes its periods so fast that it feels their mean, which is none.
+    ``averages``: whether a drive in motion passes its periods so fast that it feels their mean, which is
+    none.
     """
 
     peak_Nm: Any

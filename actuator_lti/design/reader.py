@@ -12,7 +12,7 @@ from datetime import date
 from math import isinf, pi, sqrt
 from typing import Any
 
-from actuator_lti.asked.quantities import QUANTITIES
+from actuator_lti.asked.quantities import LOOPS, QUANTITIES
 from actuator_lti.design import model
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Axis, Field, Structure
@@ -87,7 +87,7 @@ class Reader:
             tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control", "motor")
         )
         axis, self.constants = _meant(head, "design.axis"), _meant(motor, "motor.constants")
-        stages = {meant_of(f"{key}", ("current", "velocity", "position")) for key in control}
+        stages = {meant_of(f"{key}", LOOPS) for key in control}
         self.structure = Structure(axis, "velocity" in stages, "current" in stages)
         self.travel_m_rad: float | None = None
         self.travel_m_rad = self._travel(tree.get("screw"))

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
+from actuator_lti.asked.quantities import LOOPS
 from actuator_lti.design import model
 
 Many = Literal["", "named", "numbered", "listed"]
@@ -18,25 +19,15 @@ Many = Literal["", "named", "numbered", "listed"]
 class Section:
     """One table of the file.
 
-    Attributes
-    ----------
-    path : str
-        Table name, such as ``"control.velocity"``; of repeated tables without the name or number.
-    place : str
-        Where the part lies in a `Design`, such as ``"controller.velocity"``.
-    kind : type
-        Dataclass of the part.
-    required : bool
-        Whether a file must have it.
-    many : {"", "named", "numbered", "listed"}
-        Repeated tables, known by their key ``name`` (gears), by their number from 1, or by ``label``.
-    rare : bool
-        Whether lists of values pass over it while all its values are the defaults.
-    label : str
-        The key that a listed table is known by; its number from 1 where empty.
-    asked : bool
-        Whether it says what is asked of the drive and not what the drive is: the hash of a design without it
-        does not know it.
+    ``path``: table name, such as ``"control.velocity"``; of repeated tables without the name or number.
+    ``place``: where the part lies in a `Design`, such as ``"controller.velocity"``.
+    ``kind``: dataclass of the part.
+    ``required``: whether a file must have it.
+    ``many``: repeated tables, known by their key ``name`` (gears), by their number from 1, or by ``label``.
+    ``rare``: whether lists of values pass over it while all its values are the defaults.
+    ``label``: the key that a listed table is known by; its number from 1 where empty.
+    ``asked``: whether it says what is asked of the drive and not what the drive is: the hash of a design
+    without it does not know it.
     """
 
     path: str
@@ -97,7 +88,7 @@ SECTIONS: tuple[Section, ...] = (
     Section("control.position", "controller.position", model.PositionLoop),
     *(
         Section(f"control.{stage}.law{part}", f"controller.{stage}.law{part}", kind)
-        for stage in ("current", "velocity", "position")
+        for stage in LOOPS
         for part, kind in (("", model.Law), (".continuous", model.StateSpace))
     ),
     Section("validation", "validation", model.Validation),

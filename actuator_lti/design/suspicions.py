@@ -33,10 +33,9 @@ def warnings_of(design: Design) -> tuple[str, ...]:
 def _loops(design: Design) -> Iterator[tuple[str, object, float]]:
     """Name, settings and period in s of each loop that the design has."""
     control = design.controller
-    for name in ("current", "velocity", "position"):
+    for name in reversed(control.stages):
         loop = getattr(control, name)
-        if loop is not None:
-            yield name, loop, getattr(loop, "every", 1) * control.period_s
+        yield name, loop, getattr(loop, "every", 1) * control.period_s
 
 
 def _sampling(design: Design) -> Iterator[str]:

@@ -7,17 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.design.law import LAW_INPUTS
+from actuator_lti.asked.quantities import LOOPS
+from actuator_lti.design.law import BESIDE_A_LAW, LAW_INPUTS
 from actuator_lti.design.law_sources import PARTS, law_tree
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_tree, with_overrides
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 
-STAGES = ("current", "velocity", "position")
 METHODS = {"tustin": "bilinear", "zoh": "zoh"}
 """How a continuous system may be sampled, and scipy's word for it."""
-_KEPT = ("every", "sensor", "back_emf_feedforward", "resistance_feedforward")
 
 
 def _columns(system: Any) -> tuple[Any, ...]:
@@ -71,10 +70,10 @@ def with_law(
     continuous: Any = None,
 ) -> Design:
     """A copy of a design with a law of one's own at a stage, see `Design.with_law`."""
-    if stage not in STAGES:
-        raise InputError(f"stage = {shown(stage)}: allowed: {', '.join(STAGES)}")
+    if stage not in LOOPS:
+        raise InputError(f"stage = {shown(stage)}: allowed: {', '.join(LOOPS)}")
     there: Mapping[str, Any] = design_tree(design)["control"].get(stage, {})
-    table = {key: value for key, value in there.items() if key in _KEPT}
+    table = {key: value for key, value in there.items() if key in BESIDE_A_LAW}
     table |= {} if every is None else {"every": every}
     ticks = 1 if stage == "current" else table.get("every", 1)
     period_s = design.controller.period_s * (ticks if isinstance(ticks, int) and ticks > 0 else 1)

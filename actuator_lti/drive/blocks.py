@@ -43,15 +43,9 @@ class Realisation(NamedTuple):
 class Block:
     """One block in both times.
 
-    Attributes
-    ----------
-    sampled, continuous : Realisation
-    states : tuple of str
-        Names of the sampled realisation's states, told apart by the place of the block.
-    period_s : float
-        T of the sampled realisation.
-    age_s : float
-        Delay that the continuous realisation needs besides (a difference over m T is m T/2 old).
+    ``states``: names of the sampled realisation's states, told apart by the place of the block.
+    ``period_s``: T of the sampled realisation.
+    ``age_s``: delay that the continuous realisation needs besides (a difference over m T is m T/2 old).
     """
 
     sampled: Realisation

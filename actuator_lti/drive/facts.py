@@ -29,20 +29,15 @@ RATE_LIMITS = ("nothing", "speed limit", "force", "voltage")
 class Capability:
     """Figures of the whole drive at one load torque, the worse of both directions; floats or arrays.
 
-    Attributes
-    ----------
-    output_rate_rad_s : float or ndarray
-        Largest steady speed of the output within the speed, voltage and peak current limits; 0 if it
-        cannot move; ``inf`` without any limit.
-    rate_limit : int or ndarray
-        What sets it, a place in `RATE_LIMITS`.
-    motor_current_A : float or ndarray
-        Current needed at that speed; NaN for an ideal source or where the speed has no bound.
-    acceleration_rad_s2 : float or ndarray
-        Largest acceleration of the output from rest, within the acceleration limit; 0 if it cannot move.
-    torque_margin : float or ndarray
-        Motor torque at rest over what friction and the load ask of it to start, the smaller of both
-        directions; ``inf`` where nothing holds it. (ECSS-E-ST-33-01C calls it the motorization factor.)
+    ``output_rate_rad_s``: largest steady speed of the output within the speed, voltage and peak current
+    limits; 0 if it cannot move; ``inf`` without any limit.
+    ``rate_limit``: what sets it, a place in `RATE_LIMITS`.
+    ``motor_current_A``: current needed at that speed; NaN for an ideal source or where the speed has no
+    bound.
+    ``acceleration_rad_s2``: largest acceleration of the output from rest, within the acceleration limit; 0 if
+    it cannot move.
+    ``torque_margin``: motor torque at rest over what friction and the load ask of it to start, the smaller of
+    both directions; ``inf`` where nothing holds it. (ECSS-E-ST-33-01C calls it the motorization factor.)
     """
 
     output_rate_rad_s: Any

@@ -23,30 +23,19 @@ CONTACT = {"driving": 1.0, "driven": -1.0, "sliding": 1.0}  # sgn(w T_s) of the 
 class Operating:
     """Where a drive stands when it is made linear (model.md sections 3 and 6).
 
-    Attributes
-    ----------
-    point : str
-        ``sliding``: the viscous slope, as the dry part is a constant while the speed keeps its sign.
-        ``rest``: plus Tc/w_s, the slope of the tanh law at zero speed. ``describing-function``: the slope
-        that dry friction has for a sinusoidal speed. ``driving``, ``driven`` (only with a coupling): sliding,
-        with the coupling's torque against or with the motion, which decides the sign of the load-dependent
-        friction; ``sliding`` is ``driving`` there. ``gap``: the coupling open, k = c = 0.
-    load_Nm : float
-        Load torque at the output shaft; enters through Tc = C0 + CM |M_ext|, equation (9).
-    speed_amplitude_rad_s : float or None
-        W (peak, motor side), for the describing function.
-    direction : {1, -1}
-        Direction of motion, for asymmetric friction.
-    rotor : {"free", "locked"}
-    speed_rad_s : float
-        Motor speed at which the slope of a friction map is taken.
-    angle_rad : float
-        Output angle at which torques that bend with the angle are made linear.
-    twist_rad : float
-        Twist of the coupling there, at its own shaft: the motor stands at N angle + N_c twist. A spring that
-        bends has the stiffness of this twist; without one, of that under ``load_Nm``.
-    torques_held : bool
-        Whether torques that depend on the angle are taken as they stand, without their slopes.
+    ``point``: ``sliding``: the viscous slope, as the dry part is a constant while the speed keeps its sign.
+    ``rest``: plus Tc/w_s, the slope of the tanh law at zero speed. ``describing-function``: the slope that
+    dry friction has for a sinusoidal speed. ``driving``, ``driven`` (only with a coupling): sliding, with the
+    coupling's torque against or with the motion, which decides the sign of the load-dependent friction;
+    ``sliding`` is ``driving`` there. ``gap``: the coupling open, k = c = 0.
+    ``load_Nm``: load torque at the output shaft; enters through Tc = C0 + CM |M_ext|, equation (9).
+    ``speed_amplitude_rad_s``: W (peak, motor side), for the describing function.
+    ``direction``: of motion, 1 or -1, for asymmetric friction.
+    ``speed_rad_s``: motor speed at which the slope of a friction map is taken.
+    ``angle_rad``: output angle at which torques that bend with the angle are made linear.
+    ``twist_rad``: twist of the coupling there, at its own shaft: the motor stands at N angle + N_c twist. A
+    spring that bends has the stiffness of this twist; without one, of that under ``load_Nm``.
+    ``torques_held``: whether torques that depend on the angle are taken as they stand, without their slopes.
     """
 
     point: OperatingPoint = "sliding"

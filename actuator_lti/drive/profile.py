@@ -22,11 +22,7 @@ RESOLVED = 1e-13  # of the command: what sin(k pi) leaves of a zero of the mean
 class CommandMean:
     """Mean over the last samples of the command.
 
-    Attributes
-    ----------
-    samples : int
-    period_s : float
-        Of the position loop.
+    ``period_s``: of the position loop.
     """
 
     samples: int

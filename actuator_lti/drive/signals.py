@@ -52,22 +52,13 @@ SIGNALS = {signal.name: signal for signal in _SIGNALS}
 class Limiter:
     """A limiter: where it acts and how reports call it.
 
-    Attributes
-    ----------
-    name : str
-    words : str
-    signal : str
-        What stands in front of it, of `SIGNALS`.
-    kind : {"value", "rate", "rms", "command"}
-        A clamp of the signal, of its change per update, or of its mean square in the long run; or no limit of
-        a loop but what the drive makes of its command.
-    limit : str
-        Attribute of `Limits` that holds it; empty for ``torque-command``, which has that of the stage's
-        target, and for the command.
-    bit : int
-        Of the limit flags that a run writes (`REST_BIT` says that the rotor is at rest).
-    always : bool
-        Whether every drive that has the signal is told of it, also where it has no such limit.
+    ``signal``: what stands in front of it, of `SIGNALS`.
+    ``kind``: a clamp of the signal, of its change per update, or of its mean square in the long run; or no
+    limit of a loop but what the drive makes of its command.
+    ``limit``: attribute of `Limits` that holds it; empty for ``torque-command``, which has that of the
+    stage's target, and for the command.
+    ``bit``: of the limit flags that a run writes (`REST_BIT` says that the rotor is at rest).
+    ``always``: whether every drive that has the signal is told of it, also where it has no such limit.
     """
 
     name: str

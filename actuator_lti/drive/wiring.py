@@ -33,18 +33,10 @@ def present(value: Any) -> bool:
 class Drive:
     """A design (its numbers may be arrays, stacked over designs) at an operating point, as the loops need it.
 
-    Attributes
-    ----------
-    design : Design
-    operating : Operating
-    stages : tuple of str
-        The stages present, innermost first, of ``"current"``, ``"velocity"``, ``"position"``.
-    interval : dict
-        Ticks between two updates of each stage, and of the speed measurement (``"speed"``).
-    target : dict
-        The signal that each stage drives: ``"u"``, ``"i_ref"`` or ``"w_ref"``.
-    blocks_at : dict
-        Loops cut at a break point, kept by `actuator_lti.loops.periodic`.
+    ``stages``: the stages present, innermost first, of ``"current"``, ``"velocity"``, ``"position"``.
+    ``interval``: ticks between two updates of each stage, and of the speed measurement (``"speed"``).
+    ``target``: the signal that each stage drives: ``"u"``, ``"i_ref"`` or ``"w_ref"``.
+    ``blocks_at``: loops cut at a break point, kept by `actuator_lti.loops.periodic`.
     """
 
     design: Design

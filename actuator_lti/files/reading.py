@@ -148,10 +148,10 @@ def read_toml(path: str | PathLike[str], what: str = "design file") -> Tree:
     return parse_toml(decode(read_bytes(path, what), shown_path(path)), shown_path(path))
 
 
-def read_campaign_toml(path: str | PathLike[str], what: str = "campaign file") -> Tree:
-    """As `read_toml`, for files that list thousands of runs."""
+def read_campaign_toml(path: str | PathLike[str]) -> Tree:
+    """As `read_toml`, for campaign and record files, which list thousands of runs."""
     where = shown_path(path)
-    text = decode(read_bytes(path, what, CAMPAIGN_BYTES), where)
+    text = decode(read_bytes(path, "campaign or record file", CAMPAIGN_BYTES), where)
     return parse_toml(text, where, size=CAMPAIGN_BYTES, values=CAMPAIGN_VALUES)
 
 

@@ -40,19 +40,13 @@ _UNITS: dict[str, tuple[re.Pattern[str], dict[str, object]]] = {
 class RecordedResponse:
     """A response as it was measured.
 
-    Attributes
-    ----------
-    frequency_hz : array (m,)
-        Rising, above 0.
-    response : array (m,), complex
-    deviation : array (m,)
-        Root mean square of the complex error over the size of the value; not a number where it is not known.
-    coherence : array (m,)
-        Ordinary coherence, 0 to 1; not a number where it is not known.
-    name : str
-        Of the file.
-    left_out : int
-        Rows without numbers, or without coherence.
+    ``frequency_hz``, shape (m,): rising, above 0.
+    ``response``, shape (m,).
+    ``deviation``, shape (m,): root mean square of the complex error over the size of the value; not a number
+    where it is not known.
+    ``coherence``, shape (m,): ordinary coherence, 0 to 1; not a number where it is not known.
+    ``name``: of the file.
+    ``left_out``: rows without numbers, or without coherence.
     """
 
     frequency_hz: FloatArray

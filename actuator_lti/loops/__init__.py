@@ -14,14 +14,6 @@ from actuator_lti.loops.periodic import (
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
 __all__ = [
-    "ExactMargins",
-    "Form",
-    "InnerLoops",
-    "Loop",
-    "Loops",
-    "PeriodicLoop",
-    "assemble_loops",
-    "exact_margins",
-    "periodic_loop",
-    "periodic_loop_of",
-]
+    "ExactMargins", "Form", "InnerLoops", "Loop", "Loops", "PeriodicLoop", "assemble_loops", "exact_margins",
+    "periodic_loop", "periodic_loop_of",
+]  # fmt: skip

@@ -132,7 +132,8 @@ class Compliance:
     def __call__(self, z: npt.ArrayLike) -> npt.NDArray[np.complex128]:
         """Fundamental of the output at ``z = exp(j w Ts)``; of K stacked designs, shape (K, frequencies)."""
         points = np.atleast_1d(np.asarray(z, dtype=complex))[..., None, None]
-        steps = [tuple(part[..., None, :, :] for part in _parts(block)) for block in self.blocks]
+        parts = [(block.A, block.B, block.C, block.D) for block in self.blocks]
+        steps = [tuple(part[..., None, :, :] for part in each) for each in parts]
         p = _start(steps, points)
         total: Any = 0.0
         for A, B, C, D in steps:
@@ -168,10 +169,6 @@ def compliance(design: Design, at: Operating | None = None) -> Compliance:
     ticks = [program.tick(k) for k in range(program.ticks)]
     blocks = [siso(program, [tick], "moment", "output_angle") for tick in ticks]
     return Compliance(pruned(blocks), wired.tick_s)
-
-
-def _parts(block: Block) -> tuple[np.ndarray, ...]:
-    return block.A, block.B, block.C, block.D
 
 
 def _start(steps: Sequence[tuple[np.ndarray, ...]], z: np.ndarray) -> np.ndarray:

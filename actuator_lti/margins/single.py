@@ -37,19 +37,12 @@ class AtFrequency:
 class GainMargin(AtFrequency):
     """A real factor on the loop that brings a closed-loop pole to the border.
 
-    Attributes
-    ----------
-    ratio : float
-        The factor (> 1: an upper limit, < 1: a lower limit).
-    frequency_rad_s : float
-        Where the pole reaches the border; 0 and the Nyquist frequency are possible, infinity where the
-        loop has a direct feed-through.
-    tangent : bool
-        The curve touches the negative real axis there without crossing it.
-    bracket_rad_s : tuple of float or None
-        Measured data: the two frequencies between which the crossing lies.
-    ratio_range : tuple of float or None
-        Measured data: where the ratio lies, between the points and within the noise.
+    ``ratio``: the factor (> 1: an upper limit, < 1: a lower limit).
+    ``frequency_rad_s``: where the pole reaches the border; 0 and the Nyquist frequency are possible, infinity
+    where the loop has a direct feed-through.
+    ``tangent``: the curve touches the negative real axis there without crossing it.
+    ``bracket_rad_s``: measured data: the two frequencies between which the crossing lies.
+    ``ratio_range``: measured data: where the ratio lies, between the points and within the noise.
     """
 
     ratio: float
@@ -74,16 +67,11 @@ class GainMargin(AtFrequency):
 class PhaseMargin(AtFrequency):
     """A phase lag (negative: a lead) that brings a closed-loop pole to the border.
 
-    Attributes
-    ----------
-    deg : float
-        180 deg plus the phase of the loop, in (-180, 180].
-    frequency_rad_s : float
-        The gain crossover.
-    tangent : bool
-        The gain touches one there without crossing it.
-    bracket_rad_s, deg_range : tuple of float or None
-        Measured data: two frequencies between which the crossing lies, and where the margin does.
+    ``deg``: 180 deg plus the phase of the loop, in (-180, 180].
+    ``frequency_rad_s``: the gain crossover.
+    ``tangent``: the gain touches one there without crossing it.
+    ``bracket_rad_s``, ``deg_range``: measured data: two frequencies between which the crossing lies, and
+    where the margin does.
     """
 
     deg: float

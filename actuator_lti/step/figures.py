@@ -20,25 +20,15 @@ _SHOWN = 2000
 class StepFigures:
     """Figures of a unit step response.
 
-    Attributes
-    ----------
-    rise_time_s : float
-        From 10 to 90 % of the final value, first passages.
-    overshoot_percent : float
-        Largest excess over the final value, % of it; 0 where there is none.
-    settling_time_s : float
-        From when on the response stays within 2 % of the final value.
-    final_value : float
-        Limit of the response.
-    peak_value, peak_time_s : float
-        The largest value (in the direction of the final one) and when it is reached; where the response only
-        approaches its final value from below, that value and infinity.
-    period_s : float or None
-        Sampling period: the figures of a sampled system are times of samples.
-    time_s, response : arrays (m,)
-        The response to look at, until well after settling.
-    notes : tuple of str
-        What else has to be known to read the figures.
+    ``rise_time_s``: from 10 to 90 % of the final value, first passages.
+    ``overshoot_percent``: largest excess over the final value, % of it; 0 where there is none.
+    ``settling_time_s``: from when on the response stays within 2 % of the final value.
+    ``final_value``: limit of the response.
+    ``peak_value``, ``peak_time_s``: the largest value (in the direction of the final one) and when it is
+    reached; where the response only approaches its final value from below, that value and infinity.
+    ``period_s``: sampling period: the figures of a sampled system are times of samples.
+    ``time_s``, ``response``, shape (m,): the response to look at, until well after settling.
+    ``notes``: what else has to be known to read the figures.
     """
 
     rise_time_s: float

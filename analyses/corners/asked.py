@@ -19,14 +19,10 @@ HOT_DEGC, COLD_DEGC, SUPPLY_SHARE = 120.0, -40.0, 0.8
 class Asked:
     """Where the corners lie; the viscous factor is on motor and load (grease in the cold)."""
 
-    hot_degC: Annotated[
-        float, Option(words="Winding and magnets when hot; the winding's limit, or 120.", metavar="DEGC")
-    ]
-    cold_degC: Annotated[float, Option(words="Winding and magnets when cold; -40.", metavar="DEGC")]
-    supply_V: Annotated[float, Option(words="The low supply; 0.8 of limits.voltage.", metavar="V")]
-    cold_viscous: Annotated[
-        float, Option(words="Factor on viscous friction in the cold; 1.", metavar="FACTOR")
-    ] = 1.0
+    hot_degC: Annotated[float, Option("Winding and magnets when hot; the winding's limit, or 120.", "DEGC")]
+    cold_degC: Annotated[float, Option("Winding and magnets when cold; -40.", "DEGC")]
+    supply_V: Annotated[float, Option("The low supply; 0.8 of limits.voltage.", "V")]
+    cold_viscous: Annotated[float, Option("Factor on viscous friction in the cold; 1.", "FACTOR")] = 1.0
 
     def __post_init__(self) -> None:
         """Refuse what is no corner."""

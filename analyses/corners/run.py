@@ -77,12 +77,9 @@ def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
     for quantity in CORNERED:
         name, values = f"worst {QUANTITIES[quantity].words}", worst_ends(design, quantity)
         if values:
-            words = f"each tolerance at the end that {_worse(quantity)} it: " + _ends_in_words(design, values)
+            worse = "lowers" if QUANTITIES[quantity].better > 0 else "raises"
+            words = f"each tolerance at the end that {worse} it: " + _ends_in_words(design, values)
             yield name, words, with_values(design, values)
-
-
-def _worse(quantity: str) -> str:
-    return "lowers" if QUANTITIES[quantity].better > 0 else "raises"
 
 
 def at_temperature(design: Design, degC: float) -> Design:

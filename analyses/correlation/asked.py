@@ -15,20 +15,18 @@ class Asked:
     """Records, and what drives the model."""
 
     records: Annotated[
-        list[Path],
-        Option(words="Records: CSV, .mat, or record files (TOML).", metavar="RECORD...", argument=True),
+        list[Path], Option("Records: CSV, .mat, or record files (TOML).", "RECORD...", argument=True)
     ]
     command: Annotated[
         str | None,
         Option(
-            words="Signal that drives the model: a recorded command (default: the outermost), or voltage "
+            "Signal that drives the model: a recorded command (default: the outermost), or voltage "
             "(the motor's measured one).",
-            metavar="SIGNAL",
+            "SIGNAL",
         ),
     ] = None
     error_limit: Annotated[
-        float | None,
-        Option(words="Error, of the motion about its mean, above which a signal fails.", metavar="PERCENT"),
+        float | None, Option("Error, of the motion about its mean, above which a signal fails.", "PERCENT")
     ] = None
 
     def __post_init__(self) -> None:

@@ -20,21 +20,21 @@ class Asked:
     """A duty: a sine of the command, for a share of the time, the drive holding still for the rest (S3)."""
 
     amplitude_rad: Annotated[
-        float,
-        Option(words='Peak, such as "5 deg"; half the full deflection.', metavar="ANGLE", kind="output"),
+        float, Option('Peak, such as "5 deg"; half the full deflection.', "ANGLE", kind="output")
     ]
-    frequency_hz: Annotated[float, Option(words="Of the sine; 1.", metavar="HZ")] = USUAL_HZ
+    frequency_hz: Annotated[float, Option("Of the sine; 1.", "HZ")] = USUAL_HZ
     load_Nm: Annotated[
         float,
         Option(
-            words='Moment at the output, such as "4 N*m", all the time; the largest of validation.loads.',
-            metavar="LOAD", kind="load",
+            'Moment at the output, such as "4 N*m", all the time; the largest of validation.loads.',
+            "LOAD",
+            kind="load",
         ),
-    ] = 0.0  # fmt: skip
-    share: Annotated[
-        float, Option(words="Share of the time in motion; the drive holds still for the rest; 1.")
-    ] = 1.0
-    cycle_s: Annotated[float, Option(words="One motion and one rest together; 10.", metavar="S")] = 10.0
+    ] = 0.0
+    share: Annotated[float, Option("Share of the time in motion; the drive holds still for the rest; 1.")] = (
+        1.0
+    )
+    cycle_s: Annotated[float, Option("One motion and one rest together; 10.", "S")] = 10.0
 
     def __post_init__(self) -> None:
         """Refuse what is no duty."""

@@ -19,12 +19,8 @@ Floats = npt.NDArray[np.float64]
 class Overload:
     """The overload (I2t) state under this duty, for ever repeated; it acts at 1.
 
-    Attributes
-    ----------
-    peak : float
-        Largest in the periodic state, as if the protection did not act.
-    acts_after_s : float or None
-        From the cold drive, to the end of the cycle in which it does; None: never.
+    ``peak``: largest in the periodic state, as if the protection did not act.
+    ``acts_after_s``: from the cold drive, to the end of the cycle in which it does; None: never.
     """
 
     peak: float
@@ -35,17 +31,10 @@ class Overload:
 class Heating:
     """Temperature of the winding, the copper loss of a cycle taken as its mean.
 
-    Attributes
-    ----------
-    loss_W : float
-        Mean copper loss at the reference temperature.
-    final_degC : float
-        In the long run, the resistance growing with the temperature; inf: it never settles.
-    limit_degC : float
-    limit_after_s : float or None
-        When the limit is reached from ambient; None: never.
-    time_s, temperature_degC : ndarray
-        The rise from ambient, for drawing.
+    ``loss_W``: mean copper loss at the reference temperature.
+    ``final_degC``: in the long run, the resistance growing with the temperature; inf: it never settles.
+    ``limit_after_s``: when the limit is reached from ambient; None: never.
+    ``time_s``, ``temperature_degC``: the rise from ambient, for drawing.
     """
 
     loss_W: float
@@ -60,20 +49,12 @@ class Heating:
 class Duty:
     """A duty cycle and what it asks of the motor.
 
-    Attributes
-    ----------
-    rms_A, moving_rms_A, holding_A, peak_A : float
-        Current: of the whole cycle, in motion (steady), at rest, largest.
-    continuous_A : float
-        What the design allows for ever; inf where it states none.
-    limited : tuple of str
-        Limiters that act in steady motion: the duty is then not followed as asked.
-    time_s, current_A : ndarray
-        One period of the steady motion.
-    overload : Overload or None
-        None without overload protection.
-    heating : Heating or None
-        None without a thermal resistance in the design.
+    ``rms_A``, ``moving_rms_A``, ``holding_A``, ``peak_A``: current: of the whole cycle, in motion (steady),
+    at rest, largest.
+    ``continuous_A``: what the design allows for ever; inf where it states none.
+    ``limited``: limiters that act in steady motion: the duty is then not followed as asked.
+    ``time_s``, ``current_A``: one period of the steady motion.
+    ``overload``, ``heating``: None without overload protection, without a thermal resistance in the design.
     """
 
     design: Design

@@ -20,31 +20,22 @@ class Asked:
     """Deflections and times at which the failure cases are judged; the run of a case ends at the stop."""
 
     stop_rad: Annotated[
-        float,
-        Option(
-            words='Mechanical stop, such as "25 deg"; the full deflection.', metavar="ANGLE", kind="output"
-        ),
+        float, Option('Mechanical stop, such as "25 deg"; the full deflection.', "ANGLE", kind="output")
     ]
     deflection_rad: Annotated[
         float,
-        Option(
-            words='Deflection to which times are given, such as "2 deg"; stop/10.',
-            metavar="ANGLE", kind="output",
-        ),
-    ]  # fmt: skip
-    detection_s: Annotated[
-        float, Option(words="Seconds from the failure to its detection; 0.1.", metavar="S")
-    ] = 0.1
-    watched_s: Annotated[
-        float, Option(words="How long each failure is followed; 1.", metavar="S", flag="duration")
-    ] = 1.0
+        Option('Deflection to which times are given, such as "2 deg"; stop/10.', "ANGLE", kind="output"),
+    ]
+    detection_s: Annotated[float, Option("Seconds from the failure to its detection; 0.1.", "S")] = 0.1
+    watched_s: Annotated[float, Option("How long each failure is followed; 1.", "S", flag="duration")] = 1.0
     load_Nm: Annotated[
         float,
         Option(
-            words='Moment that pushes the output forward from the start, such as "4 N*m"; none.',
-            metavar="LOAD", kind="load",
+            'Moment that pushes the output forward from the start, such as "4 N*m"; none.',
+            "LOAD",
+            kind="load",
         ),
-    ] = 0.0  # fmt: skip
+    ] = 0.0
 
     def __post_init__(self) -> None:
         """Refuse what cannot be answered."""

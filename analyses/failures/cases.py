@@ -26,18 +26,11 @@ Command = Callable[[float], float]
 class Case:
     """One failure.
 
-    Attributes
-    ----------
-    start_rad : float
-        Where the drive holds before.
-    command : callable
-        Command over the time from the failure on (from the step on, where ``at_rad`` is given).
-    broken : callable
-        What is done to the rig at the failure.
-    at_rad : float or None
-        The failure happens on the way, when the output is this far from the start; ``None``: at once.
-    stops : bool
-        Whether the run ends at the stop.
+    ``start_rad``: where the drive holds before.
+    ``command``: command over the time from the failure on (from the step on, where ``at_rad`` is given).
+    ``broken``: what is done to the rig at the failure.
+    ``at_rad``: the failure happens on the way, when the output is this far from the start; ``None``: at once.
+    ``stops``: whether the run ends at the stop.
     """
 
     name: str

@@ -19,20 +19,14 @@ Floats = npt.NDArray[np.float64]
 class FailureCase:
     """One failure; time runs from the failure, deflection from where the output then was.
 
-    Attributes
-    ----------
-    name, words : str
-        Such as ``"hard-over"``, and what happens.
-    time_s, deflection_rad, current_A, moment_Nm : ndarray
-        Output side; the moment is that in the coupling (rigid: the motor's torque times the reduction).
-    to_deflection_s, to_stop_s : float or None
-        Time to the deflection asked for and to the stop, either side; ``None``: not reached while watched.
-    at_detection_rad : float
-        Largest deflection until the failure is detected.
-    peak_current_A, peak_moment_Nm : float
-        Largest magnitudes.
-    protected_s : float or None
-        When the overload protection (I2t) acts first.
+    ``name``, ``words``: such as ``"hard-over"``, and what happens.
+    ``time_s``, ``deflection_rad``, ``current_A``, ``moment_Nm``: output side; the moment is that in the
+    coupling (rigid: the motor's torque times the reduction).
+    ``to_deflection_s``, ``to_stop_s``: time to the deflection asked for and to the stop, either side;
+    ``None``: not reached while watched.
+    ``at_detection_rad``: largest deflection until the failure is detected.
+    ``peak_current_A``, ``peak_moment_Nm``: largest magnitudes.
+    ``protected_s``: when the overload protection (I2t) acts first.
     """
 
     name: str
@@ -53,12 +47,8 @@ class FailureCase:
 class Failures:
     """All cases of a design.
 
-    Attributes
-    ----------
-    left_out : dict of str to str
-        By name: why a case does not exist for the drive.
-    before : tuple of Settling
-        What holding each start ends in, the drive whole.
+    ``left_out``: by name: why a case does not exist for the drive.
+    ``before``: what holding each start ends in, the drive whole.
     """
 
     design: Design

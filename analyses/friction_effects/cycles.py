@@ -27,16 +27,10 @@ if TYPE_CHECKING:
 class LimitCycles:
     """Everything about limit cycles at one load torque.
 
-    Attributes
-    ----------
-    design : Design
-        Without counts and noise.
-    confirmations : tuple of Confirmation
-        Empty: the describing function predicts none.
-    stick_slip : StickSlipCycle or None
-        What the analysis of rest, breakaway and slip predicts beside it.
-    settlings : tuple of Settling
-        Steps of several sizes: the drive rests, breaks away, and may hunt.
+    ``design``: without counts and noise.
+    ``confirmations``: empty: the describing function predicts none.
+    ``stick_slip``: what the analysis of rest, breakaway and slip predicts beside it.
+    ``settlings``: steps of several sizes: the drive rests, breaks away, and may hunt.
     """
 
     design: Design

@@ -25,21 +25,14 @@ SLOW_RAD_S = 1e-100  # motor speed at which nothing viscous counts
 class Hysteresis:
     """One settled period of a slow triangle at the command.
 
-    Attributes
-    ----------
-    amplitude_rad, frequency_hz : float
-        Of the triangle; the width depends on its rate where a controller integrates.
-    command_rad, output_rad : ndarray
-        One period at updates of the position loop, thinned.
-    width_rad : float
-        Output falling less output rising, both where the command passes zero.
-    linear_width_rad : float
-        The same without dry friction and play: what the loop lags by at this rate.
-    largest_rad : float
-        Largest distance of the output from what it would be without dry friction and play, at any update of
-        the position loop in the period.
-    predicted_rad : float
-        What a reversal loses of a slow command: `lost_predicted_rad`.
+    ``amplitude_rad``, ``frequency_hz``: of the triangle; the width depends on its rate where a controller
+    integrates.
+    ``command_rad``, ``output_rad``: one period at updates of the position loop, thinned.
+    ``width_rad``: output falling less output rising, both where the command passes zero.
+    ``linear_width_rad``: the same without dry friction and play: what the loop lags by at this rate.
+    ``largest_rad``: largest distance of the output from what it would be without dry friction and play, at
+    any update of the position loop in the period.
+    ``predicted_rad``: what a reversal loses of a slow command: `lost_predicted_rad`.
     """
 
     amplitude_rad: float

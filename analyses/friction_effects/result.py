@@ -28,14 +28,8 @@ if TYPE_CHECKING:
 class FrictionPoint:
     """What dry friction does at one load torque.
 
-    Attributes
-    ----------
-    load_Nm, dry_torque_Nm : float
-        Dry friction at the motor, forward.
-    threshold : Threshold or None
-        ``None`` where a forward step has none.
-    hysteresis : Hysteresis or None
-    cycles : LimitCycles
+    ``load_Nm``, ``dry_torque_Nm``: dry friction at the motor, forward.
+    ``threshold``: ``None`` where a forward step has none.
     """
 
     load_Nm: float
@@ -49,15 +43,9 @@ class FrictionPoint:
 class FrictionEffects:
     """Friction at small signals, one point a load torque.
 
-    Attributes
-    ----------
-    design : Design
-    points : tuple of FrictionPoint
-    integrator : str
-        The controller that integrates, ``"speed"`` or ``"position"``: then friction leaves no lasting error
-        by itself; empty where none does.
-    reason : str
-        Why there is nothing to show; then ``points`` is empty.
+    ``integrator``: the controller that integrates, ``"speed"`` or ``"position"``: then friction leaves no
+    lasting error by itself; empty where none does.
+    ``reason``: why there is nothing to show; then ``points`` is empty.
     """
 
     design: Design

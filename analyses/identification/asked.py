@@ -26,43 +26,39 @@ class Settings:
 
     fix: Annotated[
         list[str] | None,
-        Option(words="Hold a value, such as friction.load_coefficient=0; repeatable.", metavar="KEY=VALUE"),
+        Option("Hold a value, such as friction.load_coefficient=0; repeatable.", "KEY=VALUE"),
     ] = None
     residual_limit: Annotated[
-        float,
-        Option(words="Largest relative residual for which a design is written; 20.", metavar="PERCENT"),
+        float, Option("Largest relative residual for which a design is written; 20.", "PERCENT")
     ] = 20.0
     inertia_to: Annotated[
         str,
         Option(
-            words="Where the inertia goes, less the design's others: motor.rotor_inertia (default) or "
+            "Where the inertia goes, less the design's others: motor.rotor_inertia (default) or "
             "load.inertia.",
-            metavar="KEY",
+            "KEY",
         ),
     ] = "motor.rotor_inertia"
     friction: Annotated[
         Friction,
         Option(
-            words="Of records: symmetric (default), per-direction, or map (over the speed, where it is "
+            "Of records: symmetric (default), per-direction, or map (over the speed, where it is "
             "clearly better)."
         ),
     ] = "symmetric"
-    gravity: Annotated[
-        bool, Option(words="Of records: look for a pendulum at the output, m g l sin(angle).")
-    ] = False
+    gravity: Annotated[bool, Option("Of records: look for a pendulum at the output, m g l sin(angle).")] = (
+        False
+    )
     electrical: Annotated[
-        bool, Option(words="Of records: R, kE and kM from u = R i + kE w first (L if it shows).")
+        bool, Option("Of records: R, kE and kM from u = R i + kE w first (L if it shows).")
     ] = False
     refine: Annotated[
-        bool, Option(words="Of records: refine by simulation; the design gets the refined values.")
+        bool, Option("Of records: refine by simulation; the design gets the refined values.")
     ] = False
     cutoff_hz: Annotated[
-        float | None,
-        Option(words="Of records: low-pass cut-off (default 100, or 0.1 of the rate).", metavar="Hz"),
+        float | None, Option("Of records: low-pass cut-off (default 100, or 0.1 of the rate).", "Hz")
     ] = None
-    decimation: Annotated[
-        int | None, Option(words="Of records: decimation (default: to the cut-off).", metavar="N")
-    ] = None
+    decimation: Annotated[int | None, Option("Of records: decimation (default: to the cut-off).", "N")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,63 +68,52 @@ class Asked(Settings):
     files: Annotated[
         list[Path],
         Option(
-            words="A campaign file (TOML), or records: CSV, Parquet, .mat, record files (TOML).",
-            metavar="FILE...",
+            "A campaign file (TOML), or records: CSV, Parquet, .mat, record files (TOML).",
+            "FILE...",
             argument=True,
         ),
     ]
-    validate: Annotated[
-        list[Path] | None,
-        Option(words="A record the fit does not see; repeatable.", metavar="RECORD"),
-    ] = None
+    validate: Annotated[list[Path] | None, Option("A record the fit does not see; repeatable.", "RECORD")] = (
+        None
+    )
     response: Annotated[
-        bool,
-        Option(words="FILE is a measured frequency response of a loop: inertias, stiffness, damping, delay."),
+        bool, Option("FILE is a measured frequency response of a loop: inertias, stiffness, damping, delay.")
     ] = False
     loop: Annotated[
-        str | None,
-        Option(words="With --response: which stage or break point; the outermost stage.", metavar="NAME"),
+        str | None, Option("With --response: which stage or break point; the outermost stage.", "NAME")
     ] = None
     response_of: Annotated[
         Of,
         Option(
-            words="With --response: L (open loop), T = L/(1+L), S = 1/(1+L), closed (from the command).",
-            flag="of",
+            "With --response: L (open loop), T = L/(1+L), S = 1/(1+L), closed (from the command).", flag="of"
         ),
     ] = "L"
     frequency_response: Annotated[
-        bool, Option(words="Of one record with a periodic excitation: a compliant two-mass drive.")
+        bool, Option("Of one record with a periodic excitation: a compliant two-mass drive.")
     ] = False
     play: Annotated[
-        Path | None,
-        Option(words="With --frequency-response: a reversing motion, both angles.", metavar="RECORD"),
+        Path | None, Option("With --frequency-response: a reversing motion, both angles.", "RECORD")
     ] = None
     period_s: Annotated[
-        float | None,
-        Option(words="Period of the excitation (default: found from the command).", metavar="s"),
+        float | None, Option("Period of the excitation (default: found from the command).", "s")
     ] = None
     plan: Annotated[
-        bool,
-        Option(words="FILE is a design: motions that tell its values as closely as asked (then records)."),
+        bool, Option("FILE is a design: motions that tell its values as closely as asked (then records).")
     ] = False
     within: Annotated[
-        float, Option(words="With --plan: half of each 95 % interval, of the value; 5.", metavar="PERCENT")
+        float, Option("With --plan: half of each 95 % interval, of the value; 5.", "PERCENT")
     ] = 5.0
     noise: Annotated[
         float | None,
         Option(
-            words="With --plan: noise of the recorded current (without one, voltage), rms; the design's "
+            "With --plan: noise of the recorded current (without one, voltage), rms; the design's "
             "instruments.current_noise.",
-            metavar="A",
+            "A",
         ),
     ] = None
-    accept: Annotated[
-        bool, Option(words="Write the design even where a check fails (the status stays 1).")
-    ] = False
-    suggest: Annotated[int, Option(words="Suggest so many further runs of a campaign; 6.", metavar="N")] = 6
-    criterion: Annotated[Criterion, Option(words="What suggested runs serve: margins (default), or D.")] = (
-        "margins"
-    )
+    accept: Annotated[bool, Option("Write the design even where a check fails (the status stays 1).")] = False
+    suggest: Annotated[int, Option("Suggest so many further runs of a campaign; 6.", "N")] = 6
+    criterion: Annotated[Criterion, Option("What suggested runs serve: margins (default), or D.")] = "margins"
 
     def __post_init__(self) -> None:
         """Refuse what no identification can do."""
@@ -158,9 +143,9 @@ class Asked(Settings):
         alone = len(self.files) == 1 and not (self.frequency_response or self.plan or self.response)
         if not alone or first.suffix.lower() != ".toml":
             return False
-        from analyses.toml_tables import read_toml
+        from actuator_lti.files.reading import read_campaign_toml
 
-        return not {"file", "record"} & set(read_toml(first))
+        return not {"file", "record"} & set(read_campaign_toml(first))
 
     @classmethod
     def design_of(cls, chosen: Mapping[str, Any]) -> str:

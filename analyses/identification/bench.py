@@ -150,7 +150,11 @@ def identify_bench(
         design=made,
         text=text,
         resimulated=again,
-        items=(*items, *_held_out(start, model, unseen, limit), *_again(again, limit)),
+        items=(
+            *items,
+            *_held_out(start, model, unseen, limit),
+            *(simulated_item(one.record, one.relative_error, limit, one.how) for one in again),
+        ),
         settings=settings,
         design_values=compared,
         laws=laws,
@@ -230,7 +234,3 @@ def _held_out(start: Design, model: JointModel, unseen: Sequence[Record], limit:
     return tuple(
         held_out_item(record.name, held_out_residual(start, model, record), fit, limit) for record in unseen
     )
-
-
-def _again(again: Sequence[Resimulated], limit: float) -> tuple[Item, ...]:
-    return tuple(simulated_item(one.record, one.relative_error, limit, one.how) for one in again)

@@ -186,10 +186,8 @@ def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None, fou
     near = np.convolve(flat, np.ones(2 * reach + 1), mode="same") > 0.5
     without = replace(record, left_out=near)
     try:
-        fit, whole = (
-            fit_records(start, [without], recipe=recipe),
-            record_rows(start, record, "symmetric", recipe),
-        )
+        fit = fit_records(start, [without], recipe=recipe)
+        whole = record_rows(start, record, "symmetric", recipe)
     except (InputError, NumericalError):
         return record
     rows = (whole.keep & ~fit.records[0].keep)[whole.keep]

@@ -194,27 +194,27 @@ def _fitted(
                 fit = result if result.misfit < fit.misfit else fit
             if fit.misfit <= MISFIT_DOUBTED:
                 break
+    return _held_at_zero(fit)
+
+
+def _held_at_zero(fit: TwoMass) -> TwoMass:
+    """The fit where what came out negative is zero: the rest moves as its covariance with that has it."""
     below = [name for name in FLOORS if name in fit.names and fit[name] < 0.0]
     if not below:
         return fit
-    return _held_at_zero(fit, below)
-
-
-def _held_at_zero(fit: TwoMass, below: Sequence[str]) -> TwoMass:
-    """The fit where some parameters are zero: the others move as their covariance with these has it."""
     gone = [fit.names.index(name) for name in below]
     rest = [k for k in range(len(fit.names)) if k not in gone]
     gain = np.linalg.solve(fit.covariance[np.ix_(gone, gone)], fit.covariance[np.ix_(gone, rest)])
     values = fit.values[rest] - fit.values[gone] @ gain
+    fixed = dict.fromkeys(below, Fixed(value=0.0, reason="would come out negative"))
     again = replace(
         fit,
         names=tuple(fit.names[k] for k in rest),
         values=values,
         covariance=fit.covariance[np.ix_(rest, rest)],
-        fixed={**fit.fixed, **dict.fromkeys(below, Fixed(value=0.0, reason="would come out negative"))},
+        fixed={**fit.fixed, **fixed},
     )
-    more = [name for name in FLOORS if name in again.names and again[name] < 0.0]
-    return _held_at_zero(again, more) if more else again
+    return _held_at_zero(again)
 
 
 def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:

@@ -56,24 +56,21 @@ def fit_records(
     if not records:
         raise InputError("no record to identify from")
     held = dict(fixed or {})
+    knots = None if knots_rad_s is None else tuple(float(v) for v in knots_rad_s)
     moments: Sequence[FloatArray | None] = [None] * len(records)
     model: JointModel | None = None
     for _ in range(GRAVITY_ROUNDS if gravity else 1):
         blocks = [
-            record_rows(design, record, form, recipe, gravity=gravity, moment=moment, knots_rad_s=knots_rad_s)
+            record_rows(design, record, form, recipe, gravity=gravity, moment=moment, knots_rad_s=knots)
             for record, moment in zip(records, moments, strict=True)
         ]
-        model = replace(_fitted(design, blocks, form, held, weights), knots_rad_s=_as_knots(knots_rad_s))
+        model = replace(_fitted(design, blocks, form, held, weights), knots_rad_s=knots)
         if gravity:
             moments = [
                 model["gravity_sin"] * block.sine + model["gravity_cos"] * block.cosine for block in blocks
             ]
     assert model is not None
     return model
-
-
-def _as_knots(knots_rad_s: Sequence[float] | None) -> tuple[float, ...] | None:
-    return None if knots_rad_s is None else tuple(float(v) for v in knots_rad_s)
 
 
 def _fitted(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lsim
 
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, LoadFriction
 from analyses.estimation.arrays import FloatArray
 from analyses.identification.joint_model import Recipe
 from analyses.records.differentiation import Motion
@@ -94,14 +94,11 @@ def _measured(
 
 def _follows(design: Design, record: Record, motion: Motion, moment: FloatArray) -> Motion:
     """The load's motion that the motor's makes through the design's coupling, from rest in the twist."""
-    coupling, friction = design.coupling, design.load.friction
+    coupling, friction = design.coupling, design.load.friction or LoadFriction()
     assert coupling is not None
     k, c, inertia = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad, design.load_side_inertia_kgm2
     driver = motion.scaled(1.0 / design.ratio_to_coupling)
-    viscous, dry, offset = 0.0, 0.0, 0.0
-    if friction is not None:
-        viscous, dry = friction.viscous_Nms_rad, friction.dry_torque_Nm
-        offset = friction.offset_torque_Nm
+    viscous, dry, offset = friction.viscous_Nms_rad, friction.dry_torque_Nm, friction.offset_torque_Nm
     if inertia == 0.0:
         return driver
     a = np.array([[0.0, 1.0], [-k / inertia, -(c + viscous) / inertia]])

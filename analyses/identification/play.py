@@ -15,8 +15,6 @@ CONTACT = 0.25
 """Rows whose torque is above this share of its largest (95 % point) are taken as in contact."""
 LEAST_ROWS = 50
 BEYOND = 0.9
-
-
 ROUNDS = 8
 
 
@@ -97,11 +95,10 @@ def find_play(
         if all(abs(new[name] - own[name]) <= 1e-9 * abs(new[name]) for name in own):
             break
         own = new
+    coarse = _coarse(resolution_rad, touching, smooth_samples)
     return Play(
         half_rad=values["play"],
-        half_std_rad=float(
-            np.hypot(std[told.index("play")], _coarse(resolution_rad, touching, smooth_samples))
-        ),
+        half_std_rad=float(np.hypot(std[told.index("play")], coarse)),
         middle_rad=values["middle"],
         viscous_Nms_rad=values.get("viscous"),
         dry_Nm=values.get("dry"),

@@ -52,7 +52,7 @@ def refine_records(
     """
     names = [output_name(design, record) for record in records]
     measured = [measured_signals(design, record, derive=True) for record in records]
-    sizes = [_size(one[name]) for one, name in zip(measured, names, strict=True)]
+    sizes = [float(np.sqrt(np.mean(one[name] ** 2))) for one, name in zip(measured, names, strict=True)]
     wanted = [one[name] / size for one, name, size in zip(measured, names, sizes, strict=True)]
 
     def output(tried: Design) -> FloatArray:
@@ -64,10 +64,6 @@ def refine_records(
 
     ends = np.cumsum([len(one) for one in wanted]).tolist()
     return refine_by_output_error(design, paths, output, np.concatenate(wanted), ends=ends, progress=progress)
-
-
-def _size(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 MOST_TICKS = 2_000_000

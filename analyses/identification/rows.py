@@ -89,12 +89,8 @@ def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool
         return record["force"], "force", "recorded force", False
     for name in ("current", "current_reference"):
         if name in signals and constant is not None:
-            return (
-                np.asarray(constant * record[name]),
-                name,
-                f"torque kM i, kM = {constant:g} N m/A",
-                False,
-            )
+            told = f"torque kM i, kM = {constant:g} N m/A"
+            return np.asarray(constant * record[name]), name, told, False
     name = "force_reference" if design.axis == "linear" else "torque_reference"
     if name in signals:
         return record[name], name, f"{name.replace('_reference', '')} as commanded", False

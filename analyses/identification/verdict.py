@@ -126,11 +126,8 @@ def held_out_item(record: str, residual: float, fit: float, limit: float) -> Ite
 
 def simulated_item(record: str, error: float, limit: float, how: str) -> Item:
     """How far the written design is from a record."""
-    label, why = (
-        f"Written design against {record}, {how}",
-        "the written design does not drive as the record does",
-    )
-    return share_item(f"written-{record}", label, error, limit, why)
+    why = "the written design does not drive as the record does"
+    return share_item(f"written-{record}", f"Written design against {record}, {how}", error, limit, why)
 
 
 def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: bool, loaded: bool) -> Item:

@@ -36,19 +36,13 @@ UPDATES = 400  # of the position loop in a window
 class RestSweep:
     """Response from rest, one entry a frequency.
 
-    Attributes
-    ----------
-    frequency_hz, amplitude_rad : ndarray, shape (K,)
-        Command at the output shaft, peak.
-    measured, sliding, described : ndarray of complex, shape (K,)
-        Output over command: simulated; sliding loop; describing function at ``speed_rad_s`` (NaN where
-        nothing moves).
-    speed_rad_s : ndarray, shape (K,)
-        Amplitude of the motor speed that was seen.
-    stick_fraction, distortion, unsteadiness : ndarray, shape (K,)
-        Of the last window; distortion of the motor speed.
-    limiter : tuple of str
-        Limit that acted in the last window, or empty.
+    ``frequency_hz``, ``amplitude_rad``, shape (K,): command at the output shaft, peak.
+    ``measured``, ``sliding``, ``described``, shape (K,): output over command: simulated; sliding loop;
+    describing function at ``speed_rad_s`` (NaN where nothing moves).
+    ``speed_rad_s``, shape (K,): amplitude of the motor speed that was seen.
+    ``stick_fraction``, ``distortion``, ``unsteadiness``, shape (K,): of the last window; distortion of the
+    motor speed.
+    ``limiter``: limit that acted in the last window, or empty.
     """
 
     frequency_hz: Floats

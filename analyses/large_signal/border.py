@@ -33,20 +33,14 @@ SETTLED = 1e4  # what begins at rest is that much smaller by the window: a limit
 class LimitShift:
     """Amplitude at which a limit first acts, linear and simulated with friction, at each frequency.
 
-    Attributes
-    ----------
-    frequency_hz : ndarray, shape (f,)
-    linear_rad, simulated_rad : ndarray, shape (f,)
-        Smallest A_k(w); what the simulation shows. NaN where no limit acts within the range tried, or
-        where nothing limits.
-    linear_limiter, simulated_limiter : tuple of str
-        Empty where there is none.
-    resolution : float
-        Relative width of the last interval of the bisection.
-    command_gain : ndarray, shape (f,), or float
-        Of mean and filter of the command, which the amplitudes are behind.
-    coarser : bool
-        Whether there are fewer frequencies than asked for, as those would take more than `MOST_TICKS`.
+    ``frequency_hz``, shape (f,).
+    ``linear_rad``, ``simulated_rad``, shape (f,): smallest A_k(w); what the simulation shows. NaN where no
+    limit acts within the range tried, or where nothing limits.
+    ``linear_limiter``, ``simulated_limiter``: empty where there is none.
+    ``resolution``: relative width of the last interval of the bisection.
+    ``command_gain``, shape (f,): of mean and filter of the command, which the amplitudes are behind.
+    ``coarser``: whether there are fewer frequencies than asked for, as those would take more than
+    `MOST_TICKS`.
     """
 
     frequency_hz: np.ndarray

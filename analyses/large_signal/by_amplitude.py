@@ -33,26 +33,16 @@ MOST_SETTLING = 2000  # ticks
 class AmplitudeMargin:
     """Where an oscillation lasts after a release from one deviation.
 
-    Attributes
-    ----------
-    loop : str
-    kind : {"gain", "delay"}
-    size : {"small", "medium", "large"}
-    part : float
-        Of the full deflection, speed or current.
-    friction_on : bool
-    linear : float
-        The linear margin (factor, or samples).
-    value : float or None
-        Factor or samples; 1 (0) where the nominal drive oscillates already; ``None``: not up to ``furthest``.
-    furthest : float
-    period_s : float
-    limiter : str
-        Limit that acts longest while the oscillation lasts, just past the value; empty where none does.
-    output : float
-        Amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value.
-    coarser : bool
-        Whether fewer than `VALUES` were asked, nearer to the linear margin: those take over `MOST_TICKS`.
+    ``kind``, ``size``: ``"gain"`` or ``"delay"``; ``"small"``, ``"medium"`` or ``"large"``.
+    ``part``: of the full deflection, speed or current.
+    ``linear``: the linear margin (factor, or samples).
+    ``value``: factor or samples; 1 (0) where the nominal drive oscillates already; ``None``: not up to
+    ``furthest``.
+    ``limiter``: limit that acts longest while the oscillation lasts, just past the value; empty where none
+    does.
+    ``output``: amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value.
+    ``coarser``: whether fewer than `VALUES` were asked, nearer to the linear margin: those take over
+    `MOST_TICKS`.
     """
 
     loop: str

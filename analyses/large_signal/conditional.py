@@ -60,23 +60,15 @@ LOW_GAIN = 0.02  # lower gain margins below this are out of reach of any limit
 class Prediction:
     """What the describing function of a limit says of a loop with a lower gain margin.
 
-    Attributes
-    ----------
-    point : str
-        Break point in front of the limit (all other loops closed).
-    limit : float
-        In the unit of the point.
-    limiter : str
-        What limits there: ``"current limit"``, ``"voltage limit"``, ``"voltage limit as a current, U/R"``.
-    gain_lower : float
-        Lower gain margin, factor (below 1).
-    amplitude : float
-        In front of the limit, peak, in the unit of the point: the border between dying out and growing.
-    frequency_hz : float
-    output_rad : float
-        Amplitude of the output angle that goes with it.
-    antiwindup : bool
-        Whether the controller in front stops its integral while the limit acts.
+    ``point``: break point in front of the limit (all other loops closed).
+    ``limit``: in the unit of the point.
+    ``limiter``: what limits there: ``"current limit"``, ``"voltage limit"``, ``"voltage limit as a current,
+    U/R"``.
+    ``gain_lower``: lower gain margin, factor (below 1).
+    ``amplitude``: in front of the limit, peak, in the unit of the point: the border between dying out and
+    growing.
+    ``output_rad``: amplitude of the output angle that goes with it.
+    ``antiwindup``: whether the controller in front stops its integral while the limit acts.
     """
 
     point: str
@@ -93,26 +85,15 @@ class Prediction:
 class Conditional:
     """Whether a large command makes the drive diverge.
 
-    Attributes
-    ----------
-    margins : mapping of str to ExactMargins
-        At every break point.
-    predictions : tuple of Prediction
-    threshold_rad : float or None
-        Largest step of the output that still settles; ``None`` where all steps up to full deflection do, 0
-        where not even the smallest tried does.
-    next_rad : float or None
-        Smallest step tried that does not; it has been watched for four times as long.
-    full_deflection_rad : float
-    oscillation_hz, oscillation_rad : float or None
-        Frequency, and amplitude of the output error, while the step at the threshold hovers there.
-    limiter : str
-        The limit that acts longest at the end of the smallest step that does not settle.
-    limiter_share : float
-        Of the ticks at that end.
-    ending : {"diverges", "keeps oscillating", "is held by a limit", ""}
-    end_rad : float or None
-        Half of the output's span at that end.
+    ``margins``: at every break point.
+    ``threshold_rad``: largest step of the output that still settles; ``None`` where all steps up to full
+    deflection do, 0 where not even the smallest tried does.
+    ``next_rad``: smallest step tried that does not; it has been watched for four times as long.
+    ``oscillation_hz``, ``oscillation_rad``: frequency, and amplitude of the output error, while the step at
+    the threshold hovers there.
+    ``limiter``: the limit that acts longest at the end of the smallest step that does not settle.
+    ``limiter_share``: of the ticks at that end.
+    ``end_rad``: half of the output's span at that end.
     """
 
     margins: dict[str, ExactMargins]

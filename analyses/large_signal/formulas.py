@@ -14,16 +14,9 @@ TRIANGLE_THIRD, PARABOLA_THIRD = -1.0 / 9.0, 1.0 / 27.0
 class RateLimited:
     """A sine through a pure rate limit R, with ``x = w A/R``.
 
-    Attributes
-    ----------
-    x : float
-    regime : {"linear", "between", "triangle"}
-    gain : float
-        Fundamental of the output over the command.
-    lag_deg : float
-        Positive: the output comes later.
-    peak : float or None
-        Peak of the output, in the unit of R times s; ``None`` between the two regimes.
+    ``gain``: fundamental of the output over the command.
+    ``lag_deg``: positive: the output comes later.
+    ``peak``: peak of the output, in the unit of R times s; ``None`` between the two regimes.
     """
 
     x: float

@@ -39,29 +39,19 @@ LONG = 0.1  # periods of the highest tone
 class AmplitudeMap:
     """Sines of many amplitudes and frequencies, each settled; arrays of points are (amplitude, frequency).
 
-    Attributes
-    ----------
-    load_Nm : float
-    amplitude_rad : ndarray, shape (a,)
-        Peak command at the output shaft (linear axis: m).
-    frequency_hz : ndarray, shape (f,)
-    cause, waveform : ndarray of int, shape (a, f)
-        Index into `CAUSES` and `WAVEFORMS`; criteria in `analyses.large_signal.classify`.
-    limiter_fraction : ndarray, shape (a, f, limiters)
-        Fraction of the last window in which speed, acceleration, current and voltage limits act.
-    stick_fraction, distortion, unsteadiness : ndarray, shape (a, f)
-        Of the output in the last window.
-    response : ndarray of complex, shape (a, f)
-        Fundamental of the output over the command.
-    linear : ndarray of complex, shape (f,)
-        The same from the linear sampled loop, sliding.
-    onset_rad : mapping of str to ndarray, shape (f,)
-        A_k(w) of each limiter from the linear loop, no load; without protection that is slow against the
-        tones, which acts later than they are simulated (`slow_protection`).
-    ticks : int
-        Simulated in all.
-    coarser : bool
-        Whether the grid is coarser than asked for, as that would take more than `MOST_TICKS`.
+    ``amplitude_rad``, shape (a,): peak command at the output shaft (linear axis: m).
+    ``frequency_hz``, shape (f,).
+    ``cause``, ``waveform``, shape (a, f): index into `CAUSES` and `WAVEFORMS`; criteria in
+    `analyses.large_signal.classify`.
+    ``limiter_fraction``, shape (a, f, limiters): fraction of the last window in which speed, acceleration,
+    current and voltage limits act.
+    ``stick_fraction``, ``distortion``, ``unsteadiness``, shape (a, f): of the output in the last window.
+    ``response``, shape (a, f): fundamental of the output over the command.
+    ``linear``, shape (f,): the same from the linear sampled loop, sliding.
+    ``onset_rad``, shape (f,): A_k(w) of each limiter from the linear loop, no load; without protection that
+    is slow against the tones, which acts later than they are simulated (`slow_protection`).
+    ``ticks``: simulated in all.
+    ``coarser``: whether the grid is coarser than asked for, as that would take more than `MOST_TICKS`.
     """
 
     load_Nm: float

@@ -22,15 +22,9 @@ if TYPE_CHECKING:
 class LargeSignals:
     """Map, shift of the linear limit, amplitude Bode and sawtooth of a design.
 
-    Attributes
-    ----------
-    design : Design
-    map : AmplitudeMap
-        With friction, no load.
-    shift : LimitShift or None
-        How far dry friction moves the linear limit; ``None`` without it, and where the loop is unstable.
-    bode : AmplitudeBode
-    sawtooth : Sawtooth
+    ``map``: with friction, no load.
+    ``shift``: how far dry friction moves the linear limit; ``None`` without it, and where the loop is
+    unstable.
     """
 
     design: Design

@@ -24,16 +24,12 @@ GAIN_TOLERANCE, LAG_TOLERANCE_DEG = 0.01, 1.0
 class SawtoothRun:
     """The last periods at one load torque; output side, motor speed and current at the motor.
 
-    Attributes
-    ----------
-    load_Nm : float
-    time_s, reference_rad, output_rad, output_rate_rad_s, speed_command_rad_s, current_A : ndarray
-        Thinned for drawing; the rates are those of the output (motor over N).
-    gain, lag_deg, peak_rad, distortion, crest : float
-        Of the output over the last whole period: fundamental over the command, its lag, largest deflection
-        from the mean, everything but mean and fundamental over the fundamental, peak over rms.
-    formula : RateLimited
-        What a pure rate limit would do.
+    ``time_s``, ``reference_rad``, ``output_rad``, ``output_rate_rad_s``, ``speed_command_rad_s``,
+    ``current_A``: thinned for drawing; the rates are those of the output (motor over N).
+    ``gain``, ``lag_deg``, ``peak_rad``, ``distortion``, ``crest``: of the output over the last whole period:
+    fundamental over the command, its lag, largest deflection from the mean, everything but mean and
+    fundamental over the fundamental, peak over rms.
+    ``formula``: what a pure rate limit would do.
     """
 
     load_Nm: float
@@ -65,22 +61,13 @@ class SawtoothRun:
 class Sawtooth:
     """A sine command that the output can follow only at its top speed.
 
-    Attributes
-    ----------
-    amplitude_rad, frequency_hz : float
-        Of the command.
-    rate_limit_rad_s : float
-        R at the output.
-    gain_over_frequency : float
-        Kv/w: the formulas hold where this is large.
-    reversal_deg : float
-        Part of a period that the reversal 2 R/a takes at the drive's largest acceleration, in degrees: the
-        formulas reverse at once, so this much lag may come on top.
-    has_current : bool
-    runs : tuple of SawtoothRun
-        One a load torque.
-    reason : str
-        Why there is none; then ``runs`` is empty.
+    ``amplitude_rad``, ``frequency_hz``: of the command.
+    ``rate_limit_rad_s``: R at the output.
+    ``gain_over_frequency``: Kv/w: the formulas hold where this is large.
+    ``reversal_deg``: part of a period that the reversal 2 R/a takes at the drive's largest acceleration, in
+    degrees: the formulas reverse at once, so this much lag may come on top.
+    ``runs``: one a load torque.
+    ``reason``: why there is none; then ``runs`` is empty.
     """
 
     amplitude_rad: float

@@ -42,15 +42,10 @@ LONGEST_PERIODS = 20_000
 class LinearSteadyState:
     """The whole sampled loop under ``sin(w t)`` at the command, friction sliding without its dry part.
 
-    Attributes
-    ----------
-    output : ndarray of complex, shape (K,)
-        Command to output angle: the fundamental over all ticks, the mean of a limited jerk included.
-    states : dict of str to ndarray of complex, shape (K,)
-        By column of the rows: value at t = 0 is the imaginary part.
-    stable : bool
-    settling_ticks : int
-        Ticks in which the slowest mode falls to 1e-9.
+    ``output``, shape (K,): command to output angle: the fundamental over all ticks, the mean of a limited
+    jerk included.
+    ``states``, shape (K,): by column of the rows: value at t = 0 is the imaginary part.
+    ``settling_ticks``: ticks in which the slowest mode falls to 1e-9.
     """
 
     output: np.ndarray

@@ -17,24 +17,14 @@ Seen = Literal["confirmed", "refuted"]
 class Cycle:
     """A limit cycle by describing function.
 
-    Attributes
-    ----------
-    cause : {"play", "quantisation", "motor-quantisation", "friction"}
-        Quantisation: of the output's sensor, or of the motor's.
-    with_friction : bool
-        Whether the drive's dry friction, by its own describing function, is in it.
-    output_rad : float
-        Amplitude of the output, peak.
-    inner_rad : float
-        Amplitude of what the nonlinearity sees: the twist at the coupling, the sensor's angle, or the
-        motor's speed (rad/s).
-    frequency_hz : float
-    stable : bool
-        Whether motion near it comes nearer; ``False``: the border between dying out and growing.
-    state : dict of str to complex
-        Its shape by state of the loop, at this amplitude.
-    load_Nm : float
-        Load torque that it is at.
+    ``cause``: quantisation: of the output's sensor, or of the motor's.
+    ``with_friction``: whether the drive's dry friction, by its own describing function, is in it.
+    ``output_rad``: amplitude of the output, peak.
+    ``inner_rad``: amplitude of what the nonlinearity sees: the twist at the coupling, the sensor's angle, or
+    the motor's speed (rad/s).
+    ``stable``: whether motion near it comes nearer; ``False``: the border between dying out and growing.
+    ``state``: its shape by state of the loop, at this amplitude.
+    ``load_Nm``: load torque that it is at.
     """
 
     cause: Cause
@@ -51,13 +41,9 @@ class Cycle:
 class Confirmation:
     """A predicted cycle against the simulator, started in its shape at several sizes.
 
-    Attributes
-    ----------
-    ratio : float or None
-        Amplitude of the output over the predicted one: of a stable cycle where the motion ends, of an
-        unstable one the size from which it grows; ``None``: refuted.
-    frequency_hz : float or None
-        Where the motion ends, of a stable one.
+    ``ratio``: amplitude of the output over the predicted one: of a stable cycle where the motion ends, of an
+    unstable one the size from which it grows; ``None``: refuted.
+    ``frequency_hz``: where the motion ends, of a stable one.
     """
 
     cycle: Cycle
@@ -74,14 +60,9 @@ class Confirmation:
 class LimitCycles:
     """Cycles of one design.
 
-    Attributes
-    ----------
-    confirmations : tuple of Confirmation
-        Every predicted cycle.
-    rests : tuple of Settling
-        Steps of several sizes, without load and at every load of the design, waited for.
-    looked_for : tuple of str
-        The causes that the design has.
+    ``confirmations``: every predicted cycle.
+    ``rests``: steps of several sizes, without load and at every load of the design, waited for.
+    ``looked_for``: the causes that the design has.
     """
 
     design: Design

@@ -31,15 +31,10 @@ SLOPE_STEP = 1e-3
 class StickSlipCycle:
     """A symmetric stick-slip cycle.
 
-    Attributes
-    ----------
-    output_amplitude_rad : float
-        Error at rest on either side, output side.
-    frequency_hz : float
-    rest_s : float
-        Of half a period.
-    slope : float
-        Change of the size of the next error with that of this one; below 1 in magnitude the cycle attracts.
+    ``output_amplitude_rad``: error at rest on either side, output side.
+    ``rest_s``: of half a period.
+    ``slope``: change of the size of the next error with that of this one; below 1 in magnitude the cycle
+    attracts.
     """
 
     output_amplitude_rad: float

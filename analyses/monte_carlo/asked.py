@@ -20,31 +20,23 @@ if TYPE_CHECKING:
 class Asked(OnMachines):
     """A study of the tolerances."""
 
-    samples: Annotated[int, Option(words="Number of samples; 10000.", metavar="N")] = 10_000
-    seed: Annotated[int, Option(words="Seed, 0 or more; 0.", metavar="N")] = 0
-    from_samples: Annotated[
-        Path | None, Option(words="CSV or Parquet of identified parameters, SI.", metavar="FILE")
-    ] = None
+    samples: Annotated[int, Option("Number of samples; 10000.", "N")] = 10_000
+    seed: Annotated[int, Option("Seed, 0 or more; 0.", "N")] = 0
+    from_samples: Annotated[Path | None, Option("CSV or Parquet of identified parameters, SI.", "FILE")] = (
+        None
+    )
     step: Annotated[
-        float | None,
-        Option(words='Nonlinear step of every sample, such as "1 deg".', metavar="ANGLE", kind="output"),
+        float | None, Option('Nonlinear step of every sample, such as "1 deg".', "ANGLE", kind="output")
     ] = None
-    duration_s: Annotated[float, Option(words="Duration of that step; 0.5.", metavar="S")] = 0.5
+    duration_s: Annotated[float, Option("Duration of that step; 0.5.", "S")] = 0.5
     load_Nm: Annotated[float, LOAD] = 0.0
     operating_point: Annotated[str, POINT] = "sliding"
     at_least: Annotated[
         float | None,
-        Option(
-            words="Probability that is enough, with 95 % confidence; else every sample must pass.",
-            metavar="P",
-        ),
+        Option("Probability that is enough, with 95 % confidence; else every sample must pass.", "P"),
     ] = None
-    worst: Annotated[
-        bool, Option(words="Seek the worst case of each requirement.", flag="worst/--no-worst")
-    ] = True
-    sample: Annotated[
-        int | None, Option(words="Only print sample number K as a design file.", metavar="K")
-    ] = None
+    worst: Annotated[bool, Option("Seek the worst case of each requirement.", flag="worst/--no-worst")] = True
+    sample: Annotated[int | None, Option("Only print sample number K as a design file.", "K")] = None
 
     def __post_init__(self) -> None:
         """Refuse a probability that is none."""

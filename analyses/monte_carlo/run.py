@@ -261,8 +261,8 @@ def _left_out(design: Design) -> tuple[RequirementVerdict, ...]:
     """The requirements that figures of many designs do not tell: not proven."""
     return tuple(
         RequirementVerdict(
-            id=r.id, requirement=r, loop=r.loop, value=None, distance=None, verdict=Verdict.NOT_PROVEN,
-            reason="not sampled, it takes a computation of one design", waiver=design.waiver_of(r.id),
+            id=r.id, requirement=r, loop=r.loop, verdict=Verdict.NOT_PROVEN, waiver=design.waiver_of(r.id),
+            reason="not sampled, it takes a computation of one design",
         )
         for r in by_loop(design)
         if not in_populations(r, design)

@@ -26,55 +26,43 @@ USUAL_CYCLES = 5
 class Asked:
     """A motion; amplitude and bias in the unit of the command of the outermost loop."""
 
-    command: Annotated[str | None, Option(words=f"One of {KINDS}; default step.", metavar="KIND")] = None
+    command: Annotated[str | None, Option(f"One of {KINDS}; default step.", "KIND")] = None
     amplitude: Annotated[
         float,
         Option(
-            words='Peak for the outermost loop, such as "5 deg" or 5: deg at the output (mm on a linear '
+            'Peak for the outermost loop, such as "5 deg" or 5: deg at the output (mm on a linear '
             "axis), deg/s (mm/s) of a speed drive, A, V; a ramp: per second; 1.",
             kind="command",
         ),
     ] = 1.0
-    frequency: Annotated[
-        float, Option(words="Frequency; the first of a chirp or a set; 1.", metavar="HZ")
-    ] = 1.0
-    to: Annotated[
-        float | None, Option(words="Last frequency of a chirp or set; ten times the first.", metavar="HZ")
-    ] = None
-    count: Annotated[int, Option(words="Number of frequencies of a stepped or multisine; 10.")] = 10
+    frequency: Annotated[float, Option("Frequency; the first of a chirp or a set; 1.", "HZ")] = 1.0
+    to: Annotated[float | None, Option("Last frequency of a chirp or set; ten times the first.", "HZ")] = None
+    count: Annotated[int, Option("Number of frequencies of a stepped or multisine; 10.")] = 10
     cycles: Annotated[
-        int | None, Option(words="Periods played of a sine or triangle, or of each of a stepped sine (5).")
+        int | None, Option("Periods played of a sine or triangle, or of each of a stepped sine (5).")
     ] = None
-    seed: Annotated[int, Option(words="Seed of the phases of a multisine; 0.")] = 0
-    start: Annotated[float, Option(words="Time at which the command begins; 0.", metavar="S")] = 0.0
-    duration: Annotated[
-        float | None, Option(words="Duration; 1, or that of a stepped sine or a record.", metavar="S")
-    ] = None
-    bias_rate: Annotated[
-        float, Option(words="Ramp added underneath: the amplitude's unit per second; 0.")
-    ] = 0.0
+    seed: Annotated[int, Option("Seed of the phases of a multisine; 0.")] = 0
+    start: Annotated[float, Option("Time at which the command begins; 0.", "S")] = 0.0
+    duration: Annotated[float | None, Option("Duration; 1, or that of a stepped sine or a record.", "S")] = (
+        None
+    )
+    bias_rate: Annotated[float, Option("Ramp added underneath: the amplitude's unit per second; 0.")] = 0.0
     load: Annotated[float, LOAD] = 0.0
     load_slope: Annotated[
-        float,
-        Option(words="Load torque per rad of output angle, added to the design's; 0.", metavar="N_m/rad"),
+        float, Option("Load torque per rad of output angle, added to the design's; 0.", "N_m/rad")
     ] = 0.0
     load_file: Annotated[
-        Path | None,
-        Option(words="Load torque over time: s (of the run, or the record's), N m.", metavar="CSV"),
+        Path | None, Option("Load torque over time: s (of the run, or the record's), N m.", "CSV")
     ] = None
-    record: Annotated[
-        Path | None, Option(words="Recorded command: s, and the amplitude's unit.", metavar="CSV")
-    ] = None
-    held: Annotated[
-        bool, Option(words="The record is a log of changes: each value holds until the next.")
-    ] = False
-    csv: Annotated[Path | None, Option(words="Write every row as CSV.", metavar="FILE")] = None
-    parquet: Annotated[Path | None, Option(words="Write Parquet.", metavar="FILE")] = None
-    plot: Annotated[Path | None, Option(words="Write a plot as SVG.", metavar="SVG")] = None
-    every: Annotated[int, Option(words="Keep every N-th tick; 1.", metavar="N")] = 1
-    no_friction: Annotated[bool, Option(words="Leave the dry friction out.")] = False
-    no_limits: Annotated[bool, Option(words="Leave all limits out.")] = False
-    energy: Annotated[bool, Option(words="Say where the electrical energy went.")] = False
+    record: Annotated[Path | None, Option("Recorded command: s, and the amplitude's unit.", "CSV")] = None
+    held: Annotated[bool, Option("The record is a log of changes: each value holds until the next.")] = False
+    csv: Annotated[Path | None, Option("Write every row as CSV.", "FILE")] = None
+    parquet: Annotated[Path | None, Option("Write Parquet.", "FILE")] = None
+    plot: Annotated[Path | None, Option("Write a plot as SVG.", "SVG")] = None
+    every: Annotated[int, Option("Keep every N-th tick; 1.", "N")] = 1
+    no_friction: Annotated[bool, Option("Leave the dry friction out.")] = False
+    no_limits: Annotated[bool, Option("Leave all limits out.")] = False
+    energy: Annotated[bool, Option("Say where the electrical energy went.")] = False
 
     def __post_init__(self) -> None:
         """Refuse options that contradict each other."""

@@ -16,14 +16,10 @@ from nonlinear.settling.rest import judge
 class Conduct:
     """What a run ends in, the command and the load staying as they are at its end.
 
-    Attributes
-    ----------
-    status : str
-        ``"comes to rest"`` (of a speed or less: ``"becomes steady"``), ``"sits on a limit"`` (it does while
-        this acts), ``"limit cycle"``, ``"still moving"``, ``"diverging"``; ``"following"`` where command or
-        load go on changing; or why the run stopped.
-    detail : str
-        With figures; empty where there is nothing to say.
+    ``status``: ``"comes to rest"`` (of a speed or less: ``"becomes steady"``), ``"sits on a limit"`` (it does
+    while this acts), ``"limit cycle"``, ``"still moving"``, ``"diverging"``; ``"following"`` where command or
+    load go on changing; or why the run stopped.
+    ``detail``: with figures; empty where there is nothing to say.
     """
 
     status: str

@@ -26,12 +26,8 @@ NOTICED = 1e-6  # of full deflection: a smaller swing is listed, it fails nothin
 class Settling:
     """A step from rest at zero, waited for.
 
-    Attributes
-    ----------
-    amplitude_rad, load_Nm : float
-        The step and the load torque, both there from the start.
-    rest : Rest
-        What it ends in.
+    ``amplitude_rad``, ``load_Nm``: the step and the load torque, both there from the start.
+    ``rest``: what it ends in.
     """
 
     amplitude_rad: float

@@ -44,10 +44,10 @@ from typing import Annotated, Literal
 
 from actuator_lti.bounds import CAMPAIGN_RUNS
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import shown_path
+from actuator_lti.files.reading import read_campaign_toml, shown_path
 from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
-from analyses.toml_tables import Table, key_of, read_toml
+from analyses.toml_tables import Table, key_of
 
 RECORDS = (
     'CSV, JSON, Parquet or MATLAB, or a TOML with file = "log.csv" or [[record]]'
@@ -124,7 +124,7 @@ def load_campaign(path: str | Path) -> Campaign:
         Names the file, the key, its value and what is allowed.
     """
     path = Path(path)
-    root = Table(read_toml(path), "", str(path))
+    root = Table(read_campaign_toml(path), "", str(path))
     refuse_design(root)
     root.only(("campaign", "drive", "sensor", "join", "instruments", "run"))
     head = root.table("campaign")

@@ -12,7 +12,7 @@ from typing import Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import MatContent
-from actuator_lti.files.reading import open_regular, shown_path
+from actuator_lti.files.reading import open_regular, read_campaign_toml, shown_path
 from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
 from analyses.records.csv_rows import STAMP
 from analyses.records.inputs import spec_of_names
@@ -20,7 +20,7 @@ from analyses.records.naming import is_unit
 from analyses.records.readers import TABLES, columns_of, load_mat, names_in, read_record
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
-from analyses.toml_tables import Table, read_toml
+from analyses.toml_tables import Table
 
 EMPS_SPEC = RecordSpec(
     time=TimeColumn(column="t"),
@@ -92,7 +92,7 @@ def open_records(path: str | Path) -> list[Record]:
 
 
 def _described(path: Path) -> list[Record]:
-    root = Table(read_toml(path), "", str(path))
+    root = Table(read_campaign_toml(path), "", str(path))
     refuse_design(root)
     if not {"file", "record"} & set(root):
         raise InputError(f"a TOML file, and no record; allowed: {RECORDS}", where=str(path))

@@ -47,9 +47,8 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
         return Capability(figures, None, None, None, ratio, duty)
     direction = 1 if _forward_is_worse(design, load_Nm) else -1
     Ts = design.controller.period_s
-    viscous_s = (
-        design.inertia_kgm2 / design.friction.viscous(direction) if _force_bound(figures, design) else 0.0
-    )
+    force_bound = figures.rate_limit == "force" and design.friction.viscous(1) > 0.0
+    viscous_s = design.inertia_kgm2 / design.friction.viscous(direction) if force_bound else 0.0
     time = min(12.0 * rate / push + 8.0 * settling_s + 8.0 * viscous_s, LONGEST_TICKS * Ts)
     load = direction * -abs(load_Nm) if design.load.path == "back-drivable" else load_Nm
     run = simulate(design, commands.ramp(direction * 3.0 * rate), time, load)
@@ -83,7 +82,3 @@ def _forward_is_worse(design: Design, load_Nm: float) -> bool:
     friction = design.friction
     forward = friction.dry_Nm(load_Nm, 1) + friction.offset_torque_Nm
     return forward >= friction.dry_Nm(load_Nm, -1) - friction.offset_torque_Nm
-
-
-def _force_bound(figures: DriveFigures, design: Design) -> bool:
-    return figures.rate_limit == "force" and design.friction.viscous(1) > 0.0

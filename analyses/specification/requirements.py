@@ -76,8 +76,8 @@ class RequirementVerdict:
     id: str  # of the requirement, with ``/loop`` where it holds for every loop
     requirement: Requirement
     loop: str | None  # the loop that was judged; ``None`` for the whole drive
-    value: float | None  # what was found, in ``requirement.unit``; ``inf`` where there is no such bound
-    distance: float | None  # to the limit in ``requirement.unit``, positive on the good side
+    value: float | None = None  # what was found, in ``requirement.unit``; ``inf``: there is no such bound
+    distance: float | None = None  # to the limit in ``requirement.unit``, positive on the good side
     verdict: Verdict  # not proven where it cannot be judged; ``reason`` says why
     reason: str = ""  # what has to be known to read it
     waiver: Waiver | None = None  # of what is not proven
@@ -155,11 +155,10 @@ def _judge_loop(
     if result.margins.stable is None:
         return _verdict(requirement, id, name, None, "stability is not certain, so no figure is given")
     if not result.stable:
-        reason = f"the {name} loop is {result.margins.verdict}"
+        why = f"the {name} loop is {result.margins.verdict}"
         return RequirementVerdict(
-            id=id, requirement=requirement, loop=name, value=None, distance=None, verdict=Verdict.NOT_MET,
-            reason=reason,
-        )  # fmt: skip
+            id=id, requirement=requirement, loop=name, verdict=Verdict.NOT_MET, reason=why
+        )
     value = QUANTITIES[requirement.quantity].read(result)
     reason = which_response(requirement.quantity, name, requirement.to or "command")
     if value is None:
@@ -196,21 +195,15 @@ def _verdict(
     """Compare a value with the limits."""
     if value is None or math.isnan(value):
         return RequirementVerdict(
-            id=id, requirement=requirement, loop=loop, value=None, distance=None,
-            verdict=Verdict.NOT_PROVEN, reason=reason,
-        )  # fmt: skip
+            id=id, requirement=requirement, loop=loop, verdict=Verdict.NOT_PROVEN, reason=reason
+        )
     room = distance(requirement, value)
     if math.isinf(value):
         reason = "nothing limits it" if value > 0 else reason
     return RequirementVerdict(
-        id=id,
-        requirement=requirement,
-        loop=loop,
-        value=value,
-        distance=room,
-        verdict=Verdict.of(room >= 0.0),
-        reason=reason,
-    )
+        id=id, requirement=requirement, loop=loop, value=value, distance=room,
+        verdict=Verdict.of(room >= 0.0), reason=reason,
+    )  # fmt: skip
 
 
 def distance(requirement: Requirement, value: float) -> float:

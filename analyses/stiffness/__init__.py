@@ -5,14 +5,6 @@ from analyses.stiffness.result import AtRest, Check, LostMotion, Stiffness, Stif
 from analyses.stiffness.run import stiffness, stiffness_curves
 
 __all__ = [
-    "AtRest",
-    "Check",
-    "LostMotion",
-    "Stiffness",
-    "StiffnessCurve",
-    "check_stiffness",
-    "lost_motion_seen",
-    "stiffness",
-    "stiffness_at_rest",
-    "stiffness_curves",
-]
+    "AtRest", "Check", "LostMotion", "Stiffness", "StiffnessCurve", "check_stiffness", "lost_motion_seen",
+    "stiffness", "stiffness_at_rest", "stiffness_curves",
+]  # fmt: skip

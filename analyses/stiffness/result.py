@@ -18,16 +18,10 @@ State = Literal["powered", "shorted", "open"]
 class StiffnessCurve:
     """Dynamic stiffness K = M_ext / output angle over frequency, in one state of the drive.
 
-    Attributes
-    ----------
-    state : {"powered", "shorted", "open"}
-        All loops closed and the command held; unpowered with the winding shorted (a bridge at zero voltage);
-        unpowered without a current.
-    frequency_hz : ndarray
-    stiffness_Nm_rad : ndarray of complex
-        N m/rad (linear axis: N/m); inf where the output does not move.
-    static_Nm_rad : float
-        Limit at zero frequency: 0 of an output that runs away, inf of one that comes back.
+    ``state``: all loops closed and the command held; unpowered with the winding shorted (a bridge at zero
+    voltage); unpowered without a current.
+    ``stiffness_Nm_rad``: N m/rad (linear axis: N/m); inf where the output does not move.
+    ``static_Nm_rad``: limit at zero frequency: 0 of an output that runs away, inf of one that comes back.
     """
 
     state: State
@@ -49,14 +43,10 @@ class StiffnessCurve:
 class LostMotion:
     """How far the output stays apart after a moment to either side has gone, the motor held.
 
-    Attributes
-    ----------
-    play_rad : float
-        The play of the coupling at the output.
-    foreseen_rad : float
-        Read at +-3 % of the largest load moment (`actuator_lti.loops.stiffness.lost_motion_rad`).
-    seen_rad : float or None
-        The same in the simulator; None where it was not asked.
+    ``play_rad``: the play of the coupling at the output.
+    ``foreseen_rad``: read at +-3 % of the largest load moment
+    (`actuator_lti.loops.stiffness.lost_motion_rad`).
+    ``seen_rad``: the same in the simulator; None where it was not asked.
     """
 
     play_rad: float

@@ -22,11 +22,9 @@ class Asked(OnMachines):
 
     validate: Annotated[
         bool | None,
-        Option(
-            words="The nonlinear check of every design; as the study says.", flag="validate/--no-validate"
-        ),
+        Option("The nonlinear check of every design; as the study says.", flag="validate/--no-validate"),
     ] = None
-    example: Annotated[bool, Option(words="Print a study file to start from, and stop.")] = False
+    example: Annotated[bool, Option("Print a study file to start from, and stop.")] = False
 
 
 def compared(

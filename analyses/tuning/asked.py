@@ -38,30 +38,28 @@ class Asked:
     require: Annotated[
         list[str] | None,
         Option(
-            words='In place of that of the design: "position.bandwidth>=30 Hz"; repeatable.',
-            metavar="LOOP.QUANTITY>=LIMIT",
+            'In place of that of the design: "position.bandwidth>=30 Hz"; repeatable.', "LOOP.QUANTITY>=LIMIT"
         ),
     ] = None
     aim: Annotated[
         Aim,
         Option(
-            words="The least change of the design that meets every requirement, or the largest distance to "
+            "The least change of the design that meets every requirement, or the largest distance to "
             "all limits (up to 30 %); least-change."
         ),
     ] = "least-change"
     place: Annotated[
         list[str] | None,
         Option(
-            words="What may be added where gains alone do not do: notch, lowpass, feedforward; "
+            "What may be added where gains alone do not do: notch, lowpass, feedforward; "
             "the fewest that do are kept.",
-            metavar="ELEMENT,...",
+            "ELEMENT,...",
         ),
     ] = None
     rounded: Annotated[
-        bool,
-        Option(words="Round to the steps of the motion controller's objects.", flag="round/--no-round"),
+        bool, Option("Round to the steps of the motion controller's objects.", flag="round/--no-round")
     ] = True
-    curve: Annotated[bool, Option(words="Trade-off curve.", flag="curve/--no-curve")] = True
+    curve: Annotated[bool, Option("Trade-off curve.", flag="curve/--no-curve")] = True
 
     @classmethod
     def of(cls, design: Design, **chosen: Any) -> TuningSettings:

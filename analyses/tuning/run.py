@@ -66,7 +66,8 @@ def tune(
         problem = problem_of(
             placed.design, wanted, rules.values, placed.variables, share_of(searched, len(choices) - k)
         )
-        solution = _solved(problem, settings.aim, give_up=k + 1 < len(choices))
+        seek = least_change if settings.aim == "least-change" else solve
+        solution = seek(problem, give_up=k + 1 < len(choices))
         searched += problem.evaluations
         if best is None or solution.slack > best.solution.slack:
             best = Attempt(placed, problem, solution, problem.evaluations)
@@ -118,12 +119,6 @@ class Attempt:
     problem: Problem
     solution: Solution
     evaluations: int
-
-
-def _solved(problem: Problem, aim: Aim, *, give_up: bool) -> Solution:
-    return (
-        least_change(problem, give_up=give_up) if aim == "least-change" else solve(problem, give_up=give_up)
-    )
 
 
 def _said(confirmed: tuple[RequirementVerdict, ...]) -> tuple[str, ...]:

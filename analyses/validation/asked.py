@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 class Asked:
     """How much is looked at beside the checks."""
 
-    quick: Annotated[bool, Option(words="Checks and verdict only, on the page and in JSON, too.")] = False
+    quick: Annotated[bool, Option("Checks and verdict only, on the page and in JSON, too.")] = False
     large: Annotated[
-        bool, Option(words="What is large, starts from rest or is shaken by counts, on the terminal, too.")
+        bool, Option("What is large, starts from rest or is shaken by counts, on the terminal, too.")
     ] = False
 
     @classmethod

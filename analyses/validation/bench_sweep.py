@@ -28,13 +28,9 @@ SIZES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)  # of a large signal
 class BenchSweep:
     """An injected sweep of one loop.
 
-    Attributes
-    ----------
-    loop : str
-    frequency_hz : ndarray, shape (K,)
-    open_loop : ndarray of complex, shape (K,)
-        Measured; NaN where every size met an event.
-    linear : ndarray of complex, shape (K,)
+    ``frequency_hz``, shape (K,).
+    ``open_loop``, shape (K,): measured; NaN where every size met an event.
+    ``linear``, shape (K,).
     """
 
     loop: str

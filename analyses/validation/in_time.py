@@ -44,11 +44,7 @@ SIZES = 10.0 ** -np.arange(1.0, 14.0)  # of a large signal
 class StepShown:
     """A small step at a place, simulated and linear, of height 1.
 
-    Attributes
-    ----------
-    place : str
-    time_s, simulated, linear : ndarray, shape (m,)
-    row : Row
+    ``time_s``, ``simulated``, ``linear``, shape (m,).
     """
 
     place: str
@@ -62,16 +58,10 @@ class StepShown:
 class MarginRun:
     """A run beside a gain margin, started on its critical mode.
 
-    Attributes
-    ----------
-    gain : float
-        Factor on the loop gain.
-    factor, found : float
-        What the mode is predicted to be multiplied by over the run; found over predicted.
-    error : float
-        Of ``found``, by what two sizes of the run differ in and the tangent's stated error.
-    time_s, amplitude : ndarray
-        Amplitude of the mode, from 1.
+    ``gain``: factor on the loop gain.
+    ``factor``, ``found``: what the mode is predicted to be multiplied by over the run; found over predicted.
+    ``error``: of ``found``, by what two sizes of the run differ in and the tangent's stated error.
+    ``time_s``, ``amplitude``: amplitude of the mode, from 1.
     """
 
     gain: float
@@ -86,13 +76,7 @@ class MarginRun:
 class MarginShown:
     """Two runs beside a gain margin.
 
-    Attributes
-    ----------
-    place : str
-    ratio, frequency_hz : float
-        The margin.
-    inside, outside : MarginRun
-    rows : tuple of Row
+    ``ratio``, ``frequency_hz``: the margin.
     """
 
     place: str

@@ -43,12 +43,8 @@ Complexes = npt.NDArray[np.complex128]
 class Bench:
     """A drive on the bench in both writings.
 
-    Attributes
-    ----------
-    design : Design
-        What is simulated.
-    model : Design
-        What predictions are made of.
+    ``design``: what is simulated.
+    ``model``: what predictions are made of.
     """
 
     design: Design

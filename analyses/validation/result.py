@@ -29,24 +29,15 @@ if TYPE_CHECKING:
 class Validation:
     """Everything the nonlinear simulator says of a design's predictions.
 
-    Attributes
-    ----------
-    rows : tuple of Row
-        Every check: small signals by the tangent, the runs in time, the numbers of the design.
-    figures : mapping of str to LoopFigures
-        The linear loops, as they are tested (of the current with the rotor locked).
-    steps : mapping of str to StepShown
-    margins : mapping of str to MarginShown
-        Runs on either side of the quoted gain margin of each loop.
-    sweeps : mapping of str to BenchSweep
-    amplitude_margins, conditional, rest_sweep, counts, large_signals, friction, specification :
-        Findings: what large signals, friction and counts do.
-    settlings : tuple of Settling
-        What steps of the drive as it is end in.
-    held_by_friction : tuple of str
-        Loops that are stable with the friction that is left out where the drive is tested, and only with it.
-    notes : tuple of str
-        What could not be done, and why.
+    ``rows``: every check: small signals by the tangent, the runs in time, the numbers of the design.
+    ``figures``: the linear loops, as they are tested (of the current with the rotor locked).
+    ``margins``: runs on either side of the quoted gain margin of each loop.
+    ``amplitude_margins``, ``conditional``, ``rest_sweep``, ``counts``, ``large_signals``, ``friction``,
+    ``specification``: findings: what large signals, friction and counts do.
+    ``settlings``: what steps of the drive as it is end in.
+    ``held_by_friction``: loops that are stable with the friction that is left out where the drive is tested,
+    and only with it.
+    ``notes``: what could not be done, and why.
     """
 
     design: Design

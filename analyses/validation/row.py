@@ -12,23 +12,15 @@ from actuator_lti.asked.verdict import Verdict
 class Row:
     """One prediction beside what the simulator shows of it.
 
-    Attributes
-    ----------
-    name : str
-        Quantity: ``"response"``, ``"gain_margin"``, ``"breakaway_torque"``, ...
-    loop : str
-        Stage, break point, ``"command"``, ``"load"``, or ``"drive"``.
-    unit : str
-        Of the predicted and found value.
-    predicted, found : float or None
-        ``None`` where the row judges more than one number (a response); ``because`` says which was worst.
-    error, allowed : float
-        Difference, and the largest that is agreement; in ``unit``, relative where both values are ``None``.
-    verdict : Verdict
-        ``met``, ``not met``, or ``not proven``: the simulator's own accuracy does not suffice.
-    because : str
-    condition : str
-        On which motion.
+    ``name``: quantity: ``"response"``, ``"gain_margin"``, ``"breakaway_torque"``, ...
+    ``loop``: stage, break point, ``"command"``, ``"load"``, or ``"drive"``.
+    ``unit``: of the predicted and found value.
+    ``predicted``, ``found``: ``None`` where the row judges more than one number (a response); ``because``
+    says which was worst.
+    ``error``, ``allowed``: difference, and the largest that is agreement; in ``unit``, relative where both
+    values are ``None``.
+    ``verdict``: ``met``, ``not met``, or ``not proven``: the simulator's own accuracy does not suffice.
+    ``condition``: on which motion.
     """
 
     name: str

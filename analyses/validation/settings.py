@@ -16,17 +16,11 @@ FINDINGS: tuple[Finding, ...] = get_args(Finding)
 class Settings:
     """What a validation looks at beside its checks; the defaults are those of the report.
 
-    Attributes
-    ----------
-    own : bool
-        What the drive itself does: whether it comes to rest, and what large commands make of it.  The verdict
-        is that of the checks and of these.
-    findings : tuple of str
-        Of `FINDINGS`.
-    rest_frequencies : int
-        Of the sweep from rest.
-    map_counts : tuple of int
-        Amplitudes and frequencies of the large-signal map.
+    ``own``: what the drive itself does: whether it comes to rest, and what large commands make of it.  The
+    verdict is that of the checks and of these.
+    ``findings``: of `FINDINGS`.
+    ``rest_frequencies``: of the sweep from rest.
+    ``map_counts``: amplitudes and frequencies of the large-signal map.
     """
 
     own: bool = True

@@ -50,27 +50,15 @@ MOST_LOG = 70.0  # of a gain
 class Place:
     """A loop or a path in both writings.
 
-    Attributes
-    ----------
-    name : str
-    condition : str
-        The motion that it is tested on, in words.
-    tangent : Tangent
-    predicted : callable
-        T at points z of the place's own rate, by the linear writing.
-    poles : ndarray
-        Closed-loop poles over one base period, by the linear writing.
-    figures : LoopFigures or None
-        Of a loop; its margins are judged where it is not periodic.
-    exact : ExactMargins or None
-        Of a break point with all loops closed.
-    critical : callable
-        Eigenvalues over one base period at a gain, by the linear writing.
-    delayed : callable or None
-        Tangent under a longer computing delay, and what gives its predicted poles over one base period; only
-        at the voltage.
-    quantity : str
-        Name of the row that judges the response.
+    ``condition``: the motion that it is tested on, in words.
+    ``predicted``: T at points z of the place's own rate, by the linear writing.
+    ``poles``: closed-loop poles over one base period, by the linear writing.
+    ``figures``: of a loop; its margins are judged where it is not periodic.
+    ``exact``: of a break point with all loops closed.
+    ``critical``: eigenvalues over one base period at a gain, by the linear writing.
+    ``delayed``: tangent under a longer computing delay, and what gives its predicted poles over one base
+    period; only at the voltage.
+    ``quantity``: name of the row that judges the response.
     """
 
     name: str

@@ -71,7 +71,7 @@ def exact_loop(given: Given) -> ExactLoop:
     if given.period_s is not None:
         N, D = warped(N, n), warped(D, n)
     common = N.gcd(D) if N.degree() >= 0 else D
-    hidden = _primitive(common)
+    hidden = common // (common.content() or 1)
     at_end = min(n - N.degree(), n - D.degree()) if N.degree() >= 0 else 0  # common poles at z = -1
     N, D = N // hidden, D // hidden
     both = N.content().gcd(D.content()) if N.degree() >= 0 else D.content()
@@ -141,7 +141,3 @@ def warped(p: Polynomial, degree: int) -> Polynomial:
     about: list[Any] = list(p(kind([-1, 2])).coeffs())
     about += [0] * (degree + 1 - len(about))
     return kind(about[::-1])(kind([1, -1]))
-
-
-def _primitive(p: fmpz_poly) -> fmpz_poly:
-    return p // p.content() if p.content() else p

@@ -110,7 +110,8 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
     border: list[tuple[arb, int]] = []
     right, values = 0, [0j] * at_zero
     if symmetric.degree() > 0:
-        mirrored = _exact(symmetric(_SQUARE))
+        mirrored = symmetric(_SQUARE)
+        mirrored = mirrored // mirrored.content()
         border = [(v.sqrt(), times) for v, times in positive_roots(all_roots(symmetric))]
         right = symmetric.degree() - sum(times for _, times in border)
         values += _in_doubles(all_roots(mirrored))
@@ -122,10 +123,6 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
 
 def _in_doubles(roots: list[tuple[acb, int]]) -> list[complex]:
     return [complex(root) for root, times in roots for _ in range(times)]
-
-
-def _exact(p: fmpz_poly) -> fmpz_poly:
-    return p // p.content()
 
 
 def _told_from_axis(p: fmpz_poly) -> list[tuple[acb, int]] | None:
