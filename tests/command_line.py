@@ -1,6 +1,7 @@
 """Commands of `actuator-lti` run in the process of a test, and what they say."""
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -24,14 +25,13 @@ class Ran(NamedTuple):
 class Command:
     """Run a command: `command("margins", path)`; where its status is no question, by what is read of it."""
 
+    main: Callable[[list[str]], int]
     printed: pytest.CaptureFixture[str]
 
     def __call__(self, *words: object) -> Ran:
         """Run it with these words, whatever its status is; never a traceback."""
-        from reports.cli.main import main  # behind the linear algebra of another processor
-
         self.printed.readouterr()
-        status = main([str(word) for word in words])
+        status = self.main([str(word) for word in words])
         out, err = self.printed.readouterr()
         assert "Traceback" not in err
         return Ran(int(status or 0), out, err)
