@@ -18,6 +18,8 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.command_line import Command
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
@@ -58,3 +60,11 @@ def browser() -> Iterator[Browser]:
         started = running.chromium.launch(executable_path=path, args=["--no-sandbox"])
         yield started
         started.close()
+
+
+@pytest.fixture
+def cli(capsys) -> Command:
+    """Run commands of `actuator-lti` in this process."""
+    from reports.cli.main import main  # only now: a processor that is not at hand comes first
+
+    return Command(main, capsys)

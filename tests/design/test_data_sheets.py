@@ -1,6 +1,5 @@
 """Drives written as their data sheets have them."""
 
-import json
 from math import pi, sqrt
 from pathlib import Path
 
@@ -23,7 +22,6 @@ from actuator_lti.errors import InputError
 from analyses.linear.loop_survey import survey_loops
 from analyses.studies.sampling import sampler_of
 from nonlinear import commands, simulate
-from reports.cli.main import main
 from reports.sections import forms
 
 FLAT = """
@@ -211,18 +209,16 @@ def test_amperes_of_an_ac_motor_that_say_nothing_are_refused(path: str, text: st
     assert parameter_value(again, path) == 30.5
 
 
-def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(capsys) -> None:
+def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(cli) -> None:
     items = {item.path: item for item in explained(read_design_text(SERVO, "servo"))}
     assert items["motor.torque_constant"].written == "0.93 N*m/A"
     assert items["motor.torque_constant"].model == f"kM = {0.93 / sqrt(1.5):.9g} N*m/A"
     assert items["motor.rotor_inertia"].read == "5.9e-05 kg*m^2"
-    assert main(["keys", "torque_constant", "--explain", "ilr33-amber", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["keys"] == [
+    assert cli.data("keys", "torque_constant", "--explain", "ilr33-amber")["keys"] == [
         {"path": "motor.torque_constant", "written": "5.9 mN*m/A", "read": "0.0059 N*m/A",
          "model": "kM = 0.0059 N*m/A"}
     ]  # fmt: skip
-    assert main(["keys", "--explain", "ilr33-amber"]) == 0
-    assert "In the model as" in capsys.readouterr().out
+    assert "In the model as" in cli.text("keys", "--explain", "ilr33-amber")
 
 
 def test_a_filter_is_added_behind_those_that_there_are() -> None:
@@ -380,16 +376,13 @@ def test_a_sheet_that_says_it_twice_or_by_half(old: str, new: str, words: str) -
         read_design_text(SHEET.replace(old, new), "sheet")
 
 
-def test_a_phase_margin_that_no_operating_point_bounds_is_infinite(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_phase_margin_that_no_operating_point_bounds_is_infinite(tmp_path: Path, cli) -> None:
     """A current loop by a gain below R never crosses 0 dB, at no operating point."""
     file = tmp_path / "mine.toml"
     velocity = '[control.velocity]\ngain = "0.02 As/rad"\nintegral_time = "20 ms"\n'
     position = '[control.position]\ngain = "40/s"\n'
     file.write_text(f'{SHEET}[control.current]\ngain = "0.1 V/A"\n{velocity}{position}')
-    assert main(["margins", str(file)]) == 0
-    said = " ".join(capsys.readouterr().out.split())
+    said = " ".join(cli.text("margins", file).split())
     assert "Phase margin, operating ∞" in said
 
 

@@ -1,18 +1,14 @@
 """The commands around design files, as a user calls them."""
 
-import json
-
 import pytest
 
 from actuator_lti.design import load_design, shipped_designs, warnings_of
 from reports.cli.main import main
 
 
-def test_designs_lists_all_for_people_and_machines(capsys) -> None:
-    assert main(["designs"]) == 0
-    shown = capsys.readouterr().out
-    assert main(["designs", "--json"]) == 0
-    listed = json.loads(capsys.readouterr().out)["designs"]
+def test_designs_lists_all_for_people_and_machines(cli) -> None:
+    shown = cli.text("designs")
+    listed = cli.data("designs")["designs"]
     assert [row["name"] for row in listed] == list(shipped_designs())
     assert all(name in shown for name in shipped_designs())
     assert listed[0]["loops"] == ["current PI", "velocity PI", "position P"]
@@ -49,40 +45,37 @@ def test_init_writes_a_typical_drive_of_a_kind(tmp_path, kind: str) -> None:
 
 
 @pytest.mark.parametrize("more", [["--kind", "crane"], ["--kind", "fin", "--from", "joint"]])
-def test_init_refuses_a_kind_that_there_is_not_and_two_sources(tmp_path, more: list[str], capsys) -> None:
-    assert main(["init", str(tmp_path / "mine.toml"), *more]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
+def test_init_refuses_a_kind_that_there_is_not_and_two_sources(tmp_path, more: list[str], cli) -> None:
+    cli.refused("init", tmp_path / "mine.toml", *more)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_init_does_not_overwrite_without_being_told(tmp_path, capsys) -> None:
+def test_init_does_not_overwrite_without_being_told(tmp_path, cli) -> None:
     path = tmp_path / "mine.toml"
     path.write_text("precious")
-    assert main(["init", str(path)]) == 2
-    assert "--force" in capsys.readouterr().err
+    assert "--force" in cli.refused("init", path)
     assert path.read_text() == "precious"
     assert main(["init", str(path), "--force"]) == 0
     assert load_design(path).name == "mine"
 
 
-def test_a_bad_source_writes_nothing(tmp_path, capsys) -> None:
+def test_a_bad_source_writes_nothing(tmp_path, cli) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text("[design]\nname = 3\n")
     for source in ("nope", str(bad)):
-        assert main(["init", str(tmp_path / "new.toml"), "--from", source]) == 2
-        error = capsys.readouterr().err
+        status, _, error = cli("init", tmp_path / "new.toml", "--from", source)
+        assert status == 2
         assert all(line.startswith("actuator-lti: ") for line in error.splitlines())
         assert "Traceback" not in error
     assert not (tmp_path / "new.toml").exists()
 
 
-def test_settings_go_out_and_come_in(tmp_path, capsys) -> None:
+def test_settings_go_out_and_come_in(tmp_path, cli) -> None:
     xdc, toml = tmp_path / "s.xdc", tmp_path / "d.toml"
-    assert main(["objects", "export", "--out", str(xdc)]) == 0
-    assert "rounded: 0x6080.00 (limits.speed)" in capsys.readouterr().err
+    ran = cli("objects", "export", "--out", xdc)
+    assert (ran.status, "rounded: 0x6080.00 (limits.speed)" in ran.err) == (0, True)
     assert main(["objects", "import", str(xdc), "--out", str(toml)]) == 0
     assert load_design(toml).controller == load_design("ilr33-amber").controller
-    assert main(["objects", "import", str(xdc), "--velocity-gain-per", "rpm", "--json"]) == 0
-    report = json.loads(capsys.readouterr().out)
+    report = cli.data("objects", "import", xdc, "--velocity-gain-per", "rpm")
     assert list(report["changed"]) == ["control.velocity.gain"]
     assert any("9.549" in note for note in report["notes"])

@@ -1,7 +1,5 @@
 """What a mistyped value is answered with: one line that says what to write instead."""
 
-import json
-
 import pytest
 
 from actuator_lti import assemble_loops
@@ -11,7 +9,6 @@ from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
 from nonlinear import commands, simulate
-from reports.cli.main import main
 
 AMBER = load_design("ilr33-amber")
 
@@ -55,14 +52,6 @@ def test_the_key_reference_has_every_key_once() -> None:
     assert {entry.unit for entry in key_reference("linear")} >= {"kg", "N", "m/s"}
 
 
-def shown(words: list[str], capsys) -> tuple[int, str]:
-    """Exit status and standard error of a command; never a traceback."""
-    status = main(words)
-    said = capsys.readouterr().err
-    assert "Traceback" not in said
-    return status, said
-
-
 FILES = {
     "empty.toml": ("", "is empty; allowed: a design file"),
     "comma.toml": ('[motor]\nresistance = "0,6 ohm"\n', None),
@@ -74,10 +63,10 @@ FILES = {
 
 
 @pytest.mark.parametrize("name", sorted(FILES))
-def test_a_file_that_is_no_design_is_told_what_it_looks_like(name: str, tmp_path, capsys) -> None:
+def test_a_file_that_is_no_design_is_told_what_it_looks_like(name: str, tmp_path, cli) -> None:
     text, words = FILES[name]
     (tmp_path / name).write_text(text, encoding="utf-8")
-    status, said = shown(["margins", str(tmp_path / name)], capsys)
+    status, _, said = cli("margins", tmp_path / name)
     assert status == 2
     assert all(name in line for line in said.splitlines())
     assert words is None or (words in said and said.count("\n") == 1)
@@ -90,41 +79,36 @@ def test_python_names_its_arguments() -> None:
         simulate(AMBER, commands.step(0.01), float("nan"))
 
 
-def test_a_load_with_its_unit_is_the_load(capsys) -> None:
-    result = []
-    for words in ("4 N*m", "4", "4000 mN*m"):
-        assert main(["margins", "--load", words, "--json"]) == 0
-        result.append(json.loads(capsys.readouterr().out)["asked"]["load_Nm"])
+def test_a_load_with_its_unit_is_the_load(cli) -> None:
+    texts = ("4 N*m", "4", "4000 mN*m")
+    result = [cli.data("margins", "--load", text)["asked"]["load_Nm"] for text in texts]
     assert result == pytest.approx([4.0] * 3, rel=1e-12)
 
 
-def test_an_amplitude_with_its_unit_is_the_amplitude(capsys) -> None:
+def test_an_amplitude_with_its_unit_is_the_amplitude(cli) -> None:
     said = []
     for words in ("5deg", "5", "300 arcmin", "0.08726646259971647 rad"):
-        assert main(["simulate", "--amplitude", words, "--duration", "0.02", "--json"]) in (0, 1)
-        said.append(capsys.readouterr().out)
+        ran = cli("simulate", "--amplitude", words, "--duration", "0.02", "--json")
+        assert ran.status in (0, 1)
+        said.append(ran.out)
     assert len(set(said)) == 1
-    status, refused = shown(["simulate", "--amplitude", "5 mm"], capsys)
-    assert (status, refused.count("\n")) == (2, 1)
-    assert "--amplitude '5 mm': wrong dimension" in refused
+    assert "--amplitude '5 mm': wrong dimension" in cli.refused("simulate", "--amplitude", "5 mm")
 
 
 @pytest.mark.parametrize("command", [["identify"], ["correlate", "emps"], ["simulate", "--record"]])
-def test_records_that_are_none(command: list[str], tmp_path, capsys) -> None:
+def test_records_that_are_none(command: list[str], tmp_path, cli) -> None:
     design, table, empty = tmp_path / "d.toml", tmp_path / "s.csv", tmp_path / "e.csv"
     design.write_text(write_design(AMBER), encoding="utf-8")
     table.write_text("time_s;reference_deg\n0;1\n0,001;2\n", encoding="utf-8")
     empty.write_text("", encoding="utf-8")
-    twice = [str(design)] * (2 if command == ["identify"] else 1)
-    status, said = shown([*command, *twice], capsys)
+    twice = [design] * (2 if command == ["identify"] else 1)
+    status, _, said = cli(*command, *twice)
     assert status == 2
     assert "a design, and no record" in said or "this looks like TOML, a CSV file is wanted" in said
-    status, said = shown([*command, str(empty)], capsys)
+    status, _, said = cli(*command, empty)
     assert status == 2
     assert "is empty" in said or "a header line and at least one row" in said
-    status, said = shown([*command, str(table)], capsys)
-    assert said.count("\n") == 1
-    assert status == 2
+    said = cli.refused(*command, table)
     if command[0] == "simulate":
         assert "separate the columns with commas, and write numbers with a decimal point" in said
 
@@ -146,7 +130,7 @@ def test_more_load_than_the_drive_holds_or_moves_is_warned_of(path: str, most: f
         assert any(words in line for line in warnings_of(design)) is warned
 
 
-def test_a_command_warns_and_goes_on(capsys) -> None:
-    status, said = shown(["margins", "--set", "load.moment_max=4000 N*m"], capsys)
+def test_a_command_warns_and_goes_on(cli) -> None:
+    status, _, said = cli("margins", "--set", "load.moment_max=4000 N*m")
     assert status == 0
     assert "warning: ilr33-amber: load.moment_max: 4000 N*m holds the drive fast" in said

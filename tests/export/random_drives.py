@@ -1,7 +1,5 @@
 """Random drives with every feature of the running model, and random inputs for them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import inf
 from typing import Any
@@ -9,20 +7,8 @@ from typing import Any
 import numpy as np
 
 from actuator_lti import load_design
+from actuator_lti.design import model
 from actuator_lti.design.law import LAW_INPUTS, Law
-from actuator_lti.design.model import (
-    Command,
-    Coupling,
-    Design,
-    Encoder,
-    Filter,
-    FrictionPoint,
-    Gravity,
-    Instruments,
-    LoadFriction,
-    OutputEncoder,
-    Supply,
-)
 
 Rng = np.random.Generator
 
@@ -37,7 +23,7 @@ def maybe(rng: Rng, value: Any, other: Any, share: float = 0.5) -> Any:
     return value if rng.random() < share else other
 
 
-def random_drive(rng: Rng) -> Design:
+def random_drive(rng: Rng) -> model.Design:
     """A drive near a shipped one with any of the features."""
     design, own = load_design("ilr33-amber"), rng.spawn(1)[0]
     motor = design.motor
@@ -68,23 +54,23 @@ def random_drive(rng: Rng) -> Design:
             design.load,
             path=maybe(rng, "back-drivable", "self-locking"),
             moment_slope_Nm_rad=maybe(rng, -4.0, 0.0),
-            gravity=maybe(rng, Gravity(mass_kg=2.0, arm_m=0.1, offset_rad=0.3), None),
+            gravity=maybe(rng, model.Gravity(mass_kg=2.0, arm_m=0.1, offset_rad=0.3), None),
             moment_damping_Nms_rad=maybe(own, scaled(own, 0.05), 0.0),
             gear_error_Nm=maybe(own, scaled(own, 0.3), 0.0),
             gear_error_periods=scaled(own, 10.0),
             gear_error_phase_rad=own.uniform(0.0, 3.0),
         ),
         encoder=_encoder(rng),
-        output_encoder=OutputEncoder(counts_per_rev=maybe(rng, 4096, None)),
+        output_encoder=model.OutputEncoder(counts_per_rev=maybe(rng, 4096, None)),
         command=_command(rng),
-        instruments=maybe(rng, Instruments(), _instruments(rng)),
+        instruments=maybe(rng, model.Instruments(), _instruments(rng)),
         supply=maybe(rng, None, _supply(rng)),
         limits=_limits(rng, design),
     )
     return _with_law(own.spawn(1)[0], made)
 
 
-def _with_law(rng: Rng, design: Design) -> Design:
+def _with_law(rng: Rng, design: model.Design) -> model.Design:
     """One in three with a law of one's own near the gains that the stage had."""
     stage = maybe(rng, "", str(rng.choice(["current", "velocity", "position"])), 2 / 3)
     if not stage or getattr(design.controller, stage) is None:
@@ -92,7 +78,7 @@ def _with_law(rng: Rng, design: Design) -> Design:
     return law_at(rng, design, stage, int(rng.integers(0, 4)))
 
 
-def law_at(rng: Rng, design: Design, stage: str, n: int) -> Design:
+def law_at(rng: Rng, design: model.Design, stage: str, n: int) -> model.Design:
     """A law of one's own of order ``n`` in a stage of a design, near the gain that it had."""
     loop = getattr(design.controller, stage)
     gain = loop.gain_V_A if stage == "current" else loop.gain
@@ -116,11 +102,11 @@ def law_at(rng: Rng, design: Design, stage: str, n: int) -> Design:
     return replace(design, controller=control, encoder=replace(design.encoder, filter_time_s=0.0))
 
 
-def random_elastic_drive(rng: Rng) -> Design:
+def random_elastic_drive(rng: Rng) -> model.Design:
     """The same with a coupling or a friction map, or both: play, damping, friction behind the coupling."""
     design = random_drive(rng)
     kind = int(rng.integers(4))  # 3: a map without a coupling
-    coupling = Coupling(
+    coupling = model.Coupling(
         stiffness_Nm_rad=float(10.0 ** rng.uniform(1.5, 5.0)),
         damping_Nms_rad=maybe(rng, scaled(rng, 0.05), 0.0),
         play_rad=maybe(rng, scaled(rng, 2e-3), 0.0),
@@ -141,7 +127,7 @@ def random_elastic_drive(rng: Rng) -> Design:
             design.load,
             path="back-drivable",
             moment_damping_Nms_rad=0.0,
-            friction=LoadFriction(
+            friction=model.LoadFriction(
                 dry_torque_Nm=maybe(rng, scaled(rng, 0.3), 0.0),
                 viscous_Nms_rad=scaled(rng, 0.05),
                 breakaway_ratio=maybe(rng, 1.0 + rng.random(), 1.0),
@@ -151,18 +137,18 @@ def random_elastic_drive(rng: Rng) -> Design:
     )
 
 
-def _map(rng: Rng, level_Nm: float) -> tuple[FrictionPoint, ...]:
+def _map(rng: Rng, level_Nm: float) -> tuple[model.FrictionPoint, ...]:
     """Stribeck curves, one for both directions or one each."""
     speeds = (0.0, scaled(rng, 3.0), scaled(rng, 60.0), scaled(rng, 600.0))
     sides: tuple[Any, ...] = maybe(rng, ("both",), ("forward", "reverse"))
     return tuple(
-        FrictionPoint(speed_rad_s=speed, torque_Nm=scaled(rng, level_Nm), direction=side)
+        model.FrictionPoint(speed_rad_s=speed, torque_Nm=scaled(rng, level_Nm), direction=side)
         for side in sides
         for speed in speeds[: int(rng.integers(1, 5))]
     )
 
 
-def _controller(rng: Rng, design: Design) -> Any:
+def _controller(rng: Rng, design: model.Design) -> Any:
     c = design.controller
     assert c.velocity is not None
     assert c.current is not None
@@ -201,19 +187,19 @@ def _controller(rng: Rng, design: Design) -> Any:
     )
 
 
-def _filters(rng: Rng) -> tuple[Filter, ...]:
+def _filters(rng: Rng) -> tuple[model.Filter, ...]:
     known = (
-        Filter(kind="notch", frequency_rad_s=900.0, width_rad_s=300.0, depth=0.1),
-        Filter(kind="lowpass", frequency_rad_s=3000.0, order=2, on="speed"),
-        Filter(kind="lowpass", frequency_rad_s=4000.0),
-        Filter(kind="leadlag", zero_rad_s=500.0, pole_rad_s=2000.0),
+        model.Filter(kind="notch", frequency_rad_s=900.0, width_rad_s=300.0, depth=0.1),
+        model.Filter(kind="lowpass", frequency_rad_s=3000.0, order=2, on="speed"),
+        model.Filter(kind="lowpass", frequency_rad_s=4000.0),
+        model.Filter(kind="leadlag", zero_rad_s=500.0, pole_rad_s=2000.0),
     )
     return tuple(item for item in known if rng.random() < 0.4)
 
 
-def _encoder(rng: Rng) -> Encoder:
+def _encoder(rng: Rng) -> model.Encoder:
     speed = ("ideal", "difference", "tracking")[rng.integers(3)]
-    return Encoder(
+    return model.Encoder(
         counts_per_rev=maybe(rng, 4096, None),
         speed=speed,  # type: ignore[arg-type]
         difference_samples=int(rng.integers(1, 5)),
@@ -222,10 +208,10 @@ def _encoder(rng: Rng) -> Encoder:
     )
 
 
-def _command(rng: Rng) -> Command:
+def _command(rng: Rng) -> model.Command:
     if rng.random() < 0.5:
-        return Command()
-    return Command(
+        return model.Command()
+    return model.Command(
         filter_time_s=maybe(rng, 2e-3, 0.0),
         filter_order=int(rng.integers(1, 3)),
         rate_rad_s=scaled(rng, 2.0),
@@ -234,8 +220,8 @@ def _command(rng: Rng) -> Command:
     )
 
 
-def _instruments(rng: Rng) -> Instruments:
-    return Instruments(
+def _instruments(rng: Rng) -> model.Instruments:
+    return model.Instruments(
         current_resolution_A=maybe(rng, 0.01, 0.0),
         current_noise_A=maybe(rng, 0.02, 0.0),
         angle_noise_rad=maybe(rng, 1e-4, 0.0),
@@ -245,8 +231,8 @@ def _instruments(rng: Rng) -> Instruments:
     )
 
 
-def _supply(rng: Rng) -> Supply:
-    return Supply(
+def _supply(rng: Rng) -> model.Supply:
+    return model.Supply(
         resistance_ohm=scaled(rng, 0.05),
         regenerative=maybe(rng, True, False),
         capacitance_F=1e-3,
@@ -254,7 +240,7 @@ def _supply(rng: Rng) -> Supply:
     )
 
 
-def _limits(rng: Rng, design: Design) -> Any:
+def _limits(rng: Rng, design: model.Design) -> Any:
     own = rng.spawn(1)[0]
     limits = replace(
         design.limits,

@@ -1,7 +1,5 @@
 """The controller cut out of the tick for firmware: the simulator's numbers, no library, no warning."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import struct

@@ -1,7 +1,5 @@
 """The examples run, and show what they say."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -19,72 +19,60 @@ needs_compiler = pytest.mark.skipif(
 )
 
 
-def refused(arguments: list[str], capsys) -> str:
-    """The line that a refused command says."""
-    assert main(arguments) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("\n") == 1
-    assert "Traceback" not in said.err
-    return said.err
-
-
 @pytest.mark.parametrize("command", [["c", "emps", "--no-check"], ["fmu", "emps", "--plain"]])
 @needs_compiler
-def test_a_folder_that_cannot_be_written(command: list[str], tmp_path, capsys) -> None:
+def test_a_folder_that_cannot_be_written(command: list[str], tmp_path, cli) -> None:
     """A file in the place of a folder stops the super-user too; ``/proc`` takes no new files from anyone."""
     (tmp_path / "file").write_text("mine")
     more = ["--platform", "linux64"] if command[0] == "fmu" else []
     name = "drive.fmu" if command[0] == "fmu" else "drive"
     for folder in (tmp_path / "file", Path("/proc/1")):
-        line = refused(["export", *command, *more, "--out", str(folder / name)], capsys)
+        line = cli.refused("export", *command, *more, "--out", folder / name)
         assert str(folder) in line
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
     assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_one_file_that_exists_and_no_other_is_written(tmp_path, capsys) -> None:
+def test_one_file_that_exists_and_no_other_is_written(tmp_path, cli) -> None:
     (tmp_path / "main.c").write_text("mine")
-    line = refused(["export", "c", "emps", "--no-check", "--out", str(tmp_path)], capsys)
+    line = cli.refused("export", "c", "emps", "--no-check", "--out", tmp_path)
     assert "main.c: exists already" in line
     assert [path.name for path in tmp_path.iterdir()] == ["main.c"]
     assert (tmp_path / "main.c").read_text() == "mine"
 
 
-def test_no_compiler_for_a_unit(tmp_path, capsys, monkeypatch) -> None:
+def test_no_compiler_for_a_unit(tmp_path, cli, monkeypatch) -> None:
     monkeypatch.setattr(build, "system_compiler", lambda: None)
     monkeypatch.setattr(build, "zig_command", lambda: None)
     for platform, said in (("linux64", "gcc or clang, or pip install"), ("win64", "allowed: pip install")):
         out = tmp_path / "drive.fmu"
-        line = refused(
-            ["export", "fmu", "emps", "--plain", "--platform", platform, "--out", str(out)], capsys
-        )
+        line = cli.refused("export", "fmu", "emps", "--plain", "--platform", platform, "--out", out)
         assert f"no C compiler for {platform}" in line
         assert said in line
     assert not list(tmp_path.iterdir())
 
 
-def test_a_compiler_that_fails(tmp_path, capsys, monkeypatch) -> None:
+def test_a_compiler_that_fails(tmp_path, cli, monkeypatch) -> None:
     broken = tmp_path / "cc"
     broken.write_text("#!/bin/sh\necho 'drive.c:1: error: out of order' >&2\nexit 1\n")
     broken.chmod(0o755)
     monkeypatch.setattr(build, "compiler_for", lambda _: [str(broken)])
     out = tmp_path / "drive.fmu"
-    line = refused(["export", "fmu", "emps", "--plain", "--platform", "linux64", "--out", str(out)], capsys)
+    line = cli.refused("export", "fmu", "emps", "--plain", "--platform", "linux64", "--out", out)
     assert "error: out of order" in line
     assert not out.exists()
 
 
-def test_what_single_precision_cannot_say(tmp_path, capsys) -> None:
+def test_what_single_precision_cannot_say(tmp_path, cli) -> None:
     from actuator_lti.design.shipped import shipped_path
 
     design = tmp_path / "noisy.toml"
     design.write_text(shipped_path("ilr33-amber").read_text(encoding="utf-8") + NOISY)
     out = tmp_path / "c"
-    line = refused(["export", "c", str(design), "--single", "--out", str(out)], capsys)
+    line = cli.refused("export", "c", design, "--single", "--out", out)
     assert "noise and jitter need double precision" in line
     assert not out.exists()
-    line = refused(["export", "c", "fin", "--single", "--out", str(out)], capsys)
+    line = cli.refused("export", "c", "fin", "--single", "--out", out)
     assert "an elastic drive train or a friction map needs double precision" in line
     assert not out.exists()
     assert main(["export", "c", str(design), "--no-check", "--out", str(out)]) == 0
@@ -97,7 +85,7 @@ FILES = {
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_a_folder_holds_all_files_of_its_export(name: str, tmp_path, capsys) -> None:
+def test_a_folder_holds_all_files_of_its_export(name: str, tmp_path, cli) -> None:
     more = ["--no-check"] if name == "c" else []
     assert main(["export", name, "emps", *more, "--out", str(tmp_path / "out")]) == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == FILES[name]
@@ -113,10 +101,10 @@ def test_a_folder_holds_all_files_of_its_export(name: str, tmp_path, capsys) -> 
     ],
 )
 def test_unknown_versions_platforms_prefixes_and_designs(
-    command: list[str], said: str, tmp_path, capsys
+    command: list[str], said: str, tmp_path, cli
 ) -> None:
     out = tmp_path / "out"
-    assert said in refused(["export", *command, "--out", str(out)], capsys)
+    assert said in cli.refused("export", *command, "--out", out)
     assert not out.exists()
 
 

@@ -1,7 +1,5 @@
 """The hosts of docs/hosts.md, each run as it stands there."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -18,7 +18,7 @@ from analyses.studies.study import load_study
 from nonlinear import Drive, Run, State, commands, loads, simulate, simulate_many
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.batch import run_rows
-from reports.cli.main import main
+from reports.cli import main  # noqa: F401 - what it loads is not what is measured
 
 ROOT = Path(__file__).parents[2]
 PERIOD_S = 1e-4
@@ -142,14 +142,12 @@ def test_a_multisine_of_many_lines_is_summed_in_parts() -> None:
     "given",
     ["--every 9", "--cycles 9", "--count 9", "--seed 9", "--frequency inf", "--to nan", "--amplitude=-inf"],
 )
-def test_a_number_beyond_all_bounds_is_one_line(given: str, capsys) -> None:
+def test_a_number_beyond_all_bounds_is_one_line(given: str, cli) -> None:
     """Four hundred digits, or no finite number: whatever the option."""
     option = given.replace(" 9", " " + "9" * 400)
-    assert main(["simulate", "--command", "stepped-sine", *option.split()]) == 2
-    line = capsys.readouterr().err
+    line = cli.refused("simulate", "--command", "stepped-sine", *option.split())
     assert given.split()[0].partition("=")[0] in line
     assert ("finite" if "9" not in given else "2^63") in line
-    assert line.count("\n") == 1
 
 
 def test_a_command_as_large_as_a_double_has_no_warning() -> None:

@@ -153,7 +153,7 @@ def bare(tmp_path, monkeypatch) -> Iterator[Cluster]:
         ({"OPENBLAS_NUM_THREADS": "3"}, "start it with .*OPENBLAS_NUM_THREADS=1"),
     ],
 )
-def test_a_worker_that_adds_up_otherwise_gets_no_work(bare, environment, words, tmp_path, capsys) -> None:
+def test_a_worker_that_adds_up_otherwise_gets_no_work(bare, environment, words, tmp_path, cli) -> None:
     bare.add_worker(**environment)
     got: list[int] = []
     with pytest.raises(InputError, match=rf"worker tcp://\S+ is refused: .*{words}") as caught:
@@ -161,8 +161,7 @@ def test_a_worker_that_adds_up_otherwise_gets_no_work(bare, environment, words, 
     assert "\n" not in str(caught.value)
     assert got == []
     command = ["montecarlo", "ilr33-amber", "--out", str(tmp_path / "out"), "--quiet"]
-    assert main([*command, "--scheduler", bare.address]) == 2
-    assert "is refused" in capsys.readouterr().err
+    assert "is refused" in cli.refused(*command, "--scheduler", bare.address)
     assert not (tmp_path / "out").exists()
 
 
@@ -265,11 +264,11 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_done_is_kept(bare, tmp_pa
         ("tcp://127.0.0.1:8786", False), ("tcp://localhost:8786", False), ("tcp://[::1]:8786", False),
     ],
 )  # fmt: skip
-def test_an_address_that_anybody_can_reach_is_warned_about(address, told, tmp_path, capsys) -> None:
+def test_an_address_that_anybody_can_reach_is_warned_about(address, told, tmp_path, cli) -> None:
     assert bool(Engine(scheduler=address).caution) is told
     words = ["nightly", "approve", "emps", "--site", str(tmp_path / "s"), "--by", "x", "--reason", "y"]
-    assert main([*words, "--scheduler", address]) == 2
-    said = capsys.readouterr().err
+    status, _, said = cli(*words, "--scheduler", address)
+    assert status == 2
     assert ("tls://" in said) is told
     assert said.count("\n") == 1 + told  # and that there is no night yet
 

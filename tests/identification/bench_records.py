@@ -1,25 +1,12 @@
 """Records whose truth is known: simulated motions, written as a recorder would."""
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from actuator_lti.design import load_design
-from actuator_lti.design.model import (
-    Controller,
-    Coupling,
-    CurrentLoop,
-    Design,
-    Encoder,
-    Friction,
-    Instruments,
-    LoadFriction,
-    OutputEncoder,
-)
+from actuator_lti.design import load_design, model
 from analyses.records.record import Record, RowCounts
 from nonlinear import Trajectory, commands, simulate
 
@@ -27,23 +14,7 @@ Columns = dict[str, np.ndarray]
 NOISE_A = 0.02
 
 
-class Ran(NamedTuple):
-    """A command's status and what it printed."""
-
-    status: int
-    out: str
-    err: str
-
-    @property
-    def data(self) -> Any:
-        """Its JSON."""
-        return json.loads(self.out)
-
-
-Command = Callable[..., Ran]
-
-
-def motion(seed: int, *, load_Nm: float = 0.0, design: Design | None = None) -> Trajectory:
+def motion(seed: int, *, load_Nm: float = 0.0, design: model.Design | None = None) -> Trajectory:
     """A multisine of 20 mrad at the output over 4 s: both directions, to the speed limit."""
     drive = load_design("ilr33-amber") if design is None else design
     command = commands.multisine(0.02, [0.7, 1.9, 4.3], 4.0, 1e-4, seed=seed)
@@ -102,7 +73,7 @@ def staircase(*speeds: float) -> Trajectory:
 HALF_PLAY = 1e-3
 
 
-def two_mass_design() -> Design:
+def two_mass_design() -> model.Design:
     """10:1, 2 mrad of play, dry friction, 16-bit and 20-bit encoders, 30 mA rms and 5 mA steps of current."""
     base = load_design("ilr33-amber")
     gear = replace(base.gears[0], name="gear", ratio=10.0, input_inertia_kgm2=0.0, output_inertia_kgm2=0.0)
@@ -112,20 +83,20 @@ def two_mass_design() -> Design:
     )  # fmt: skip
     load = replace(
         base.load, path="back-drivable", inertia_kgm2=2e-3, moment_max_Nm=0.0,
-        friction=LoadFriction(viscous_Nms_rad=0.02),
+        friction=model.LoadFriction(viscous_Nms_rad=0.02),
     )  # fmt: skip
     limits = replace(
         base.limits, voltage_V=48.0, speed_rad_s=900.0, peak_current_A=30.0, continuous_current_A=30.0
     )
-    current = CurrentLoop(gain_V_A=5.0, integral_time_s=2e-3)
-    tools = Instruments(current_noise_A=0.03, current_resolution_A=0.005, output_angle_noise_rad=5e-6)
+    current = model.CurrentLoop(gain_V_A=5.0, integral_time_s=2e-3)
+    tools = model.Instruments(current_noise_A=0.03, current_resolution_A=0.005, output_angle_noise_rad=5e-6)
     parts = {"gears": (gear,), "motor": motor, "load": load, "limits": limits, "instruments": tools}
     parts |= {
-        "friction": Friction(dry_torque_Nm=0.004, viscous_Nms_rad=1e-5),
-        "controller": Controller(period_s=1e-4, computing_delay_s=1e-4, current=current),
-        "coupling": Coupling(stiffness_Nm_rad=400.0, damping_Nms_rad=0.02, play_rad=2.0 * HALF_PLAY),
-        "encoder": Encoder(counts_per_rev=65536),
-        "output_encoder": OutputEncoder(counts_per_rev=1 << 20),
+        "friction": model.Friction(dry_torque_Nm=0.004, viscous_Nms_rad=1e-5),
+        "controller": model.Controller(period_s=1e-4, computing_delay_s=1e-4, current=current),
+        "coupling": model.Coupling(stiffness_Nm_rad=400.0, damping_Nms_rad=0.02, play_rad=2.0 * HALF_PLAY),
+        "encoder": model.Encoder(counts_per_rev=65536),
+        "output_encoder": model.OutputEncoder(counts_per_rev=1 << 20),
     }
     bare = {"parameters": {}, "requirements": (), "correlations": (), "facts": ()}
     return replace(base, name="two-mass", **parts, **bare)

@@ -6,8 +6,6 @@ import pytest
 
 from actuator_lti.design import load_design
 from examples.virtual_bench import BenchPlan, measure_bench, simulate_bench, write_bench
-from reports.cli.main import main
-from tests.identification.bench_records import Command, Ran
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 
@@ -27,18 +25,6 @@ def emps_file() -> Path:
 @pytest.fixture(scope="session")
 def odrive_files() -> dict[str, Path]:
     return {name: _found(f"odrive/{name}.csv") for name in ("step1", "step2", "chirp1")}
-
-
-@pytest.fixture
-def command(capsys) -> Command:
-    """Run a command of `actuator-lti` in this process."""
-
-    def run(*words: object) -> Ran:
-        capsys.readouterr()
-        status = main([str(word) for word in words])
-        return Ran(int(status or 0), *capsys.readouterr())
-
-    return run
 
 
 @pytest.fixture(scope="session")

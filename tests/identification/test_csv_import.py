@@ -63,16 +63,18 @@ def test_ticks_that_wrap_around(tmp_path) -> None:
     assert np.diff(record.time_s) == pytest.approx(3.0)
 
 
-def test_bad_rows_are_dropped_only_on_demand_and_counted(tmp_path) -> None:
-    path = _write(tmp_path, "t,n\n0,1\n1,abc\n2\n3,4\n4,inf\n5,6\n")
-    counts = read_csv_record(path, _spec(bad_rows="drop")).counts
-    assert (counts.rows_in, counts.rows_out, counts.dropped) == (6, 3, {"not a row of numbers": 3})
-
-
-def test_time_that_goes_back_is_counted_on_demand(tmp_path) -> None:
-    path = _write(tmp_path, "t,n\n0,1\n2,1\n1,1\n3,1\n")
-    counts = read_csv_record(path, _spec(disorder="drop")).counts
-    assert (counts.rows_out, counts.dropped) == (3, {"whose time does not increase": 1})
+@pytest.mark.parametrize(
+    ("what", "text", "rows", "reason"),
+    [
+        ("bad_rows", "0,1\n1,abc\n2\n3,4\n4,inf\n5,6\n", 6, "not a row of numbers"),
+        ("disorder", "0,1\n2,1\n1,1\n3,1\n", 4, "whose time does not increase"),
+    ],
+)
+def test_rows_are_dropped_only_on_demand_and_counted(
+    what: str, text: str, rows: int, reason: str, tmp_path
+) -> None:
+    counts = read_csv_record(_write(tmp_path, f"t,n\n{text}"), _spec(**{what: "drop"})).counts
+    assert (counts.rows_in, counts.rows_out, counts.dropped) == (rows, 3, {reason: rows - 3})
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Damaged and misread records are put right and said, or give no design; an undamaged one says nothing."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,6 +1,5 @@
 """`identify` and `correlate` from the command line: what they print, what they write, how they refuse."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -10,7 +9,6 @@ from actuator_lti.design import load_design
 from examples.virtual_bench import BenchPlan
 from examples.virtual_bench.__main__ import main as simulate
 from reports.document import load as load_document
-from tests.identification.bench_records import Command
 
 
 @pytest.fixture(scope="module")
@@ -21,10 +19,8 @@ def campaign(bench: Path, tmp_path_factory) -> Path:
     return folder / "campaign.toml"
 
 
-def test_a_campaign_as_json(campaign: Path, command: Command) -> None:
-    status, out, _ = command("identify", str(campaign), "--json", "--suggest", "2")
-    result = json.loads(out)
-    assert status == 0
+def test_a_campaign_as_json(campaign: Path, cli) -> None:
+    result = cli.data("identify", campaign, "--suggest", "2")
     found = result["result"]
     assert found["runs_listed"] == len(found["fit"]["points"]) + len(found["set_aside"]) == 9
     assert found["set_aside"][0]["id"] == "05"
@@ -35,9 +31,8 @@ def test_a_campaign_as_json(campaign: Path, command: Command) -> None:
     assert len(result["suggestion"]["runs"]) == 2
 
 
-def test_a_campaign_on_paper(campaign: Path, tmp_path, command: Command) -> None:
-    status, out, _ = command("identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
-    assert status == 0
+def test_a_campaign_on_paper(campaign: Path, tmp_path, cli) -> None:
+    out = cli.text("identify", campaign, "--out", tmp_path, "--suggest", "0")
     assert "8 of 9 runs" in out
     assert "run05_torque.csv: cannot be read: no such file" in " ".join(out.split())
     document = load_document(tmp_path / "identification.json")
@@ -52,33 +47,26 @@ def test_a_campaign_on_paper(campaign: Path, tmp_path, command: Command) -> None
     assert len(identified.correlations) >= 1
 
 
-def test_the_identified_design_goes_on_into_margins(campaign: Path, tmp_path, command: Command) -> None:
-    command("identify", str(campaign), "--out", str(tmp_path), "--suggest", "0")
-    status, out, _ = command("margins", str(tmp_path / "ilr33-amber-identified.toml"), "--json")
-    assert status == 0
-    assert json.loads(out)["loops"]
+def test_the_identified_design_goes_on_into_margins(campaign: Path, tmp_path, cli) -> None:
+    cli("identify", campaign, "--out", tmp_path, "--suggest", "0")
+    assert cli.data("margins", tmp_path / "ilr33-amber-identified.toml")["loops"]
 
 
-def test_emps_on_the_command_line(emps_file: Path, tmp_path, command: Command) -> None:
-    status, out, _ = command("identify", str(emps_file), "--json", "--refine")
-    result = json.loads(out)
-    assert status == 0
+def test_emps_on_the_command_line(emps_file: Path, tmp_path, cli) -> None:
+    result = cli.data("identify", emps_file, "--refine")
     assert round(result["model"]["parameters"]["inertia"]["value"], 4) == 95.1089
     assert result["model"]["rows_in"] == 24841
-    assert result["refined"]["parameters"]["motor.rotor_inertia"]["value"] == pytest.approx(
-        95.1089, rel=0.005
-    )
-    status, out, _ = command("correlate", "emps", str(emps_file), "--json", "--out", str(tmp_path))
-    signals = json.loads(out)["records"][0]["signals"]
-    assert status == 0
+    refined = result["refined"]["parameters"]["motor.rotor_inertia"]
+    assert refined["value"] == pytest.approx(95.1089, rel=0.005)
+    signals = cli.data("correlate", "emps", emps_file, "--out", tmp_path)["records"][0]["signals"]
     assert 100.0 * signals["force"]["relative_error"] < 5.848
     assert (tmp_path / "correlation.html").stat().st_size > 10_000
 
 
-def test_the_results_become_sections_of_the_report(campaign: Path, tmp_path, command: Command) -> None:
-    command("identify", str(campaign), "--out", str(tmp_path / "i"), "--suggest", "0")
+def test_the_results_become_sections_of_the_report(campaign: Path, tmp_path, cli) -> None:
+    cli("identify", campaign, "--out", tmp_path / "i", "--suggest", "0")
     result, out = str(tmp_path / "i" / "identification.json"), str(tmp_path / "r")
-    command("report", "ilr33-amber", "--include", result, "--out", out)
+    cli("report", "ilr33-amber", "--include", result, "--out", out)
     ids = [part["id"] for part in load_document(tmp_path / "r" / "report.json")["sections"]]
     assert "identification" in ids
     assert ids.count("provenance") == 1
@@ -111,12 +99,10 @@ def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(
     assert reason in capsys.readouterr().err
 
 
-def test_the_example_is_a_campaign_file(tmp_path, command: Command) -> None:
+def test_the_example_is_a_campaign_file(tmp_path, cli) -> None:
     from analyses.records.campaign_file import load_campaign
 
-    status, out, _ = command("identify", "--example")
-    (tmp_path / "c.toml").write_text(out)
-    assert status == 0
+    (tmp_path / "c.toml").write_text(cli.text("identify", "--example"))
     assert load_campaign(tmp_path / "c.toml").runs[0].load_Nm == 2.0
 
 
@@ -130,23 +116,14 @@ def test_the_example_is_a_campaign_file(tmp_path, command: Command) -> None:
         (("correlate", "no-such-design", "nowhere.csv"), "no such design"),
     ],
 )
-def test_bad_input_is_one_line_and_status_2(
-    arguments: tuple[str, ...], reason: str, command: Command
-) -> None:
-    status, out, err = command(*arguments)
-    assert (status, out) == (2, "")
-    assert reason in err
-    assert err.count("\n") == 1
+def test_bad_input_is_one_line_and_status_2(arguments: tuple[str, ...], reason: str, cli) -> None:
+    assert reason in cli.refused(*arguments)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "reason"),
     [
-        (
-            'method = "correlation"',
-            'method = "guess"',
-            "join.method = 'guess': one of correlation, event, given",
-        ),
+        ('"correlation"', '"guess"', "join.method = 'guess': one of correlation, event, given"),
         ('signals.current = { column = "Current", unit = "mA" }', "", "drive.signals.current: is needed"),
         ('unit = "rpm"', 'unit = "kg"', "must be a unit like rad/s"),
         ("torque_accuracy = 0.005", "torque_acuracy = 0.005", 'did you mean "torque_accuracy"'),
@@ -156,14 +133,12 @@ def test_bad_input_is_one_line_and_status_2(
     ],
 )
 def test_a_bad_campaign_file_is_one_line_with_its_key(
-    old: str, new: str, reason: str, campaign: Path, tmp_path, command: Command
+    old: str, new: str, reason: str, campaign: Path, tmp_path, cli
 ) -> None:
     text = campaign.read_text()
     assert old in text
     path = tmp_path / "bad.toml"
     path.write_text(text.replace(old, new, 1))
-    status, _, err = command("identify", str(path))
-    assert status == 2
+    err = cli.refused("identify", path)
     assert "bad.toml" in err
     assert reason in err
-    assert err.count("\n") == 1

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from actuator_lti.design import load_design
 from analyses.estimation.least_squares import between_records, solve
-from tests.identification.bench_records import Command, columns_of, motion, staircase, write
+from tests.identification.bench_records import columns_of, motion, staircase, write
 
 
 @pytest.fixture(scope="module")
@@ -27,16 +27,12 @@ def files(tmp_path_factory) -> dict[str, str]:
 
 
 def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_another(
-    files: dict[str, str], tmp_path, command: Command
+    files: dict[str, str], tmp_path, cli
 ) -> None:
     """Truth: the coefficients of the design that was simulated (Table 1 of the paper)."""
     arguments = ("identify", files["a"], files["b"], files["loaded"], "--validate", files["unseen"])
-    status, out, _ = command(
-        *arguments, "--design", "ilr33-amber", "--refine", "--json", "--out", str(tmp_path)
-    )
-    result = json.loads(out)
+    result = cli.data(*arguments, "--design", "ilr33-amber", "--refine", "--out", tmp_path)
     checks = {check["id"]: check for check in result["items"]}
-    assert status == 0
     assert checks["held-out-unseen.csv"]["passed"]
     assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(
         1.5 * result["model"]["relative_residual"] + 0.02
@@ -52,45 +48,37 @@ def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_anoth
         assert tolerance.std == pytest.approx(refined["standard_error"], rel=1e-5)
 
 
-def test_a_held_out_record_of_another_drive_fails(files: dict[str, str], tmp_path, command: Command) -> None:
+def test_a_held_out_record_of_another_drive_fails(files: dict[str, str], tmp_path, cli) -> None:
     from actuator_lti.design import with_values
 
     other = with_values(load_design("ilr33-amber"), {"friction.dry_torque": 3.5e-3})
     path = str(write(tmp_path / "other.csv", columns_of(motion(6, design=other), 7)))
-    status, out, _ = command("identify", files["a"], "--validate", path, "--design", "ilr33-amber", "--json")
-    checks = {check["id"]: check for check in json.loads(out)["items"]}
-    assert status == 1
+    told = cli.data("identify", files["a"], "--validate", path, "--design", "ilr33-amber", status=1)
+    checks = {check["id"]: check for check in told["items"]}
     assert not checks["held-out-other.csv"]["passed"]
     assert checks["residual"]["passed"]
 
 
-def test_a_value_can_be_held(files: dict[str, str], command: Command) -> None:
-    common = ("identify", files["loaded"], "--design", "ilr33-amber", "--json")
-    status, out, _ = command(*common, "--fix", "friction.load_coefficient=1.34 mN*m/(N*m)")
-    result = json.loads(out)
-    assert status == 0
-    assert result["model"]["fixed"]["load_coefficient"] == {
-        "value": 1.34e-3,
-        "reason": "fixed as asked",
-        "moves": {},
-        "std": 0.0,
-    }
-    assert result["model"]["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.05)
+def test_a_value_can_be_held(files: dict[str, str], cli) -> None:
+    common = ("identify", files["loaded"], "--design", "ilr33-amber")
+    model = cli.data(*common, "--fix", "friction.load_coefficient=1.34 mN*m/(N*m)")["model"]
+    held = {"value": 1.34e-3, "reason": "fixed as asked", "moves": {}, "std": 0.0}
+    assert model["fixed"]["load_coefficient"] == held
+    assert model["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.05)
     for wrong, reason in (
         ("friction.load_coefficient", "KEY=VALUE is wanted"),
         ("friction.banana=1", "unknown parameter"),
         ("friction.viscous=1 kg", "wrong dimension"),
         ("motor.resistance=1 ohm", "can be fixed here"),
     ):
-        status, _, err = command(*common, "--fix", wrong)
-        assert (status, reason in err) == (2, True), err
+        assert reason in cli.refused(*common, "--fix", wrong)
 
 
-def test_a_torque_command_is_the_drive(tmp_path, command: Command) -> None:
+def test_a_torque_command_is_the_drive(tmp_path, cli) -> None:
     columns = columns_of(motion(2))
     columns["torque_command_Nm"] = 5.9e-3 * columns.pop("current_A")
     path = write(tmp_path / "r.csv", columns)
-    result = command("identify", path, "--design", "ilr33-amber", "--json").data
+    result = cli("identify", path, "--design", "ilr33-amber", "--json").data
     uses = {row["meaning"]: row["use"] for row in result["inputs"]["r.csv"]}
     assert uses["commanded motor torque"] == "drive: torque as commanded"
     assert result["model"]["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.03)
@@ -99,10 +87,8 @@ def test_a_torque_command_is_the_drive(tmp_path, command: Command) -> None:
     )
 
 
-def test_one_direction_says_what_it_cannot_tell_apart(files: dict[str, str], command: Command) -> None:
-    status, out, _ = command("identify", files["one way"], "--design", "ilr33-amber", "--json")
-    result = json.loads(out)
-    assert status == 0
+def test_one_direction_says_what_it_cannot_tell_apart(files: dict[str, str], cli) -> None:
+    result = cli.data("identify", files["one way"], "--design", "ilr33-amber")
     told = "cannot be separated from dry: the design's value kept; an error of it moves dry by -1 times it"
     assert result["model"]["fixed"]["offset"]["reason"] == told
     for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
@@ -111,13 +97,12 @@ def test_one_direction_says_what_it_cannot_tell_apart(files: dict[str, str], com
         assert abs(value - truth) < 3.0 * std
 
 
-def test_one_speed_has_errors_that_hold_the_truth(files: dict[str, str], command: Command) -> None:
+def test_one_speed_has_errors_that_hold_the_truth(files: dict[str, str], cli) -> None:
     """Dry and viscous friction are told by the run-up alone: poorly, and their errors say so."""
-    result = command("identify", files["one speed"], "--design", "ilr33-amber", "--json").data["model"][
-        "parameters"
-    ]
+    model = cli("identify", files["one speed"], "--design", "ilr33-amber", "--json").data["model"]
     for name, truth in (("dry", 2.25e-3), ("viscous", 5.25e-6)):
-        assert abs(result[name]["value"] - truth) < 3.0 * result[name]["standard_error"]
+        found = model["parameters"][name]
+        assert abs(found["value"] - truth) < 3.0 * found["standard_error"]
 
 
 def test_errors_of_correlated_residuals_are_the_scatter_of_the_fits() -> None:
@@ -148,7 +133,7 @@ def test_scatter_between_records_is_found_again() -> None:
     assert np.sqrt(np.mean(np.square(result))) == pytest.approx(0.5, rel=0.05)
 
 
-def test_records_that_differ_widen_the_errors(tmp_path, command: Command) -> None:
+def test_records_that_differ_widen_the_errors(tmp_path, cli) -> None:
     """Six records whose dry friction differs by 10 % rms: the joint error is the scatter over root six."""
     from actuator_lti.design import with_values
 
@@ -159,21 +144,18 @@ def test_records_that_differ_widen_the_errors(tmp_path, command: Command) -> Non
             motion(3, design=with_values(drive, {"friction.dry_torque": float(c)})), k)))
         for k, c in enumerate(true)
     ]  # fmt: skip
-    _, out, _ = command("identify", *paths, "--design", "ilr33-amber", "--json")
-    dry = json.loads(out)["model"]["parameters"]["dry"]
+    model = cli("identify", *paths, "--design", "ilr33-amber", "--json").data["model"]
+    dry = model["parameters"]["dry"]
     assert dry["value"] == pytest.approx(true.mean(), rel=0.03)
     assert dry["standard_error"] == pytest.approx(true.std(ddof=1) / np.sqrt(6.0), rel=0.2)
-    white = json.loads(out)["model"]["white_errors"][2]
-    assert white < 0.3 * dry["standard_error"]
+    assert model["white_errors"][2] < 0.3 * dry["standard_error"]
 
 
-def test_correlation_over_several_records(files: dict[str, str], command: Command) -> None:
+def test_correlation_over_several_records(files: dict[str, str], cli) -> None:
     paths = (files["a"], files["b"], files["loaded"])
-    status, out, _ = command("correlate", "ilr33-amber", *paths, "--json")
-    result = json.loads(out)
+    result = cli.data("correlate", "ilr33-amber", *paths)
     own = [record["signals"]["current"] for record in result["records"]]
     summary = result["summary"]["current"]
-    assert status == 0
     assert summary["max_error"] == max(one["max_error"] for one in own)
     shares = [one["share_of_motion"] for one in own]
     assert min(shares) < summary["share_of_motion"] < max(shares)
@@ -183,16 +165,12 @@ def test_correlation_over_several_records(files: dict[str, str], command: Comman
     assert own[0]["mean_error"] == pytest.approx(0.02 * np.sqrt(2.0 / np.pi), rel=0.05)
     worst = max(result["records"], key=lambda one: one["signals"]["angle"]["relative_error"])
     assert result["worst"] == worst["record"]
-    _, text, _ = command("correlate", "ilr33-amber", *paths)
-    assert (
-        f"3 records against ilr33-amber; the motion of {Path(result['worst']).name} is furthest off" in text
-    )
+    said = f"3 records against ilr33-amber; the motion of {Path(result['worst']).name} is furthest off"
+    assert said in cli("correlate", "ilr33-amber", *paths).out
 
 
-def test_a_record_that_contradicts_itself_fails_the_correlation(tmp_path, command: Command) -> None:
+def test_a_record_that_contradicts_itself_fails_the_correlation(tmp_path, cli) -> None:
     columns = columns_of(motion(2))
     columns["motor_speed_rad_s"] = columns.pop("motor_speed_rpm")
-    path = str(write(tmp_path / "r.csv", columns))
-    status, out, _ = command("correlate", "ilr33-amber", path, "--json")
-    assert status == 1
-    assert "60/2 pi" in json.dumps(json.loads(out)["records"][0]["findings"])
+    told = cli.data("correlate", "ilr33-amber", write(tmp_path / "r.csv", columns), status=1)
+    assert "60/2 pi" in json.dumps(told["records"][0]["findings"])

@@ -1,7 +1,5 @@
 """Gravity, load friction on the moment, supply from a voltage drive, friction maps: closed forms as truth."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

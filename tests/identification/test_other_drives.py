@@ -15,7 +15,6 @@ from actuator_lti.design.model import Design
 from nonlinear import Trajectory, commands, simulate
 from nonlinear.commands import Command
 from tests.identification.bench_records import Columns, write
-from tests.identification.bench_records import Command as Run
 
 
 def _bare(name: str) -> Design:
@@ -133,14 +132,14 @@ def _truth(design: Design, name: str) -> float:
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.log.__name__[1:] for case in CASES])
-def test_a_drive_is_found_from_its_record(case: Case, tmp_path, command: Run) -> None:
+def test_a_drive_is_found_from_its_record(case: Case, tmp_path, cli) -> None:
     design = _bare(case.name)
     run = simulate(design, case.command, case.seconds, record_every=case.every)
     table: Columns = case.log(run, np.random.default_rng(7))
     write(tmp_path / "r.csv", table, mark=";")
     (tmp_path / "wrong.toml").write_text(write_design(_wrong(design)))
     record, out = str(tmp_path / "r.csv"), str(tmp_path / "o")
-    ran = command("identify", record, "--design", tmp_path / "wrong.toml", "--out", out, "--json")
+    ran = cli("identify", record, "--design", tmp_path / "wrong.toml", "--out", out, "--json")
     result = ran.data
     assert not ran.status, [check for check in result["items"] if check["passed"] is False]
     for name, near in case.near.items():
@@ -149,7 +148,7 @@ def test_a_drive_is_found_from_its_record(case: Case, tmp_path, command: Run) ->
         assert abs(value - _truth(design, name)) < 2.5 * std, name
     errors = {}
     for label, path in (("found", next((tmp_path / "o").glob("*.toml"))), ("wrong", tmp_path / "wrong.toml")):
-        summary = command("correlate", path, record, "--json").data["summary"]
+        summary = cli("correlate", path, record, "--json").data["summary"]
         errors[label] = max(
             summary[name]["relative_error"] for name in ("current", "voltage") if name in summary
         )
@@ -158,9 +157,7 @@ def test_a_drive_is_found_from_its_record(case: Case, tmp_path, command: Run) ->
 
 @pytest.mark.parametrize("name", ["ballscrew", "fin"])
 @pytest.mark.parametrize("clock", [1.05, 0.95])
-def test_a_clock_that_is_off_shows_in_the_following_error(
-    name: str, clock: float, tmp_path, command: Run
-) -> None:
+def test_a_clock_that_is_off_shows_in_the_following_error(name: str, clock: float, tmp_path, cli) -> None:
     """A position and a current alone: inertia and friction agree with any clock, the loops' gains do not."""
     case = next(case for case in CASES if case.name == name)
     design = _bare(name)
@@ -171,7 +168,7 @@ def test_a_clock_that_is_off_shows_in_the_following_error(
     write(tmp_path / "r.csv", table, mark=";")
     (tmp_path / "d.toml").write_text(write_design(design))
     out = tmp_path / "o"
-    ran = command("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml", "--out", out, "--json")
+    ran = cli("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml", "--out", out, "--json")
     assert ran.status == 1
     checks = {one["id"]: one for one in ran.data["items"]}
     assert f"a clock about {100.0 * (clock - 1.0):+.1g}"[:15] in checks["following-r.csv"]["reason"]
@@ -187,7 +184,7 @@ def test_a_clock_that_is_off_shows_in_the_following_error(
     ],
 )
 def test_a_fault_on_a_linear_axis_is_named(
-    change: dict[str, tuple[str, float]], status: int, reason: str, tmp_path, command: Run
+    change: dict[str, tuple[str, float]], status: int, reason: str, tmp_path, cli
 ) -> None:
     """Friction behind the coupling counts in the common factor of a wrong scale of the current."""
     case = next(case for case in CASES if case.name == "ballscrew")
@@ -196,13 +193,13 @@ def test_a_fault_on_a_linear_axis_is_named(
     changed = {change.get(k, (k, 1.0))[0]: change.get(k, (k, 1.0))[1] * v for k, v in table.items()}
     write(tmp_path / "r.csv", changed, mark=";")
     out = tmp_path / "o"
-    ran = command("identify", tmp_path / "r.csv", "--design", "ballscrew", "--out", out, "--json")
+    ran = cli("identify", tmp_path / "r.csv", "--design", "ballscrew", "--out", out, "--json")
     assert ran.status == status
     assert reason in (ran.err if status == 2 else json.dumps(ran.data["items"]))
     assert not list((tmp_path / "o").glob("*.toml"))
 
 
-def test_a_current_sampled_too_slowly_is_named(tmp_path, command: Run) -> None:
+def test_a_current_sampled_too_slowly_is_named(tmp_path, cli) -> None:
     """Steps of the voltage: the current peaks within a millisecond, the log has one row for each."""
     base = _bare("ilr33-amber")
     controller = replace(base.controller, position=None, velocity=None, current=None)
@@ -213,13 +210,13 @@ def test_a_current_sampled_too_slowly_is_named(tmp_path, command: Run) -> None:
     columns = {"voltage_command_V": run.reference_rad, "motor_speed [rad/s]": run.motor_speed_rad_s}
     write(tmp_path / "r.csv", {"time_s": run.time_s, **columns, "current_A": run.current_A})
     (tmp_path / "d.toml").write_text(write_design(design))
-    ran = command("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml", "--json")
+    ran = cli("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml", "--json")
     failed = [check["reason"] for check in ran.data["items"] if not check["passed"]]
     assert ran.status == 1
     assert any("sampled too slowly" in reason for reason in failed)
 
 
-def test_a_stepped_command_is_taken_as_steps(tmp_path, command: Run) -> None:
+def test_a_stepped_command_is_taken_as_steps(tmp_path, cli) -> None:
     """Logged at every tenth tick: taken as ramps of a millisecond, the current would be off by 20 %."""
     base = _bare("ilr33-amber")
     design = replace(base, controller=replace(base.controller, position=None))
@@ -230,12 +227,12 @@ def test_a_stepped_command_is_taken_as_steps(tmp_path, command: Run) -> None:
     speed["motor_speed [rad/s]"] = run.motor_speed_rad_s
     write(tmp_path / "r.csv", {"time_s": run.time_s, **speed, "current_A": run.current_A})
     (tmp_path / "d.toml").write_text(write_design(design))
-    summary = command("correlate", tmp_path / "d.toml", tmp_path / "r.csv", "--json").data["summary"]
+    summary = cli("correlate", tmp_path / "d.toml", tmp_path / "r.csv", "--json").data["summary"]
     assert summary["current"]["relative_error"] < 1e-6
     assert summary["speed"]["relative_error"] < 1e-6
 
 
-def test_correlate_begins_with_its_result_and_judges_on_demand(tmp_path, command: Run) -> None:
+def test_correlate_begins_with_its_result_and_judges_on_demand(tmp_path, cli) -> None:
     design = _bare("ctms-motor-position")
     run = simulate(design, commands.multisine(1.0, [0.5, 1.1], 4.0, 1e-3, seed=2), 4.0)
     table = _voltage(run, np.random.default_rng(1))
@@ -246,12 +243,12 @@ def test_correlate_begins_with_its_result_and_judges_on_demand(tmp_path, command
         (("--error-limit", "0.1"), "FAIL"),
         (("--error-limit", "50"), "PASS"),
     ):
-        ran = command("correlate", tmp_path / "w.toml", tmp_path / "r.csv", *limit)
+        ran = cli("correlate", tmp_path / "w.toml", tmp_path / "r.csv", *limit)
         assert ran.status == int(verdict == "FAIL")
         assert ran.out.startswith(f"{verdict}  ctms-motor-position: Motor angle of the model within")
 
 
-def test_signals_at_several_rates(tmp_path, command: Run) -> None:
+def test_signals_at_several_rates(tmp_path, cli) -> None:
     """The current every 5 ms among rows of 1 ms: rows are dropped, which is said, or kept."""
     design = _bare("ctms-motor-position")
     motor = replace(design.motor, inductance_H=2e-3)
@@ -269,12 +266,12 @@ def test_signals_at_several_rates(tmp_path, command: Run) -> None:
     (tmp_path / "d.toml").write_text(write_design(_wrong(current)))
     used = {}
     for name in ("r.csv", "r.toml"):
-        result = command("identify", tmp_path / name, "--design", tmp_path / "d.toml", "--json").data
+        result = cli("identify", tmp_path / name, "--design", tmp_path / "d.toml", "--json").data
         used[name] = result["model"]["records"][0]["rows_in"]
         near = 0.01 if name == "r.toml" else 0.05
         assert result["model"]["parameters"]["inertia"]["value"] == pytest.approx(
             design.inertia_kgm2, rel=near
         )
     assert used == {"r.csv": 800, "r.toml": 4000}
-    told = command("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml").out
+    told = cli("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml").out
     assert 'missing = "interpolate"' in " ".join(told.split())

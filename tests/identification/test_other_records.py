@@ -9,7 +9,7 @@ from actuator_lti import load_design
 from analyses.identification.inverse import fit_records
 from analyses.records.open_record import open_record
 from analyses.records.record import Record
-from tests.identification.bench_records import Command, record_of
+from tests.identification.bench_records import record_of
 
 
 @pytest.fixture(scope="module")
@@ -109,14 +109,14 @@ full_deflection = "10 deg"
 
 @pytest.mark.parametrize(("resistance", "status"), [("2.6 ohm", 0), ("0.26 ohm", 1)])
 def test_its_own_record_fits_and_a_factor_of_ten_does_not(
-    tmp_path, command: Command, resistance: str, status: int
+    tmp_path, cli, resistance: str, status: int
 ) -> None:
     """The record is the simulator's; u = R i + L di/dt + kE w holds in it."""
     design, record = tmp_path / "gimbal.toml", tmp_path / "run.csv"
     design.write_text(GIMBAL)
     words = ("--command", "chirp", "--to", 20, "--duration", 2, "--amplitude", 3, "--csv", record)
-    assert command("simulate", design, *words, "--every", 4, "--quiet").status == 0
+    assert cli("simulate", design, *words, "--every", 4, "--quiet").status == 0
     design.write_text(GIMBAL.replace('"2.6 ohm"', f'"{resistance}"'))
-    ran = command("correlate", design, record, "--quiet")
+    ran = cli("correlate", design, record, "--quiet")
     assert ran.status == status
     assert ("R i counts" in ran.out) == bool(status)

@@ -14,7 +14,7 @@ from analyses.records.open_record import open_record
 from analyses.records.record import Record
 from analyses.studies.sampling import sampler_of
 from analyses.tuning.problem import loop_requirements, problem_of
-from tests.identification.bench_records import Command, columns_of, motion, record_of, write
+from tests.identification.bench_records import columns_of, motion, record_of, write
 
 AMBER = load_design("ilr33-amber")
 
@@ -28,14 +28,14 @@ AMBER = load_design("ilr33-amber")
         ("emps", "--command step --amplitude 1 --duration 0.3"),
     ],
 )
-def test_own_record(design: str, motion: str, tmp_path, command: Command) -> None:
+def test_own_record(design: str, motion: str, tmp_path, cli) -> None:
     path = tmp_path / "run.csv"
-    assert command(*f"simulate {design} {motion} --csv {path} --quiet".split()).status == 0
-    data = command("correlate", design, path, "--json").data
+    assert cli(*f"simulate {design} {motion} --csv {path} --quiet".split()).status == 0
+    data = cli("correlate", design, path, "--json").data
     assert data["passed"] is True
     for name, one in data["records"][0]["signals"].items():
         assert one["relative_error"] < 1e-9, name
-    assert command("correlate", design, path).out.startswith("PASS  ")
+    assert cli("correlate", design, path).out.startswith("PASS  ")
 
 
 def _noisy(clock: float = 1.0) -> Record:
@@ -62,10 +62,10 @@ def test_a_clock_that_is_off_shows_in_a_short_motion() -> None:
 NAMES = {"viscous": "friction.viscous", "dry": "friction.dry_torque", "offset": "friction.offset_torque"}
 
 
-def test_what_was_identified_is_what_the_studies_draw(tmp_path, command: Command) -> None:
+def test_what_was_identified_is_what_the_studies_draw(tmp_path, cli) -> None:
     """Covariance of the fit = that of the samples (4096 draws, 5 %); tuning knows them; a study runs."""
     record = write(tmp_path / "a.csv", columns_of(motion(1)))
-    ran = command("identify", record, "--design", "ilr33-amber", "--out", tmp_path, "--json")
+    ran = cli("identify", record, "--design", "ilr33-amber", "--out", tmp_path, "--json")
     assert not ran.status
     result = ran.data
     design = load_design(tmp_path / "ilr33-amber-identified.toml")
@@ -80,7 +80,7 @@ def test_what_was_identified_is_what_the_studies_draw(tmp_path, command: Command
     corner = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
     assert set(paths) <= {factor.path for factor in corner.factors}
     drawn = ("--samples", "64", "--no-worst", "--out", tmp_path / "mc", "--json")
-    study = command("montecarlo", tmp_path / "ilr33-amber-identified.toml", *drawn)
+    study = cli("montecarlo", tmp_path / "ilr33-amber-identified.toml", *drawn)
     assert not study.status
     assert study.data["verdict"] == "met"
 

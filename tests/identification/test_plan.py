@@ -12,7 +12,7 @@ from analyses.identification.bench import identify_bench
 from analyses.identification.plan import PERIOD_S, Plan, plan_motions
 from analyses.records.record import Record
 from nonlinear import commands, simulate
-from tests.identification.bench_records import NOISE_A, Command, record_of
+from tests.identification.bench_records import NOISE_A, record_of
 
 BASE = load_design("ilr33-amber")
 VALUES = ("inertia", "viscous", "dry", "offset")
@@ -87,12 +87,12 @@ def test_what_cannot_be_planned_is_refused() -> None:
         plan_motions(bare, within=0.01, noise=NOISE_A)
 
 
-def test_the_command_writes_the_motions_for_the_drive(tmp_path, command: Command) -> None:
-    ran = command("identify", "--plan", "ilr33-amber", "--noise", NOISE_A, "--out", tmp_path, "--json")
+def test_the_command_writes_the_motions_for_the_drive(tmp_path, cli) -> None:
+    ran = cli("identify", "--plan", "ilr33-amber", "--noise", NOISE_A, "--out", tmp_path, "--json")
     assert ran.status == 0
     assert ran.data["half_widths"]["inertia"] < ran.data["within"] == 0.05
     written = np.loadtxt(tmp_path / "ilr33-amber-plan.csv", delimiter=",", skiprows=1)
     assert len(written) == 4000 * len(ran.data["segments"])
-    out = command("identify", "--plan", "ballscrew", "--noise", 0.02, "--within", 1e-2).out
+    out = cli("identify", "--plan", "ballscrew", "--noise", 0.02, "--within", 1e-2).out
     assert out.startswith("FAIL")
     assert "are not enough" in " ".join(out.split())

@@ -1,6 +1,5 @@
 """A design fitted to measured responses: the truth is the exact sampled loop from matrix exponentials."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,6 @@ from scipy.linalg import expm
 
 from actuator_lti.design import load_design, parameter_value
 from analyses.identification.measured_response import ResponseResult, identify_response
-from tests.identification.bench_records import Command
 
 TICK, GAIN, N = 1e-3, 0.8, 50.0
 TRUTH = {
@@ -138,14 +136,12 @@ def test_what_a_response_does_not_determine_is_kept_and_said(tmp_path) -> None:
     assert all("not determined, the design's value kept" in one.reason for one in fit.fixed.values())
 
 
-def test_another_drive_than_the_model_fails(tmp_path, command: Command) -> None:
+def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
     """A stiffness that is held at half: no other values make up for it, and the page says so."""
     file, design = _measured(tmp_path, "L", 0.01, 3), _design(tmp_path, OFF)
-    words = ("identify", "--response", file, "--design", design, "--json", "--out", tmp_path / "o")
-    assert command(*words).status == 0
-    status, out, _ = command(*words, "--fix", "coupling.stiffness=450")
-    result = json.loads(out)
-    assert status == 1
+    words = ("identify", "--response", file, "--design", design, "--out", tmp_path / "o")
+    assert cli(*words).status == 0
+    result = cli.data(*words, "--fix", "coupling.stiffness=450", status=1)
     assert result["fit"]["misfit"] > 5.0
     assert next(item["passed"] for item in result["items"]) is False
 
@@ -158,7 +154,6 @@ def test_another_drive_than_the_model_fails(tmp_path, command: Command) -> None:
         (("--fix", "motor.resistance=1"), "motor.resistance"),
     ],
 )
-def test_what_cannot_be_is_refused(more: tuple[str, ...], reason: str, tmp_path, command: Command) -> None:
+def test_what_cannot_be_is_refused(more: tuple[str, ...], reason: str, tmp_path, cli) -> None:
     file, design = _measured(tmp_path, "L", 0.01, 0), _design(tmp_path, {})
-    status, _, err = command("identify", "--response", file, "--design", design, *more)
-    assert (status, reason in err) == (2, True), err
+    assert reason in cli.refused("identify", "--response", file, "--design", design, *more)

@@ -3,7 +3,6 @@
 Records of the simulator seen through instruments: gravity, load friction, a supply that sags.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from actuator_lti.design import load_design, write_design
 from actuator_lti.design.model import Design, Gravity, PositionLoop
 from nonlinear import commands, simulate
 from nonlinear.commands import Command
-from tests.identification.bench_records import Ran, write
+from tests.identification.bench_records import write
 
 RATIO = 100.0
 DURATION = 8.0
@@ -102,10 +101,10 @@ def files(tmp_path_factory) -> dict[str, str]:
 
 
 def test_the_joint_is_identified_and_meets_its_records_within_0_06_rad(
-    files: dict[str, str], tmp_path, command: Callable[..., Ran]
+    files: dict[str, str], tmp_path, cli
 ) -> None:
     """Identified from two motions, held against all of them; the guess misses them by more."""
-    ran = command(
+    ran = cli(
         "identify", files["waves"], files["lifting"], "--validate", files["steps"],
         "--design", files["guess"], "--inertia-to", "load.inertia", "--out", tmp_path, "--json",
     )  # fmt: skip
@@ -114,8 +113,8 @@ def test_the_joint_is_identified_and_meets_its_records_within_0_06_rad(
     gravity = load_design(written).load.gravity
     assert gravity.peak_Nm == pytest.approx(0.8 * 9.80665 * 0.15, rel=0.05)
     records = [files[name] for name in MOTIONS]
-    after = command("correlate", written, *records, "--json").data
+    after = cli("correlate", written, *records, "--json").data
     for record in after["records"]:
         assert record["signals"]["output_angle"]["mean_error"] < 0.06
-    before = command("correlate", files["guess"], *records, "--json").data["summary"]["output_angle"]
+    before = cli("correlate", files["guess"], *records, "--json").data["summary"]["output_angle"]
     assert after["summary"]["output_angle"]["mean_error"] < 0.5 * before["mean_error"]

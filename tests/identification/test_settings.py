@@ -1,6 +1,5 @@
 """Records of one drive at several settings: one fit, each record with its own gain and load."""
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,7 @@ from actuator_lti.design import load_design, parameter_value, write_design
 from analyses.records.open_record import open_records
 from nonlinear import commands, simulate
 from reports.document import load as load_document
-from tests.identification.bench_records import Command, columns_of, motion, write
+from tests.identification.bench_records import columns_of, motion, write
 
 SHARED = """
 time = { column = "time_s" }
@@ -38,12 +37,10 @@ def sixteen(tmp_path_factory) -> Path:
     return folder / "runs.toml"
 
 
-def test_sixteen_records_of_four_gains_are_one_fit(sixteen: Path, command: Command) -> None:
+def test_sixteen_records_of_four_gains_are_one_fit(sixteen: Path, cli) -> None:
     """The inertia at the output is known of each: what is found is the motor's own, from all sixteen."""
     design = load_design("ilr33-amber")
-    status, out, _ = command("identify", sixteen, "--design", "ilr33-amber", "--json")
-    assert status == 0
-    model = json.loads(out)["model"]
+    model = cli.data("identify", sixteen, "--design", "ilr33-amber")["model"]
     assert len(model["records"]) == 16
     truth = {"inertia": design.inertia_kgm2, "viscous": design.friction.viscous(1)}
     for name, value in truth.items():
@@ -51,17 +48,16 @@ def test_sixteen_records_of_four_gains_are_one_fit(sixteen: Path, command: Comma
         assert abs(found["value"] - value) < 4.0 * found["standard_error"] + 1e-3 * value, name
 
 
-def test_each_record_is_simulated_with_its_own_settings(sixteen: Path, command: Command, tmp_path) -> None:
-    status, out, _ = command("correlate", "ilr33-amber", sixteen, "--error-limit", "3", "--json")
-    assert status == 0
-    told = [note for record in json.loads(out)["records"] for note in record["notes"]]
+def test_each_record_is_simulated_with_its_own_settings(sixteen: Path, cli, tmp_path) -> None:
+    records = cli.data("correlate", "ilr33-amber", sixteen, "--error-limit", "3")["records"]
+    told = [note for record in records for note in record["notes"]]
     assert [told.count(f"set: control.position.gain = {gain} 1/s") for gain in GAINS] == [4] * 4
     plain = sixteen.with_name("plain.toml")
     plain.write_text(SHARED + f'file = "{GAINS[0]:g}_{INERTIAS[0]:g}_1.csv"\n')
-    assert command("correlate", "ilr33-amber", plain, "--error-limit", "3").status == 1
+    assert cli("correlate", "ilr33-amber", plain, "--error-limit", "3").status == 1
 
 
-def test_a_drive_on_a_voltage_is_refined_over_its_gains(tmp_path, command: Command) -> None:
+def test_a_drive_on_a_voltage_is_refined_over_its_gains(tmp_path, cli) -> None:
     """A P position loop sets the voltage, which no column holds: it is the gain times a difference of two."""
     drive = load_design("ctms-motor-position")
     text = 'time = { column = "time_s" }\nsignals.reference = { column = "reference_rad", unit = "rad" }\n'
@@ -76,12 +72,11 @@ def test_a_drive_on_a_voltage_is_refined_over_its_gains(tmp_path, command: Comma
         text += f'[[record]]\nfile = "{k}.csv"\nsettings."control.position.gain" = {gain}\n'
         text += f'signals.voltage = {{ column = "reference_rad - angle_rad", unit = "V", scale = {gain} }}\n'
     (tmp_path / "runs.toml").write_text(text)
-    words = ("identify", tmp_path / "runs.toml", "--design", "ctms-motor-position", "--refine", "--json")
-    status, out, _ = command(*words, "--out", tmp_path / "o")
-    assert status == 0
+    words = ("identify", tmp_path / "runs.toml", "--design", "ctms-motor-position", "--refine")
+    result = cli.data(*words, "--out", tmp_path / "o")
     first = load_document(tmp_path / "o" / "identification.json")["sections"][0]["result"]
     assert first.startswith("Refined by simulation: motor.rotor_inertia 3.228")
-    found = json.loads(out)["refined"]["parameters"]
+    found = result["refined"]["parameters"]
     made = load_design(tmp_path / "o" / "ctms-motor-position-identified.toml")
     for key in ("motor.rotor_inertia", "friction.viscous"):
         value, error = found[key]["value"], found[key]["standard_error"]
@@ -101,13 +96,10 @@ def test_a_drive_on_a_voltage_is_refined_over_its_gains(tmp_path, command: Comma
         ('"control.position.gain" = [1]', "a key of the design with its value is wanted"),
     ],
 )
-def test_a_setting_that_cannot_be_is_refused(
-    settings: str, reason: str, sixteen: Path, command: Command
-) -> None:
+def test_a_setting_that_cannot_be_is_refused(settings: str, reason: str, sixteen: Path, cli) -> None:
     file = sixteen.with_name("wrong.toml")
     file.write_text(f'{SHARED}\nfile = "{GAINS[0]:g}_{INERTIAS[0]:g}_1.csv"\n[settings]\n{settings}\n')
-    status, _, err = command("identify", file, "--design", "ilr33-amber")
-    assert (status, err.count("\n")) == (2, 1)
+    err = cli.refused("identify", file, "--design", "ilr33-amber")
     assert reason in err
     assert "wrong.toml" in err or ".csv" in err
 
@@ -115,17 +107,15 @@ def test_a_setting_that_cannot_be_is_refused(
 @pytest.mark.parametrize(
     "words", [("correlate", "ilr33-amber", "DESIGN"), ("identify", "DESIGN"), ("identify", "FILE", "DESIGN")]
 )
-def test_a_design_in_the_place_of_a_record_is_named(
-    words: tuple[str, ...], sixteen: Path, command: Command
-) -> None:
+def test_a_design_in_the_place_of_a_record_is_named(words: tuple[str, ...], sixteen: Path, cli) -> None:
     file = sixteen.with_name("my.toml")
     file.write_text(write_design(load_design("ilr33-amber")))
     names = {"DESIGN": file, "FILE": sixteen}
-    status, _, err = command(*(names.get(word, word) for word in words))
+    status, _, err = cli(*(names.get(word, word) for word in words))
     assert status == 2
     assert "my.toml: a design, and no record; allowed: CSV" in err
     assert "correlate takes the design first, identify behind --design" in err
-    status, _, err = command("correlate", sixteen.with_name("60_0.0002_1.csv"), file)
+    status, _, err = cli("correlate", sixteen.with_name("60_0.0002_1.csv"), file)
     assert status == 2
     assert "a table of numbers, TOML is wanted: a record, and no design?" in err
 

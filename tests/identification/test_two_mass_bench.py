@@ -12,7 +12,7 @@ from actuator_lti.errors import InputError
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
 from examples.virtual_bench import TwoMassPlan, reversal_record, sweep_record
 from examples.virtual_bench.__main__ import main as simulate
-from tests.identification.bench_records import HALF_PLAY, Command, two_mass_design
+from tests.identification.bench_records import HALF_PLAY, two_mass_design
 
 TRUTH = {
     "motor_inertia": 2e-5,
@@ -115,7 +115,7 @@ def _set(*changes: str) -> list[str]:
     return [part for change in changes for part in ("--set", change)]
 
 
-def test_a_robot_joint_from_its_simulated_bench(tmp_path, command: Command) -> None:
+def test_a_robot_joint_from_its_simulated_bench(tmp_path, cli) -> None:
     """Truth: the shipped joint with 2 mrad of play; start: inertias and stiffness 20 to 30 % off.
 
     Its friction grows with the load (CM) and it has dry friction on both sides: both are in the truth.
@@ -124,7 +124,7 @@ def test_a_robot_joint_from_its_simulated_bench(tmp_path, command: Command) -> N
     made = _set("instruments.current_noise=30 mA", "coupling.play=2 mrad")
     simulate([str(bench), "--sweep", "--design", "joint", "--seed", "3", *made])
     files = ["--frequency-response", bench / "sweep.csv", "--play", bench / "reversal.csv"]
-    ran = command("identify", *files, "--design", "joint", *_set(*WRONG), "--out", out, "--json")
+    ran = cli("identify", *files, "--design", "joint", *_set(*WRONG), "--out", out, "--json")
     result = ran.data
     assert not ran.status, result["items"]
     design = load_design("joint")

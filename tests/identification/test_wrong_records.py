@@ -1,6 +1,5 @@
 """Records that are wrong as records are on a bench: no design may come of them with status 0."""
 
-import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +10,7 @@ import pytest
 from actuator_lti.design import load_design, parameter_value
 from actuator_lti.errors import InputError
 from analyses.identification.to_design import inertia_share
-from tests.identification.bench_records import Columns, Command, columns_of, motion, write
+from tests.identification.bench_records import Columns, columns_of, motion, write
 
 
 @pytest.fixture(scope="module")
@@ -19,24 +18,20 @@ def right() -> Columns:
     return columns_of(motion(2))
 
 
-def test_the_right_record_gives_the_drive_that_made_it(right: Columns, tmp_path, command: Command) -> None:
+def test_the_right_record_gives_the_drive_that_made_it(right: Columns, tmp_path, cli) -> None:
     """The whole inertia at the motor is the drive's: what gears and load have is taken off the rotor's."""
-    record, out = str(write(tmp_path / "r.csv", right)), tmp_path / "o"
-    status, text, _ = command("identify", record, "--design", "ilr33-amber", "--out", str(out), "--json")
-    truth, result = load_design("ilr33-amber"), load_design(out / "ilr33-amber-identified.toml")
-    assert status == 0
+    record, written = write(tmp_path / "r.csv", right), tmp_path / "o" / "ilr33-amber-identified.toml"
+    data = cli.data("identify", record, "--design", "ilr33-amber", "--out", written.parent)
+    truth, result = load_design("ilr33-amber"), load_design(written)
     assert result.inertia_kgm2 == pytest.approx(truth.inertia_kgm2, rel=0.01)
     assert result.motor.rotor_inertia_kgm2 == pytest.approx(truth.motor.rotor_inertia_kgm2, rel=0.01)
     assert result.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=0.03)
-    data, given = json.loads(text), "torque constant kM, 0.005900 N m/A"
     assert data["model"]["fixed"]["torque_constant"]["value"] == truth.motor.torque_constant_Nm_A
-    assert given in (out / "identification.html").read_text()
+    assert "torque constant kM, 0.005900 N m/A" in written.with_name("identification.html").read_text()
     again = data["resimulated"][0]
     assert again["relative_error"] < 0.03
-    status, text, _ = command("correlate", str(out / "ilr33-amber-identified.toml"), record, "--json")
-    assert status == 0
-    own = json.loads(text)["records"][0]["signals"]["current"]["relative_error"]
-    assert own == pytest.approx(again["relative_error"], rel=1e-9)
+    own = cli.data("correlate", written, record)["records"][0]["signals"]["current"]
+    assert own["relative_error"] == pytest.approx(again["relative_error"], rel=1e-9)
 
 
 @pytest.mark.parametrize("key", ["motor.rotor_inertia", "load.inertia"])
@@ -52,36 +47,34 @@ def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
         inertia_share(design, 1e-6, "gear.worm.ratio")
 
 
-def test_a_load_in_another_unit_shows_in_the_load_friction(tmp_path, command: Command) -> None:
+def test_a_load_in_another_unit_shows_in_the_load_friction(tmp_path, cli) -> None:
     """N m written as kN m: all else is right, and the load friction comes out a thousand times too large."""
     free, loaded = columns_of(motion(2), 1, load_Nm=0.0), columns_of(motion(5, load_Nm=5.0), 3, load_Nm=5e-3)
     files = [write(tmp_path / name, table) for name, table in (("free.csv", free), ("loaded.csv", loaded))]
-    ran = command("identify", *files, "--design", "ilr33-amber", "--json")
+    ran = cli("identify", *files, "--design", "ilr33-amber", "--json")
     size = {check["id"]: check for check in ran.data["items"]}["size"]
     assert ran.status == 1
     assert "times the design's: factor 1000" in size["reason"]
 
 
 def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
-    right: Columns, tmp_path, command: Command
+    right: Columns, tmp_path, cli
 ) -> None:
     rng = np.random.default_rng(1)
     noisy = {**right, "current_A": right["current_A"] + 1.5 * rng.standard_normal(len(right["time_s"]))}
-    record, out = str(write(tmp_path / "r.csv", noisy)), tmp_path / "o"
-    arguments = ["identify", record, "--design", "ilr33-amber", "--out", str(out)]
-    assert command(*arguments, "--cutoff", "400")[0] == 1
+    record, out = write(tmp_path / "r.csv", noisy), tmp_path / "o"
+    words = ["identify", record, "--design", "ilr33-amber", "--out", out, "--cutoff", "400"]
+    assert cli(*words).status == 1
     assert not list(out.glob("*.toml"))
-    status, text, _ = command(*arguments, "--cutoff", "400", "--accept")
-    assert status == 1
-    assert "accepted, a check failed" in " ".join(text.split())
+    assert "accepted, a check failed" in " ".join(cli.text(*words, "--accept", status=1).split())
     assert list(out.glob("*.toml"))
 
 
-def test_every_column_is_accounted_for(right: Columns, tmp_path, command: Command) -> None:
+def test_every_column_is_accounted_for(right: Columns, tmp_path, cli) -> None:
     more = {**right, "temperature_C": right["time_s"], "current_mA": 1e3 * right["current_A"]}
-    record = str(write(tmp_path / "r.csv", more))
-    _, out, _ = command("identify", record, "--design", "ilr33-amber", "--json")
-    inputs = {row["column"]: row["use"] for row in json.loads(out)["inputs"]["r.csv"]}
+    record = write(tmp_path / "r.csv", more)
+    told = cli("identify", record, "--design", "ilr33-amber", "--json").data
+    inputs = {row["column"]: row["use"] for row in told["inputs"]["r.csv"]}
     assert set(inputs) == set(more)
     assert inputs["current_A"].startswith("drive")
     assert inputs["temperature_C"] == "no: no name that is known"
@@ -99,15 +92,13 @@ def test_every_column_is_accounted_for(right: Columns, tmp_path, command: Comman
     ],
 )
 def test_a_signal_that_nothing_reads_is_refused(
-    signal: str, reason: str, right: Columns, tmp_path, command: Command
+    signal: str, reason: str, right: Columns, tmp_path, cli
 ) -> None:
     write(tmp_path / "r.csv", right)
     text = f'file = "r.csv"\ntime = {{ column = "time_s" }}\n{signal}\n'
     (tmp_path / "r.toml").write_text(text)
-    status, _, err = command("identify", str(tmp_path / "r.toml"), "--design", "ilr33-amber")
-    assert status == 2
+    err = cli.refused("identify", tmp_path / "r.toml", "--design", "ilr33-amber")
     assert reason in err
-    assert err.count("\n") == 1
 
 
 def test_the_designs_slope_of_the_load_is_used_by_correlate(tmp_path) -> None:
@@ -172,53 +163,43 @@ WRONG_BENCH = {
 
 
 @pytest.mark.parametrize("fault", WRONG_BENCH)
-def test_a_wrong_campaign_gives_no_design(fault: str, bench: Path, tmp_path, command: Command) -> None:
+def test_a_wrong_campaign_gives_no_design(fault: str, bench: Path, tmp_path, cli) -> None:
     change, reason = WRONG_BENCH[fault]
     folder = tmp_path / "bench"
     shutil.copytree(bench, folder)
     change(folder)
-    arguments = ("--suggest", "0", "--json", "--out", str(tmp_path / "o"))
-    status, out, err = command("identify", str(folder / "campaign.toml"), *arguments)
-    assert status in (1, 2)
-    assert reason in out + err
+    ran = cli("identify", folder / "campaign.toml", "--suggest", "0", "--json", "--out", tmp_path / "o")
+    assert ran.status in (1, 2)
+    assert reason in ran.out + ran.err
     assert not list((tmp_path / "o").glob("*.toml"))
 
 
-def test_a_right_campaign_is_simulated_again_with_what_was_written(bench: Path, command: Command) -> None:
-    status, out, _ = command("identify", str(bench / "campaign.toml"), "--suggest", "0", "--json")
-    checks = {check["id"]: check for check in json.loads(out)["items"]}
-    assert status == 0
+def test_a_right_campaign_is_simulated_again_with_what_was_written(bench: Path, cli) -> None:
+    told = cli.data("identify", bench / "campaign.toml", "--suggest", "0")
+    checks = {check["id"]: check for check in told["items"]}
     assert checks["written-the runs"]["value"] < 0.005
-    inputs = {(row["file"], row["column"]) for row in json.loads(out)["result"]["inputs"]}
+    inputs = {(row["file"], row["column"]) for row in told["result"]["inputs"]}
     assert inputs >= {("drive", "Current"), ("drive", "Position"), ("sensor", "torque")}
 
 
-def test_unloaded_runs_say_what_they_do_not_tell(bench: Path, tmp_path, command: Command) -> None:
+def test_unloaded_runs_say_what_they_do_not_tell(bench: Path, tmp_path, cli) -> None:
     """The commonest friction test: no load, so CM stays the design's, and that is said."""
     folder = tmp_path / "bench"
     shutil.copytree(bench, folder)
     head, *runs = (bench / "campaign.toml").read_text().split("[[run]]")
     text = head + "".join(f"[[run]]{run}" for run in (*runs[:3], runs[1].replace('id = "02"', 'id = "99"')))
     (folder / "unloaded.toml").write_text(text)
-    status, out, _ = command("identify", str(folder / "unloaded.toml"), "--json")
-    result = json.loads(out)
-    assert status == 0
-    fit = result["result"]["fit"]
-    assert {name: one["reason"] for name, one in fit["fixed"].items()} == {
-        "CM": "no run is loaded: the design's value kept"
-    }
+    fit = cli.data("identify", folder / "unloaded.toml")["result"]["fit"]
+    kept = {name: one["reason"] for name, one in fit["fixed"].items()}
+    assert kept == {"CM": "no run is loaded: the design's value kept"}
     assert fit["parameters"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
     assert fit["parameters"]["CM"]["value"] == 1.34e-3
 
 
-def test_a_coefficient_of_a_campaign_can_be_fixed(bench: Path, tmp_path, command: Command) -> None:
-    arguments = ("identify", str(bench / "campaign.toml"), "--json", "--out", str(tmp_path))
-    status, out, _ = command(*arguments, "--fix", "friction.viscous=5.25 uN*m*s/rad")
-    result = json.loads(out)
-    assert status == 0
-    assert result["result"]["fit"]["fixed"]["Cv"]["reason"] == "fixed as asked"
+def test_a_coefficient_of_a_campaign_can_be_fixed(bench: Path, tmp_path, cli) -> None:
+    words = ("identify", bench / "campaign.toml", "--fix")
+    fit = cli.data(*words, "friction.viscous=5.25 uN*m*s/rad", "--out", tmp_path)["result"]["fit"]
+    assert fit["fixed"]["Cv"]["reason"] == "fixed as asked"
     assert load_design(tmp_path / "ilr33-amber-identified.toml").friction.viscous_Nms_rad == 5.25e-6
-    status, _, _ = command(*arguments[:3], "--fix", "friction.load_coefficient=0")
-    assert status == 1
-    status, _, err = command(*arguments[:3], "--fix", "motor.resistance=1 ohm")
-    assert (status, "can be fixed here" in err) == (2, True)
+    assert cli(*words, "friction.load_coefficient=0", "--json").status == 1
+    assert "can be fixed here" in cli.refused(*words, "motor.resistance=1 ohm", "--json")

@@ -6,54 +6,41 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from actuator_lti.design.model import (
-    Controller,
-    CurrentLoop,
-    Design,
-    Encoder,
-    Friction,
-    Gear,
-    Limits,
-    Load,
-    Motor,
-    PositionLoop,
-    Validation,
-    VelocityLoop,
-)
+from actuator_lti.design import model
 
 
 def amber(
     n_v: int = 1, n_p: int = 1, delay_s: float = 1e-4, feedforward: float = 0.0, **changes: Any
-) -> Design:
+) -> model.Design:
     """The shipped baseline with J = 1.05e-6 kg m2 in all (J_motor 9.2e-7 + 1.3e-7)."""
-    design = Design(
+    design = model.Design(
         name="amber",
         title="canard drive",
-        motor=Motor(
+        motor=model.Motor(
             rotor_inertia_kgm2=1.05e-6,
             resistance_ohm=0.055,
             inductance_H=6e-6,
             torque_constant_Nm_A=5.9e-3,
             back_emf_constant_Vs_rad=5.9e-3,
         ),
-        controller=Controller(
+        controller=model.Controller(
             period_s=1e-4,
             computing_delay_s=delay_s,
-            position=PositionLoop(gain=120.0, every=n_p, feedforward=feedforward),
-            velocity=VelocityLoop(gain=0.12, integral_time_s=15e-3, every=n_v),
-            current=CurrentLoop(gain_V_A=0.02, integral_time_s=150e-6),
+            position=model.PositionLoop(gain=120.0, every=n_p, feedforward=feedforward),
+            velocity=model.VelocityLoop(gain=0.12, integral_time_s=15e-3, every=n_v),
+            current=model.CurrentLoop(gain_V_A=0.02, integral_time_s=150e-6),
         ),
-        limits=Limits(
+        limits=model.Limits(
             voltage_V=12.0, speed_rad_s=942.5, acceleration_rad_s2=30000 * 2 * pi, peak_current_A=12.0
         ),
-        validation=Validation(full_deflection_rad=0.35),
-        gears=(Gear(name="planetary", ratio=66.0), Gear(name="worm", ratio=36.0)),
-        friction=Friction(dry_torque_Nm=2.25e-3, viscous_Nms_rad=5.25e-6, load_coefficient=1.34e-3),
+        validation=model.Validation(full_deflection_rad=0.35),
+        gears=(model.Gear(name="planetary", ratio=66.0), model.Gear(name="worm", ratio=36.0)),
+        friction=model.Friction(dry_torque_Nm=2.25e-3, viscous_Nms_rad=5.25e-6, load_coefficient=1.34e-3),
     )
     return replace(design, **changes)
 
 
-def without(design: Design, *stages: str, gain: float) -> Design:
+def without(design: model.Design, *stages: str, gain: float) -> model.Design:
     """The design without its current and/or velocity loop; ``gain`` goes to the stage outside the gap."""
     control = replace(design.controller, **dict.fromkeys(stages))
     if "velocity" in stages:
@@ -63,50 +50,50 @@ def without(design: Design, *stages: str, gain: float) -> Design:
     return replace(design, controller=control)
 
 
-def emps(delay_s: float = 0.0, **changes: Any) -> Design:
+def emps(delay_s: float = 0.0, **changes: Any) -> model.Design:
     """EMPS as published: P-P cascade on a force source, speed by backward difference of two-sample means."""
-    design = Design(
+    design = model.Design(
         name="emps",
         title="linear axis",
         axis="linear",
-        motor=Motor(rotor_inertia_kgm2=95.1089, source_gain_Nm_V=35.15065),
-        controller=Controller(
+        motor=model.Motor(rotor_inertia_kgm2=95.1089, source_gain_Nm_V=35.15065),
+        controller=model.Controller(
             period_s=1e-3,
             computing_delay_s=delay_s,
-            position=PositionLoop(gain=160.18),
-            velocity=VelocityLoop(gain=243.45),
+            position=model.PositionLoop(gain=160.18),
+            velocity=model.VelocityLoop(gain=243.45),
         ),
-        limits=Limits(voltage_V=10.0),
-        validation=Validation(full_deflection_rad=0.1),
-        friction=Friction(dry_torque_Nm=20.3935, viscous_Nms_rad=203.5034, offset_torque_Nm=-3.1648),
-        encoder=Encoder(speed="difference", difference_samples=2),
+        limits=model.Limits(voltage_V=10.0),
+        validation=model.Validation(full_deflection_rad=0.1),
+        friction=model.Friction(dry_torque_Nm=20.3935, viscous_Nms_rad=203.5034, offset_torque_Nm=-3.1648),
+        encoder=model.Encoder(speed="difference", difference_samples=2),
     )
     return replace(design, **changes)
 
 
-def ctms_position(gain_V_rad: float = 1.0, delay_s: float = 0.0) -> Design:
+def ctms_position(gain_V_rad: float = 1.0, delay_s: float = 0.0) -> model.Design:
     """CTMS motor position (G6): P position loop on the voltage, no inner loops."""
-    return Design(
+    return model.Design(
         name="ctms",
         title="motor position",
-        motor=Motor(
+        motor=model.Motor(
             rotor_inertia_kgm2=3.2284e-6,
             resistance_ohm=4.0,
             inductance_H=2.75e-6,
             torque_constant_Nm_A=0.0274,
             back_emf_constant_Vs_rad=0.0274,
         ),
-        controller=Controller(
-            period_s=1e-3, computing_delay_s=delay_s, position=PositionLoop(gain=gain_V_rad)
+        controller=model.Controller(
+            period_s=1e-3, computing_delay_s=delay_s, position=model.PositionLoop(gain=gain_V_rad)
         ),
-        limits=Limits(voltage_V=12.0),
-        validation=Validation(full_deflection_rad=1.0),
-        friction=Friction(viscous_Nms_rad=3.5077e-6),
+        limits=model.Limits(voltage_V=12.0),
+        validation=model.Validation(full_deflection_rad=1.0),
+        friction=model.Friction(viscous_Nms_rad=3.5077e-6),
     )
 
 
 @st.composite
-def designs(draw: st.DrawFn) -> Design:
+def designs(draw: st.DrawFn) -> model.Design:
     """Valid drives around the baseline: rates, delays, stages left out, speed estimates, loads."""
     scale = st.floats(0.5, 2.0)
     n_v = draw(st.sampled_from([1, 2, 3]))
@@ -120,13 +107,13 @@ def designs(draw: st.DrawFn) -> Design:
         inductance_H=6e-6 * draw(scale),
     )
     difference = st.builds(
-        Encoder,
+        model.Encoder,
         speed=st.just("difference"),
         difference_samples=st.integers(1, 4),
         filter_time_s=st.sampled_from([0.0, 5e-4]),
     )
-    encoder = draw(st.one_of(st.just(Encoder()), difference))
-    load = draw(st.sampled_from([Load(), Load(path="back-drivable", moment_slope_Nm_rad=-40.0)]))
+    encoder = draw(st.one_of(st.just(model.Encoder()), difference))
+    load = draw(st.sampled_from([model.Load(), model.Load(path="back-drivable", moment_slope_Nm_rad=-40.0)]))
     design = replace(base, motor=motor, encoder=encoder, load=load)
     kind = draw(st.sampled_from(["cascade", "cascade", "no current", "no velocity", "position only"]))
     if kind == "no current":

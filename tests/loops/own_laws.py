@@ -1,7 +1,5 @@
 """Random laws of one's own on shipped drives, and a plain writing of model.md section 10."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

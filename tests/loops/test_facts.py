@@ -8,21 +8,8 @@ from loop_designs import amber, emps, without
 from test_stacked import DRIVES, scattered
 from two_mass import drive_d, drive_e
 
+from actuator_lti.design import model
 from actuator_lti.design.access import stacked
-from actuator_lti.design.model import (
-    Controller,
-    Design,
-    Friction,
-    FrictionPoint,
-    Limits,
-    Load,
-    LoadFriction,
-    Motor,
-    PositionLoop,
-    Supply,
-    Temperature,
-    Validation,
-)
 from actuator_lti.drive.facts import (
     RATE_LIMITS,
     Capability,
@@ -34,17 +21,19 @@ from actuator_lti.drive.facts import (
 from analyses.specification.drive_figures import drive_figures
 
 
-def force_source(ratio: float = 2.0) -> Design:
+def force_source(ratio: float = 2.0) -> model.Design:
     """A mass of 2 kg m2 pushed by an ideal source of 4 N m/V at up to 10 V, friction 5 N m."""
-    return Design(
+    return model.Design(
         name="source",
         title="",
-        motor=Motor(rotor_inertia_kgm2=2.0, source_gain_Nm_V=4.0),
-        controller=Controller(period_s=1e-4, computing_delay_s=0.0, position=PositionLoop(gain=1e6)),
-        limits=Limits(voltage_V=10.0),
-        validation=Validation(full_deflection_rad=1.0),
-        load=Load(path="back-drivable", moment_max_Nm=30.0),
-        friction=Friction(dry_torque_Nm=5.0, breakaway_ratio=ratio),
+        motor=model.Motor(rotor_inertia_kgm2=2.0, source_gain_Nm_V=4.0),
+        controller=model.Controller(
+            period_s=1e-4, computing_delay_s=0.0, position=model.PositionLoop(gain=1e6)
+        ),
+        limits=model.Limits(voltage_V=10.0),
+        validation=model.Validation(full_deflection_rad=1.0),
+        load=model.Load(path="back-drivable", moment_max_Nm=30.0),
+        friction=model.Friction(dry_torque_Nm=5.0, breakaway_ratio=ratio),
     )
 
 
@@ -65,8 +54,8 @@ def test_j10_the_breakaway_ratio_acts_on_the_dry_part_only(load: float, starts: 
 def test_a_map_of_friction_bounds_the_speed() -> None:
     """U = R i + kE w with the map's torque: on its second piece 0.02 + 1e-4 (w - 100)."""
     rows = ((0.0, 0.05), (100.0, 0.02), (900.0, 0.1))
-    points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in rows)
-    design = replace(drive_e(), friction=Friction(points=points), coupling=None, load=Load())
+    points = tuple(model.FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in rows)
+    design = replace(drive_e(), friction=model.Friction(points=points), coupling=None, load=model.Load())
     capacity = capability(design)
     w = capacity.output_rate_rad_s * design.total_ratio
     i = (0.02 + 1e-4 * (w - 100)) / 0.05
@@ -77,11 +66,11 @@ def test_a_map_of_friction_bounds_the_speed() -> None:
 
 def test_friction_behind_the_coupling_counts() -> None:
     """Both frictions at the motor: Cv + Cv_l/N_c^2, C0_l/N_c; each dry part held by its own ratio."""
-    behind = LoadFriction(dry_torque_Nm=3.0, viscous_Nms_rad=0.2, breakaway_ratio=1.5)
+    behind = model.LoadFriction(dry_torque_Nm=3.0, viscous_Nms_rad=0.2, breakaway_ratio=1.5)
     design = drive_d()
     design = replace(
         design,
-        friction=Friction(dry_torque_Nm=0.01, viscous_Nms_rad=1e-5, breakaway_ratio=1.2),
+        friction=model.Friction(dry_torque_Nm=0.01, viscous_Nms_rad=1e-5, breakaway_ratio=1.2),
         load=replace(design.load, friction=behind),
     )
     assert breakaway_torque_Nm(design, 0.0, 1) == pytest.approx(1.2 * 0.01 + 1.5 * 3.0 / 10)
@@ -91,7 +80,7 @@ def test_friction_behind_the_coupling_counts() -> None:
 
 
 def test_a_hot_motor_is_weaker() -> None:
-    warm = Temperature(winding_degC=125.0, magnet_degC=75.0)
+    warm = model.Temperature(winding_degC=125.0, magnet_degC=75.0)
     hot = replace(drive_d(), temperature=warm)
     R, kM = 0.5 * (1 + 0.00393 * 100), 0.05 * (1 - 0.0011 * 50)
     assert stall_torque_Nm(hot) == pytest.approx(kM * 48.0 / R)
@@ -132,7 +121,7 @@ def test_a_sagging_supply_slows_the_drive(load: float) -> None:
 
     base = amber()
     design = replace(
-        base, supply=Supply(resistance_ohm=0.04), coupling=None,
+        base, supply=model.Supply(resistance_ohm=0.04), coupling=None,
         limits=replace(base.limits, speed_rad_s=1e5, acceleration_rad_s2=float("inf"), peak_current_A=1e3),
     )  # fmt: skip
     motor, friction = design.motor, design.friction

@@ -1,7 +1,5 @@
 """A law of one's own (model.md section 10): both writings, what it does at limits, sources, refusals."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from math import floor, inf, pi

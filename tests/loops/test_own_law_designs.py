@@ -1,7 +1,5 @@
 """Four controllers made outside and brought in as a law of one's own, each with a truth of its own."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A law of one's own in what asks for the loops and the running drive: validator, C code, page, tuning."""
 
-from __future__ import annotations
-
 import sys
 from dataclasses import replace
 from typing import Any

@@ -13,18 +13,7 @@ from test_stacked import DRIVES, FILTERS, everything
 from two_mass import drive_d, drive_e
 
 from actuator_lti import assemble_loops
-from actuator_lti.design.model import (
-    Command,
-    Controller,
-    Coupling,
-    Design,
-    Encoder,
-    Filter,
-    Friction,
-    Load,
-    LoadFriction,
-    PositionLoop,
-)
+from actuator_lti.design import model
 
 UNITS = {"position": 1.0, "velocity": 30.0, "current": 2.0, "voltage": 1.0}
 CONTACTS = {"driving": 1.0, "driven": -1.0}
@@ -36,7 +25,7 @@ def worst(ours: np.ndarray, theirs: np.ndarray) -> float:
     return float(np.max(np.abs(ours - theirs)) / np.max(np.abs(theirs)))
 
 
-def agree(design: Design, ticks: int, tolerance: float, point: str = "sliding", torque: float = 0.0,
+def agree(design: model.Design, ticks: int, tolerance: float, point: str = "sliding", torque: float = 0.0,
           start: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:  # fmt: skip
     """Same command, a constant moment and torque: every signal to a part of its largest value."""
     t = np.arange(ticks)
@@ -49,21 +38,21 @@ def agree(design: Design, ticks: int, tolerance: float, point: str = "sliding", 
         assert worst(ours[name], theirs[name]) < tolerance, name
 
 
-def between_two_gears() -> Design:
+def between_two_gears() -> model.Design:
     base = everything()
     first = replace(base.gears[0], name="first", ratio=4.0, output_inertia_kgm2=1e-5)
     second = replace(base.gears[0], name="second", ratio=2.5, input_inertia_kgm2=2e-5)
     return replace(base, gears=(first, second), coupling=replace(base.coupling, after="first"))
 
 
-OPEN = replace(drive_d(), controller=Controller(period_s=1e-4, computing_delay_s=1.5e-4))
+OPEN = replace(drive_d(), controller=model.Controller(period_s=1e-4, computing_delay_s=1.5e-4))
 PLAIN = {name: one for name, one in DRIVES.items() if not one.friction.points}  # its friction is a slope
 KINDS = {**PLAIN, "open-loop voltage": OPEN, "coupling between two gears": between_two_gears()}
 DELAYS, RATES = (0.0, 0.5, 1.0, 1.5), ((1, 1), (2, 10))
 ESTIMATES = (
-    Encoder(speed="difference"),
-    Encoder(speed="difference", difference_samples=3),
-    Encoder(speed="difference", difference_samples=2, filter_time_s=8e-4),
+    model.Encoder(speed="difference"),
+    model.Encoder(speed="difference", difference_samples=3),
+    model.Encoder(speed="difference", difference_samples=2, filter_time_s=8e-4),
 )
 
 
@@ -81,7 +70,7 @@ def test_every_delay_and_rate(delay: float, rates: tuple[int, int]) -> None:
 
 @pytest.mark.parametrize("rates", RATES)
 @pytest.mark.parametrize("encoder", ESTIMATES)
-def test_speed_estimates_and_feedforward(encoder: Encoder, rates: tuple[int, int]) -> None:
+def test_speed_estimates_and_feedforward(encoder: model.Encoder, rates: tuple[int, int]) -> None:
     design = amber(*rates, delay_s=1.5e-4, feedforward=0.8, encoder=encoder)
     agree(design, 4000, 1e-10, torque=-2.25e-3, start=START)
 
@@ -93,13 +82,13 @@ def test_force_source_on_a_linear_axis() -> None:
 @pytest.mark.parametrize("point", CONTACTS)
 @pytest.mark.parametrize("delay", DELAYS)
 def test_driving_and_driven_for_every_delay(point: str, delay: float) -> None:
-    design = replace(everything(), friction=Friction(viscous_Nms_rad=1e-5, load_coefficient=0.02))
+    design = replace(everything(), friction=model.Friction(viscous_Nms_rad=1e-5, load_coefficient=0.02))
     control = replace(design.controller, computing_delay_s=delay * 2e-4)
     agree(replace(design, controller=control), 5000, 1e-9, point)
 
 
 @st.composite
-def wide_designs(draw: st.DrawFn) -> Design:
+def wide_designs(draw: st.DrawFn) -> model.Design:
     """Any stage outermost, any plant, any slot of the controller filled or empty."""
     n_v = draw(st.sampled_from([1, 2, 3]))
     base = draw(st.sampled_from([drive_e(), amber(), without(amber(), "current", gain=0.01), emps(5e-4)]))
@@ -107,11 +96,13 @@ def wide_designs(draw: st.DrawFn) -> Design:
     velocity, current, position = control.velocity, control.current, control.position
     T = n_v * control.period_s
     kinds = (
-        Filter(kind="lowpass", frequency_rad_s=0.4 / T, order=draw(st.sampled_from([1, 2]))),
-        Filter(kind="notch", frequency_rad_s=0.8 / T, width_rad_s=0.3 / T, depth=0.2),
-        Filter(kind="skewed-notch", zero_rad_s=0.5 / T, pole_rad_s=0.7 / T, width_rad_s=0.4 / T, depth=0.1),
-        Filter(kind="leadlag", zero_rad_s=0.1 / T, pole_rad_s=0.3 / T, on="speed"),
-        Filter(kind="biquad", b=(0.2, 0.1, 0.05), a=(-0.9, 0.25)),
+        model.Filter(kind="lowpass", frequency_rad_s=0.4 / T, order=draw(st.sampled_from([1, 2]))),
+        model.Filter(kind="notch", frequency_rad_s=0.8 / T, width_rad_s=0.3 / T, depth=0.2),
+        model.Filter(
+            kind="skewed-notch", zero_rad_s=0.5 / T, pole_rad_s=0.7 / T, width_rad_s=0.4 / T, depth=0.1
+        ),
+        model.Filter(kind="leadlag", zero_rad_s=0.1 / T, pole_rad_s=0.3 / T, on="speed"),
+        model.Filter(kind="biquad", b=(0.2, 0.1, 0.05), a=(-0.9, 0.25)),
     )
     some = st.booleans()
     velocity = replace(
@@ -147,25 +138,25 @@ def wide_designs(draw: st.DrawFn) -> Design:
     encoder = draw(
         st.sampled_from(
             [
-                Encoder(),
-                Encoder(speed="difference", difference_samples=3),
-                Encoder(speed="tracking", bandwidth_rad_s=0.3 / T, filter_time_s=T),
+                model.Encoder(),
+                model.Encoder(speed="difference", difference_samples=3),
+                model.Encoder(speed="tracking", bandwidth_rad_s=0.3 / T, filter_time_s=T),
             ]
         )
     )
-    coupling = draw(st.sampled_from([None, Coupling(stiffness_Nm_rad=300.0, damping_Nms_rad=0.05)]))
+    coupling = draw(st.sampled_from([None, model.Coupling(stiffness_Nm_rad=300.0, damping_Nms_rad=0.05)]))
     J_l = 2e-3 * base.total_ratio**2 / 100 if base.axis == "rotary" else 20.0
     k = 300.0 * base.total_ratio**2 / 100 if base.axis == "rotary" else 2e6
     if coupling is not None:
-        coupling = Coupling(stiffness_Nm_rad=k, damping_Nms_rad=1e-3 * k)
-    load = Load(
+        coupling = model.Coupling(stiffness_Nm_rad=k, damping_Nms_rad=1e-3 * k)
+    load = model.Load(
         inertia_kgm2=J_l,
         path=draw(st.sampled_from(["back-drivable", "self-locking"])),
         moment_slope_Nm_rad=draw(st.sampled_from([0.0, -0.05 * k])),
         moment_damping_Nms_rad=draw(st.sampled_from([0.0, 2e-4 * k])),
-        friction=LoadFriction(viscous_Nms_rad=1e-4 * k),
+        friction=model.LoadFriction(viscous_Nms_rad=1e-4 * k),
     )
-    command = Command(
+    command = model.Command(
         filter_time_s=draw(st.sampled_from([0.0, 20 * T])), filter_order=draw(st.sampled_from([1, 2]))
     )
     friction = replace(base.friction, load_coefficient=0.3 / base.total_ratio)
@@ -177,13 +168,13 @@ def wide_designs(draw: st.DrawFn) -> Design:
 
 @settings(max_examples=60)
 @given(wide_designs())
-def test_any_wide_design(design: Design) -> None:
+def test_any_wide_design(design: model.Design) -> None:
     agree(design, 90, 1e-9)
 
 
 @settings(max_examples=40)
 @given(designs())
-def test_any_design_from_any_start(design: Design) -> None:
+def test_any_design_from_any_start(design: model.Design) -> None:
     agree(design, 120, 1e-9, torque=-2.25e-3, start=START)
 
 
@@ -203,7 +194,7 @@ def test_the_gate_has_teeth() -> None:
 
 def test_position_loop_of_a_rigid_drive_does_not_care_for_the_sensor() -> None:
     design = amber()
-    other = replace(design.controller, position=PositionLoop(gain=120.0, sensor="output"))
+    other = replace(design.controller, position=model.PositionLoop(gain=120.0, sensor="output"))
     one, two = (assemble_loops(each).position for each in (design, replace(design, controller=other)))
     np.testing.assert_allclose(one.open_loop.A, two.open_loop.A, rtol=1e-14)
 

@@ -154,17 +154,6 @@ voltage = "7.4 V"
 period = "500 us"
 computing_delay = "100 us"
 """
-WITH_CURRENT_LOOP = """
-[control.current]
-gain = "0.5 V/A"
-integral_time = "1 ms"
-[control.velocity]
-gain = "0.02 A*s/rad"
-[control.position]
-gain = "30 1/s"
-[validation]
-full_deflection = "30 deg"
-"""
 WITHOUT = """
 [control.velocity]
 gain = "0.02 V*s/rad"
@@ -173,6 +162,9 @@ gain = "30 1/s"
 [validation]
 full_deflection = "30 deg"
 """
+WITH_CURRENT_LOOP = '[control.current]\ngain = "0.5 V/A"\nintegral_time = "1 ms"' + WITHOUT.replace(
+    "V*s", "A*s"
+)
 
 
 @pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])

@@ -9,20 +9,11 @@ from loop_designs import amber
 from two_mass import drive_d, drive_e
 
 from actuator_lti import InputError, assemble_loops, stability_margins
-from actuator_lti.design.model import (
-    Coupling,
-    Design,
-    Filter,
-    Friction,
-    FrictionPoint,
-    Gravity,
-    Load,
-    PositionLoop,
-)
+from actuator_lti.design import model
 from actuator_lti.drive.blocks import biquad
 from actuator_lti.drive.operating import friction_slope
 
-NOTCH = Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
+NOTCH = model.Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
 
 
 def table(margins: list) -> list[tuple[float, float]]:
@@ -81,11 +72,11 @@ def test_k4_dynamic_stiffness() -> None:
         assert np.angle(stiffness, deg=True) == pytest.approx(angle, abs=1e-7)
 
 
-def undamped(design: Design) -> Design:
+def undamped(design: model.Design) -> model.Design:
     return replace(
         design,
         motor=replace(design.motor, back_emf_constant_Vs_rad=1e-12),
-        friction=Friction(),
+        friction=model.Friction(),
         load=replace(design.load, friction=None),
         coupling=replace(design.coupling, damping_Nms_rad=0.0),
     )
@@ -110,7 +101,7 @@ def test_an_ever_stiffer_coupling_tends_to_the_rigid_drive(form: str) -> None:
     gaps = []
     for k in (4e5, 4e7):
         # damping that keeps the mode's damping ratio, as it moves out
-        stiff = Coupling(stiffness_Nm_rad=k, damping_Nms_rad=1e-3 * np.sqrt(k))
+        stiff = model.Coupling(stiffness_Nm_rad=k, damping_Nms_rad=1e-3 * np.sqrt(k))
         loops = assemble_loops(replace(free, coupling=stiff), form)
         worst = 0.0
         for name, loop in rigid.present.items():
@@ -127,7 +118,7 @@ def test_driving_and_driven_change_the_reaction() -> None:
     from actuator_lti.drive.operating import Operating
     from actuator_lti.drive.plant import motor_plant
 
-    design = replace(drive_d(), friction=Friction(load_coefficient=0.02))
+    design = replace(drive_d(), friction=model.Friction(load_coefficient=0.02))
     for point, share in (("driving", 0.1 + 0.02), ("driven", 0.1 - 0.02)):
         plant = motor_plant(design, Operating(point=point))
         w, twist = plant.states.index("w"), plant.states.index("twist")
@@ -141,7 +132,7 @@ def test_driving_and_driven_change_the_reaction() -> None:
 def test_output_sensor_sees_the_spring() -> None:
     """Below the resonance both sensors agree; above it the output lags the motor by half a turn."""
     design = drive_e()
-    control = replace(design.controller, position=PositionLoop(gain=20.0, sensor="output"))
+    control = replace(design.controller, position=model.PositionLoop(gain=20.0, sensor="output"))
     motor, output = (
         assemble_loops(each, "ideal").position for each in (design, replace(design, controller=control))
     )
@@ -153,10 +144,12 @@ def test_output_sensor_sees_the_spring() -> None:
 
 
 def test_gravity_is_a_stiffness_at_its_angle() -> None:
-    base = replace(drive_d(), coupling=None, friction=Friction())
-    hanging = replace(base, load=Load(path="back-drivable", gravity=Gravity(mass_kg=2.0, arm_m=0.3)))
+    base = replace(drive_d(), coupling=None, friction=model.Friction())
+    hanging = replace(
+        base, load=model.Load(path="back-drivable", gravity=model.Gravity(mass_kg=2.0, arm_m=0.3))
+    )
     slope = replace(
-        base, load=Load(path="back-drivable", moment_slope_Nm_rad=2.0 * 9.80665 * 0.3 * np.cos(2.5))
+        base, load=model.Load(path="back-drivable", moment_slope_Nm_rad=2.0 * 9.80665 * 0.3 * np.cos(2.5))
     )
     one, other = assemble_loops(hanging, angle_rad=2.5).velocity, assemble_loops(slope).velocity
     np.testing.assert_allclose(one.open_loop.A, other.open_loop.A, rtol=1e-13)
@@ -164,9 +157,9 @@ def test_gravity_is_a_stiffness_at_its_angle() -> None:
 
 def test_slope_and_describing_function_of_a_friction_map() -> None:
     points = tuple(
-        FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in ((0.0, 0.02), (10.0, 0.01), (50.0, 0.03))
+        model.FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in ((0.0, 0.02), (10.0, 0.01), (50.0, 0.03))
     )
-    design = replace(drive_d(), friction=Friction(points=points))
+    design = replace(drive_d(), friction=model.Friction(points=points))
     assert friction_slope(design) == pytest.approx(-1e-3)
     assert friction_slope(design, speed_rad_s=-80.0) == pytest.approx(5e-4)
     # fundamental of the torque of a sinusoidal speed, by quadrature over a quarter turn

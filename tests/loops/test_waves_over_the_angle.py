@@ -7,18 +7,7 @@ import numpy as np
 import pytest
 
 from actuator_lti import InputError, load_design
-from actuator_lti.design import read_design_text
-from actuator_lti.design.model import (
-    Command,
-    Controller,
-    Design,
-    Friction,
-    Gear,
-    Limits,
-    Load,
-    Motor,
-    Validation,
-)
+from actuator_lti.design import model, read_design_text
 from actuator_lti.design.writing import write_design
 from actuator_lti.drive.angle import follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
@@ -47,7 +36,7 @@ class Case:
         """The angle of the motor nearest to zero at which it holds the rotor."""
         return (pi - PHASE) / self.order
 
-    def put(self, design: Design) -> Design:
+    def put(self, design: model.Design) -> model.Design:
         """Add it to a drive."""
         if self.name == "cogging":
             motor = replace(design.motor, cogging_Nm=A, cogging_periods=self.order, cogging_phase_rad=PHASE)
@@ -64,17 +53,17 @@ each = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 def rotor(
     viscous: float = 0.0, load_coefficient: float = 0.0, path: str = "back-drivable", damping: float = 0.0
-) -> Design:
+) -> model.Design:
     """A torque source without a controller, so that the rotor coasts."""
-    return Design(
+    return model.Design(
         name="rotor",
-        motor=Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=1.0),
-        gears=(Gear(name="one", ratio=N),),
-        controller=Controller(period_s=Ts, computing_delay_s=0.0),
-        limits=Limits(voltage_V=10.0),
-        validation=Validation(full_deflection_rad=1.0),
-        load=Load(path=path, moment_damping_Nms_rad=damping),
-        friction=Friction(viscous_Nms_rad=viscous, load_coefficient=load_coefficient),
+        motor=model.Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=1.0),
+        gears=(model.Gear(name="one", ratio=N),),
+        controller=model.Controller(period_s=Ts, computing_delay_s=0.0),
+        limits=model.Limits(voltage_V=10.0),
+        validation=model.Validation(full_deflection_rad=1.0),
+        load=model.Load(path=path, moment_damping_Nms_rad=damping),
+        friction=model.Friction(viscous_Nms_rad=viscous, load_coefficient=load_coefficient),
     )
 
 
@@ -163,7 +152,7 @@ def test_it_is_asked_without_its_name(case: Case) -> None:
 
 @each
 def test_the_drive_must_get_over_its_peak(case: Case) -> None:
-    dry = replace(rotor(), friction=Friction(dry_torque_Nm=3e-3))
+    dry = replace(rotor(), friction=model.Friction(dry_torque_Nm=3e-3))
     design = case.put(dry)
     assert breakaway_torque_Nm(design, 0.0, 1) == pytest.approx(3e-3 + A, rel=1e-12)
     assert capability(design).torque_margin == pytest.approx(10.0 / (3e-3 + A), rel=1e-12)
@@ -225,7 +214,7 @@ def test_keys_of_the_cogging() -> None:
 def test_a_self_locking_drive_feels_its_cogging() -> None:
     """It holds the rotor against a torque below its peak, whatever the load path."""
     amber = load_design("ilr33-amber")
-    plain = replace(amber, friction=Friction(viscous_Nms_rad=2e-4))
+    plain = replace(amber, friction=model.Friction(viscous_Nms_rad=2e-4))
     design = CASES[1].put(plain)
     assert design.load.path == "self-locking"
     assert follows_angle(design)
@@ -256,12 +245,12 @@ def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: 
     """Nothing moves; the loops are those of the operating angle, and a small push grows as they say."""
     shipped = load_design(name)
     back = replace(shipped.load, path="back-drivable", friction=None)
-    design = case.put(replace(shipped, load=back, friction=Friction(viscous_Nms_rad=1e-5)))
+    design = case.put(replace(shipped, load=back, friction=model.Friction(viscous_Nms_rad=1e-5)))
     motion = operating_motion(design)
     assert motion.speed_rad_s == 0.0
     start = State(motor_angle_rad=0.0, output_angle_rad=motion.output_rad(design))
     control = replace(design.controller, position=None, velocity=None, current=None)
-    free = replace(design, controller=control, command=Command())
+    free = replace(design, controller=control, command=model.Command())
     turned = [
         simulate(
             free,

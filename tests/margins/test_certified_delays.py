@@ -1,7 +1,5 @@
 """Exact delays, certified: verdict by the direct method of Walton and Marshall, crossings by a dense grid."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

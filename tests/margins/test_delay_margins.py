@@ -1,7 +1,5 @@
 """Exact delays, in series and inside: against closed forms, and against whole samples as states."""
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import replace

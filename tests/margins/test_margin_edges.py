@@ -1,7 +1,5 @@
 """Ends of the axis, tangencies, poles on the stability boundary, hidden modes, refusals."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

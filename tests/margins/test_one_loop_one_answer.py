@@ -4,8 +4,6 @@ The table's figures were computed apart from this package: closed-loop poles in 
 or the closed forms beside them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

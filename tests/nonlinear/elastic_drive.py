@@ -5,65 +5,44 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.design.model import (
-    Controller,
-    Coupling,
-    CurrentLoop,
-    Design,
-    Friction,
-    FrictionPoint,
-    Gear,
-    Limits,
-    Load,
-    LoadFriction,
-    Motor,
-    PositionLoop,
-    Validation,
-    VelocityLoop,
-)
+from actuator_lti.design import model
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
 from nonlinear.native import parameters, tick
 from nonlinear.row.parameters import design_row
+from tests.loops.two_mass import MOTOR
 
-MOTOR = Motor(
-    rotor_inertia_kgm2=2e-5,
-    resistance_ohm=0.5,
-    inductance_H=1e-3,
-    torque_constant_Nm_A=0.05,
-    back_emf_constant_Vs_rad=0.05,
-)
-SOURCE = Motor(rotor_inertia_kgm2=2e-5, source_gain_Nm_V=1.0)
+SOURCE = model.Motor(rotor_inertia_kgm2=2e-5, source_gain_Nm_V=1.0)
 
 
-def drive_f() -> Design:
+def drive_f() -> model.Design:
     """Drive F of the reference numbers: coupling with play and damping, three loops, limits."""
-    return Design(
+    return model.Design(
         name="F",
         title="",
         motor=MOTOR,
-        gears=(Gear(name="g", ratio=10.0),),
-        load=Load(inertia_kgm2=1e-3, path="back-drivable"),
-        friction=Friction(viscous_Nms_rad=1e-4),
-        coupling=Coupling(stiffness_Nm_rad=200.0, damping_Nms_rad=0.02, play_rad=0.02),
-        controller=Controller(
+        gears=(model.Gear(name="g", ratio=10.0),),
+        load=model.Load(inertia_kgm2=1e-3, path="back-drivable"),
+        friction=model.Friction(viscous_Nms_rad=1e-4),
+        coupling=model.Coupling(stiffness_Nm_rad=200.0, damping_Nms_rad=0.02, play_rad=0.02),
+        controller=model.Controller(
             period_s=2e-4,
             computing_delay_s=2e-4,
-            position=PositionLoop(gain=20.0, every=2),
-            velocity=VelocityLoop(gain=0.08, integral_time_s=0.03),
-            current=CurrentLoop(gain_V_A=0.8, integral_time_s=2e-3),
+            position=model.PositionLoop(gain=20.0, every=2),
+            velocity=model.VelocityLoop(gain=0.08, integral_time_s=0.03),
+            current=model.CurrentLoop(gain_V_A=0.8, integral_time_s=2e-3),
         ),
-        limits=Limits(voltage_V=24.0, speed_rad_s=300.0, peak_current_A=15.0),
-        validation=Validation(full_deflection_rad=0.1),
+        limits=model.Limits(voltage_V=24.0, speed_rad_s=300.0, peak_current_A=15.0),
+        validation=model.Validation(full_deflection_rad=0.1),
     )
 
 
 def two_mass(
     period_s: float = 2e-4, *, source: bool = False, path: Any = "back-drivable", **parts: Any
-) -> Design:
+) -> model.Design:
     """Drive F with other parts: ``coupling``, ``friction``, ``load_friction`` as dicts of their fields."""
     design = drive_f()
-    friction = LoadFriction(**parts["load_friction"]) if "load_friction" in parts else None
+    friction = model.LoadFriction(**parts["load_friction"]) if "load_friction" in parts else None
     controller = replace(design.controller, period_s=period_s, computing_delay_s=0.0)
     if source:
         controller = replace(controller, current=None)
@@ -74,16 +53,16 @@ def two_mass(
         design,
         motor=SOURCE if source else design.motor,
         load=replace(design.load, path=path, friction=friction, inertia_kgm2=parts.get("J_l", 1e-3)),
-        friction=Friction(**parts.get("friction", {})),
+        friction=model.Friction(**parts.get("friction", {})),
         coupling=coupling,
         controller=controller,
-        gears=(Gear(name="g", ratio=parts.get("ratio", 10.0)), *parts.get("behind", ())),
+        gears=(model.Gear(name="g", ratio=parts.get("ratio", 10.0)), *parts.get("behind", ())),
     )
 
 
-def stribeck(*points: tuple[float, float], direction: Any = "both") -> tuple[FrictionPoint, ...]:
+def stribeck(*points: tuple[float, float], direction: Any = "both") -> tuple[model.FrictionPoint, ...]:
     """Points of a friction map."""
-    return tuple(FrictionPoint(speed_rad_s=v, torque_Nm=T, direction=direction) for v, T in points)
+    return tuple(model.FrictionPoint(speed_rad_s=v, torque_Nm=T, direction=direction) for v, T in points)
 
 
 @dataclass
@@ -101,7 +80,9 @@ class Run:
 PLACES = (layout.S_CURRENT, layout.S_SPEED, at.ES_LOAD_SPEED, layout.S_ANGLE)
 
 
-def open_drive(design: Design, start: tuple[float, ...], fraction_s: float, **options: float) -> np.ndarray:
+def open_drive(
+    design: model.Design, start: tuple[float, ...], fraction_s: float, **options: float
+) -> np.ndarray:
     """Row of a design whose voltage is the command; ``start`` is (i, w, W, th, phi)."""
     row = design_row(design)
     row[[layout.HAS_POSITION, layout.HAS_VELOCITY, layout.HAS_CURRENT]] = 0.0
@@ -118,7 +99,7 @@ def open_drive(design: Design, start: tuple[float, ...], fraction_s: float, **op
 
 
 def run_plant(
-    design: Design,
+    design: model.Design,
     voltages: np.ndarray,
     moments: np.ndarray | float = 0.0,
     start: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0, 0.0),
@@ -149,7 +130,7 @@ def power_of_ten(rng: np.random.Generator, low: float, high: float) -> float:
     return float(10.0 ** rng.uniform(low, high))
 
 
-def random_drive(seed: int) -> tuple[Design, np.ndarray, np.ndarray, float]:
+def random_drive(seed: int) -> tuple[model.Design, np.ndarray, np.ndarray, float]:
     """A random drive train with voltages, moments and the fraction of the delay; every part may be absent."""
     rng = np.random.default_rng(seed)
     N, J_m, torque = power_of_ten(rng, 0, 2), MOTOR.rotor_inertia_kgm2, 0.2
@@ -157,7 +138,7 @@ def random_drive(seed: int) -> tuple[Design, np.ndarray, np.ndarray, float]:
     resonance, source = power_of_ten(rng, 1.5, 3.5), rng.random() < 0.25
     k = resonance**2 * J_l / (1 + J_l / (N * N * J_m))
     locking, behind = rng.random() < 0.3, rng.random() < 0.4
-    gears = (Gear(name="b", ratio=power_of_ten(rng, 0, 1)),) if behind else ()
+    gears = (model.Gear(name="b", ratio=power_of_ten(rng, 0, 1)),) if behind else ()
     N_r = gears[0].ratio if behind else 1.0
     CM = power_of_ten(rng, 0.02, 0.5) / N if locking else rng.choice([0.0, power_of_ten(rng, -1.5, -0.3) / N])
     friction: dict[str, Any] = {

@@ -10,7 +10,6 @@ import pytest
 from actuator_lti.errors import InputError
 from analyses.motion.asked import OF
 from nonlinear import loads
-from reports.cli.main import main
 
 TS = 1e-4
 
@@ -92,12 +91,11 @@ def _those(kind: str, **options: int) -> str:
 
 
 @pytest.mark.parametrize("kind", ["hold", "triangle", "chirp", "multisine", "stepped-sine"])
-def test_every_command_on_the_terminal(kind: str, capsys) -> None:
+def test_every_command_on_the_terminal(kind: str, cli) -> None:
     stepped = kind == "stepped-sine"  # to its end: 5 cycles of 5, 10 and 20 Hz, 1.75 s
     arguments = f"simulate --command {kind} --every 10 {_those(kind, frequency=5, to=20, count=3)}"
     more = "" if stepped else " --amplitude 0.2 --duration 0.4 --bias-rate 5 --load-slope -20"
-    assert main(f"{arguments}{more}".split()) == 0
-    out = capsys.readouterr().out
+    out = cli.text(*f"{arguments}{more}".split())
     assert ("1750 rows, status comes to rest" if stepped else "400 rows, status following") in out
     assert " deg " in out
 

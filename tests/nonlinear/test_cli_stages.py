@@ -1,13 +1,10 @@
 """A drive without a position loop is commanded, judged and written in the unit of its outermost stage."""
 
-import json
 from math import exp, pi
 from pathlib import Path
 
 import numpy as np
 import pytest
-
-from reports.cli.main import main
 
 VOLTAGE = """
 [design]
@@ -81,10 +78,9 @@ def test_speed_settles_while_the_output_turns_however_short_the_run_is(run, tmp_
 
 
 @pytest.mark.parametrize(("text", "unit"), [(VOLTAGE, "V"), (CURRENT, "A"), (SPEED, "deg/s")])
-def test_words_have_the_unit(text: str, unit: str, tmp_path, capsys) -> None:
-    words = "--amplitude 0.5 --duration 0.1 --quiet"
-    assert main(f"simulate {written(text, tmp_path)} {words}".split()) == 0
-    rows = [row.split() for row in capsys.readouterr().out.splitlines()]
+def test_words_have_the_unit(text: str, unit: str, tmp_path, cli) -> None:
+    said = cli.text("simulate", written(text, tmp_path), "--amplitude", 0.5, "--duration", 0.1, "--quiet")
+    rows = [row.split() for row in said.splitlines()]
     assert ["largest", "command", "0.5", unit] in rows
     assert any(row[:2] == ["largest", "error"] and row[3:] == [unit] for row in rows)
 
@@ -103,7 +99,7 @@ def test_words_have_the_unit(text: str, unit: str, tmp_path, capsys) -> None:
         ),
     ],
 )
-def test_its_own_record_correlates(text: str, words: str, most: float, run, tmp_path, capsys) -> None:
+def test_its_own_record_correlates(text: str, words: str, most: float, run, tmp_path, cli) -> None:
     """A record of the same drive under the same command: the same run, to the last digits of the file."""
     drive = written(text, tmp_path) if text else "ilr33-amber"
     if not text:
@@ -111,8 +107,7 @@ def test_its_own_record_correlates(text: str, words: str, most: float, run, tmp_
         (tmp_path / "load.csv").write_text("t,M\n" + rows)
         words += f" --load-slope -5 --load-file {tmp_path / 'load.csv'}"
     assert run(f"{drive} {words}").status == 0
-    assert main(f"correlate {drive} {tmp_path / 'run.csv'} --json".split()) == 0
-    data = json.loads(capsys.readouterr().out)
+    data = cli.data("correlate", drive, tmp_path / "run.csv")
     assert data["passed"] is True
     errors = [one["relative_error"] for one in data["records"][0]["signals"].values()]
     assert len(errors) >= (1 if text else 3)

@@ -7,43 +7,34 @@ import numpy as np
 import pytest
 
 from actuator_lti import load_design
-from actuator_lti.design.model import (
-    Controller,
-    CurrentLoop,
-    Design,
-    Limits,
-    Motor,
-    PositionLoop,
-    Validation,
-    VelocityLoop,
-)
+from actuator_lti.design import model
 from actuator_lti.drive.signals import LIMITERS
 from nonlinear import Drive, Reducers, Run, State, commands, simulate, simulate_many
 from nonlinear._kernels import layout
 
 
-def ideal_drive(period_s: float, limits: Limits) -> Design:
+def ideal_drive(period_s: float, limits: model.Limits) -> model.Design:
     """Inner loops without lag: a torque source whose velocity loop reaches its command in one tick."""
     inertia = 1e-6
-    return Design(
+    return model.Design(
         name="ideal",
         title="ideal inner loops",
-        motor=Motor(rotor_inertia_kgm2=inertia, source_gain_Nm_V=1.0),
-        controller=Controller(
+        motor=model.Motor(rotor_inertia_kgm2=inertia, source_gain_Nm_V=1.0),
+        controller=model.Controller(
             period_s=period_s,
             computing_delay_s=0.0,
-            position=PositionLoop(gain=0.5 / period_s),
-            velocity=VelocityLoop(gain=inertia / period_s),
+            position=model.PositionLoop(gain=0.5 / period_s),
+            velocity=model.VelocityLoop(gain=inertia / period_s),
         ),
         limits=limits,
-        validation=Validation(full_deflection_rad=1.0),
+        validation=model.Validation(full_deflection_rad=1.0),
     )
 
 
 def test_h1_pure_rate_limit() -> None:
     """10 deg at 5 Hz through 150 deg/s: triangle of 7.5 deg, fundamental 0.607927, lag 41.4096 deg."""
     Ts, f, A, R = 2e-8, 5.0, radians(10.0), radians(150.0)
-    design = ideal_drive(Ts, Limits(voltage_V=inf, speed_rad_s=R))
+    design = ideal_drive(Ts, model.Limits(voltage_V=inf, speed_rad_s=R))
     period = round(1.0 / (f * Ts))
     run = Run(
         design=design,
@@ -69,7 +60,7 @@ def test_h1_pure_rate_limit() -> None:
 @pytest.mark.parametrize(("frequency", "reached"), [(2.3872, False), (2.3874, True)])
 def test_h1_onset(frequency: float, reached: bool) -> None:
     Ts, A, R = 1e-6, radians(10.0), radians(150.0)
-    design = ideal_drive(Ts, Limits(voltage_V=inf, speed_rad_s=R))
+    design = ideal_drive(Ts, model.Limits(voltage_V=inf, speed_rad_s=R))
     start = min(2.0 * pi * frequency * A, R)
     initial = State(motor_speed_rad_s=start, speed_command_rad_s=start)
     run = simulate(design, commands.sine(A, frequency), 0.6 / frequency, initial=initial)
@@ -80,7 +71,7 @@ def test_h1_onset(frequency: float, reached: bool) -> None:
 def test_h2_pure_acceleration_limit() -> None:
     """20 000 deg/s2 at 20 Hz: parabola train of 1.5625 deg, fundamental 1.6126 deg."""
     Ts, f, a = 1e-6, 20.0, radians(20_000.0)
-    design = ideal_drive(Ts, Limits(voltage_V=inf, acceleration_rad_s2=a))
+    design = ideal_drive(Ts, model.Limits(voltage_V=inf, acceleration_rad_s2=a))
     start = -a / (4.0 * f)
     run = Run(
         design=design,
@@ -143,9 +134,9 @@ def test_multirate_limit_holds_between_updates() -> None:
 def test_conditional_integration(e: float, integral: float, output: float, kept: float, acts: bool) -> None:
     """Kp = 2, Kp T/Tn = 0.5, limit 5 (model.md section 2)."""
     design = load_design("ilr33-amber")
-    current = CurrentLoop(gain_V_A=2.0, integral_time_s=4.0 * design.controller.period_s)
+    current = model.CurrentLoop(gain_V_A=2.0, integral_time_s=4.0 * design.controller.period_s)
     control = replace(design.controller, position=None, velocity=None, current=current)
-    design = replace(design, controller=control, limits=Limits(voltage_V=5.0))
+    design = replace(design, controller=control, limits=model.Limits(voltage_V=5.0))
     drive = Drive(design, State(current_integral_V=integral))
     assert drive.control(e, 0.0, 0.0, 0.0) == output
     assert drive.value("current_integrator") == kept

@@ -9,19 +9,7 @@ from controller_reference import Controller
 from elastic_drive import two_mass
 
 from actuator_lti import load_design
-from actuator_lti.design import shipped_designs
-from actuator_lti.design.model import (
-    Command,
-    CurrentLoop,
-    Design,
-    Encoder,
-    Filter,
-    Limits,
-    OutputEncoder,
-    PositionLoop,
-    Supply,
-    VelocityLoop,
-)
+from actuator_lti.design import model, shipped_designs
 from nonlinear import Drive
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.state_kinds import CONTINUOUS, KINDS, NOTE, WORK, state_kinds
@@ -30,7 +18,7 @@ TICKS = 240
 CASES = 120
 
 
-def some_filters(rng: np.random.Generator, T: float) -> tuple[Filter, ...]:
+def some_filters(rng: np.random.Generator, T: float) -> tuple[model.Filter, ...]:
     def w() -> float:
         return float(rng.uniform(0.02, 0.8) * pi / T)
 
@@ -48,11 +36,11 @@ def some_filters(rng: np.random.Generator, T: float) -> tuple[Filter, ...]:
     places = ("torque", "speed")
     count = int(rng.integers(0, 5))
     return tuple(
-        Filter(on=places[rng.integers(2)], **kinds[rng.integers(len(kinds))]()) for _ in range(count)
+        model.Filter(on=places[rng.integers(2)], **kinds[rng.integers(len(kinds))]()) for _ in range(count)
     )
 
 
-def some_drive(rng: np.random.Generator) -> Design:
+def some_drive(rng: np.random.Generator) -> model.Design:
     """Any stages, any options, on the motor of the baseline."""
 
     def pick(*values):
@@ -66,7 +54,7 @@ def some_drive(rng: np.random.Generator) -> Design:
         pick(True, True, False),
         pick(True, True, False),
     )
-    cascade = CurrentLoop(
+    cascade = model.CurrentLoop(
         gain_V_A=wide,
         integral_time_s=pick(None, 20 * Ts),
         back_emf_feedforward=pick(0.0, 0.7),
@@ -74,7 +62,7 @@ def some_drive(rng: np.random.Generator) -> Design:
         anti_windup=pick(*laws),
         tracking_time_s=pick(None, 7 * Ts),
     )
-    velocity = VelocityLoop(
+    velocity = model.VelocityLoop(
         sensor=pick("motor", "motor", "output"),
         gain=0.05 * wide,
         integral_time_s=pick(None, 50 * Ts),
@@ -84,7 +72,7 @@ def some_drive(rng: np.random.Generator) -> Design:
         filters=some_filters(rng, n_v * Ts),
     )
     T_p = Ts * n_v * int(pick(1, 3))
-    position = PositionLoop(
+    position = model.PositionLoop(
         gain=0.02 / Ts if has_velocity else 0.3,
         every=round(T_p / Ts),
         feedforward=pick(0.0, 0.6),
@@ -98,7 +86,7 @@ def some_drive(rng: np.random.Generator) -> Design:
     T_o = T_p if has_position else (n_v * Ts if has_velocity else Ts)
     shaped = has_position or has_velocity
     rate = 2e-4 / T_o if has_position else 0.4
-    command = Command(
+    command = model.Command(
         filter_time_s=pick(0.0, 3 * T_o, 0.4 * T_o),
         filter_order=pick(1, 2),
         filter_damping=0.8,
@@ -107,7 +95,7 @@ def some_drive(rng: np.random.Generator) -> Design:
     )
     if command.acceleration_rad_s2 < inf:
         command = replace(command, jerk_rad_s3=pick(inf, command.acceleration_rad_s2 / (4.3 * T_o)))
-    limits = Limits(
+    limits = model.Limits(
         voltage_V=20.0,
         speed_rad_s=pick(inf, 300.0),
         acceleration_rad_s2=pick(inf, 20.0 / T_p),
@@ -122,7 +110,7 @@ def some_drive(rng: np.random.Generator) -> Design:
             release=0.8,
             overload=pick("thermal", "excess"),
         )
-    encoder = Encoder(
+    encoder = model.Encoder(
         counts_per_rev=pick(None, 4096),
         speed=pick("ideal", "difference", "tracking"),
         difference_samples=int(pick(1, 3)),
@@ -143,11 +131,11 @@ def some_drive(rng: np.random.Generator) -> Design:
         limits=limits,
         encoder=encoder,
         command=command,
-        output_encoder=OutputEncoder(counts_per_rev=pick(None, 10**6)),
+        output_encoder=model.OutputEncoder(counts_per_rev=pick(None, 10**6)),
     )
 
 
-def some_measurements(rng: np.random.Generator, design: Design) -> np.ndarray:
+def some_measurements(rng: np.random.Generator, design: model.Design) -> np.ndarray:
     """Command, current, speed, angle and output angle at every tick: smooth, large enough to reach limits."""
     t, N = np.arange(TICKS), design.total_ratio
     waves = [
@@ -190,14 +178,14 @@ def kinds_of(drive: Drive) -> np.ndarray:
     return state_kinds(drive._p)
 
 
-def drives() -> list[Design]:
+def drives() -> list[model.Design]:
     """Every shipped drive, random cascades, two masses with play, stick on both sides, and a supply."""
     play = two_mass(
         friction={"dry_torque_Nm": 0.02, "load_coefficient": 0.01}, load_friction={"dry_torque_Nm": 0.1}
     )
     play = replace(play, load=replace(play.load, moment_damping_Nms_rad=0.01))
     weak = load_design("ilr33-amber")
-    weak = replace(weak, supply=Supply(resistance_ohm=0.05, regenerative=False, capacitance_F=1e-3))
+    weak = replace(weak, supply=model.Supply(resistance_ohm=0.05, regenerative=False, capacitance_F=1e-3))
     feeding = replace(
         weak.controller, position=replace(weak.controller.position, acceleration_feedforward=0.5)
     )

@@ -8,28 +8,16 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from actuator_lti import load_design
-from actuator_lti.design.model import (
-    Command,
-    CurrentLoop,
-    Design,
-    Filter,
-    Friction,
-    Gravity,
-    Instruments,
-    Limits,
-    Motor,
-    PositionLoop,
-    Supply,
-)
+from actuator_lti.design import model
 from actuator_lti.errors import InputError
 from nonlinear import Drive, Probe, Rows, State, commands, loads, simulate
 
 AMBER = load_design("ilr33-amber")
-FREE = Friction(viscous_Nms_rad=1e-6)
+FREE = model.Friction(viscous_Nms_rad=1e-6)
 GAIN = 0.05  # V/A, of a current loop that hardly acts
 
 
-def changed(design: Design = AMBER, **control: object) -> Design:
+def changed(design: model.Design = AMBER, **control: object) -> model.Design:
     return replace(design, controller=replace(design.controller, **control))
 
 
@@ -40,10 +28,10 @@ def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
         AMBER.load,
         path="back-drivable",
         moment_slope_Nm_rad=-300.0,
-        gravity=Gravity(mass_kg=3.0, arm_m=0.4, offset_rad=0.7),
+        gravity=model.Gravity(mass_kg=3.0, arm_m=0.4, offset_rad=0.7),
     )
     design = changed(
-        replace(AMBER, load=load, friction=FREE, limits=Limits(voltage_V=1e9)), computing_delay_s=0.0
+        replace(AMBER, load=load, friction=FREE, limits=model.Limits(voltage_V=1e9)), computing_delay_s=0.0
     )
     u, t = 6.0 * np.sin(0.02 * np.arange(ticks)), np.arange(ticks) * Ts
     series = 20.0 * np.sin(300.0 * t)
@@ -83,14 +71,14 @@ def test_j9_the_slope_of_the_design_acts_without_being_told() -> None:
 @pytest.mark.parametrize(
     "supply",
     [
-        Supply(resistance_ohm=0.1),
-        Supply(resistance_ohm=0.1, regenerative=False, capacitance_F=2e-4, brake_voltage_V=27.0),
-        Supply(regenerative=False, capacitance_F=1e-3),
+        model.Supply(resistance_ohm=0.1),
+        model.Supply(resistance_ohm=0.1, regenerative=False, capacitance_F=2e-4, brake_voltage_V=27.0),
+        model.Supply(regenerative=False, capacitance_F=1e-3),
     ],
 )
-def test_supply(supply: Supply) -> None:
+def test_supply(supply: model.Supply) -> None:
     """The bus by its law from recorded voltage and current, its account, and the limit that it is."""
-    design = replace(AMBER, supply=supply, limits=Limits(voltage_V=24.0, peak_current_A=8.0))
+    design = replace(AMBER, supply=supply, limits=model.Limits(voltage_V=24.0, peak_current_A=8.0))
     Ts, Us, C = design.controller.period_s, 24.0, supply.capacitance_F
     drive, U, power, braked, saturated = Drive(design), Us, 0.0, False, False
     for k in range(4000):
@@ -120,7 +108,7 @@ def test_supply(supply: Supply) -> None:
 @pytest.mark.parametrize(("overload", "tau"), [("thermal", 8.490187), ("excess", 8.0)])
 def test_overload_time_at_the_peak(overload: str, tau: float) -> None:
     """r = 3, 1 s: after one second at the peak the limit falls to the continuous current."""
-    limits = Limits(
+    limits = model.Limits(
         voltage_V=24.0,
         peak_current_A=6.0,
         continuous_current_A=2.0,
@@ -129,7 +117,7 @@ def test_overload_time_at_the_peak(overload: str, tau: float) -> None:
         release=0.5,
     )
     design = replace(
-        changed(position=None, velocity=None, current=CurrentLoop(gain_V_A=1.0, integral_time_s=None)),
+        changed(position=None, velocity=None, current=model.CurrentLoop(gain_V_A=1.0, integral_time_s=None)),
         limits=limits,
     )
     Ts = design.controller.period_s
@@ -151,9 +139,9 @@ def test_the_overload_protection_is_not_called_the_current_limit(amperes: float,
 
     Thermal: x = (i/i_c)^2 (1 - exp(-t/tau)) reaches 1; tau from one second at three times i_c.
     """
-    limits = Limits(voltage_V=inf, peak_current_A=6.0, continuous_current_A=2.0, peak_time_s=1.0)
+    limits = model.Limits(voltage_V=inf, peak_current_A=6.0, continuous_current_A=2.0, peak_time_s=1.0)
     design = replace(
-        changed(position=None, velocity=None, current=CurrentLoop(gain_V_A=GAIN, integral_time_s=1e-3)),
+        changed(position=None, velocity=None, current=model.CurrentLoop(gain_V_A=GAIN, integral_time_s=1e-3)),
         limits=limits,
     )
     design = replace(design, friction=replace(design.friction, dry_torque_Nm=10.0))  # the rotor stays
@@ -171,10 +159,10 @@ def test_the_overload_protection_is_not_called_the_current_limit(amperes: float,
 def test_noise_resolution_and_their_seeds() -> None:
     """A torque drive that is commanded 0 shows its measured current as -u over its gain."""
     design = replace(
-        changed(position=None, velocity=None, current=CurrentLoop(gain_V_A=GAIN, integral_time_s=None)),
-        limits=Limits(voltage_V=inf),
+        changed(position=None, velocity=None, current=model.CurrentLoop(gain_V_A=GAIN, integral_time_s=None)),
+        limits=model.Limits(voltage_V=inf),
     )
-    noisy = replace(design, instruments=Instruments(current_noise_A=0.1, seed=3))
+    noisy = replace(design, instruments=model.Instruments(current_noise_A=0.1, seed=3))
     ticks = 20_000
     runs = [
         simulate(
@@ -191,7 +179,7 @@ def test_noise_resolution_and_their_seeds() -> None:
     assert np.mean(noise**4) == pytest.approx(3.0, abs=5.0 * sqrt(96 / ticks))
     other = (-runs[2].voltage_V / GAIN - runs[2].current_A) / 0.1
     assert abs(np.mean(noise * other)) < 5.0 / sqrt(ticks)
-    coarse = replace(design, instruments=Instruments(current_resolution_A=0.25))
+    coarse = replace(design, instruments=model.Instruments(current_resolution_A=0.25))
     run = simulate(coarse, commands.sine(200.0, 5.0), 0.2)
     measured = run.reference_rad - run.voltage_V / GAIN
     assert np.abs(measured / 0.25 - np.round(measured / 0.25)).max() < 1e-9
@@ -201,25 +189,25 @@ def test_noise_resolution_and_their_seeds() -> None:
 def test_jitter_and_angle_noise() -> None:
     """A source that cannot be felt, at constant speed: the position loop shows what it reads."""
     Ts, w, ticks = 1e-3, 40.0, 4000
-    design = Design(
+    design = model.Design(
         name="coasting",
         title="",
-        motor=Motor(rotor_inertia_kgm2=1.0, source_gain_Nm_V=1e-15),
+        motor=model.Motor(rotor_inertia_kgm2=1.0, source_gain_Nm_V=1e-15),
         controller=replace(
             AMBER.controller,
             period_s=Ts,
             computing_delay_s=0.0,
-            position=PositionLoop(gain=1.0),
+            position=model.PositionLoop(gain=1.0),
             velocity=None,
             current=None,
         ),
-        limits=Limits(voltage_V=inf),
+        limits=model.Limits(voltage_V=inf),
         validation=AMBER.validation,
     )
     start = State(motor_speed_rad_s=w)
     for instruments, rms in (
-        (Instruments(jitter_s=1e-4), 1e-4 * w),
-        (Instruments(angle_noise_rad=0.02), 0.02),
+        (model.Instruments(jitter_s=1e-4), 1e-4 * w),
+        (model.Instruments(angle_noise_rad=0.02), 0.02),
     ):
         run = simulate(replace(design, instruments=instruments), commands.hold(), ticks * Ts, initial=start)
         seen = -run.voltage_V - run.motor_angle_rad
@@ -228,15 +216,15 @@ def test_jitter_and_angle_noise() -> None:
         assert abs(seen.mean()) < 5.0 * rms / sqrt(ticks)
 
 
-def everything() -> Design:
+def everything() -> model.Design:
     """A drive with every rare feature on."""
     control = AMBER.controller
     velocity = replace(
         control.velocity,
         every=2,
         filters=(
-            Filter(kind="notch", frequency_rad_s=4000.0, width_rad_s=1000.0),
-            Filter(kind="lowpass", on="speed", frequency_rad_s=6000.0),
+            model.Filter(kind="notch", frequency_rad_s=4000.0, width_rad_s=1000.0),
+            model.Filter(kind="lowpass", on="speed", frequency_rad_s=6000.0),
         ),
     )
     position = replace(
@@ -251,14 +239,14 @@ def everything() -> Design:
     return replace(
         changed(velocity=velocity, position=position, computing_delay_s=1.3e-4),
         encoder=replace(AMBER.encoder, speed="tracking", bandwidth_rad_s=1500.0, counts_per_rev=4096),
-        command=Command(
+        command=model.Command(
             filter_time_s=2e-3, filter_order=2, rate_rad_s=0.3, acceleration_rad_s2=20.0, jerk_rad_s3=5000.0
         ),
-        supply=Supply(resistance_ohm=0.2, regenerative=False, capacitance_F=1e-3, brake_voltage_V=27.0),
-        instruments=Instruments(
+        supply=model.Supply(resistance_ohm=0.2, regenerative=False, capacitance_F=1e-3, brake_voltage_V=27.0),
+        instruments=model.Instruments(
             current_noise_A=0.01, angle_noise_rad=1e-4, output_angle_noise_rad=1e-6, jitter_s=1e-6, seed=5
         ),
-        load=replace(AMBER.load, moment_slope_Nm_rad=-20.0, gravity=Gravity(mass_kg=1.0, arm_m=0.1)),
+        load=replace(AMBER.load, moment_slope_Nm_rad=-20.0, gravity=model.Gravity(mass_kg=1.0, arm_m=0.1)),
         limits=replace(AMBER.limits, peak_time_s=0.02),
     )
 
@@ -283,7 +271,7 @@ def test_a_state_set_elsewhere_goes_on_with_the_same_bits() -> None:
 
 
 def test_profile_keeps_its_limits_and_arrives() -> None:
-    limits = Command(rate_rad_s=0.2, acceleration_rad_s2=4.0, jerk_rad_s3=200.0)
+    limits = model.Command(rate_rad_s=0.2, acceleration_rad_s2=4.0, jerk_rad_s3=200.0)
     T = AMBER.controller.period_s
     rng = np.random.default_rng(2)
     for jerk in (inf, 200.0):
@@ -307,12 +295,12 @@ def test_profile_keeps_its_limits_and_arrives() -> None:
 
 
 def test_profile_leaves_a_command_within_its_limits_untouched() -> None:
-    command = Command(rate_rad_s=0.2, acceleration_rad_s2=4.0)
+    command = model.Command(rate_rad_s=0.2, acceleration_rad_s2=4.0)
     wave = commands.sine(0.005, 4.0, phase_rad=pi / 2)
     # slowly into the cosine, so that the start keeps the limits as well
     run = [
         simulate(replace(AMBER, command=c), commands.ramp(0.05, 0.0, 0.2), 0.3)
-        for c in (command, Command(rate_rad_s=0.06))
+        for c in (command, model.Command(rate_rad_s=0.06))
     ]
     plain = simulate(AMBER, commands.ramp(0.05, 0.0, 0.2), 0.3)
     assert np.array_equal(run[1].output_angle_rad, plain.output_angle_rad)
@@ -327,7 +315,7 @@ def test_profile_leaves_a_command_within_its_limits_untouched() -> None:
 
 def test_any_stage_may_be_the_outermost() -> None:
     m, friction = AMBER.motor, replace(FREE, dry_torque_Nm=1e-3)
-    design = replace(AMBER, friction=friction, limits=Limits(voltage_V=48.0))
+    design = replace(AMBER, friction=friction, limits=model.Limits(voltage_V=48.0))
     voltage = simulate(changed(design, position=None, velocity=None, current=None), commands.step(10.0), 2.0)
     lost = (friction.dry_torque_Nm + 1e-6 * voltage.motor_speed_rad_s[-1]) / m.torque_constant_Nm_A
     assert voltage.motor_speed_rad_s[-1] == pytest.approx(
@@ -340,22 +328,22 @@ def test_any_stage_may_be_the_outermost() -> None:
     speed = simulate(changed(design, position=None), commands.step(0.2), 1.0)
     assert speed.motor_speed_rad_s[-1] == pytest.approx(0.2 * AMBER.total_ratio, rel=1e-6)
     assert speed.speed_command_rad_s[-1] == pytest.approx(0.2 * AMBER.total_ratio, rel=1e-12)
-    slow = replace(changed(design, position=None), command=Command(acceleration_rad_s2=2.0))
+    slow = replace(changed(design, position=None), command=model.Command(acceleration_rad_s2=2.0))
     ramped = simulate(slow, commands.step(0.2), 0.3).speed_command_rad_s / AMBER.total_ratio
     assert np.diff(ramped).max() == pytest.approx(2.0 * AMBER.controller.period_s, rel=1e-9)
     assert ramped[-1] == pytest.approx(0.2, rel=1e-12)
 
 
-def filtered(count: int = 1, **item: object) -> Design:
-    return changed(velocity=replace(AMBER.controller.velocity, filters=(Filter(**item),) * count))
+def filtered(count: int = 1, **item: object) -> model.Design:
+    return changed(velocity=replace(AMBER.controller.velocity, filters=(model.Filter(**item),) * count))
 
 
 TORQUE = changed(position=None, velocity=None)
 REFUSED = {
-    "need a position or a velocity loop": replace(TORQUE, command=Command(rate_rad_s=1.0)),
-    "needs command.acceleration": replace(AMBER, command=Command(jerk_rad_s3=1.0)),
-    "a mean over": replace(AMBER, command=Command(acceleration_rad_s2=1.0, jerk_rad_s3=1e-4)),
-    "supply.capacitance: missing": replace(AMBER, supply=Supply(regenerative=False)),
+    "need a position or a velocity loop": replace(TORQUE, command=model.Command(rate_rad_s=1.0)),
+    "needs command.acceleration": replace(AMBER, command=model.Command(jerk_rad_s3=1.0)),
+    "a mean over": replace(AMBER, command=model.Command(acceleration_rad_s2=1.0, jerk_rad_s3=1e-4)),
+    "supply.capacitance: missing": replace(AMBER, supply=model.Supply(regenerative=False)),
     "encoder.bandwidth: missing": replace(AMBER, encoder=replace(AMBER.encoder, speed="tracking")),
     "below pi/T": filtered(kind="notch", frequency_rad_s=4e4, width_rad_s=1.0),
     "width = None": filtered(kind="notch", frequency_rad_s=400.0),

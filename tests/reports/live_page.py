@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -32,10 +33,16 @@ FIGURES = {  # of the page: of `margins --json`
 RESPONSE = ("bandwidth", "overshoot", "settling_time")
 
 
+@cache
+def page_text(design: Design) -> str:
+    """The page of a design without validation, built once however many tests open it."""
+    return page_of(loads(dumps(design_report(design))))
+
+
 def written(design: Design, folder: Path) -> Path:
     """Write the page of a design without validation."""
     path = folder / "page.html"
-    path.write_text(page_of(loads(dumps(design_report(design)))), encoding="utf-8")
+    path.write_text(page_text(design), encoding="utf-8")
     return path
 
 

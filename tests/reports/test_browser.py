@@ -1,7 +1,5 @@
 """The page in a real browser: no error, no request, every figure to be seen, on any screen and on paper."""
 
-from __future__ import annotations
-
 import io
 import unicodedata
 

@@ -1,6 +1,5 @@
 """A report's margins are certified, its page says so, and what is withheld gives its reason."""
 
-import json
 from dataclasses import replace
 
 import control
@@ -13,7 +12,6 @@ from actuator_lti.margins import stability_margins
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 from analyses.linear.loop_survey import survey_loops
 from reports.as_json import loop_json
-from reports.cli.main import main
 from reports.sections import loop as loop_section
 from reports.sections import margins
 
@@ -75,12 +73,10 @@ def test_without_being_asked_a_loop_takes_the_quick_way():
     assert quick.margins.verdict == certified.margins.verdict
 
 
-def test_the_terminal_prints_the_evidence(capsys):
-    assert main(["margins", "ilr33-amber", "--json"]) == 0
-    loops = json.loads(capsys.readouterr().out)["loops"]
+def test_the_terminal_prints_the_evidence(cli):
+    loops = cli.data("margins", "ilr33-amber")["loops"]
     assert {result["evidence"] for result in loops.values()} == {"certified"}
-    assert main(["margins", "ilr33-amber"]) == 0
-    line = next(line for line in capsys.readouterr().out.splitlines() if "Margins are" in line)
+    line = next(line for line in cli.text("margins", "ilr33-amber").splitlines() if "Margins are" in line)
     assert (
         line.split() == ["Margins", "are"] + ["certified"] * 4
     )  # the current loop with the rotor free and locked

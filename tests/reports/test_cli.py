@@ -10,7 +10,6 @@ import pytest
 import typer
 
 from reports.cli.app import build
-from reports.cli.main import main
 
 
 def shipped_text(name: str = "ilr33-amber") -> str:
@@ -18,14 +17,6 @@ def shipped_text(name: str = "ilr33-amber") -> str:
     from actuator_lti.design.shipped import shipped_path
 
     return shipped_path(name).read_text(encoding="utf-8")
-
-
-def one_line(error: str) -> str:
-    """Check that a message is one line without a traceback."""
-    assert error.endswith("\n")
-    assert error.count("\n") == 1
-    assert "Traceback" not in error
-    return error
 
 
 def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
@@ -38,9 +29,8 @@ def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
     assert not any(docs.values()), docs
 
 
-def test_version(capsys) -> None:
-    assert main(["--version"]) == 0
-    assert capsys.readouterr().out.startswith("actuator-lti ")
+def test_version(cli) -> None:
+    assert cli.text("--version").startswith("actuator-lti ")
 
 
 def loaded(code: str) -> set[str]:
@@ -81,20 +71,18 @@ def test_a_report_with_validation_waits_for_no_library_that_it_does_not_use() ->
     assert not loaded(code) & PLOTTING
 
 
-def test_margins_in_json_and_nothing_else(capsys) -> None:
-    assert main(["margins", "--json"]) == 0
-    captured = capsys.readouterr()
-    result = json.loads(captured.out)
-    assert captured.err == ""
+def test_margins_in_json_and_nothing_else(cli) -> None:
+    ran = cli("margins", "--json")
+    assert (ran.status, ran.err) == (0, "")
+    result = ran.data
     assert result["passed"] is True
     assert result["loops"]["velocity"]["phase_margin_deg"] == pytest.approx(73.70, abs=0.01)
     assert len(result["requirements"]) == 12
 
 
 @pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
-def test_margins_on_the_terminal_name_every_loop(form: str, capsys) -> None:
-    assert main(["margins", "ilr33-amber", "--form", form]) == 0
-    words = capsys.readouterr().out
+def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
+    words = cli.text("margins", "ilr33-amber", "--form", form)
     for name in ("Current loop", "Velocity loop", "Position loop", "Phase margin, deg", "✓ met"):
         assert name in words
 
@@ -142,46 +130,40 @@ def test_margins_on_the_terminal_name_every_loop(form: str, capsys) -> None:
         (["compare", "emps", "--workers", "2"], "--workers 2: computes variants, and emps has none"),
     ],
 )
-def test_bad_input_is_one_line_and_status_2(arguments: list[str], words: str, capsys) -> None:
-    assert main(arguments) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert words in one_line(captured.err)
+def test_bad_input_is_one_line_and_status_2(arguments: list[str], words: str, cli) -> None:
+    assert words in cli.refused(*arguments)
 
 
-def test_a_bad_design_writes_nothing(tmp_path, capsys) -> None:
+def test_a_bad_design_writes_nothing(tmp_path, cli) -> None:
     design = tmp_path / "bad.toml"
     design.write_text(shipped_text().replace('"9.2 g*cm^2"', '"-9.2 g*cm^2"'), encoding="utf-8")
-    assert main(["report", str(design), "--out", str(tmp_path / "out")]) == 2
-    assert "rotor_inertia" in one_line(capsys.readouterr().err)
+    assert "rotor_inertia" in cli.refused("report", design, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_that_is_a_file_is_named(tmp_path, capsys) -> None:
+def test_a_folder_that_is_a_file_is_named(tmp_path, cli) -> None:
     (tmp_path / "out").write_text("in the way")
-    assert main(["report", "ctms-motor-position", "--out", str(tmp_path / "out"), "--no-validation"]) == 2
-    assert str(tmp_path / "out") in one_line(capsys.readouterr().err)
-    (tmp_path / "empty.json").touch()
-    assert main(["pdf", str(tmp_path / "empty.json")]) == 2
-    assert "empty.json: is empty; allowed: a report.json" in one_line(capsys.readouterr().err)
-
-
-def test_report_writes_both_files_and_gives_the_document(tmp_path, capsys) -> None:
-    arguments = ["report", "ctms-motor-position", "--out", str(tmp_path), "--json", "--no-validation"]
-    assert main(arguments) == 0
-    assert json.loads(capsys.readouterr().out) == json.loads(
-        (tmp_path / "report.json").read_text(encoding="utf-8")
+    assert str(tmp_path / "out") in cli.refused(
+        "report", "ctms-motor-position", "--out", tmp_path / "out", "--no-validation"
     )
+    (tmp_path / "empty.json").touch()
+    assert "empty.json: is empty; allowed: a report.json" in cli.refused("pdf", tmp_path / "empty.json")
+
+
+def test_report_writes_both_files_and_gives_the_document(tmp_path, cli) -> None:
+    told = cli.data("report", "ctms-motor-position", "--out", tmp_path, "--no-validation")
+    assert told == json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert sorted(os.listdir(tmp_path)) == ["report.html", "report.json"]
 
 
-def test_an_interrupted_command_says_so(monkeypatch, capsys) -> None:
+def test_an_interrupted_command_says_so(monkeypatch, cli) -> None:
     def interrupted() -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("actuator_lti.design.load_design", lambda name: interrupted())
-    assert main(["margins"]) == 130
-    assert "interrupted" in one_line(capsys.readouterr().err)
+    ran = cli("margins")
+    assert (ran.status, ran.err.count("\n")) == (130, 1)
+    assert "interrupted" in ran.err
 
 
 def test_a_closed_pipe_is_no_error() -> None:
@@ -206,20 +188,19 @@ def test_progress_stays_off_where_nobody_looks(capsys) -> None:
 
 @pytest.mark.parametrize("command", ["report", "validate", "compare", "tune", "montecarlo"])
 def test_a_folder_that_cannot_be_is_refused_before_anything_is_computed(
-    command: str, tmp_path, capsys, monkeypatch
+    command: str, tmp_path, cli, monkeypatch
 ) -> None:
     def unwanted(*_: object) -> None:
         raise AssertionError("the design was read before the folder was looked at")
 
     monkeypatch.setattr("actuator_lti.design.load_design", unwanted)
     (tmp_path / "file").write_text("mine")
-    assert main([command, "ilr33-amber", "--out", str(tmp_path / "file" / "inside")]) == 2
-    assert "is not a directory" in one_line(capsys.readouterr().err)
+    assert "is not a directory" in cli.refused(command, "ilr33-amber", "--out", tmp_path / "file" / "inside")
     assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_margins_say_what_is_suspicious_on_standard_error(capsys) -> None:
-    assert main(["margins", "emps", "--json"]) in (0, 1)
-    printed = capsys.readouterr()
-    assert printed.err.startswith("warning: emps: control.position.gain:")
-    assert json.loads(printed.out)["design"]["name"] == "emps"
+def test_margins_say_what_is_suspicious_on_standard_error(cli) -> None:
+    ran = cli("margins", "emps", "--json")
+    assert ran.status in (0, 1)
+    assert ran.err.startswith("warning: emps: control.position.gain:")
+    assert ran.data["design"]["name"] == "emps"

@@ -14,7 +14,6 @@ from analyses.stiffness import Stiffness, stiffness
 from reports.analyses import ANALYSES, FURTHER, Analysis
 from reports.as_json import as_json
 from reports.cli.app import PANELS, build
-from reports.cli.main import main
 from reports.document import load
 
 APP = typer.main.get_command(build())
@@ -64,9 +63,8 @@ def test_the_json_of_a_result_is_its_fields_and_properties() -> None:
     json.dumps(told, allow_nan=False)
 
 
-def test_the_page_of_a_command_is_its_section(tmp_path, capsys) -> None:
-    assert main(["stiffness", "emps", "--out", str(tmp_path), "--quiet"]) == 0
-    shown = capsys.readouterr().out
+def test_the_page_of_a_command_is_its_section(tmp_path, cli) -> None:
+    shown = cli.text("stiffness", "emps", "--out", tmp_path, "--quiet")
     made = load(tmp_path / "stiffness.json")
     first = made["sections"][0]
     assert shown.splitlines()[0] == f"PASS  emps: {first['result']}"

@@ -1,6 +1,5 @@
 """What holds of every command: --json, --set, help, the verdict first, no line wider than the terminal."""
 
-import json
 import re
 import subprocess
 import sys
@@ -13,7 +12,6 @@ import typer
 from actuator_lti.design import load_design, write_design
 from reports import document as doc
 from reports.cli.app import PANELS, build
-from reports.cli.main import main
 from reports.terminal import SideBySide, print_blocks
 
 NO_DESIGN = {"designs", "keys", "pdf", "nightly", "objects import", "init"}  # nightly, pdf: a study, a report
@@ -54,14 +52,13 @@ def test_every_command_speaks_json_and_takes_changes(name: str) -> None:
 
 
 @pytest.mark.parametrize("words", [[], ["objects"], ["export"]])
-def test_no_command_prints_help(words: list[str], capsys) -> None:
-    main(words)
-    shown = capsys.readouterr()
+def test_no_command_prints_help(words: list[str], cli) -> None:
+    shown = cli(*words)
     assert "Usage" in shown.out + shown.err
     assert "Traceback" not in shown.err
 
 
-def test_json_of_commands_that_write(tmp_path, capsys) -> None:
+def test_json_of_commands_that_write(tmp_path, cli) -> None:
     file = tmp_path / "mine.toml"
     for words in (
         ["init", str(file)],
@@ -73,8 +70,7 @@ def test_json_of_commands_that_write(tmp_path, capsys) -> None:
         ["stiffness", "--set", "limits.voltage=9 V"],
         ["simulate", "--duration", "0.01"],
     ):
-        main([*words, "--json"])
-        assert isinstance(json.loads(capsys.readouterr().out), dict), words
+        assert isinstance(cli(*words, "--json").data, dict), words
     assert any("9.0" in path.read_text(encoding="utf-8") for path in (tmp_path / "c").iterdir())
 
 
@@ -92,14 +88,13 @@ def test_json_of_commands_that_write(tmp_path, capsys) -> None:
     ],
     ids=lambda value: " ".join(value[:1]) if isinstance(value, list) else str(value),
 )
-def test_the_first_line_is_the_verdict(words: list[str], passed: bool, tmp_path, monkeypatch, capsys) -> None:
+def test_the_first_line_is_the_verdict(words: list[str], passed: bool, tmp_path, monkeypatch, cli) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
-    status = main([*words, "--quiet"] if words[0] in ("compare", "tune") else words)
-    first, *rest = capsys.readouterr().out.splitlines()
+    quiet = ["--quiet"] * (words[0] in ("compare", "tune"))
+    first, *rest = cli.text(*words, *quiet, status=0 if passed else 1).splitlines()
     assert first.startswith("PASS  " if passed else "FAIL  ")
     assert len(first) > 20
-    assert status == (0 if passed else 1)
     tables = [line for line in rest if not line.startswith(("note:", "out/", "  ", "play"))]
     assert max(map(len, tables), default=0) <= 80
 
@@ -124,13 +119,15 @@ def test_side_by_side_tables_are_stacked_rather_than_broken(width: int, monkeypa
         assert not re.search(r"^\s*\w\s*$", out, re.M)
 
 
-def test_a_name_of_a_record_is_changed_for_identify(tmp_path, capsys) -> None:
+def test_a_name_of_a_record_is_changed_for_identify(tmp_path, cli) -> None:
     file = tmp_path / "d.toml"
     file.write_text(write_design(load_design("emps")))
-    assert main(["identify", str(file), "--set", "nothing"]) == 2
-    assert main(["correlate", str(file), "none.csv", "--set", "limits.voltage"]) == 2
-    shown = capsys.readouterr().err
-    assert "allowed: KEY=VALUE" in shown
+    ran = (
+        cli("identify", file, "--set", "nothing"),
+        cli("correlate", file, "none.csv", "--set", "limits.voltage"),
+    )
+    assert [one.status for one in ran] == [2, 2]
+    assert "allowed: KEY=VALUE" in ran[0].err + ran[1].err
 
 
 WORDS = ["gain", "crossover", "velocity", "position", "anti-windup"]
@@ -173,24 +170,20 @@ def test_headings_break_before_a_word_of_a_cell_is_cut(width: int, monkeypatch, 
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])
-def test_margins_say_the_verdict_first_and_fit(width: int, monkeypatch, capsys) -> None:
+def test_margins_say_the_verdict_first_and_fit(width: int, monkeypatch, cli) -> None:
     monkeypatch.setenv("COLUMNS", str(width))
-    assert main(["margins", "ilr33-amber"]) == 0
-    first, *rest = capsys.readouterr().out.splitlines()
+    first, *rest = cli.text("margins", "ilr33-amber").splitlines()
     assert first == "PASS  ilr33-amber: every loop is stable. 12 of 12 requirements met."
     assert max(map(len, rest)) <= width
     assert sum(line.count("✓ met") for line in rest) == 12
 
 
-def test_a_failed_requirement_is_in_the_first_line(capsys) -> None:
-    assert main(["margins", "ilr33-amber", "--set", "control.position.gain=1560 1/s"]) == 1
-    first = capsys.readouterr().out.splitlines()[0]
+def test_a_failed_requirement_is_in_the_first_line(cli) -> None:
+    first = cli.text("margins", "--set", "control.position.gain=1560 1/s", status=1)
     said = "FAIL  ilr33-amber: every loop is stable. 9 of 12 requirements met, 3 not met. Not met: "
     assert first.startswith(said)
-    assert main(["margins", "ilr33-amber", "--set", "control.position.gain=9000 1/s"]) == 1
-    assert (
-        capsys.readouterr().out.splitlines()[0].startswith("FAIL  ilr33-amber: not stable: Position loop. ")
-    )
+    first = cli.text("margins", "--set", "control.position.gain=9000 1/s", status=1)
+    assert first.startswith("FAIL  ilr33-amber: not stable: Position loop. ")
 
 
 def test_the_program_runs_as_a_module() -> None:

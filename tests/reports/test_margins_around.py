@@ -91,19 +91,17 @@ def test_coefficients_and_matrices_of_one_sampled_system_are_one_loop() -> None:
         assert complex(loop_around(loops, outer).open_loop(z)) == pytest.approx(want, rel=1e-12)
 
 
-def test_the_command_line_judges_it(tmp_path, capsys) -> None:
+def test_the_command_line_judges_it(tmp_path, cli) -> None:
     path = tmp_path / "airframe.json"
     path.write_text(json.dumps(AIRFRAME))
-    assert main(["margins", "ilr33-amber", "--around", str(path), "--json"]) == 0
-    around = json.loads(capsys.readouterr().out)["around"]["roll rate"]
+    around = cli.data("margins", "ilr33-amber", "--around", path)["around"]["roll rate"]
     assert around["stable"] is True
-    assert main(["margins", "ilr33-amber", "--around", str(path)]) == 0
-    words = capsys.readouterr().out
+    words = cli.text("margins", "ilr33-amber", "--around", path)
     assert "roll rate" in words
     assert "broken at the command of the drive" in " ".join(words.split())
     path.write_text(json.dumps({**AIRFRAME, "num": [30.0 * 10.0 ** (1.1 * around["gain_margin_db"] / 20.0)]}))
-    assert main(["margins", "ilr33-amber", "--around", str(path), "--json"]) == 1
-    assert json.loads(capsys.readouterr().out)["around"]["roll rate"]["stable"] is False
+    around = cli.data("margins", "ilr33-amber", "--around", path, status=1)["around"]["roll rate"]
+    assert around["stable"] is False
 
 
 @pytest.mark.parametrize(
@@ -130,15 +128,12 @@ def test_the_command_line_judges_it(tmp_path, capsys) -> None:
         *((text, "airframe.json") for text in ("", "[1, 2]", "{", '{"num": [NaN]}', '{"dt": 0, "dt": 1}')),
     ],
 )  # fmt: skip
-def test_a_bad_file_is_one_line(change: dict | str, said: str, tmp_path, capsys) -> None:
+def test_a_bad_file_is_one_line(change: dict | str, said: str, tmp_path, cli) -> None:
     path = tmp_path / "airframe.json"
     if isinstance(change, str):
         path.write_text(change)
     else:
         table = {key: value for key, value in {**AIRFRAME, **change}.items() if value is not None}
         path.write_text(json.dumps(table))
-    assert main(["margins", "ilr33-amber", "--around", str(path)]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert said in error
+    assert said in cli.refused("margins", "ilr33-amber", "--around", path)
     assert main(["margins", "ilr33-amber", "--around", str(tmp_path / "none.json")]) == 2

@@ -1,7 +1,5 @@
 """A measured response over the model: truth is the model itself times a known error."""
 
-import json
-
 import control
 import numpy as np
 import pytest
@@ -60,22 +58,21 @@ def test_stated_noise_covers_as_many_points_as_it_says(tmp_path) -> None:
     assert main(["margins", "ilr33-amber", "--response", str(path), "--out", str(tmp_path / "x")]) == 0
 
 
-def test_command_line(tmp_path, capsys) -> None:
+def test_command_line(tmp_path, cli) -> None:
     truth = bench("velocity", gain=1.0)
     path, L = tmp_path / "r.csv", truth.frdata.ravel()
     rows = np.column_stack([truth.omega / (2.0 * np.pi), 20.0 * np.log10(np.abs(L)), np.degrees(np.angle(L))])
     np.savetxt(path, rows, delimiter=",", header="f_hz,gain_db,phase_deg", comments="", fmt="%.17g")
     asked = ["margins", "ilr33-amber", "--response", str(path), "--response-of"]
-    assert main([*asked, "velocity", "--json"]) == 0
-    shown = json.loads(capsys.readouterr().out)["measured"]
+    shown = cli.data(*asked, "velocity")["measured"]
     assert max(map(abs, shown["difference_db"])) < 1e-9
     made = report("ilr33-amber", validation=False, response=path, response_of="velocity")
     (section,) = [one for one in made["sections"] if one["id"] == "measured-response"]
     assert "velocity loop. The model explains the measurement within 0.00 dB" in section["result"]
-    assert main([*asked, "speed"]) == 2
-    assert "--response-of speed: allowed: " in capsys.readouterr().err
+    assert "--response-of speed: allowed: " in cli.refused(*asked, "speed")
     for command in ("margins", "report"):
-        assert main([command, "ilr33-amber", "--averages", "8", "--out", str(tmp_path / "x")]) == 2
-        assert "--averages: allowed with --response" in capsys.readouterr().err
+        assert "--averages: allowed with --response" in cli.refused(
+            command, "ilr33-amber", "--averages", "8", "--out", tmp_path / "x"
+        )
     with pytest.raises(InputError, match="no two frequencies below"):
         measured_over(LOOPS, control.FrequencyResponseData([1.0, 1j], [1e6, 2e6]), "current")

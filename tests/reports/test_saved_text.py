@@ -1,7 +1,5 @@
 """The design that the page saves is the user's own text with only the changed entries written anew."""
 
-from __future__ import annotations
-
 import difflib
 import re
 

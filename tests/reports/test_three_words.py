@@ -86,7 +86,7 @@ def test_what_corners_and_samples_leave_out_is_not_proven(
     assert ("Not judged at corners: hot." in corners_summary(made)) is not bool(waivers)
 
 
-def test_a_loop_whose_stability_is_not_known_is_no_pass(monkeypatch, capsys) -> None:
+def test_a_loop_whose_stability_is_not_known_is_no_pass(monkeypatch, cli) -> None:
     known = loop_figures.all_loop_figures
 
     def undecided(*args: Any, **options: Any) -> Mapping[str, loop_figures.LoopFigures]:
@@ -95,8 +95,7 @@ def test_a_loop_whose_stability_is_not_known_is_no_pass(monkeypatch, capsys) -> 
         return {**figures, "current": replace(current, margins=replace(current.margins, stable=None))}
 
     monkeypatch.setattr(run, "all_loop_figures", undecided)
-    assert main(["margins", "ilr33-amber"]) == 1
-    first = capsys.readouterr().out.splitlines()[0]
+    first = cli.text("margins", "ilr33-amber", status=1).splitlines()[0]
     assert first.startswith("NOT PROVEN  ilr33-amber: stability not known: Current loop.")
 
 

@@ -1,6 +1,5 @@
 """The weakest point is the worst of all views, by how near L comes to -1; the spread names its points."""
 
-import json
 from dataclasses import replace
 from math import inf, log10, radians, sin
 
@@ -19,7 +18,6 @@ from analyses.linear.responses import curve
 from analyses.specification.mending import mending
 from analyses.specification.weakest import spread, views, weakest
 from reports.build import report
-from reports.cli.main import main
 from reports.sections.answer import weakest as words_of
 
 
@@ -119,12 +117,10 @@ def test_the_spread_is_that_of_the_operating_points(fin: Design) -> None:
     assert found.where == "motor driven by the load"
 
 
-def test_margins_shows_the_spread_and_names_the_points(capsys) -> None:
-    assert main(["margins", "fin", "--json"]) == 0
-    data = json.loads(capsys.readouterr().out)
+def test_margins_shows_the_spread_and_names_the_points(cli) -> None:
+    data = cli.data("margins", "fin")
     assert data["spread"]["position"]["gain_margin"]["where"] == "motor driven by the load"
-    assert main(["margins", "--help"]) == 0
-    said = capsys.readouterr().out
+    said = cli.text("margins", "--help")
     for name in ("sliding", "rest", "describing-function", "driving", "driven", "gap"):
         assert name in said
 

@@ -17,30 +17,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from actuator_lti.design.model import (
-    Command,
-    Controller,
-    Coupling,
-    CurrentLoop,
-    Design,
-    Encoder,
-    Filter,
-    Friction,
-    FrictionPoint,
-    Gear,
-    Gravity,
-    Instruments,
-    Limits,
-    Load,
-    LoadFriction,
-    Motor,
-    OutputEncoder,
-    PositionLoop,
-    Supply,
-    Temperature,
-    Validation,
-    VelocityLoop,
-)
+from actuator_lti.design import model
 from actuator_lti.errors import InputError, NumericalError
 from analyses.validation.settings import CHECKS, Settings
 
@@ -66,7 +43,7 @@ class Dice:
         return values[int(self.rng.integers(len(values)))]
 
 
-def _rigid_drive(dice: Dice, seed: int) -> Design:
+def _rigid_drive(dice: Dice, seed: int) -> model.Design:
     """A rigid cascade."""
     period = dice.decades(2e-6 if dice.chance(0.1) else 2e-5, 1e-3)
     delay = period * dice.one_of((0.0, 0.5, 1.0, 1.0, 2.0, 3.0))
@@ -85,7 +62,7 @@ def _rigid_drive(dice: Dice, seed: int) -> Design:
     torque = (motor.torque_constant_Nm_A or 0.0) * min(
         limits.peak_current_A, limits.voltage_V / (motor.resistance_ohm or 1.0)
     )
-    design = Design(
+    design = model.Design(
         name=f"random-{seed}",
         title=f"Random drive {seed}",
         motor=motor,
@@ -96,7 +73,7 @@ def _rigid_drive(dice: Dice, seed: int) -> Design:
         limits=limits,
         friction=_friction(dice, torque, speed),
         encoder=_encoder(dice, control, axis),
-        validation=Validation(full_deflection_rad=full if full > 0.0 else 0.1),
+        validation=model.Validation(full_deflection_rad=full if full > 0.0 else 0.1),
     )
     if dice.chance(0.2):
         slope = -dice.decades(0.01, 1.0) * torque * ratio / design.validation.full_deflection_rad
@@ -104,7 +81,9 @@ def _rigid_drive(dice: Dice, seed: int) -> Design:
     return design
 
 
-def _plant(dice: Dice, delay: float, axis: str) -> tuple[Motor, float, tuple[Gear, ...], Load]:
+def _plant(
+    dice: Dice, delay: float, axis: str
+) -> tuple[model.Motor, float, tuple[model.Gear, ...], model.Load]:
     """Motor, inertia at its shaft, gears and load."""
     resistance, k = dice.decades(0.05, 50.0), dice.decades(0.005, 2.0) * (20.0 if axis == "linear" else 1.0)
     inductance = resistance * delay * dice.decades(2.0, 60.0)
@@ -113,29 +92,29 @@ def _plant(dice: Dice, delay: float, axis: str) -> tuple[Motor, float, tuple[Gea
         inertia = dice.decades(1.0, 150.0)
     share = dice.rng.uniform(0.05, 0.9)
     gears = tuple(
-        Gear(name=f"g{n}", ratio=dice.decades(2.0, 15.0)) for n in range(dice.one_of((0, 0, 1, 2, 3)))
+        model.Gear(name=f"g{n}", ratio=dice.decades(2.0, 15.0)) for n in range(dice.one_of((0, 0, 1, 2, 3)))
     )
     ratio = float(np.prod([gear.ratio for gear in gears]))
-    motor = Motor(
+    motor = model.Motor(
         rotor_inertia_kgm2=inertia * (1.0 - share),
         resistance_ohm=resistance,
         inductance_H=inductance,
         torque_constant_Nm_A=k,
         back_emf_constant_Vs_rad=k,
     )
-    return motor, inertia, gears, Load(inertia_kgm2=inertia * share * ratio**2)
+    return motor, inertia, gears, model.Load(inertia_kgm2=inertia * share * ratio**2)
 
 
 def _controller(
-    dice: Dice, motor: Motor, inertia: float, period: float, delay: float, current: bool, velocity: bool
-) -> Controller:
+    dice: Dice, motor: model.Motor, inertia: float, period: float, delay: float, current: bool, velocity: bool
+) -> model.Controller:
     """A cascade whose crossovers are fractions of each other."""
     R, L, k = (motor.resistance_ohm or 1.0), (motor.inductance_H or 1.0), (motor.torque_constant_Nm_A or 1.0)
     inner = dice.rng.uniform(0.1, 0.5) / (period + delay)
     currents = None
     if current:
         integral = None if dice.chance(0.1) else (L / R) * dice.decades(0.5, 3.0)
-        currents = CurrentLoop(gain_V_A=L * inner, integral_time_s=integral)
+        currents = model.CurrentLoop(gain_V_A=L * inner, integral_time_s=integral)
     else:
         inner = min(inner, R / L)
     per_unit = inertia / k * (1.0 if current else R)
@@ -144,23 +123,23 @@ def _controller(
     velocities = None
     if velocity:
         integral = None if dice.chance(0.2) else dice.decades(2.0, 30.0) / wv
-        velocities = VelocityLoop(gain=per_unit * wv, integral_time_s=integral, every=n_v)
+        velocities = model.VelocityLoop(gain=per_unit * wv, integral_time_s=integral, every=n_v)
         n_p = n_v * dice.one_of((1, 1, 2, 5))
         gain = min(wv / dice.decades(2.5, 20.0), 0.4 / (n_p * period))
-        position = PositionLoop(gain=gain, every=n_p, feedforward=dice.one_of((0.0, 0.0, 1.0, 0.5)))
+        position = model.PositionLoop(gain=gain, every=n_p, feedforward=dice.one_of((0.0, 0.0, 1.0, 0.5)))
     elif current:
         wp = wv / dice.decades(3.0, 10.0)
-        position = PositionLoop(gain=per_unit * wp**2 / 2.0, every=n_v, derivative_time_s=2.0 / wp)
+        position = model.PositionLoop(gain=per_unit * wp**2 / 2.0, every=n_v, derivative_time_s=2.0 / wp)
     else:
         slow = min(k**2 / (R * inertia), R / L)
         gain = k * slow / dice.decades(2.5, 20.0)
-        position = PositionLoop(gain=gain, every=n_v)
-    return Controller(
+        position = model.PositionLoop(gain=gain, every=n_v)
+    return model.Controller(
         period_s=period, computing_delay_s=delay, position=position, velocity=velocities, current=currents
     )
 
 
-def _limits(dice: Dice, motor: Motor, control: Controller) -> Limits:
+def _limits(dice: Dice, motor: model.Motor, control: model.Controller) -> model.Limits:
     """Tight, loose, or hardly any."""
     volts = dice.decades(3.0, 600.0)
     short = volts / (motor.resistance_ohm or 1.0)
@@ -170,15 +149,17 @@ def _limits(dice: Dice, motor: Motor, control: Controller) -> Limits:
     if control.velocity is not None and dice.chance(0.3):
         acceleration = fastest * control.position_loop.gain * dice.decades(0.3, 30.0)
     peak = short * dice.decades(0.05, 1.0) if control.current is not None and dice.chance(0.8) else inf
-    return Limits(voltage_V=volts, speed_rad_s=speed, acceleration_rad_s2=acceleration, peak_current_A=peak)
+    return model.Limits(
+        voltage_V=volts, speed_rad_s=speed, acceleration_rad_s2=acceleration, peak_current_A=peak
+    )
 
 
-def _friction(dice: Dice, torque: float, speed: float) -> Friction:
+def _friction(dice: Dice, torque: float, speed: float) -> model.Friction:
     """None, viscous, dry of either law."""
     if dice.chance(0.15):
-        return Friction()
+        return model.Friction()
     dry = 0.0 if dice.chance(0.2) else torque * dice.decades(1e-3, 0.2)
-    return Friction(
+    return model.Friction(
         law=dice.one_of(("coulomb", "coulomb", "coulomb", "tanh")),
         dry_torque_Nm=dry,
         viscous_Nms_rad=0.0 if dice.chance(0.2) else torque / speed * dice.decades(1e-4, 0.3),
@@ -187,7 +168,7 @@ def _friction(dice: Dice, torque: float, speed: float) -> Friction:
     )
 
 
-def _encoder(dice: Dice, control: Controller, axis: str) -> Encoder:
+def _encoder(dice: Dice, control: model.Controller, axis: str) -> model.Encoder:
     """Ideal, or a real one."""
     source = dice.one_of(("ideal", "ideal", "difference", "tracking"))
     counts = None
@@ -195,7 +176,7 @@ def _encoder(dice: Dice, control: Controller, axis: str) -> Encoder:
         counts = int(dice.decades(1e3, 1e6)) * (100 if axis == "linear" else 1)
     inner = control.velocity.every if control.velocity else 1
     band = 0.2 / (control.period_s * inner) if source == "tracking" else None
-    return Encoder(
+    return model.Encoder(
         counts_per_rev=counts,
         speed=source,
         bandwidth_rad_s=band,
@@ -203,7 +184,7 @@ def _encoder(dice: Dice, control: Controller, axis: str) -> Encoder:
     )
 
 
-def full_drive(seed: int) -> Design:
+def full_drive(seed: int) -> model.Design:
     """A drive with any mixture of what sections 6 and 7 of the model know; not known to be stable yet."""
     design = _rigid_drive(Dice(seed), seed)
     dice = Dice(10**6 + seed)
@@ -215,7 +196,7 @@ def full_drive(seed: int) -> Design:
     return _damped(Dice(2 * 10**6 + seed), design) if seed >= DAMPED else design
 
 
-def _damped(dice: Dice, design: Design) -> Design:
+def _damped(dice: Dice, design: model.Design) -> model.Design:
     """A load in air or water."""
     if not dice.chance(0.2):
         return design
@@ -225,7 +206,7 @@ def _damped(dice: Dice, design: Design) -> Design:
     return replace(design, load=replace(design.load, moment_damping_Nms_rad=damping, path=path))
 
 
-def _elastic(dice: Dice, design: Design) -> Design:
+def _elastic(dice: Dice, design: model.Design) -> model.Design:
     """A coupling, with play and friction behind it."""
     if not dice.chance(0.3) or design.friction.law == "tanh":
         return design
@@ -239,8 +220,8 @@ def _elastic(dice: Dice, design: Design) -> Design:
         torque = (motor.torque_constant_Nm_A or 1.0) * min(
             limits.peak_current_A, limits.voltage_V / (motor.resistance_ohm or 1.0)
         )
-        friction = LoadFriction(dry_torque_Nm=torque * design.total_ratio * dice.decades(1e-3, 0.03))
-    coupling = Coupling(
+        friction = model.LoadFriction(dry_torque_Nm=torque * design.total_ratio * dice.decades(1e-3, 0.03))
+    coupling = model.Coupling(
         stiffness_Nm_rad=stiffness,
         damping_Nms_rad=dice.decades(0.01, 0.2) * stiffness / omega,
         play_rad=design.validation.full_deflection_rad * dice.one_of((0.0, 0.0, 1e-3, 0.01)),
@@ -258,7 +239,7 @@ def _elastic(dice: Dice, design: Design) -> Design:
     )
 
 
-def _frictions(dice: Dice, design: Design) -> Design:
+def _frictions(dice: Dice, design: model.Design) -> model.Design:
     """Asymmetric, with an offset, or as a map."""
     friction, kind = design.friction, dice.one_of(("", "", "", "asymmetric", "offset", "map", "load"))
     dry = friction.dry_torque_Nm
@@ -279,7 +260,7 @@ def _frictions(dice: Dice, design: Design) -> Design:
             design.limits.voltage_V / (design.motor.back_emf_constant_Vs_rad or 1.0),
         )
         points = tuple(
-            FrictionPoint(speed_rad_s=speed * fast, torque_Nm=dry * torque)
+            model.FrictionPoint(speed_rad_s=speed * fast, torque_Nm=dry * torque)
             for speed, torque in ((0.0, 1.0), (0.02, 0.7), (0.2, 0.75), (1.0, 1.2))
         )
         return replace(
@@ -290,7 +271,7 @@ def _frictions(dice: Dice, design: Design) -> Design:
     return design
 
 
-def _loads(dice: Dice, design: Design) -> Design:
+def _loads(dice: Dice, design: model.Design) -> model.Design:
     """Gravity on a rotary output."""
     if not dice.chance(0.15) or design.axis == "linear":
         return design
@@ -299,12 +280,12 @@ def _loads(dice: Dice, design: Design) -> Design:
         limits.peak_current_A, limits.voltage_V / (motor.resistance_ohm or 1.0)
     )
     peak = dice.decades(0.01, 0.2) * torque * design.total_ratio
-    gravity = Gravity(mass_kg=peak / 9.80665, arm_m=1.0, offset_rad=dice.one_of((0.0, 0.5, pi)))
+    gravity = model.Gravity(mass_kg=peak / 9.80665, arm_m=1.0, offset_rad=dice.one_of((0.0, 0.5, pi)))
     load = replace(design.load, gravity=gravity, path="back-drivable", moment_slope_Nm_rad=0.0)
     return replace(design, load=load)
 
 
-def _motor_data(dice: Dice, design: Design) -> Design:
+def _motor_data(dice: Dice, design: model.Design) -> model.Design:
     """The same motor from the data sheet of an AC servo motor, or a warm one."""
     motor, kind = design.motor, dice.one_of(("", "", "ac", "warm"))
     if kind == "ac":
@@ -319,28 +300,28 @@ def _motor_data(dice: Dice, design: Design) -> Design:
             design, motor=replace(ac, **{name: getattr(motor, name) * x for name, x in factors.items()})
         )
     if kind == "warm":
-        return replace(design, temperature=Temperature(winding_degC=90.0, magnet_degC=70.0))
+        return replace(design, temperature=model.Temperature(winding_degC=90.0, magnet_degC=70.0))
     return design
 
 
-def _filtered(dice: Dice, design: Design) -> Design:
+def _filtered(dice: Dice, design: model.Design) -> model.Design:
     """Filters of the torque command and of the speed."""
     control, velocity = design.controller, design.controller.velocity
     if velocity is None:
         return design
     at = 2.0 * pi * 0.05 / (control.period_s * velocity.every)
     shelf = (
-        Filter(kind="lowpass", on="torque", frequency_rad_s=2.0 * at, order=2),
-        Filter(kind="lowpass", on="speed", frequency_rad_s=3.0 * at),
-        Filter(kind="notch", on="torque", frequency_rad_s=at, width_rad_s=0.5 * at, depth=0.1),
-        Filter(kind="leadlag", on="torque", zero_rad_s=at, pole_rad_s=1.5 * at),
-        Filter(kind="biquad", on="torque", b=(0.5, 0.3, 0.0), a=(-0.2, 0.0)),
+        model.Filter(kind="lowpass", on="torque", frequency_rad_s=2.0 * at, order=2),
+        model.Filter(kind="lowpass", on="speed", frequency_rad_s=3.0 * at),
+        model.Filter(kind="notch", on="torque", frequency_rad_s=at, width_rad_s=0.5 * at, depth=0.1),
+        model.Filter(kind="leadlag", on="torque", zero_rad_s=at, pole_rad_s=1.5 * at),
+        model.Filter(kind="biquad", on="torque", b=(0.5, 0.3, 0.0), a=(-0.2, 0.0)),
     )
     chosen = tuple(item for item in shelf if dice.chance(0.12))
     return replace(design, controller=replace(control, velocity=replace(velocity, filters=chosen)))
 
 
-def _regulators(dice: Dice, design: Design) -> Design:
+def _regulators(dice: Dice, design: model.Design) -> model.Design:
     """Other kinds of anti-windup, and feed-forward in the current loop."""
     control, kinds = design.controller, ("conditional", "conditional", "clamped", "back-calculation")
     if control.velocity is not None and control.velocity.integral_time_s is not None:
@@ -353,7 +334,7 @@ def _regulators(dice: Dice, design: Design) -> Design:
     return replace(design, controller=control)
 
 
-def _outer(dice: Dice, design: Design) -> Design:
+def _outer(dice: Dice, design: model.Design) -> model.Design:
     """PI, PID and feed-forward of the position loop."""
     control, place = design.controller, design.controller.position_loop
     if dice.chance(0.25):
@@ -370,7 +351,7 @@ def _outer(dice: Dice, design: Design) -> Design:
     return replace(design, controller=replace(control, position=place))
 
 
-def _sensors(dice: Dice, design: Design) -> Design:
+def _sensors(dice: Dice, design: model.Design) -> model.Design:
     """Position, speed or both from the output's encoder, with counts or without."""
     control, kind = design.controller, dice.one_of(("", "", "", "", "position", "both"))
     if not kind:
@@ -379,20 +360,22 @@ def _sensors(dice: Dice, design: Design) -> Design:
     control = replace(control, position=replace(control.position_loop, sensor="output"))
     if kind == "both" and control.velocity is not None:
         control = replace(control, velocity=replace(control.velocity, sensor="output"))
-    return replace(design, controller=control, output_encoder=OutputEncoder(counts_per_rev=counts))
+    return replace(design, controller=control, output_encoder=model.OutputEncoder(counts_per_rev=counts))
 
 
-def _commanded(dice: Dice, design: Design) -> Design:
+def _commanded(dice: Dice, design: model.Design) -> model.Design:
     """A filter, a profile."""
     kind = dice.one_of(("", "", "", "filter", "profile"))
     gain, full = design.controller.position_loop.gain, design.validation.full_deflection_rad
     if kind == "filter":
-        return replace(design, command=Command(filter_time_s=0.2 / gain, filter_order=dice.one_of((1, 2))))
+        return replace(
+            design, command=model.Command(filter_time_s=0.2 / gain, filter_order=dice.one_of((1, 2)))
+        )
     if kind == "profile" and design.controller.velocity is not None:
         rate = 0.2 * full * gain
         return replace(
             design,
-            command=Command(
+            command=model.Command(
                 rate_rad_s=rate,
                 acceleration_rad_s2=rate * gain,
                 jerk_rad_s3=dice.one_of((inf, rate * gain**2)),
@@ -401,22 +384,22 @@ def _commanded(dice: Dice, design: Design) -> Design:
     return design
 
 
-def _supplied(dice: Dice, design: Design) -> Design:
+def _supplied(dice: Dice, design: model.Design) -> model.Design:
     """A supply with resistance, one that takes nothing back."""
     R, volts = design.motor.resistance_ohm or 1.0, design.limits.voltage_V
     kind = dice.one_of(("", "", "", "resistance", "capacitor"))
     if kind == "resistance":
-        return replace(design, supply=Supply(resistance_ohm=0.1 * R))
+        return replace(design, supply=model.Supply(resistance_ohm=0.1 * R))
     if kind == "capacitor":
         farad = 200.0 * design.controller.period_s / R
-        supply = Supply(
+        supply = model.Supply(
             resistance_ohm=0.05 * R, regenerative=False, capacitance_F=farad, brake_voltage_V=1.2 * volts
         )
         return replace(design, supply=supply)
     return design
 
 
-def _protected(dice: Dice, design: Design) -> Design:
+def _protected(dice: Dice, design: model.Design) -> model.Design:
     """Overload protection."""
     limits = design.limits
     if limits.peak_current_A == inf or not dice.chance(0.3):
@@ -432,14 +415,14 @@ def _protected(dice: Dice, design: Design) -> Design:
     )
 
 
-def _instrumented(dice: Dice, design: Design) -> Design:
+def _instrumented(dice: Dice, design: model.Design) -> model.Design:
     """Noise, resolution, jitter."""
     if not dice.chance(0.15):
         return design
     quantum = 1e-4 * design.validation.full_deflection_rad
     return replace(
         design,
-        instruments=Instruments(
+        instruments=model.Instruments(
             current_resolution_A=1e-3 * design.limits.voltage_V / (design.motor.resistance_ohm or 1.0),
             angle_noise_rad=quantum * design.total_ratio,
             jitter_s=0.01 * design.controller.period_s,
@@ -448,7 +431,7 @@ def _instrumented(dice: Dice, design: Design) -> Design:
     )
 
 
-def _outermost(dice: Dice, design: Design) -> Design:
+def _outermost(dice: Dice, design: model.Design) -> model.Design:
     """Now and then the drive ends at its speed, its current or its voltage."""
     control, kind = design.controller, dice.one_of(("", "", "", "", "", "", "speed", "torque"))
     plain = replace(design.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
@@ -461,7 +444,7 @@ def _outermost(dice: Dice, design: Design) -> Design:
     return design
 
 
-def stable_drives(first: int, count: int) -> Iterator[Design]:
+def stable_drives(first: int, count: int) -> Iterator[model.Design]:
     """The first ``count`` drives from a seed on whose loops are all stable, by their exact margins."""
     seed, result = first, 0
     while result < count:
@@ -472,7 +455,7 @@ def stable_drives(first: int, count: int) -> Iterator[Design]:
             yield design
 
 
-def is_stable(design: Design) -> bool:
+def is_stable(design: model.Design) -> bool:
     """Whether every loop is stable, inner ones too."""
     from actuator_lti.design.checks import check_design
     from actuator_lti.loops import assemble_loops
@@ -524,7 +507,7 @@ def main(first: int, count: int, everything: bool, until_s: float = inf) -> Trie
     return tried
 
 
-def validate_one(design: Design, settings: Settings, tried: Tried) -> None:
+def validate_one(design: model.Design, settings: Settings, tried: Tried) -> None:
     """Validate one drive and print what it came to."""
     import time
     import traceback

@@ -1,7 +1,5 @@
 """Bandwidth against amplitude."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

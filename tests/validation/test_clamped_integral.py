@@ -15,17 +15,7 @@ import pytest
 
 from actuator_lti import assemble_loops
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.model import (
-    Controller,
-    Design,
-    Friction,
-    Limits,
-    Load,
-    Motor,
-    PositionLoop,
-    Validation,
-    VelocityLoop,
-)
+from actuator_lti.design import model
 from analyses.large_signal.map import amplitude_map
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import small_signal
@@ -34,24 +24,24 @@ from nonlinear import Rows, commands, simulate
 T, k, J, Kp, Tn, Kv, LIMIT = 5e-4, 0.5, 0.02, 6.0, 0.05, 12.0, 30.0
 
 
-def drive(law: str, feedforward: float = 3.0) -> Design:
+def drive(law: str, feedforward: float = 3.0) -> model.Design:
     """The drive of the docstring."""
-    velocity = VelocityLoop(gain=Kp, integral_time_s=Tn, anti_windup=law)
-    return Design(
+    velocity = model.VelocityLoop(gain=Kp, integral_time_s=Tn, anti_windup=law)
+    return model.Design(
         name="clamped",
         title="Clamped integral",
-        motor=Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=k),
-        load=Load(path="back-drivable"),
-        controller=Controller(
+        motor=model.Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=k),
+        load=model.Load(path="back-drivable"),
+        controller=model.Controller(
             period_s=T,
             computing_delay_s=0.0,
-            position=PositionLoop(gain=Kv, acceleration_feedforward=feedforward),
+            position=model.PositionLoop(gain=Kv, acceleration_feedforward=feedforward),
             velocity=velocity,
             current=None,
         ),
-        limits=Limits(voltage_V=LIMIT),
-        friction=Friction(),
-        validation=Validation(full_deflection_rad=1.0),
+        limits=model.Limits(voltage_V=LIMIT),
+        friction=model.Friction(),
+        validation=model.Validation(full_deflection_rad=1.0),
     )
 
 

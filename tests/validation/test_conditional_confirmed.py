@@ -8,26 +8,14 @@ import pytest
 from plain_drive import output_of_step
 
 from actuator_lti import assemble_loops
-from actuator_lti.design.model import (
-    Command,
-    Controller,
-    Design,
-    Friction,
-    Gear,
-    Limits,
-    Load,
-    Motor,
-    PositionLoop,
-    Validation,
-    VelocityLoop,
-)
+from actuator_lti.design import model
 from analyses.large_signal.conditional import Conditional, conditional_stability, step_rows, step_threshold
 from analyses.large_signal.settling_ticks import settling_ticks_of
 from analyses.motion.settling import settle
 from tests.validation.random_drives import full_drive
 
 
-def look(design: Design) -> tuple[Conditional, int]:
+def look(design: model.Design) -> tuple[Conditional, int]:
     loops = assemble_loops(design)
     place = design.controller.position_loop
     settle = settling_ticks_of(loops.present["position"].closed_loop, place.every, design.name, 400_000)
@@ -59,25 +47,25 @@ def test_a_finding_on_a_random_drive_is_that_of_plain_integration(
         assert left < 1e-3 if settles else left > 2.0
 
 
-def unstable(slope_Nm_rad: float, volts: float = 10.0, full_rad: float = 3.0) -> Design:
+def unstable(slope_Nm_rad: float, volts: float = 10.0, full_rad: float = 3.0) -> model.Design:
     """A torque source with P controllers on a load that pushes away from the middle."""
-    return Design(
+    return model.Design(
         name="inverted",
         title="A load that pushes away",
-        motor=Motor(rotor_inertia_kgm2=1e-3, source_gain_Nm_V=0.5),
-        gears=(Gear(name="g", ratio=10.0),),
-        load=Load(inertia_kgm2=0.1, path="back-drivable", moment_slope_Nm_rad=slope_Nm_rad),
+        motor=model.Motor(rotor_inertia_kgm2=1e-3, source_gain_Nm_V=0.5),
+        gears=(model.Gear(name="g", ratio=10.0),),
+        load=model.Load(inertia_kgm2=0.1, path="back-drivable", moment_slope_Nm_rad=slope_Nm_rad),
         axis="rotary",
-        controller=Controller(
+        controller=model.Controller(
             period_s=2e-4,
             computing_delay_s=0.0,
-            position=PositionLoop(gain=30.0),
-            velocity=VelocityLoop(gain=1.6, integral_time_s=None),
+            position=model.PositionLoop(gain=30.0),
+            velocity=model.VelocityLoop(gain=1.6, integral_time_s=None),
         ),
-        limits=Limits(voltage_V=volts),
-        command=Command(rate_rad_s=0.2),
-        friction=Friction(),
-        validation=Validation(full_deflection_rad=full_rad),
+        limits=model.Limits(voltage_V=volts),
+        command=model.Command(rate_rad_s=0.2),
+        friction=model.Friction(),
+        validation=model.Validation(full_deflection_rad=full_rad),
     )
 
 
@@ -99,7 +87,7 @@ def test_largest_deflection_that_an_unstable_load_lets_come_back(slope: float) -
 
 def test_a_load_that_pushes_back_holds_the_drive_and_nothing_diverges() -> None:
     """A spring: P controllers end at r K/(K + c), no divergence; the limit holds beyond tau_max/c."""
-    damped = Friction(viscous_Nms_rad=0.02)
+    damped = model.Friction(viscous_Nms_rad=0.02)
     settled, _ = look(replace(unstable(-40.0, full_rad=1.2), friction=damped))
     assert not settled.diverges
     found, _ = look(replace(unstable(-40.0), friction=damped))

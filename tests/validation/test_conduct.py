@@ -1,6 +1,5 @@
 """What a simulation ended in: said in words where it is not rest on the command."""
 
-import json
 import re
 from dataclasses import replace
 from math import radians
@@ -14,7 +13,6 @@ from analyses.motion import Asked, Motion
 from analyses.motion.conduct import conduct
 from nonlinear import commands, simulate
 from nonlinear.settling.rest import PERIODS
-from reports.cli.main import main
 from reports.sections.simulate import section
 
 AMBER = load_design("ilr33-amber")
@@ -53,14 +51,12 @@ def test_noise_is_no_limit_cycle() -> None:
     assert conduct(simulate(noisy, commands.step(0.02), 0.3)).status == "comes to rest"
 
 
-def test_the_command_line_says_it(capsys) -> None:
+def test_the_command_line_says_it(cli) -> None:
     """In the figures that passages through the middle of a long run give."""
     arguments = ["simulate", "--amplitude", "3", "--duration", "0.5", "--quiet"]
     arguments += ["--set", "control.position.gain=4000 1/s"]
-    assert main(arguments) == 0
-    assert "status limit cycle (" in capsys.readouterr().out
-    assert main([*arguments, "--json"]) == 0
-    facts = json.loads(capsys.readouterr().out)
+    assert "status limit cycle (" in cli.text(*arguments)
+    facts = cli.data(*arguments)
     assert facts["status"] == "limit cycle"
     found = re.fullmatch(
         r"±(\S+) deg at (\S+) Hz \((\d+) periods seen, (.*) limit acting\)", facts["status_detail"]

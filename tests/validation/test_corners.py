@@ -1,6 +1,5 @@
 """Corners: each is the design that its words say, and the worst ends are the worst corner of the box."""
 
-import json
 from dataclasses import replace
 from itertools import product
 
@@ -14,7 +13,6 @@ from actuator_lti.errors import InputError
 from analyses.corners import Asked, corners
 from analyses.corners.run import worst_ends
 from analyses.specification.sensitivity import population_figures
-from reports.cli.main import main
 from reports.sections.corners import chart, section
 
 
@@ -67,9 +65,8 @@ def test_torque_and_back_emf_constant_go_together() -> None:
     assert chosen["motor.back_emf_constant"] == pytest.approx(0.126, rel=1e-12)
 
 
-def test_command_and_section(capsys) -> None:
-    assert main(["corners", "fin", "--json"]) == 1
-    told = {one["name"]: one for one in json.loads(capsys.readouterr().out)["corners"]}
+def test_command_and_section(cli) -> None:
+    told = {one["name"]: one for one in cli.data("corners", "fin", status=1)["corners"]}
     assert told["nominal"]["passed"]
     assert not told["cold"]["passed"]
     made = section(corners(load_design("emps")))
@@ -82,8 +79,7 @@ def test_command_and_section(capsys) -> None:
     assert limits == [[6.0], [45.0]]
     seen = [item.words for panel in (left, right) for item in panel.items if item.kind == "note"]
     assert seen == ["not stable"] * 2 * sum(not one.sound for c in fin.corners for one in c.figures.values())
-    assert main(["corners", "fin", "--hot", "-60"]) == 2
-    assert "allowed: cold below hot" in capsys.readouterr().err
+    assert "allowed: cold below hot" in cli.refused("corners", "fin", "--hot", "-60")
 
 
 def test_a_source_has_no_temperature() -> None:

@@ -1,7 +1,5 @@
 """What counts do: describing function by quadrature, cycles by loop poles and by simulation from rest."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise

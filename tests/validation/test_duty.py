@@ -1,8 +1,5 @@
 """Duty cycle: closed forms of current and temperature, and the overload state of the running drive."""
 
-from __future__ import annotations
-
-import json
 from dataclasses import replace
 from math import exp, inf, pi, sin
 
@@ -15,7 +12,6 @@ from actuator_lti.errors import InputError
 from analyses.duty import Asked, duty
 from analyses.duty.run import heating
 from nonlinear import Drive
-from reports.cli.main import main
 from reports.drawing import draw_svg
 from reports.sections.duty import section
 
@@ -113,17 +109,14 @@ def test_without_heat_of_its_own_the_rise_is_an_exponential() -> None:
     assert result.temperature_degC[k] == pytest.approx(25.0 + 50.0 * (1.0 - exp(-result.time_s[k] / 60.0)))
 
 
-def test_section_figure_and_command(capsys: pytest.CaptureFixture[str]) -> None:
+def test_section_figure_and_command(cli) -> None:
     made = section(duty(with_overrides(load_design("fin"), HOT)))
     (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
     assert "Winding" in draw_svg(figure, page=False)
-    assert main(["duty", "joint", "--amplitude", "10 deg", "--load", "20", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = cli.data("duty", "joint", "--amplitude", "10 deg", "--load", "20")
     assert told["rms_A"] < told["continuous_A"] == 6.0
-    assert main(["duty", "joint", "--share", "0"]) == 2
-    assert "--share 0: allowed: above 0, at most 1" in capsys.readouterr().err
-    assert main(["duty", "joint", "--frequency", "1e-320"]) == 2
-    assert "Hz: at least" in capsys.readouterr().err
+    assert "--share 0: allowed: above 0, at most 1" in cli.refused("duty", "joint", "--share", "0")
+    assert "Hz: at least" in cli.refused("duty", "joint", "--frequency", "1e-320")
     with pytest.raises(InputError, match="no current"):
         duty(load_design("emps"))
     speed = load_design("joint")

@@ -1,6 +1,5 @@
 """Failure cases against closed forms; nothing failed, the rig is the drive."""
 
-import json
 from dataclasses import replace
 from math import pi, sqrt
 
@@ -125,18 +124,16 @@ def test_an_oscillating_command_is_followed_as_the_linear_drive_does() -> None:
     assert tail.max() == pytest.approx(0.001 * T, rel=0.01)
 
 
-def test_section_figure_and_command(capsys) -> None:
+def test_section_figure_and_command(cli) -> None:
     result = failures(load_design("emps"), Asked.of(load_design("emps"), watched_s=0.5))
     made = section(result)
     (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
     assert "Lost sensor" in draw_svg(figure, page=False)
     assert "until it is detected" in made["result"]
-    assert main(["failures", "fin", "--stop", "25 deg", "--load", "4", "--duration", "0.2", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+    told = cli.data("failures", "fin", "--stop", "25 deg", "--load", "4", "--duration", "0.2")
     assert told["asked"]["stop_rad"] == pytest.approx(25 * pi / 180)
     assert {case["name"] for case in told["cases"]} >= {"jam", "hard-over", "open-phase", "lost-sensor"}
-    assert main(["failures", "fin", "--deflection", "30 mm"]) == 2
-    assert "--deflection '30 mm'" in capsys.readouterr().err
+    assert "--deflection '30 mm'" in cli.refused("failures", "fin", "--deflection", "30 mm")
 
 
 def test_a_drive_without_a_position_loop_has_fewer_cases() -> None:

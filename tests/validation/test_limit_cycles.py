@@ -1,6 +1,5 @@
 """Limit cycles of play and quantisation: describing functions by quadrature, cycles by simulation."""
 
-import json
 from dataclasses import replace
 from math import asin, pi
 
@@ -17,7 +16,6 @@ from analyses.limit_cycles import limit_cycles
 from analyses.limit_cycles.describing import cycles_of_play, cycles_of_quantisation, without_nonlinearities
 from analyses.limit_cycles.run import confirm
 from nonlinear import commands, simulate
-from reports.cli.main import main
 from reports.sections.cycles import section
 
 
@@ -80,10 +78,9 @@ def test_a_count_makes_a_cycle_at_the_gain_border_of_the_loop() -> None:
     assert seen == pytest.approx(cycle.output_rad, rel=0.15)
 
 
-def test_a_drive_with_too_much_gain_hunts_and_says_so(capsys) -> None:
+def test_a_drive_with_too_much_gain_hunts_and_says_so(cli) -> None:
     changes = ["--set", "control.position.gain=300 1/s"]
-    assert main(["cycles", "fin", *changes, "--json"]) == 1
-    told = json.loads(capsys.readouterr().out)
+    told = cli.data("cycles", "fin", *changes, status=1)
     assert any(one["hunting"] for one in told["rests"])
     border = next(one for one in told["confirmations"] if one["cycle"]["with_friction"])
     assert not border["cycle"]["stable"]

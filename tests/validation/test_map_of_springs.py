@@ -1,7 +1,5 @@
 """The map compares the output with the output's own linear response, springs and limited jerk included."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

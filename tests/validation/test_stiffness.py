@@ -1,6 +1,5 @@
 """Stiffness at the output: published digits, closed forms, and the same seen by the simulator."""
 
-import json
 import re
 from dataclasses import replace
 
@@ -17,7 +16,6 @@ from analyses.stiffness import (
     stiffness_at_rest,
     stiffness_curves,
 )
-from reports.cli.main import main
 from reports.drawing import draw_svg
 from reports.sections.stiffness import section
 from tests.loops.two_mass import drive_d, drive_e
@@ -116,30 +114,26 @@ def test_at_rest_dry_friction_holds_a_small_moment() -> None:
     assert result.seen_Nm_rad == complex(np.inf)
 
 
-def test_command_section_and_figure(capsys) -> None:
-    assert main(["stiffness", "fin", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
+def test_command_section_and_figure(cli) -> None:
+    told = cli.data("stiffness", "fin")
     assert told["passed"] is True
     assert [curve["state"] for curve in told["curves"]] == ["powered", "shorted", "open"]
     assert told["lost_motion"]["play_rad"] == 1.5e-3
-    assert main(["stiffness"]) == 0
-    assert "infinite" in capsys.readouterr().out
+    assert "infinite" in cli.text("stiffness")
     part = section(stiffness(load_design("fin")))
     figure = next(block for block in part["blocks"] if block["kind"] == "figure")
     assert "<svg" in draw_svg(figure, page=False)
     assert section(stiffness(load_design("ilr33-amber"), simulated=False))["result"].startswith("A moment")
 
 
-def test_without_a_position_loop_nothing_is_proven_and_that_is_no_pass(tmp_path, capsys) -> None:
+def test_without_a_position_loop_nothing_is_proven_and_that_is_no_pass(tmp_path, cli) -> None:
     fin = load_design("fin")
     bare = replace(fin, controller=replace(fin.controller, position=None), requirements=())
     (tmp_path / "speed.toml").write_text(write_design(bare), encoding="utf-8")
-    assert main(["stiffness", str(tmp_path / "speed.toml")]) == 1
-    first = capsys.readouterr().out.splitlines()[0]
+    first = cli.text("stiffness", tmp_path / "speed.toml", status=1).splitlines()[0]
     assert first.startswith("NOT PROVEN  ")
     assert first.endswith("nothing is compared: no position loop holds the output.")
-    assert main(["stiffness", "fin"]) == 0
-    first = capsys.readouterr().out.splitlines()[0]
+    first = cli.text("stiffness", "fin").splitlines()[0]
     assert re.search(r"small moments at 3 frequencies agree to \S+, allowed 1e-06, the lost motion to", first)
 
 

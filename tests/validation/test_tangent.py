@@ -1,7 +1,5 @@
 """The simulator's derivative against the linear writing, which shares no code with it, and closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a validation says: an unstable loop, a drive that hunts, rows that are not met, and their words."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 from math import degrees, exp, log
 
