@@ -54,19 +54,23 @@ def without_common_rest_mode(
 
 
 def _own(systems: Sequence[System], at: float, alone: bool) -> tuple[int, np.ndarray] | None:
-    """An integrator and the mode at rest that it is the largest part of; ``None`` where there is none.
+    """A mode at rest over the integrator that is the largest part of it; ``None`` where there is none.
 
-    One that takes part by 1e-10 only would leave the difference of large numbers.
+    Any integrator may have found it, but by one that takes part by 1e-10 only it would leave the difference
+    of large numbers.
     """
     As, Cs = (np.stack([each[k] for each in systems]) for k in (0, 2))
     if As.shape[1] < 2 or not (np.isfinite(As).all() and np.isfinite(Cs).all()):
         return None
     integrators = np.flatnonzero((np.diagonal(As, axis1=1, axis2=2) == at).all(axis=0))
-    modes = [(int(j), v) for j in integrators if (v := _at_rest(As, Cs, at, int(j), alone)) is not None]
-    if len(modes) < 2:
-        return modes[0] if modes else None
-    scale = balanced(As[0])[1]
-    return min(modes, key=lambda mode: np.max(np.abs(mode[1]) / scale) * scale[mode[0]])
+    found = [v for j in integrators if (v := _at_rest(As, Cs, at, int(j), alone)) is not None]
+    if not found:
+        return None
+    parts = np.abs(found) / balanced(As[0])[1]
+    shares = parts[:, integrators] / parts.max(axis=1, keepdims=True)
+    k, largest = np.unravel_index(np.argmax(shares), shares.shape)
+    j = int(integrators[largest])
+    return j, found[k] / found[k][j]
 
 
 def _at_rest(As: np.ndarray, Cs: np.ndarray, at: float, j: int, alone: bool) -> np.ndarray | None:

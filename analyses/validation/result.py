@@ -24,6 +24,12 @@ if TYPE_CHECKING:
     from analyses.large_signal import LargeSignals
     from analyses.specification import Specification
 
+REST = {
+    Verdict.MET: "",
+    Verdict.NOT_MET: "the drive does not come to rest ",
+    Verdict.NOT_PROVEN: "the drive is not known to come to rest ",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Validation:
@@ -102,13 +108,7 @@ class Validation:
     @property
     def rest_words(self) -> str:
         """What is said of a drive that does not come to rest; empty where it does."""
-        if self.hunting is None:
-            return ""
-        ends, known = ending_of(self.design, self.hunting), self.rest
-        if known is Verdict.MET:
-            return ends
-        says = "does not come" if known is Verdict.NOT_MET else "is not known to come"
-        return f"the drive {says} to rest {ends}"
+        return "" if self.hunting is None else REST[self.rest] + ending_of(self.design, self.hunting)
 
     @property
     def failures(self) -> tuple[str, ...]:

@@ -85,7 +85,7 @@ def even(step: Floats, other: Floats, scale: Floats, coarse: Floats) -> bool:
     return bool((same | (small(step, scale) & small(other, scale))).all())
 
 
-def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Floats) -> int:
+def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Floats, coarse: Floats) -> int:
     """Set a drive forward by windows of one change each, as many as have no event.
 
     Parameters
@@ -93,6 +93,8 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
     step, before : ndarray
         Change of the state at ``places`` in the last window, and in the one before it; next to nothing that
         differs between them is rounding, which does not add up.
+    scale, coarse : ndarray
+        Largest values at ``places``, and their `grain`.
 
     Returns
     -------
@@ -102,7 +104,7 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
     angles = (places == at.S_ANGLE) | (places == at.S_OUTPUT)
     if (angles & ~small(step, scale)).any():
         return 0
-    stay, start, coarse = drive.s.copy(), drive.s[places], grain(drive.p, drive.s.size)[places]
+    stay, start = drive.s.copy(), drive.s[places]
     step = np.where(small(step, scale) & (np.abs(step - before) > EVEN * np.abs(step)), 0.0, step)
 
     def holds(windows: int) -> bool:

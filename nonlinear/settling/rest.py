@@ -239,17 +239,15 @@ class _Watch:
             states.append(drive.s[places])
         if any(piece.flags.size < DRIFT for piece in pieces):
             return False  # cut short, as the work is done
-        scale = self.scales.states[places]
+        scale, coarse = self.scales.states[places], self.coarse[places]
         before, step = change(states[1], states[0]), change(states[2], states[1])
         kept = (places == at.S_OVERLOAD) & stays_overloaded(drive)
         nothing = bool((kept | (small(before, scale) & small(step, scale))).all())
         if all(self._still(piece) for piece in pieces) and (nothing or self._turning):
             return True
-        if not all(eventless(piece) for piece in pieces) or not even(
-            step, before, scale, self.coarse[places]
-        ):
+        if not all(eventless(piece) for piece in pieces) or not even(step, before, scale, coarse):
             return False
-        windows = leap(drive, places, step, before, scale)
+        windows = leap(drive, places, step, before, scale, coarse)
         self.periods += windows * DRIFT
         if windows:
             followed, motor = (float(values[-1]) for values in self.seen[-1][1:])

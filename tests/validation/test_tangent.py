@@ -118,7 +118,7 @@ def test_python_control_draws_it() -> None:
 
 FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035, 740_026,
                741_646, 90_006, 770_155, 910_883, 1_010_043,
-               1_010_057, 1_101_223, 1_101_436, 1_102_029, 1_102_211]  # fmt: skip
+               1_010_057, 1_101_223, 1_101_436, 1_102_029, 1_102_211, 1_301_202]  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", FAILED_ONCE)
@@ -127,6 +127,7 @@ def test_drives_that_failed_once(seed: int) -> None:
 
     A slow pair was taken for the rest that an integral holds; a response of 1e-10 was left to rounding.
     A slow pole was taken for the one that passes 1 beside it; a quotient of roundings led away from a margin.
+    A mode at rest was taken out over an integrator that hardly takes part in it.
     """
     result = validate(full_drive(seed), CHECKS)
     assert result.passed, [str(row) for row in result.not_met]
