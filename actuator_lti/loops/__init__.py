@@ -14,6 +14,14 @@ from actuator_lti.loops.periodic import (
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
 __all__ = [
-    "ExactMargins", "Form", "InnerLoops", "Loop", "Loops", "PeriodicLoop", "assemble_loops", "exact_margins",
-    "periodic_loop", "periodic_loop_of",
-]  # fmt: skip
+    "ExactMargins",
+    "Form",
+    "InnerLoops",
+    "Loop",
+    "Loops",
+    "PeriodicLoop",
+    "assemble_loops",
+    "exact_margins",
+    "periodic_loop",
+    "periodic_loop_of",
+]

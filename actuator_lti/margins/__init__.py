@@ -11,6 +11,12 @@ from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement, DelayMargin, DiskMargin, GainMargin, PhaseMargin
 
 __all__ = [
-    "Agreement", "DelayMargin", "DiskMargin", "GainMargin", "MeasuredResponse", "PhaseMargin",
-    "StabilityMargins", "stability_margins",
-]  # fmt: skip
+    "Agreement",
+    "DelayMargin",
+    "DiskMargin",
+    "GainMargin",
+    "MeasuredResponse",
+    "PhaseMargin",
+    "StabilityMargins",
+    "stability_margins",
+]

@@ -5,6 +5,14 @@ from analyses.stiffness.result import AtRest, Check, LostMotion, Stiffness, Stif
 from analyses.stiffness.run import stiffness, stiffness_curves
 
 __all__ = [
-    "AtRest", "Check", "LostMotion", "Stiffness", "StiffnessCurve", "check_stiffness", "lost_motion_seen",
-    "stiffness", "stiffness_at_rest", "stiffness_curves",
-]  # fmt: skip
+    "AtRest",
+    "Check",
+    "LostMotion",
+    "Stiffness",
+    "StiffnessCurve",
+    "check_stiffness",
+    "lost_motion_seen",
+    "stiffness",
+    "stiffness_at_rest",
+    "stiffness_curves",
+]
