@@ -94,6 +94,11 @@ class LoopFigures:
         return as_control(self.plain_response)
 
     @property
+    def of_feedback(self) -> bool:
+        """Whether bandwidth and step are those of the feedback loop alone, without what the command adds."""
+        return self.plain_response is self.loop.plain_closed
+
+    @property
     def stable(self) -> bool:
         """Whether the closed loop is known to be stable."""
         return self.margins.stable is True
