@@ -15,7 +15,7 @@ from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.numbers import capital
 from reports.sections import beyond, friction_effects, in_time, large_signal, specification
-from reports.sections.names import LOOPS, POINTS, QUANTITIES, unit_words
+from reports.sections.names import LOOPS, POINTS, QUANTITIES, loop_words, unit_words
 from reports.terminal import Brief
 
 MORE = {
@@ -102,7 +102,7 @@ def result(validation: Validation) -> str:
 def findings(validation: Validation) -> list[doc.Finding]:
     """Name what has to be watched, the gravest first."""
     made = [
-        doc.Finding(severity="fail", text=f"{loop_name(name)}: not stable.", where="validation")
+        doc.Finding(severity="fail", text=f"{loop_words(name)}: not stable.", where="validation")
         for name in validation.unstable
     ]
     for row in validation.rows:
