@@ -78,7 +78,7 @@ CROSSING_COLUMNS = [
     doc.column("unit", "Unit"),
     doc.column("rad_s", "at", "rad/s", format="sig:5"),
     doc.column("hz", "at", "Hz", format="sig:4"),
-    figure_column("delay_margin", "delay_ms", format="sig:4"),
+    figure_column("delay_margin", "delay_ms", format="ms:4"),
     doc.column("samples", "", "samples", format="sig:4"),
     doc.column("note", "Remark"),
 ]
