@@ -80,7 +80,7 @@ def loop_json(figures: LoopFigures) -> Tree:
         "period_s": m.period_s,
         "band_rad_s": list(m.band_rad_s),
         "notes": [*m.notes, *figures.notes],
-        **({"rotor": "free"} if figures.locked is not None else {}),
+        **({"rotor": figures.loop.rotor} if figures.loop.name == "current" else {}),
         **{
             key: more | loop_json(other)
             for key, more, other in (

@@ -76,7 +76,7 @@ class LoopFigures:
     @property
     def rotor(self) -> str:
         """How the rotor stands, of a current loop as it is judged: ``"free"`` or ``"locked"``; else empty."""
-        return "" if self.loop.name != "current" else "free" if self.held is None else "locked"
+        return self.judged.loop.rotor if self.loop.name == "current" else ""
 
     @property
     def judged(self) -> LoopFigures:

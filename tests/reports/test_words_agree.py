@@ -76,6 +76,16 @@ def test_a_bandwidth_says_by_its_name_of_which_response_it_is() -> None:
     }
 
 
+def test_a_current_loop_says_how_its_rotor_stands() -> None:
+    """With a locked rotor no friction and no load acts: one loop, on the bench and in margins."""
+    design = load_design("ilr33-amber")
+    free = as_json(margins(design))["loops"]["current"]
+    tested = as_json(Bench(design, design).figures)["current"]
+    assert (free["rotor"], free["rotor_locked"]["rotor"], tested["rotor"]) == ("free", "locked", "locked")
+    assert tested["phase_margin_deg"] == pytest.approx(free["rotor_locked"]["phase_margin_deg"], abs=1e-9)
+    assert free["phase_margin_deg"] != pytest.approx(tested["phase_margin_deg"], abs=1e-3)
+
+
 def test_the_first_screen_counts_what_is_not_met() -> None:
     items = [
         doc.verdict(str(k), "check", value=None, limit=None, unit="", passed=passed)
