@@ -67,23 +67,20 @@ def _fields(of: Any, *names: str) -> Tree:
 
 def loop_json(figures: LoopFigures) -> Tree:
     """Give everything known of one loop; a figure that does not exist is null."""
-    m, band, peaks, step = figures.margins, figures.bandwidth, figures.peaks, figures.step
+    m, peaks = figures.margins, figures.peaks
     return {
         **_fields(m, *_OF_MARGINS),
         "disk_margin": m.disk_margin.alpha if m.disk_margin else None,
         "gain_margins": [_fields(one, "ratio", "db", "frequency_rad_s") for one in m.gain_margins],
         "phase_margins": [_fields(one, "deg", "frequency_rad_s") for one in m.phase_margins],
         "delay_margins": [_fields(one, "seconds", "samples", "frequency_rad_s") for one in m.delay_margins],
-        "bandwidth_hz": band.minus3db_hz if band else None,
-        "bandwidth_90deg_hz": band.minus90deg_hz if band else None,
-        "resonance_peak_db": band.resonance_peak_db if band else None,
+        **_response_json(figures),
         "sensitivity_peak_db": m.sensitivity_peak_db,
         "complementary_peak_db": peaks.complementary_db if peaks else None,
-        **{name: getattr(step, name, None) for name in _OF_STEP},
         "period_s": m.period_s,
         "band_rad_s": list(m.band_rad_s),
         "notes": [*m.notes, *figures.notes],
-        **({"rotor": "free"} if figures.locked is not None else {}),
+        **({"rotor": figures.loop.rotor} if figures.loop.name == "current" else {}),
         **{
             key: more | loop_json(other)
             for key, more, other in (
@@ -94,3 +91,16 @@ def loop_json(figures: LoopFigures) -> Tree:
             if other is not None
         },
     }
+
+
+def _response_json(figures: LoopFigures) -> Tree:
+    """Bandwidths and step; those of a position loop are to the command, else ``feedback_`` says so."""
+    band, step = figures.bandwidth, figures.step
+    found = {
+        "bandwidth_hz": band.minus3db_hz if band else None,
+        "bandwidth_90deg_hz": band.minus90deg_hz if band else None,
+        "resonance_peak_db": band.resonance_peak_db if band else None,
+        **{name: getattr(step, name, None) for name in _OF_STEP},
+    }
+    alone = figures.loop.name == "position" and figures.of_feedback
+    return {f"feedback_{name}": value for name, value in found.items()} if alone else found

@@ -8,6 +8,7 @@ from importlib.util import find_spec
 
 from actuator_lti.design.model import Design
 from reports.charts.paint import COLOURS
+from reports.numbers import seconds
 from reports.visible import escape
 
 WIDTH, HEIGHT = 640, 300
@@ -58,7 +59,7 @@ def controller_boxes(design: Design) -> list[Box]:
         boxes.append(("position", f"{c.position.gain:.4g} 1/s"))
     if c.velocity is not None:
         integral = c.velocity.integral_time_s
-        boxes.append(("velocity", "P" if integral is None else f"PI {1e3 * integral:.4g} ms"))
+        boxes.append(("velocity", "P" if integral is None else f"PI {seconds(integral)}"))
     if c.current is not None:
         boxes.append(("current", _limit(design.limits.peak_current_A, "A")))
     boxes.append(("voltage", _limit(design.limits.voltage_V, "V")))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 MISSING = "–"
+LONG_S = 10.0  # a time from which on a column of ms is not read any more
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -25,7 +27,7 @@ def show(value: Any, format: str = "text") -> str:
         return value
     kind, _, digits = format.partition(":")
     if kind == "ms":  # a time in ms; a long one says its own unit
-        return seconds(value / 1e3) if abs(value) >= 1e4 else significant(value, int(digits))
+        return seconds(value / 1e3) if abs(value) >= 1e3 * LONG_S else significant(value, int(digits))
     if kind == "int":
         return to_minus(f"{value:.0f}")
     if kind == "fix":
@@ -80,6 +82,18 @@ def time_unit(span_s: float) -> tuple[float, str]:
     if span_s >= 1.0:
         return 1.0, "s"
     return (1e3, "ms") if span_s >= 1e-3 else (1e6, "µs")
+
+
+def row_time_unit(values_s: Iterable[float | None]) -> tuple[float, str]:
+    """Choose the unit of a row of times, with the factor from seconds: ms, or s where one of them is long.
+
+    Examples
+    --------
+    >>> row_time_unit([0.023, None]), row_time_unit([0.023, 23.0])
+    ((1000.0, 'ms'), (1.0, 's'))
+    """
+    known = [abs(value) for value in values_s if value is not None and math.isfinite(value)]
+    return (1.0, "s") if max(known, default=0.0) >= LONG_S else (1e3, "ms")
 
 
 def plain_decade(value: float) -> str:

@@ -199,7 +199,7 @@ class VelocityLoop:
     integral_time_s: Annotated[float | None, positive("integral_time", "s", "Tn_w",
         "integral time of the velocity PI; without it a P controller", example="15 ms")] = None
     every: Annotated[int, integer("every", 1000, "n_v", "the velocity loop runs every so many ticks")] = 1
-    sensor: Annotated[Sensor, choice("sensor", "where the speed is measured", choices=("motor",))] = "motor"
+    sensor: Annotated[Sensor, choice("sensor", "where the speed is measured")] = "motor"
     anti_windup: Annotated[AntiWindup, choice(
         "anti_windup", "what the integral does while the output is at its limit")] = "conditional"
     tracking_time_s: Annotated[float | None, positive("tracking_time", "s", "Tt",

@@ -78,7 +78,8 @@ def design_text(name_or_path: str | PathLike[str]) -> str:
     if name in shipped_designs():
         return shipped_path(name).read_text(encoding="utf-8")
     path = Path(name)
-    if not path.suffix and "/" not in name and "\\" not in name and not _exists(path):
+    named = not path.suffix and "/" not in name and "\\" not in name
+    if named and not (name and _exists(path)):
         hint = nearest(name, shipped_designs())
         names = ", ".join(shipped_designs())
         raise InputError(f"{shown(name)}: no such design{hint}; allowed: {names}, or a design file")

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.drive.operating import slope_at
+
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from actuator_lti.drive.operating import Operating
@@ -50,8 +52,11 @@ def moment_slope(design: Design, at: Operating) -> Any:
 
 
 def pushes_away(design: Design, at: Operating) -> Any:
-    """Whether a torque grows with the deflection that it makes; a bool, or an array of stacked designs."""
-    return (moment_slope(design, at) > 0) | (torque_slope(design, at) > 0)
+    """Whether a torque grows with the deflection that it makes, or friction falls with the speed.
+
+    A bool, or an array of stacked designs.
+    """
+    return (moment_slope(design, at) > 0) | (torque_slope(design, at) > 0) | (slope_at(design, at) < 0)
 
 
 def level(design: Design) -> Design:

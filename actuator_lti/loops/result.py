@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from actuator_lti.design.model import Design
-    from actuator_lti.drive.operating import Operating
+    from actuator_lti.drive.operating import Operating, RotorState
     from actuator_lti.drive.wiring import Drive
     from actuator_lti.loops.limiters import LimiterPath
     from actuator_lti.loops.simulation import TickSystem
@@ -47,6 +47,8 @@ class Loop:
     periodic : bool
         True where faster ticks inside slower loops make the loop periodically time-varying: then S and T are
         the fundamental responses of the exact loop and L = T/S, see `actuator_lti.loops.periodic`.
+    rotor : {"free", "locked"}
+        How the rotor stands: with a locked one there is a current loop alone.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Loop:
     unit_in: str
     unit_out: str
     periodic: bool = False
+    rotor: RotorState = "free"
 
     @cached_property
     def open_loop(self) -> Any:
@@ -125,6 +128,7 @@ def loop_of(
         unit_in=unit,
         unit_out=unit,
         periodic=periodic,
+        rotor=wired.operating.rotor,
     )
 
 

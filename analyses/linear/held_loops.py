@@ -1,9 +1,10 @@
-"""Inner loops that a load drives away while the outer loops are open, though the drive as a whole is stable.
+"""Inner loops that are driven away while the outer loops are open, though the drive as a whole is stable.
 
 A load whose moment grows with its own deflection (a pendulum upright, a fin ahead of its centre of pressure)
-moves away by itself. A current loop alone, or a P velocity loop alone, does not stop that; the loops around
-them do. Such a loop is unstable in itself and no fault of the drive: it is judged with the rotor locked
-(current loop), or with the load's moment held (velocity loop).
+moves away by itself, and so does a rotor whose friction falls with the speed. A current loop alone, or a P
+velocity loop alone, does not stop that; the loops around them do. Such a loop is unstable in itself and no
+fault of the drive: it is judged with the rotor locked (current loop), or with the load's moment held
+(velocity loop).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
 OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}
 """How it stands then."""
+AWAY = "the load or falling friction drives it away"
 
 
 def held_loop(loops: Loops, name: str) -> Loop | None:
@@ -47,7 +49,7 @@ def by_itself(name: str) -> str:
 
     Examples
     --------
-    >>> by_itself("current")
-    'with the rotor locked; by itself, outer loops open and rotor free, the load drives it away'
+    >>> by_itself("velocity")
+    'with the load moment held; by itself, outer loops open, the load or falling friction drives it away'
     """
-    return f"with the {HELD[name]}; by itself, {OPEN[name]}, the load drives it away"
+    return f"with the {HELD[name]}; by itself, {OPEN[name]}, {AWAY}"

@@ -76,7 +76,7 @@ class LoopFigures:
     @property
     def rotor(self) -> str:
         """How the rotor stands, of a current loop as it is judged: ``"free"`` or ``"locked"``; else empty."""
-        return "" if self.loop.name != "current" else "free" if self.held is None else "locked"
+        return self.judged.loop.rotor if self.loop.name == "current" else ""
 
     @property
     def judged(self) -> LoopFigures:
@@ -92,6 +92,11 @@ class LoopFigures:
     def response(self) -> Any:
         """What bandwidth and step are taken of, as a python-control system."""
         return as_control(self.plain_response)
+
+    @property
+    def of_feedback(self) -> bool:
+        """Whether bandwidth and step are those of the feedback loop alone, without what the command adds."""
+        return self.plain_response is self.loop.plain_closed
 
     @property
     def stable(self) -> bool:

@@ -37,6 +37,7 @@ class Validation:
 
     ``rows``: every check: small signals by the tangent, the runs in time, the numbers of the design.
     ``figures``: the linear loops, as they are tested (of the current with the rotor locked).
+    ``loops``: the same as `analyses.margins` judges them: sliding, of the current with the rotor free.
     ``margins``: runs on either side of the quoted gain margin of each loop.
     ``amplitude_margins``, ``conditional``, ``rest_sweep``, ``counts``, ``large_signals``, ``friction``,
     ``specification``: findings: what large signals, friction and counts do.
@@ -49,6 +50,7 @@ class Validation:
     design: Design
     rows: tuple[Row, ...]
     figures: Mapping[str, LoopFigures]
+    loops: Mapping[str, LoopFigures] = field(default_factory=dict)
     steps: Mapping[str, StepShown] = field(default_factory=dict)
     margins: Mapping[str, MarginShown] = field(default_factory=dict)
     sweeps: Mapping[str, BenchSweep] = field(default_factory=dict)
@@ -80,17 +82,23 @@ class Validation:
 
     @property
     def unstable(self) -> tuple[str, ...]:
-        """Loops that are not stable."""
-        return tuple(
-            name
-            for name, own in self.figures.items()
-            if own.margins.stable is False and name not in self.held_by_friction
-        )
+        """Loops that are not stable: as `analyses.margins` judges them, or where they are tested."""
+        judged = [name for name, own in self.loops.items() if own.sound is False]
+        tested = [name for name, own in self.figures.items() if own.margins.stable is False]
+        spared = {*self.held_by_friction, *self.held}
+        return tuple(dict.fromkeys([*judged, *(name for name in tested if name not in spared)]))
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Loops that are unstable only by themselves, in a drive that is stable."""
+        return tuple(name for name, own in self.loops.items() if own.held is not None)
 
     @property
     def undecided(self) -> tuple[str, ...]:
         """Loops of which the data do not tell whether they are stable."""
-        return tuple(name for name, own in self.figures.items() if own.margins.stable is None)
+        doubts = [name for name, own in self.figures.items() if own.margins.stable is None]
+        doubts += [name for name, own in self.loops.items() if own.sound is None]
+        return tuple(dict.fromkeys(doubts))
 
     @property
     def hunting(self) -> Settling | None:
@@ -113,7 +121,8 @@ class Validation:
     @property
     def failures(self) -> tuple[str, ...]:
         """What the drive does that it must not, beside rows that are not met; a sentence each."""
-        found = [f"the {name} loop is {self.figures[name].margins.verdict}" for name in self.unstable]
+        free = {"current": ", rotor free"}
+        found = [f"the {name} loop is unstable{free.get(name, '')}" for name in self.unstable]
         if self.rest is Verdict.NOT_MET:
             found.append(self.rest_words)
         if self.conditional is not None and self.conditional.diverges:

@@ -325,7 +325,7 @@ def _loop_margins(place: Place, figures: LoopFigures) -> Iterator[Row]:
 def _figures(place: Place, figures: LoopFigures) -> Iterator[Row]:
     """Bandwidths, resonance and peaks: each where it is predicted."""
     band, peaks, t = figures.bandwidth, figures.peaks, place.tangent
-    if band is not None and figures.plain_response is figures.loop.plain_closed:
+    if band is not None and figures.of_feedback:
         level = abs(band.dc_gain) / np.sqrt(2.0)
         yield from _fall(place, "bandwidth", band.minus3db_rad_s, lambda T: np.log(np.abs(T) / level))
         yield from _fall(

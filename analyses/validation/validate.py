@@ -23,7 +23,7 @@ from analyses.large_signal.by_amplitude import margins_by_amplitude
 from analyses.large_signal.conditional import Conditional, conditional_stability
 from analyses.large_signal.settling_ticks import settling_ticks_of
 from analyses.limit_cycles.counts import Counts, counts_of
-from analyses.linear.loop_figures import LoopFigures, loop_figures
+from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 from analyses.motion.settling import Settling, settlings_of
 from analyses.validation.bench_sweep import bench_sweep
 from analyses.validation.design_values import design_value_rows
@@ -102,7 +102,9 @@ class _Work:
         self.total = len(self.bench.names) + 9
         rows, places = self._small_signals()
         stable = [name for name, own in self.bench.figures.items() if own.stable]
-        whole = len(stable) == len(self.bench.figures) and self.design.controller.position is not None
+        loops = all_loop_figures(assemble_loops(self.bench.model), step=False, refused=self.notes)
+        held = {name for name, own in loops.items() if own.held is not None}
+        whole = {*stable, *held} >= {*self.bench.figures} and self.design.controller.position is not None
         if self.design.controller.position is None:
             self.notes.append(NO_POSITION)
         steps = {name: self._shown("step", step_shown, name) for name in stable}
@@ -119,6 +121,7 @@ class _Work:
             design=self.design,
             rows=tuple(rows),
             figures=self.bench.figures,
+            loops=loops,
             steps={name: shown for name, shown in steps.items() if shown is not None},
             margins={name: shown for name, shown in margins.items() if shown is not None},
             sweeps={

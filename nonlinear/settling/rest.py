@@ -3,7 +3,8 @@
 With constant inputs a run is one map applied again and again, once a period of the outermost stage.  So the
 question is asked of the whole state, and the drive is followed until it is answered:
 
-- *at rest*: over `DRIFT` periods nothing changes by more than `STILL` of the largest value that it had;
+- *at rest*: over `DRIFT` periods nothing changes by more than `STILL` of the largest value that it had; or
+  swings that do not grow move it by no more than that of the largest angle;
 - held by friction while an integral grows is not rest.  Then every period adds the same to the state; the
   state is set forward to just before breakaway (`nonlinear.settling.drift`), and the drive is followed
   from there;
@@ -176,11 +177,15 @@ class _Watch:
             if len(self.seen) >= due:
                 due += due // 2
                 swing = self._swing()
+                if self._faint(swing):
+                    return self._rest("at rest")
                 if swing.alike and self._bent():
                     return self._rest("limit cycle", swing)
                 if self._idle():
                     return self._rest("at rest")
-        return self._rest("diverging" if self._grows() else "still moving", self._swing())
+        if self._faint(swing := self._swing()):
+            return self._rest("at rest")
+        return self._rest("diverging" if self._grows() else "still moving", swing)
 
     def _advance(self, periods: int) -> Piece:
         """Go on and keep one entry a period."""
@@ -261,7 +266,7 @@ class _Watch:
         """
         p = self.drive.p
         counts = p[at.COUNTS_PER_RAD] * p[at.RATIO], p[at.POSITION_COUNTS]
-        far = max([STILL * float(self.scales.signals[1]), *(1.0 / each for each in counts if each > 0.0)])
+        far = max([self._least, *(1.0 / each for each in counts if each > 0.0)])
         places = np.array([(one.followed, one.motor) for one in self.stood])
         near = np.abs(places - places[-1]).max(axis=1) <= far
         came = np.flatnonzero(near & ~np.append(near[1:], [False]))[::-1]  # last of each stay
@@ -301,6 +306,20 @@ class _Watch:
         early, late = ((part[:, 0].min(axis=0), part[:, 1].max(axis=0)) for part in np.array_split(ranges, 2))
         kept = bool((late[0] >= early[0]).all() and (late[1] <= early[1]).all())
         return kept and not self._turning and bool((early[0][:2] == early[1][:2]).all())
+
+    def _faint(self, swing: _Swing) -> bool:
+        """Whether the swings of the last half of the entries move next to nothing, and do not grow."""
+        seen = np.concatenate(self.seen, axis=1)[1:]
+        late = seen[:, seen.shape[1] // 2 :]
+        if self._turning or swing.periods < PERIODS or np.ptp(late, axis=1).max() > self._least:
+            return False
+        first, second = (float(np.ptp(part, axis=1).max()) for part in np.array_split(late, 2, axis=1))
+        return second <= 2.0 * first
+
+    @property
+    def _least(self) -> float:
+        """A motion that counts for none, beside the largest angle."""
+        return STILL * float(self.scales.signals[1])
 
     def _bent(self) -> bool:
         """Whether anything but a linear drive is in the last half: events, limits, counts."""

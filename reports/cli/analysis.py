@@ -56,7 +56,7 @@ def command(one: Analysis) -> Callable[..., None]:
     """The function that typer makes a command of."""
 
     def run(design: str | None = None, changes: list[str] | None = None, **given: Any) -> None:
-        name = design or (usual(given) if usual else DEFAULT_DESIGN)
+        name = (usual(given) if usual else DEFAULT_DESIGN) if design is None else design
         subject = None if one.alone else _study(design, changes) if one.study else load_drive(name, changes)
         answer(one, subject, **given)
 

@@ -17,7 +17,7 @@ from analyses.specification.requirements import RequirementVerdict
 from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.as_json import as_json
-from reports.numbers import capital, significant
+from reports.numbers import capital, row_time_unit, significant
 from reports.sections import compare_best, compare_figures
 from reports.sections.compare_best import SEEN, number
 from reports.sections.names import LOOPS, unit_words
@@ -30,7 +30,6 @@ COLUMNS = 4  # variants beside the base in one table: what reads on one screen
 _MOST_MOVERS = 3
 _TERMINAL = ("gain_margin", "phase_margin", "modulus_margin", "bandwidth", "overshoot", "settling_time")
 _OF_GROUP = doc.of(lambda name: f"{GROUPS[name.group]}: {name.label}", "figure", "Figure")
-_UNIT = doc.of(lambda name: "ms" if name.unit == "s" else name.unit.replace("^2", "²"), "unit", "Unit")
 _MARKS = (
     "In brackets the difference from the base. ▲ best and ▽ worst of all designs. Margins by their size: one "
     "downwards counts as one upwards."
@@ -161,7 +160,7 @@ def _with_change(value: float, change: float) -> str:
 
 def figures(comparison: Comparison) -> doc.Section:
     """Every figure of every design, a table a group; best and worst marked."""
-    heads = [doc.of(lambda name: capital(name.label), "figure", "Figure"), _UNIT]
+    heads = [doc.of(lambda name: capital(name.label), "figure", "Figure"), _unit_of(comparison)]
     blocks: list[doc.Block] = []
     for group, title in GROUPS.items():
         if names := [name for name in comparison.names if name.group == group]:
@@ -180,7 +179,7 @@ def _moved_loops(comparison: Comparison) -> list[doc.Block]:
         if name.group in LOOPS and name.key.removeprefix(f"{name.group}.") in _TERMINAL
         if any(name.key in one.differences for one in comparison.variants)
     ]
-    heads, first = [_OF_GROUP, _UNIT], batches(comparison)[:1]
+    heads, first = [_OF_GROUP, _unit_of(comparison)], batches(comparison)[:1]
     made = _side_by_side("Loops", names, heads, first, partial(_cell, comparison), _MARKS)
     return made if names else []
 
@@ -189,12 +188,23 @@ def _cell(comparison: Comparison, one: Compared, name: FigureName) -> str | None
     value = one.figures.get(name.key)
     if value is None:
         return None
-    scale = 1e3 if name.unit == "s" else 1.0
+    scale, _ = _scaled(comparison, name)
     words = _with_change(scale * value, scale * one.differences.get(name.key, 0.0))
     ends = comparison.ends(name)
     if ends is not None and value in ends:
         words += " ▲" if value == ends[0] else " ▽"
     return words
+
+
+def _unit_of(comparison: Comparison) -> doc.Shown:
+    return doc.of(lambda name: _scaled(comparison, name)[1], "unit", "Unit")
+
+
+def _scaled(comparison: Comparison, name: FigureName) -> tuple[float, str]:
+    """Factor and unit of a figure's row, the same for all designs."""
+    if name.unit == "s":
+        return row_time_unit(one.figures.get(name.key) for one in comparison.everything.all)
+    return 1.0, name.unit.replace("^2", "²")
 
 
 def differences(comparison: Comparison) -> doc.Section:

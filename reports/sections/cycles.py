@@ -47,7 +47,9 @@ def summary(result: LimitCycles) -> str:
     seen = sum(one.verdict == "confirmed" for one in result.confirmations)
     tail = f"; {seen} of {count} predicted cycles confirmed" if count else "; none is predicted"
     if swing is None:
-        return f"The drive as it is comes to rest after every step{tail}."
+        faint = any(one.hunting for one in result.rests)
+        but = " but for swings below a millionth of full deflection" if faint else ""
+        return f"The drive as it is comes to rest after every step{but}{tail}."
     does = {
         Verdict.MET: f"comes to rest as far as is asked ({judged_by(result.design)})",
         Verdict.NOT_MET: "does not come to rest",

@@ -11,7 +11,7 @@ from analyses.failures import Failures
 from analyses.motion.settling import noticed, told, verdict_of
 from reports import document as doc
 from reports.charts import style
-from reports.numbers import short
+from reports.numbers import seconds, short
 from reports.sections.names import load_unit, output_unit
 
 NAMES = {
@@ -57,7 +57,7 @@ def summary(result: Failures) -> str:
     worst = max(result.cases, key=lambda case: case.at_detection_rad)
     size = short(scale * worst.at_detection_rad, 3)
     when = f"{1e3 * result.asked.detection_s:.4g} ms"
-    stop = "" if worst.to_stop_s is None else f"; it reaches the stop after {1e3 * worst.to_stop_s:.3g} ms"
+    stop = "" if worst.to_stop_s is None else f"; it reaches the stop after {seconds(worst.to_stop_s)}"
     if verdict_of(result.design, noticed(result.design, result.before)) is not Verdict.MET:
         stop += "; the drive does not come to rest before it"
     return f"{NAMES[worst.name]} moves the output most until it is detected: {size} {unit} in {when}{stop}."

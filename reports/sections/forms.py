@@ -103,7 +103,7 @@ EXACT_COLUMNS = [
     doc.of(lambda pair: POINTS.get(pair[0], pair[0]), "point", "Cut at"),
     doc.of(lambda pair: pair[1].gain_upper, "gain_upper", "Gain may grow by", "×", format="sig:4"),
     doc.of(lambda pair: pair[1].gain_lower or None, "gain_lower", "and fall to", "×", format="sig:3"),
-    doc.of(lambda pair: pair[1].delay_s, "delay_ms", "Delay may grow by", "ms", scale=1e3, format="sig:3"),
+    doc.of(lambda pair: pair[1].delay_s, "delay_ms", "Delay may grow by", "ms", scale=1e3, format="ms:3"),
 ]
 
 

@@ -106,7 +106,7 @@ def _slip_words(cycles: LimitCycles, fine: float, small: str) -> str:
 def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> doc.Block:
     torque, torque_scale = ("mN m", 1e3) if load == "N m" else ("N", 1.0)
     size: dict[str, Any] = {"unit": small, "scale": fine, "format": "sig:3"}
-    wait: dict[str, Any] = {"unit": "ms", "scale": 1e3, "format": "sig:3"}
+    wait: dict[str, Any] = {"unit": "ms", "scale": 1e3, "format": "ms:3"}
     columns = [
         doc.of("load_Nm", "load", "Load", load, format="short:4"),
         doc.of("dry_torque_Nm", "dry", "Dry friction, motor", torque, scale=torque_scale, format="sig:3"),

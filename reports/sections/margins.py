@@ -9,7 +9,7 @@ from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.bandwidth import Bandwidth
 from actuator_lti.files.tree import Tree
-from analyses.linear.held_loops import HELD, OPEN
+from analyses.linear.held_loops import AWAY, HELD, OPEN
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.loop_survey import OperatingPointFigures
 from analyses.margins import Margins
@@ -78,7 +78,7 @@ CROSSING_COLUMNS = [
     doc.column("unit", "Unit"),
     doc.column("rad_s", "at", "rad/s", format="sig:5"),
     doc.column("hz", "at", "Hz", format="sig:4"),
-    figure_column("delay_margin", "delay_ms", format="sig:4"),
+    figure_column("delay_margin", "delay_ms", format="ms:4"),
     doc.column("samples", "", "samples", format="sig:4"),
     doc.column("note", "Remark"),
 ]
@@ -159,7 +159,7 @@ def _stability(named: Mapping[str, LoopFigures]) -> str:
         words = f"not stable: {', '.join(unstable)}" if unstable else ""
         return words or f"stability not known: {', '.join(unknown)}"
     held = [
-        f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, the load drives it away)"
+        f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, {AWAY})"
         for label, one in named.items()
         if one.held is not None
     ]
@@ -367,7 +367,7 @@ def with_own_margins(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]
 def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
     """Say of each loop that is unstable only by itself which case it is, and how it is judged."""
     return [
-        f"{label}: unstable by itself, {OPEN[figures.loop.name]}, as the load drives it away. With all loops "
+        f"{label}: unstable by itself, {OPEN[figures.loop.name]}, as {AWAY}. With all loops "
         f"closed the drive is stable. The loop is judged with the {HELD[figures.loop.name]}: stable."
         for label, figures in named.items()
         if figures.held is not None

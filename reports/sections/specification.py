@@ -240,7 +240,7 @@ def _step_table(result: Specification) -> doc.Block:
         doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
         doc.of("amplitude_rad", "step", "Step", unit, scale=scale, format="sig:3"),
         doc.of("fraction", "fraction", "of full", "%", scale=100.0, format="sig:2"),
-        doc.of("rise_time_s", "rise", "Rise 10–90 %", "ms", scale=1e3, format="sig:3", better=-1),
+        doc.of("rise_time_s", "rise", "Rise 10–90 %", "ms", scale=1e3, format="ms:3", better=-1),
         doc.of("overshoot_percent", "overshoot", "Overshoot", "%", format="fix:1", better=-1),
         doc.of("settling_time_s", "settle", "Settled to 2 %", "ms", scale=1e3, format="ms:3", better=-1),
         doc.of("peak_rate_rad_s", "rate", "Peak rate", f"{unit}/s", scale=scale, format="sig:3"),

@@ -156,9 +156,9 @@ def checks(result: TuningResult) -> doc.Block:
     columns = [
         doc.of("corner", "corner", "Design"),
         doc.of("amplitude_rad", "amplitude", "Step", unit, scale=scale, format="sig:3"),
-        doc.of("rise_time_s", "rise", "Rise", "ms", scale=1e3, format="sig:3", better=-1),
+        doc.of("rise_time_s", "rise", "Rise", "ms", scale=1e3, format="ms:3", better=-1),
         doc.of("overshoot_percent", "overshoot", "Overshoot", "%", format="fix:1", better=-1),
-        doc.of("settling_time_s", "settling", "Settling 2 %", "ms", scale=1e3, format="sig:3", better=-1),
+        doc.of("settling_time_s", "settling", "Settling 2 %", "ms", scale=1e3, format="ms:3", better=-1),
         doc.of("final_error_percent", "error", "Final error", "%", format="fix:2"),
         doc.of(lambda c: c.limited or "none", "limited", "Limits that act"),
     ]

@@ -13,9 +13,9 @@ from analyses.motion.settling import waiver_of_rest
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
-from reports.numbers import capital
+from reports.numbers import capital, row_time_unit
 from reports.sections import beyond, friction_effects, in_time, large_signal, specification
-from reports.sections.names import LOOPS, POINTS, QUANTITIES, unit_words
+from reports.sections.names import LOOPS, POINTS, QUANTITIES, loop_words, unit_words
 from reports.terminal import Brief
 
 MORE = {
@@ -102,7 +102,7 @@ def result(validation: Validation) -> str:
 def findings(validation: Validation) -> list[doc.Finding]:
     """Name what has to be watched, the gravest first."""
     made = [
-        doc.Finding(severity="fail", text=f"{loop_name(name)}: not stable.", where="validation")
+        doc.Finding(severity="fail", text=f"{loop_words(name)}: not stable.", where="validation")
         for name in validation.unstable
     ]
     for row in validation.rows:
@@ -177,7 +177,7 @@ def table(rows: Sequence[Check], caption: str) -> doc.Block:
         doc.of(quantity_name, "quantity", "Prediction"),
         doc.of(lambda row: _rounded(row, row.predicted, 12), "predicted", "Predicted", format="sig:6"),
         doc.of(lambda row: _rounded(row, row.found, 10), "found", "Simulated", format="sig:6"),
-        doc.of(lambda row: "ms" if row.unit == "s" else unit_words(row.unit), "unit", "Unit"),
+        doc.of(lambda row: _scaled(row)[1], "unit", "Unit"),
         doc.of(lambda row: _rounded(row, _error(row), 2), "error", "Error", format="sig:2"),
         doc.of(lambda row: _rounded(row, row.allowed, 2), "allowed", "Allowed", format="sig:2"),
         doc.of(lambda row: str(row.verdict), "verdict", "Verdict"),
@@ -192,9 +192,14 @@ def _error(row: Check) -> float:
     return max(row.error, NOISE * abs(row.predicted or 1.0))
 
 
+def _scaled(row: Check) -> tuple[float, str]:
+    """Factor and unit of a row: seconds as ms, unless they are many."""
+    return row_time_unit([row.predicted, row.found]) if row.unit == "s" else (1.0, unit_words(row.unit))
+
+
 def _rounded(row: Check, value: float | None, digits: int) -> float | None:
-    """Seconds as ms."""
-    scale = 1e3 if row.unit == "s" else 1.0
+    """A value in the unit of its row."""
+    scale, _ = _scaled(row)
     return None if value is None else float(f"{value * scale:.{digits}g}")
 
 

@@ -1,14 +1,16 @@
 """Keys of the wider drive: what is read, what is refused and with which words."""
 
+from collections.abc import Callable
 from math import log, pi, sqrt
 
 import pytest
 
-from actuator_lti.design import load_design, read_design_text, write_design
+from actuator_lti.design import check_design, load_design, read_design_text, write_design
 from actuator_lti.design.checks_control import TRACKING_LIMIT
 from actuator_lti.design.checks_elastic import elastic_warnings
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
+from tests.validation.random_drives import full_drive
 
 AMBER = load_design("ilr33-amber")
 DIRECT = {  # the amperes of ilr33-amber, as an AC motor's file has to say them
@@ -189,3 +191,25 @@ def test_the_overload_time_of_stacked_designs_is_that_of_each() -> None:
     assert stacked(base, {"limits.peak_time": times}).limits.overload_time_s == pytest.approx(
         times * 8.490187, rel=1e-6
     )
+
+
+def _taken(call: Callable[[], object]) -> bool:
+    try:
+        call()
+    except InputError:
+        return False
+    return True
+
+
+def test_what_the_check_of_a_design_accepts_its_file_may_hold() -> None:
+    """Random drives, some with the speed from the output's sensor: one drive in Python and in a file."""
+    drives = [full_drive(seed) for seed in range(2_100_000, 2_100_060)]
+    accepted = [drive for drive in drives if _taken(lambda drive=drive: check_design(drive, drive.name))]
+    read = [read_design_text(write_design(drive)) for drive in accepted]
+    assert [one.controller for one in read] == [one.controller for one in accepted]
+    assert [one.load for one in read] == [one.load for one in accepted]
+    behind = [one.controller.velocity for one in read if one.controller.velocity is not None]
+    assert {one.sensor for one in behind} == {"motor", "output"}
+    refused = [drive for drive in drives if drive not in accepted]
+    assert not any(_taken(lambda drive=drive: read_design_text(write_design(drive))) for drive in refused)
+    assert refused

@@ -9,6 +9,7 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.design import with_values
 from analyses.friction_effects import friction_effects
+from analyses.motion.conduct import conduct
 from analyses.motion.settling import settle
 from nonlinear import Rows, State, commands, simulate
 from nonlinear._kernels import layout as at
@@ -183,6 +184,19 @@ def test_overload_that_stays_is_not_waited_for() -> None:
     run = rows.run()
     assert np.ptp(run.span("output_angle_rad")) < 1e-12
     assert run.window_limit_fraction("overload")[0] == pytest.approx(1.0, abs=0.15)
+
+
+def test_hops_of_a_billionth_of_the_step_are_rest() -> None:
+    """An integral that a count keeps from zero moves 4.6 mm by 3e-13 m a day: a plain run stands."""
+    design = full_drive(2000019)
+    step = design.validation.full_deflection_rad
+    assert settle(design, 0.0, step).rest.verdict == "at rest"
+    assert conduct(simulate(design, commands.step(step), 1.0)).status == "comes to rest"
+    rows = Rows.of(design)
+    rows.step("command", step)
+    rows["ticks"] = 1_000_000
+    rows.window(500_000, 1, 0)
+    assert np.ptp(rows.run().span("output_angle_rad")) < 1e-9 * step
 
 
 @pytest.mark.parametrize("seed", range(1, 31))

@@ -95,6 +95,7 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
         (["margins", "--load", "nan"], "load"),
         (["margins", "--operating-point", "flying"], "flying"),
         (["margins", "--no-such-option"], "--no-such-option"),
+        (["margins", ""], '"": no such design; allowed: ilr33-amber'),  # an unset variable is no default
         (["no-such-command"], "no-such-command"),
         (["report", "missing.toml"], "missing.toml"),
         (["report", "--processes", "2"], "--processes"),

@@ -11,12 +11,14 @@ from typer.testing import CliRunner
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
-from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.model import Design, FrictionPoint, Requirement
 from actuator_lti.drive.angle import level
 from analyses.linear.held_loops import held_loop
 from analyses.linear.loop_figures import all_loop_figures
+from analyses.margins import margins
 from analyses.specification.requirements import evaluate_requirements, tally
 from analyses.tuning.problem import problem_of
+from analyses.validation import QUICK, validate
 from reports.cli.app import build
 
 SET = ["--set", "load.path=back-drivable", "--set"]
@@ -34,6 +36,21 @@ def p_velocity(slope_Nm_rad: float) -> Design:
     design = pushed(slope_Nm_rad)
     velocity = replace(design.controller.velocity, integral_time_s=None)
     return replace(design, controller=replace(design.controller, velocity=velocity))
+
+
+def falling_friction(slope_Nm_rad: float = 0.0) -> Design:
+    """J s + b with b < 0: s ((L s + R)(J s + b) + k^2) + Kp (s + 1/Ti)(J s + b) is below 0 at s = 0."""
+    design = pushed(slope_Nm_rad)
+    dry = design.friction.dry_torque_Nm
+    points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=dry * x) for w, x in ((0, 1), (20, 0.7), (300, 2)))
+    friction = replace(design.friction, dry_torque_Nm=0.0, viscous_Nms_rad=0.0, points=points)
+    return replace(design, friction=friction, requirements=())
+
+
+def torque_drive() -> Design:
+    """Nothing around the current loop stops the load that pushes away."""
+    design = replace(pushed(), requirements=())
+    return replace(design, controller=replace(design.controller, position=None, velocity=None))
 
 
 def held_phase_margin_deg(design: Design) -> float:
@@ -93,6 +110,24 @@ def test_a_drive_that_its_load_drives_away_is_judged_as_it_is() -> None:
         assert figures["velocity"].sound is stable
 
 
+@pytest.mark.parametrize(
+    ("design", "held", "verdict"),
+    [
+        (falling_friction(), ["current"], "met"),
+        (replace(p_velocity(1.0), requirements=()), ["current", "velocity"], "met"),
+        (torque_drive(), [], "not met"),
+    ],
+)
+def test_margins_and_validate_judge_the_same_loops(design: Design, held: list[str], verdict: str) -> None:
+    found, checked = margins(design), validate(design, QUICK)
+    assert [name for name, one in found.loops.items() if one.held is not None] == held
+    assert list(checked.held) == held
+    assert found.loops["current"].margins.stable is False
+    assert (found.verdict, checked.verdict) == (verdict, verdict)
+    assert ("the current loop is unstable, rotor free" in checked.words) is (verdict == "not met")
+    assert bool(checked.settlings) is bool(held)
+
+
 def test_a_loop_that_its_own_gain_makes_unstable_is_not_held() -> None:
     """Without a load that pushes, an unstable current loop inside a stable drive stays what it is."""
     loops = assemble_loops(pushed(-1.0))
@@ -103,7 +138,7 @@ def test_a_loop_that_its_own_gain_makes_unstable_is_not_held() -> None:
 
 def test_many_designs_at_once_are_judged_alike() -> None:
     slopes = np.array([-1.0, 0.0, 1.0, 100.0])
-    for make in (pushed, p_velocity):
+    for make in (pushed, p_velocity, falling_friction):
         many = linear_figures(Population(make(1.0), {"load.moment_slope": slopes}, 4), held=True)
         for k, slope in enumerate(slopes):
             single = all_loop_figures(assemble_loops(make(float(slope))))

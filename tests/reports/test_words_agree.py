@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import pi
+
 import pytest
 
 from actuator_lti import assemble_loops, load_design
@@ -9,8 +11,11 @@ from actuator_lti.design import with_values
 from actuator_lti.margins import stability_margins
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import operating_points
+from analyses.margins import margins
 from analyses.specification.weakest import spread
+from analyses.validation.places import Bench
 from reports import document as doc
+from reports.as_json import as_json
 from reports.cli.main import main
 from reports.sections.answer import believed
 from reports.sections.margins import DOWNWARDS, margin_table, result, spread_table
@@ -54,6 +59,31 @@ def test_a_loop_that_is_known_to_be_unstable_is_said_to_be() -> None:
     gain = 30.0 * design.controller.velocity.gain  # the upper gain margin is 23.1 dB, a factor of 14.3
     figures = all_loop_figures(assemble_loops(with_values(design, {"control.velocity.gain": gain})))
     assert result(figures).startswith("Not stable: velocity loop")
+
+
+def test_a_bandwidth_says_by_its_name_of_which_response_it_is() -> None:
+    """Behind a filter of 1 s the command is followed to 1/(2 pi) Hz; the loop does not know of the filter."""
+    design = with_values(load_design("ilr33-amber"), {"command.filter_time": 1.0})
+    to_command = as_json(margins(design))["loops"]["position"]
+    tested = as_json(Bench(design, design).figures)["position"]
+    alone = as_json(Bench(load_design("ilr33-amber"), load_design("ilr33-amber")).figures)["position"]
+    assert to_command["bandwidth_hz"] == pytest.approx(1.0 / (2.0 * pi), rel=1e-3)
+    assert tested["feedback_bandwidth_hz"] == alone["feedback_bandwidth_hz"] > 10.0
+    for own, other in ((tested, "bandwidth_hz"), (to_command, "feedback_bandwidth_hz")):
+        assert other not in own
+    assert {name for name in tested if name.startswith("feedback_")} == {
+        f"feedback_{name}" for name in set(to_command) - set(tested) - {"to_reference"}
+    }
+
+
+def test_a_current_loop_says_how_its_rotor_stands() -> None:
+    """With a locked rotor no friction and no load acts: one loop, on the bench and in margins."""
+    design = load_design("ilr33-amber")
+    free = as_json(margins(design))["loops"]["current"]
+    tested = as_json(Bench(design, design).figures)["current"]
+    assert (free["rotor"], free["rotor_locked"]["rotor"], tested["rotor"]) == ("free", "locked", "locked")
+    assert tested["phase_margin_deg"] == pytest.approx(free["rotor_locked"]["phase_margin_deg"], abs=1e-9)
+    assert free["phase_margin_deg"] != pytest.approx(tested["phase_margin_deg"], abs=1e-3)
 
 
 def test_the_first_screen_counts_what_is_not_met() -> None:

@@ -290,3 +290,13 @@ def test_the_printed_example_is_a_study(tmp_path, capsys):
     assert len(load_study(path).variants) == 10
     assert main(["compare"]) == 2
     assert "--example" in capsys.readouterr().err
+
+
+def test_a_settling_of_23_s_stands_in_a_row_of_seconds(cli, tmp_path):
+    """A position gain of 0.17 1/s alone settles to 2 % in ln(50)/0.17 s, the base in some 30 ms."""
+    slow = ("--set", "control.position.gain=0.17 1/s", "--no-validate", "--quiet", "--out", tmp_path)
+    said = cli("compare", "ilr33-amber", *slow).out
+    row = next(line.split() for line in said.splitlines() if "settling time" in line)
+    assert row[row.index("time") + 1] == "s"
+    assert float(row[-3]) == pytest.approx(math.log(50.0) / 0.17, abs=0.01)
+    assert float(row[-5]) == pytest.approx(0.033, abs=0.001)

@@ -34,6 +34,7 @@ CHOICES: dict[str, tuple[object, ...]] = {
     "load.path": ("self-locking", "back-drivable"),
     "friction.law": ("coulomb", "tanh"),
     "encoder.speed": ("ideal", "difference"),
+    "control.velocity.sensor": ("motor", "output"),
     "control.position.sensor": ("motor", "output"),
 }
 
@@ -48,13 +49,19 @@ class Seen:
     why: str = ""
 
 
-def keys_of(design: Design) -> tuple[str, ...]:
-    """Keys with a number, and those whose choice another of `CHOICES` can take."""
-    there = {"motor.constants": design.motor.constants, "load.path": design.load.path}
+def chosen(design: Design) -> dict[str, object]:
+    """What a design has of the keys whose choice another of `CHOICES` can take."""
+    control = design.controller
+    there: dict[str, object] = {"motor.constants": design.motor.constants, "load.path": design.load.path}
     there |= {"friction.law": design.friction.law, "encoder.speed": design.encoder.speed}
-    if design.controller.position is not None:
-        there["control.position.sensor"] = design.controller.position.sensor
-    return (*design.parameters, *there)
+    for name, loop in (("velocity", control.velocity), ("position", control.position)):
+        there |= {f"control.{name}.sensor": loop.sensor} if loop is not None else {}
+    return there
+
+
+def keys_of(design: Design) -> tuple[str, ...]:
+    """Keys with a number, and those with such a choice."""
+    return (*design.parameters, *chosen(design))
 
 
 def seen(design: Design, key: str) -> Seen:
@@ -82,6 +89,8 @@ def why_idle(design: Design, key: str) -> str:
         return "idle: no loop reads the output's encoder"
     if key == "control.position.sensor" and design.coupling is None and design.output_quantum_rad is None:
         return "idle: on a rigid drive without counts both sensors read one angle"
+    if key == "control.velocity.sensor" and design.coupling is None and design.encoder.speed == "ideal":
+        return "idle: on a rigid drive without counts both sensors read one speed"
     if key == "limits.continuous_current" and design.limits.peak_time_s is None:
         return "idle: without limits.peak_time nothing in the drive acts on it"
     return ""
@@ -90,13 +99,7 @@ def why_idle(design: Design, key: str) -> str:
 def changed(design: Design, key: str) -> Iterator[tuple[str, Design | str]]:
     """Models with one key changed by more and more; in place of one that is refused the reason."""
     if key in CHOICES:
-        own = {
-            "motor.constants": design.motor.constants,
-            "load.path": design.load.path,
-            "friction.law": design.friction.law,
-            "encoder.speed": design.encoder.speed,
-            "control.position.sensor": design.controller.position_loop.sensor,
-        }[key]
+        own = chosen(design)[key]
         tried = [(f'"{other}"', other) for other in CHOICES[key] if other != own]
     else:
         value = design.parameters[key].value

@@ -38,6 +38,9 @@ def test_two_halves_without_a_failure_are_the_drive(name: str) -> None:
     assert [one.current_A for one in seen] == run.current_A.tolist()
 
 
+SLOW = "its output does not get half-way to the stop in 5 s"
+
+
 def test_hard_over_is_the_motor_on_the_bus() -> None:
     """Rigid, dry friction constant while it moves: di, dw, dth linear in (i, w, th, 1), after the delay d."""
     design = load_design("ilr33-amber")
@@ -180,3 +183,12 @@ def test_an_open_phase_of_three_says_what_one_winding_leaves_out() -> None:
 def test_an_unstable_drive_is_a_verdict_and_no_bad_input(command: str, capsys) -> None:
     assert main([command, "fin", "--set", "control.velocity.gain=5 V*s/rad"]) == 1
     assert "not stable" in capsys.readouterr().err
+
+
+def test_a_jam_at_speed_is_left_out_where_the_drive_is_too_slow() -> None:
+    """A gain Kv alone is half-way after ln(2)/Kv: 6.9 s at 0.1 1/s, more than 5 s; 1.4 s at 0.5."""
+    for gain, there in ((0.1, False), (0.5, True)):
+        design = with_overrides(load_design("emps"), {"control.position.gain": f"{gain} 1/s"})
+        result = failures(design)
+        assert ("jam" in {case.name for case in result.cases}) is there
+        assert result.left_out == ({} if there else {"jam": SLOW})
