@@ -118,7 +118,11 @@ ANALYSES = (
         group="Designs",
         alone=True,
         function="reports.design_files.catalogue.catalogue",
-        words="List the shipped designs: name, title, and the stages that each drive has.",
+        words="""
+        List the shipped designs: name, title, and the stages that each drive has.
+
+        Try: actuator-lti designs
+        """,
     ),
     Analysis(
         name="init",
@@ -126,7 +130,12 @@ ANALYSES = (
         alone=True,
         request=StartAsked,
         function="reports.design_files.start.start",
-        words="Write a commented design file to start one's own drive from.",
+        words="""
+        Write a commented design file to start one's own drive from.
+
+        Try: actuator-lti init arm.toml --kind joint, or with values of data sheets:
+        actuator-lti init arm.toml --motor maxon-ec-i-40-100w-48v --gear harmonic-drive-csf-17-30
+        """,
     ),
     Analysis(
         name="keys",
@@ -150,6 +159,9 @@ ANALYSES = (
         Print margins, bandwidths and verdicts of every loop; the margins are certified.
 
         Requirements are judged on the sampled loops with sliding friction, whatever form is printed.
+
+        Try: actuator-lti margins joint --set control.position.gain="12 1/s", or
+        actuator-lti margins joint --operating-point rest --load "60 N*m"
         """,
     ),
     Analysis(
@@ -160,6 +172,8 @@ ANALYSES = (
 
         Met where the simulator agrees; not proven where no position loop holds the
         output. The exit status is 1 where it is not met, or not proven.
+
+        Try: actuator-lti stiffness joint
         """,
     ),
     Analysis(
@@ -172,6 +186,8 @@ ANALYSES = (
 
         Resistance and torque constant follow \\[temperature] of the design, or copper and NdFeB. The
         exit status is 1 where a requirement is not met, or a loop not stable, at any corner.
+
+        Try: actuator-lti corners fin --hot 85 --cold -54 --supply 22
         """,
     ),
     Analysis(
@@ -182,6 +198,9 @@ ANALYSES = (
         doing="simulating",
         words="""
         Move the drive in the nonlinear simulator: every limit, stick and slip, exact between the ticks.
+
+        Try: actuator-lti simulate joint --amplitude "5 deg" --duration 0.5 --load "20 N*m" --csv step.csv, or
+        actuator-lti simulate fin --command chirp --amplitude 0.5 --frequency 1 --to 50 --duration 4
         """,
     ),
     Analysis(
@@ -193,8 +212,10 @@ ANALYSES = (
         Simulate jam, hard-over, open phase, frozen and lost sensor and an oscillatory command.
 
         Prints for each failure the time to a stated deflection and to the mechanical stop, the
-        deflection until the failure is detected, the largest current and the largest moment in the
+        deflection until the failure is detected, the largest current and the largest torque in the
         train. What is not given comes from \\[failure] of the design.
+
+        Try: actuator-lti failures joint --stop "25 deg" --deflection "2 deg" --detection 0.05
         """,
     ),
     Analysis(
@@ -210,6 +231,8 @@ ANALYSES = (
         \\[duty]. The temperature needs thermal_resistance and thermal_time in \\[temperature], the
         protection limits.peak_time. The exit status is 1 where the duty is beyond the continuous rating, or
         where none is stated.
+
+        Try: actuator-lti duty joint --amplitude "10 deg" --load "40 N*m" --share 0.3 --cycle 20
         """,
     ),
     Analysis(
@@ -221,8 +244,10 @@ ANALYSES = (
         Predict limit cycles of play and of a quantised output sensor, and seek them in the simulator.
 
         Each is predicted by describing function in the exact sampled loop, then the simulator is
-        started in its shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are
-        waited for. The exit status is 1 where such a step ends in a cycle.
+        started in its shape at sizes from 0.4 to 2.5 of it. Last, steps of the drive as it is are simulated
+        until they settle. The exit status is 1 where such a step ends in a cycle.
+
+        Try: actuator-lti cycles fin --set coupling.play="0.2 deg"
         """,
     ),
     Analysis(
@@ -240,6 +265,8 @@ ANALYSES = (
         Each row is met, not met or not proven. Exit status 1 if one is not met, or not proven and not waived,
         if the drive does not come to rest, or if a command within full deflection makes it diverge. The page
         (--out), --json and --large also show what is large, starts from rest, or is shaken by counts.
+
+        Try: actuator-lti validate joint --quick, or actuator-lti validate fin --out out/fin
         """,
     ),
     Analysis(
@@ -278,6 +305,8 @@ ANALYSES = (
         itself and against the design's limits, and the written design against the
         record that it came from. Where a check fails the status is 1, and no
         design is written without --accept; with --out, page and JSON are.
+
+        Try: actuator-lti identify DATA_EMPS.mat --design emps --out result
         """,
     ),
     Analysis(
@@ -328,6 +357,8 @@ ANALYSES = (
         Compare variants with their base: margins, bandwidths, verdicts, large signals, cause of each change.
 
         What is found of each design is kept under --out; an interrupted comparison goes on where it stopped.
+
+        Try: actuator-lti compare joint --set control.position.gain="12 1/s" --set gear.harmonic.ratio=120
         """,
     ),
     Analysis(
@@ -344,6 +375,8 @@ ANALYSES = (
 
         Up to 1000000 samples, each is kept as Parquet under --out; of more, only what they come to. An
         interrupted run goes on where it stopped.
+
+        Try: actuator-lti montecarlo fin --samples 2000 --seed 7
         """,
     ),
     Analysis(
@@ -357,14 +390,14 @@ ANALYSES = (
         Find gains that meet the requirements at every corner of the tolerances, or say by how much none can.
 
         By default the least change of the design. With --place also a notch, a low-pass, feed-forward
-        where gains alone do not do, as in
-
-        actuator-lti tune joint --require "position.bandwidth>=60 Hz" --place notch,feedforward
+        where gains alone do not do.
 
         The result is confirmed by certified margins, nominal and at each requirement's worst corner.
 
         Writes tuned.toml (a design), tune.html and tune.json. Exit status 1 where the requirements
         cannot be met.
+
+        Try: actuator-lti tune joint --require "position.bandwidth>=60 Hz" --place notch,feedforward
         """,
     ),
     Analysis(
@@ -379,8 +412,10 @@ ANALYSES = (
         Build every design and variant of a study, keep every figure, and publish a site of it.
 
         What has not changed is not computed again. Exit status 1 where a requirement fails, a design has no
-        result, or a figure is worse than the approved baseline. `nightly approve STUDY --site DIR --by NAME
-        --reason TEXT` makes the last night the baseline.
+        result, or a figure is worse than the approved baseline.
+
+        Try: actuator-lti nightly study.toml --site site; to make the last night the baseline: actuator-lti
+        nightly approve study.toml --site site --by NAME --reason TEXT
         """,
     ),
     Analysis(
@@ -389,7 +424,11 @@ ANALYSES = (
         page=False,
         request=AskedC,
         function="reports.exports.run.export_c",
-        words="Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README.",
+        words="""
+        Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README.
+
+        Try: actuator-lti export c fin --out fin-c --prefix fin_
+        """,
     ),
     Analysis(
         name="export controller",
@@ -398,7 +437,11 @@ ANALYSES = (
         request=AskedController,
         function="reports.exports.run.export_controller",
         shown="listing",
-        words="Write the controller alone as C99 for firmware, with test vectors and a class for C++.",
+        words="""
+        Write the controller alone as C99 for firmware, with test vectors and a class for C++.
+
+        Try: actuator-lti export controller joint --type float --prefix joint_ --out joint-controller
+        """,
     ),
     Analysis(
         name="export fmu",
@@ -406,8 +449,11 @@ ANALYSES = (
         page=False,
         request=AskedFmu,
         function="reports.exports.run.export_fmu",
-        words="Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a "
-        "parameter.",
+        words="""
+        Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a parameter.
+
+        Try: actuator-lti export fmu joint --platform linux64
+        """,
     ),
     Analysis(
         name="export linear",
@@ -415,8 +461,11 @@ ANALYSES = (
         page=False,
         request=AskedLinear,
         function="reports.exports.run.export_linear",
-        words="Write every loop, break point, command and load response as state space, with units and "
-        "margins.",
+        words="""
+        Write every loop, break point, command and load response as state space, with units and margins.
+
+        Try: actuator-lti export linear joint --to mat
+        """,
     ),
 )
 COMMANDS_IN = {"export": "The drive outside of Python: C99, FMU, controller for firmware, linear models."}

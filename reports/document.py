@@ -41,6 +41,7 @@ from reports.document_schema import (
     VerdictItem,
     validate,
 )  # fmt: skip
+from reports.numbers import prose
 from reports.verdict_summary import verdict_of, walk
 from reports.visible import visible
 
@@ -122,7 +123,7 @@ def table(
         "rows": [
             plain(row if isinstance(row, Mapping) else dict(zip(keys, row, strict=True))) for row in rows
         ],
-        "note": note,
+        "note": prose(note),
     }
 
 
@@ -183,8 +184,8 @@ def figure(name: str, chart: Chart, caption: str, *, alt: str = "", layout: Layo
         "kind": "figure",
         "figure": name,
         "chart": chart_data(chart),
-        "caption": caption,
-        "alt": alt or caption,
+        "caption": prose(caption),
+        "alt": prose(alt or caption),
         "layout": layout,
     }
 
@@ -198,7 +199,7 @@ def with_columns(block: Block, keys: Collection[str]) -> Block:
 
 def text(content: str) -> Block:
     """Make a paragraph."""
-    return {"kind": "text", "text": content}
+    return {"kind": "text", "text": prose(content)}
 
 
 def remark(words: str) -> Block:
@@ -261,7 +262,7 @@ def verdict(
             "verdict": str(Verdict.of(passed)),
             "waiver": waiver,
             "source": source,
-            "reason": reason,
+            "reason": prose(reason),
         }
     )
     return item
@@ -307,7 +308,9 @@ def section(
     where the first screen says it; ``findings``: what else that has to say. Where ``verdict`` is not proven,
     a report is not proven by this section, whatever its verdicts.
     """
+    result, intro = prose(result), prose(intro)
     first = [Finding(severity=told, text=result, where=id)] if told and result else []
+    more = [Finding(**{**one, "text": prose(one["text"])}) for one in findings]
     made: Section = {
         "id": id,
         "title": title,
@@ -315,7 +318,7 @@ def section(
         "intro": intro,
         "status": status,
         "blocks": list(blocks),
-        "findings": [*first, *findings],
+        "findings": [*first, *more],
     }
     return made if verdict is None else {**made, "verdict": verdict.value}
 

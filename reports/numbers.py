@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -127,6 +128,26 @@ def hertz(value: float) -> str:
 def capital(words: str) -> str:
     """Begin with a capital; the rest stays."""
     return words[:1].upper() + words[1:]
+
+
+_POWER = re.compile(r"(?<![\w.])([+-]?\d(?:\.\d+)?)e([+-]\d+)\b")
+_MINUS = re.compile(r"(?<![\w)\]=`'\"-])-(?=\d)")
+
+
+def prose(text: str) -> str:
+    """Write the numbers of a sentence as its tables do: no exponent where none is needed, a true minus.
+
+    Examples
+    --------
+    >>> prose("off by 1.29e+03 deg, allowed 1e-09; -3 dB on 2026-11-23")
+    'off by 1290 deg, allowed 10⁻⁹; −3 dB on 2026-11-23'
+    """
+    return _MINUS.sub("\N{MINUS SIGN}", _POWER.sub(_plain, text))
+
+
+def _plain(power: re.Match[str]) -> str:
+    digits = sum(map(str.isdigit, power[1]))
+    return "+" * power[1].startswith("+") + significant(float(power[0]), digits).removeprefix("1×")
 
 
 def to_minus(text: str) -> str:

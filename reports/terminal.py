@@ -14,9 +14,10 @@ from rich.text import Text
 
 from actuator_lti.asked.verdict import Verdict
 from reports import document as doc
+from reports.certain import certain
 from reports.cli.output import console, printable
 from reports.html import show_signed
-from reports.numbers import show
+from reports.numbers import prose, show
 from reports.verdict_summary import role, why
 
 COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}
@@ -48,10 +49,11 @@ def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequen
     out = console()
     for block in blocks:
         if isinstance(block, SideBySide):
-            laid = _side_by_side(block)
-            out.print(laid if _fits(laid, out) else _one_by_one(block))
+            side = SideBySide(block.title, [certain(one) for one in block.blocks])
+            laid = _side_by_side(side)
+            out.print(laid if _fits(laid, out) else _one_by_one(side))
         else:
-            _print(block, out)
+            _print(certain(block), out)
     for note in dict.fromkeys(notes):
         out.print(Text(f"note: {note}", style="yellow"))
 
@@ -60,7 +62,7 @@ def print_verdict(passed: bool | Verdict, words: str) -> None:
     """Print the first line of an answer: a verdict, or whether all is well, and why."""
     verdict = passed if isinstance(passed, Verdict) else Verdict.of(passed)
     line = Text().append(HEADS[verdict], style=COLOURS[verdict.role()])
-    console().print(line.append(f"  {printable(words)}"), soft_wrap=True)
+    console().print(line.append(f"  {printable(prose(words))}"), soft_wrap=True)
 
 
 def print_section(section: Mapping[str, Any], passed: bool | Verdict | None, name: str = "") -> None:
@@ -84,6 +86,8 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
         laid = table(block, wrapped)
         if Measurement.get(out, out.options.update(width=10_000), laid).maximum > out.width:
             laid = table(block, wrapped, narrow=True)
+        if not _fits(laid, out):
+            laid = table(block, VERDICT_WRAPPED, narrow=True)
         out.print(laid if _fits(laid, out) else stacked(block))
         if block.get("note"):
             out.print(Text(block["note"], style="dim"))
@@ -142,7 +146,8 @@ def _list(text: Text, said: Iterable[tuple[Mapping[str, Any], Any]]) -> None:
     there = [(column, cell) for column, cell in cells if cell.plain.strip() not in ("", "–")]
     for number, (column, cell) in enumerate(there):
         label = column["label"].lower() if column["label"] != "Unit" else ""
-        text.append("; " if number and label not in ("", "at") else " " if number else "")
+        between = " " if column["label"] == "Unit" else ", " if label in ("", "at") else "; "
+        text.append(between if number else "")
         text.append(f"{label} ".lstrip()).append_text(cell).append(f" {column['unit']}".rstrip())
 
 

@@ -26,7 +26,7 @@ class Asked:
     load_Nm: Annotated[
         float,
         Option(
-            'Moment at the output, such as "4 N*m", all the time; the largest of validation.loads.',
+            'Load torque at the output, such as "4 N*m", all the time; the largest of validation.loads.',
             "LOAD",
             kind="load",
         ),

@@ -31,7 +31,7 @@ class Asked:
     load_Nm: Annotated[
         float,
         Option(
-            'Moment that pushes the output forward from the start, such as "4 N*m"; none.',
+            'Load torque that pushes the output forward from the start, such as "4 N*m"; none.',
             "LOAD",
             kind="load",
         ),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from actuator_lti.bandwidth import closed_loop_bandwidth
 from actuator_lti.design.model import Design, LoadFriction
 from actuator_lti.drive.facts import stall_torque_Nm
 from actuator_lti.errors import InputError
@@ -146,8 +147,8 @@ def _followed_most_hz(design: Design) -> tuple[float, str]:
     top = int(np.argmax(size))
     if size[top] > FLAT * size[0]:
         return float(f[top]), "where the drive follows most"
-    beyond = np.flatnonzero(size < math.sqrt(0.5) * size[0])
-    return float(f[beyond[0] if beyond.size else -1]), "its bandwidth, as it has no resonance"
+    band = closed_loop_bandwidth(response).minus3db_hz
+    return float(f[-1] if band is None else band), "its bandwidth, as it has no resonance"
 
 
 def _size(design: Design, value: float) -> str:

@@ -192,13 +192,14 @@ def words(rest: Rest, factor: float, unit: str) -> str:
         return "comes to rest"
     if rest.verdict == "diverging":
         return "diverges"
+    after = f"{float(f'{rest.after_s:.3g}'):g}"
     if rest.verdict == "still moving" and not (rest.amplitude or rest.motor_amplitude):
-        return f"stands still {rest.after_s:.3g} s later; whether it stays is not known"
+        return f"stands still {after} s later; whether it stays is not known"
     size = f"±{factor * rest.amplitude:.3g} {unit}"
     if rest.motor_amplitude > 1.05 * rest.amplitude:
         size += f" (motor ±{factor * rest.motor_amplitude:.3g} {unit})"
     if rest.verdict == "still moving":
-        return f"still moving {rest.after_s:.3g} s later, by {size}"
+        return f"still moving {after} s later, by {size}"
     limits = f", {' and '.join(rest.limited)} limit acting" if rest.limited else ""
     seen = f"{rest.periods} periods seen{limits}"
     return f"limit cycle of {size} at {rest.frequency_hz:.3g} Hz ({seen})"

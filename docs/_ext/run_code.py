@@ -42,6 +42,7 @@ class RunDirective(SphinxDirective):
         "status": directives.nonnegative_int,
         "lines": directives.positive_int,
         "hide-output": directives.flag,
+        "alt": directives.unchanged,
     }
     language = "python"
 
@@ -72,7 +73,23 @@ class RunDirective(SphinxDirective):
 
 
 class PythonRun(RunDirective):
-    """Lines of Python; the value of a last expression is shown as at a prompt."""
+    """Lines of Python; the value of a last expression is shown as at a prompt, figures where ``:alt:`` is."""
+
+    def run(self) -> list[nodes.Node]:
+        return [*super().run(), *self._pictures()]
+
+    def _pictures(self) -> list[nodes.Node]:
+        pyplot = sys.modules.get("matplotlib.pyplot")
+        made: list[nodes.Node] = []
+        for number in pyplot.get_fignums() if pyplot and "alt" in self.options else ():
+            page = self.env.docname.replace("/", "-")
+            name = f"generated/{page}-{self.env.new_serialno('picture')}.svg"
+            path = Path(self.env.srcdir) / name
+            pyplot.figure(number).savefig(path, bbox_inches="tight", metadata={"Date": None})
+            made.append(nodes.image(uri=f"/{name}", alt=self.options["alt"]))
+        if pyplot:
+            pyplot.close("all")
+        return made
 
     def result(self, text: str, room: Room) -> str:
         tree = ast.parse(text)

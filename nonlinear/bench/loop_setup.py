@@ -120,7 +120,7 @@ class LoopSetup:
         if self.held:
             return "rotor locked" + (" at a constant speed" if self.bias.speed_rad_s else "")
         if self.bias.speed_rad_s:
-            pressed = ", coupling pressed by a constant moment" if self.bias.coupling_Nm else ""
+            pressed = ", coupling pressed by a constant load" if self.bias.coupling_Nm else ""
             return f"on a constant speed{pressed}"
         return "standing, without dry friction"
 

@@ -85,7 +85,7 @@ def command(one: Analysis) -> Callable[..., None]:
     parameters = [each for each in parameters if each.name not in left_out]
     run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}
-    run.__doc__ = cleandoc(one.words) + (f" In the report: --also {one.name}." if one.also else "")
+    run.__doc__ = cleandoc(one.words) + (f"\n\nIn the report: --also {one.name}." if one.also else "")
     return run
 
 

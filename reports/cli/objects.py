@@ -48,7 +48,10 @@ def export(
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a design's settings as controller objects: TOML, or XML where FILE ends in .xdc or .xml."""
+    """Write a design's settings as controller objects: TOML, or XML where FILE ends in .xdc or .xml.
+
+    Try: actuator-lti objects export ilr33-amber --velocity-gain-per rad/s --out settings.toml
+    """
     from dataclasses import replace
 
     from actuator_lti.design.objects import calibration, export_objects
@@ -93,6 +96,8 @@ def import_settings(
 
     Known by what stands in them: objects of an MC V3 controller, an EPOS4 export (.dcf, .xdc), an ODrive
     configuration (JSON), a VESC motor configuration (XML), SimpleFOC settings (lines of the sketch).
+
+    Try: actuator-lti objects import settings.toml --onto ilr33-amber --out mine.toml
     """
     from actuator_lti.design import load_design, write_design
     from actuator_lti.design.controller_files import import_controller_file

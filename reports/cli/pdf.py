@@ -26,7 +26,10 @@ def pdf(
     summary: SummaryOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Typeset any report.json as PDF: cover with verdicts and lines to sign, tables, vector figures."""
+    """Typeset any report.json as PDF: cover with verdicts and lines to sign, tables, vector figures.
+
+    Try: actuator-lti pdf out/report.json --summary --out joint.pdf
+    """
     from analyses.isolation import drain
     from reports.cli.output import print_json, print_line
     from reports.document import load

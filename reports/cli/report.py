@@ -73,6 +73,8 @@ def report(
     The page needs no network and opens from disk. With --json the document also goes to standard output.
     With --include the results of identify and correlate become sections of it; with --also
     failure cases, duty cycle, limit cycles and corners.
+
+    Try: actuator-lti report joint --also corners --also failures --pdf --out out/joint
     """
     from actuator_lti.asked.verdict import Verdict
     from actuator_lti.design.loader import design_text

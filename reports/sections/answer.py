@@ -180,7 +180,7 @@ def weakest(point: WeakPoint) -> Weakest:
     quantity = QUANTITIES[point.quantity]
     unit = "" if quantity.unit == "1" else f" {quantity.unit}"
     kind, left = "required" if point.required else "customary", point.value - point.limit
-    side = "inside" if left >= 0.0 else "beyond"
+    side = "above" if left >= 0.0 else "below"
     words = (
         f"{quantity.words} {short(point.value, 3)}{unit}, {kind} {short(point.limit, 6)}{unit}: "
         f"{short(abs(left), 3)}{unit} {side}"

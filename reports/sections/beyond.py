@@ -88,7 +88,7 @@ def _ending(conditional: Conditional, scale: float, unit: str) -> str:
 
 def _large_facts(conditional: Conditional, scale: float, unit: str) -> doc.Block:
     size = (conditional.threshold_rad or conditional.full_deflection_rad) * scale
-    items = [doc.fact("Largest step that no limit keeps moving", size, unit, better=1)]
+    items = [doc.fact("Largest step after which no limit sustains an oscillation", size, unit, better=1)]
     for point, margins in conditional.margins.items():
         if margins.stable and margins.gain_lower > 0.0:
             label = f"Lower gain margin at {POINTS.get(point, point)}, all loops closed"
@@ -123,7 +123,7 @@ NAMES = {"motor": "Motor encoder", "output": "Output encoder"}
 def counts(found: Sequence[Counts], axis: str = "rotary") -> doc.Section:
     """Make the section: standing error, ripple, limit cycles, and from where the loop is linear."""
     intro = (
-        "A counted angle is a staircase. About the edge of a count it is a relay (gain 2 q/(pi A)); for "
+        "A counted angle is a staircase. About the edge of a count it is a relay (gain 2 q/(π A)); for "
         "large amplitudes its gain tends to 1. The motor's counts are seen in the speed made of them, the "
         "output's in its position."
     )
@@ -142,7 +142,8 @@ def counts(found: Sequence[Counts], axis: str = "rotary") -> doc.Section:
 def sentence(one: Counts, axis: str) -> str:
     """Say in one sentence what the counts do."""
     scale, unit, speed = _units(axis)
-    words = [f"{one.ripple_rad_s:.2g} {speed} of ripple at {one.ripple_at_rad_s:.3g} {speed} (motor side)"]
+    side = "" if axis == "linear" else " (motor side)"
+    words = [f"{one.ripple_rad_s:.2g} {speed} of ripple at {one.ripple_at_rad_s:.3g} {speed}{side}"]
     if one.speed_step_rad_s is not None:
         words.append(f"steps of {one.speed_step_rad_s:.3g} {speed} in the speed estimate")
     if one.standing_rad:
@@ -153,6 +154,7 @@ def sentence(one: Counts, axis: str) -> str:
 def _facts(one: Counts, axis: str) -> list[FactItem]:
     scale, unit, speed = _units(axis)
     name = NAMES[one.sensor]
+    standing, seen = one.standing_rad * scale, one.standing_seen_rad * scale
     linear = (
         f"Linear within {100 * WITHIN:.0f} % from this amplitude at the sensor on, by describing function"
     )
@@ -160,8 +162,8 @@ def _facts(one: Counts, axis: str) -> list[FactItem]:
         doc.fact(f"{name}: one count", one.quantum_rad * scale, unit),
         doc.fact("Ripple of the motor's speed, largest", one.ripple_rad_s, speed),
         doc.fact("at a motor speed of", one.ripple_at_rad_s, speed),
-        doc.fact("Standing error, one count", one.standing_rad * scale, unit, better=-1),
-        doc.fact("Standing error after a step, simulated", one.standing_seen_rad * scale, unit, better=-1),
+        doc.fact("Standing error of one count, without friction", standing, unit, better=-1),
+        doc.fact("what counts add to it after a step with friction", seen, unit, better=-1),
         doc.fact(linear, one.linear_rad * scale, unit),
     ]
     if one.linear_seen_rad is not None:

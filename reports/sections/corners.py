@@ -42,16 +42,23 @@ def summary(result: Corners) -> str:
     if not failed:
         every = "every other requirement" if more else "every requirement"
         return f"Every loop is stable and {every} met at all {len(result.corners)} corners.{more}"
-    share = f"{len(failed)} of {len(result.corners)} corners"
-    return f"At {share} a loop is not stable or a requirement not met: {'; '.join(failed)}.{more}"
+    every = len(failed) == len(result.corners)
+    where = f"all {len(failed)}" if every else f"{len(failed)} of {len(result.corners)}"
+    names = "" if every else f" ({'; '.join(failed)})"
+    what = dict.fromkeys(name for corner in result.corners for name in _failings(corner))
+    return f"The drive fails at {where} corners{names}: {', '.join(what)}.{more}"
 
 
 def unmet(corner: Corner) -> str:
     """Name what a corner fails."""
+    return ", ".join(_failings(corner))
+
+
+def _failings(corner: Corner) -> list[str]:
     doubts = {name: one.sound for name, one in corner.figures.items() if not one.sound}
     known = {None: "not known to be stable", False: "not stable"}
     loops = [f"{name} loop {known[stable]}" for name, stable in doubts.items()]
-    return ", ".join([*loops, *(one.id for one in corner.verdicts if not one.passes)])
+    return [*loops, *(one.id for one in corner.verdicts if not one.passes)]
 
 
 def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.limit_cycles import Confirmation, LimitCycles
-from analyses.motion.settling import FROM_THE_LARGEST, judged_by, verdict_of, words
+from analyses.motion.settling import FROM_THE_LARGEST, Settling, judged_by, verdict_of, words
 from reports import document as doc
 from reports.sections.names import fine_unit, load_unit
 
@@ -45,11 +45,9 @@ def summary(result: LimitCycles) -> str:
     fine, small = fine_unit(result.design.axis)
     swing, count = result.hunting, len(result.confirmations)
     seen = sum(one.verdict == "confirmed" for one in result.confirmations)
-    tail = f"; {seen} of {count} predicted cycles confirmed" if count else "; none is predicted"
+    tail = f"; {seen} of {count} predicted cycles confirmed" if count else "; no cycle is predicted"
     if swing is None:
-        faint = any(one.hunting for one in result.rests)
-        but = " but for swings below a millionth of full deflection" if faint else ""
-        return f"The drive as it is comes to rest after every step{but}{tail}."
+        return f"The drive as it is comes to rest after every step{_still(result, fine, small)}{tail}."
     does = {
         Verdict.MET: f"comes to rest as far as is asked ({judged_by(result.design)})",
         Verdict.NOT_MET: "does not come to rest",
@@ -57,6 +55,13 @@ def summary(result: LimitCycles) -> str:
     }[_judged(result)]
     at = f"{swing.load_Nm:g} {load_unit(result.design)}"
     return f"The drive as it is {does}: {words(swing.rest, fine, small)} under {at}{tail}."
+
+
+def _still(result: LimitCycles, fine: float, small: str) -> str:
+    """Say what is too small to count as motion, or stands for longer than it was followed."""
+    left = [one for one in result.rests if one.hunting]
+    ends = (f"{fine * one.amplitude_rad:.3g} {small} it {words(one.rest, fine, small)}" for one in left)
+    return f", but after {', after '.join(ends)}" if left else ""
 
 
 def _judged(result: LimitCycles) -> Verdict:
@@ -86,12 +91,18 @@ def _seen(one: Confirmation) -> float | None:
     return None if one.ratio is None else one.ratio * one.cycle.output_rad
 
 
+def _end(one: Settling) -> str:
+    stands = one.rest.verdict == "still moving" and not one.swing_rad
+    words = "stands still, not known for how long" if stands else one.rest.verdict
+    return words + ", a limit acting" * bool(one.rest.limited)
+
+
 def _rests(result: LimitCycles, fine: float, small: str) -> doc.Block:
     size: dict[str, Any] = {"unit": small, "scale": fine, "format": "sig:3"}
     columns = [
         doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
         doc.of("amplitude_rad", "step", "Step", **size),
-        doc.of(lambda one: one.rest.verdict + ", a limit acting" * bool(one.rest.limited), "end", "Ends"),
+        doc.of(_end, "end", "Ends"),
         doc.of(lambda one: one.rest.amplitude or None, "size", "Output, peak", **size, better=-1),
         doc.of(lambda one: one.rest.motor_amplitude or None, "motor", "Motor, at the output", **size),
         doc.of("rest.frequency_hz", "hz", "at", "Hz", format="sig:3"),

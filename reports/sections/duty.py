@@ -22,7 +22,8 @@ def section(result: Duty) -> doc.Section:
     )
     blocks = [doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), _note(result))]
     blocks.append(_figure(result))
-    severity: Literal["info", "warn"] = "info" if result.verdict is Verdict.MET else "warn"
+    does = result.verdict is Verdict.MET and not result.limited
+    severity: Literal["info", "warn"] = "info" if does else "warn"
     return doc.section(
         "duty", "Duty cycle", blocks, result=summary(result), intro=intro, status=severity, told=severity
     )
@@ -54,16 +55,16 @@ def asked_words(result: Duty) -> str:
 
 
 def summary(result: Duty) -> str:
-    """Say whether the drive may do it for ever."""
+    """Say whether the drive may do it without end, and whether it follows at all."""
     known = math.isfinite(result.continuous_A)
     part = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
+    limits = f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
+    part += limits if result.limited else ""
     return f"{asked_words(result)} is {RATED[result.verdict]}: {result.rms_A:.4g} A rms{part}."
 
 
 def _note(result: Duty) -> str:
     words = [f"Duty: {asked_words(result)}."]
-    if result.limited:
-        words.append(f"Limiters that act in it: {', '.join(result.limited)}; it is not followed as asked.")
     if result.heating is None:
         words.append("No winding temperature: the design states no temperature.thermal_resistance.")
     if result.overload is None:
@@ -82,7 +83,7 @@ def _rows(result: Duty) -> list[doc.Row]:
         rows.append(_row("current at rest, rms", result.holding_A, math.inf, "A"))
     rows.append(_row("current, peak", result.peak_A, peak, "A", judged=False))
     if over is not None:
-        rows.append(_row("overload state, peak", over.peak, 1.0, "1", over.acts_after_s))
+        rows.append(_row("overload state, peak", over.peak, 1.0, "", over.acts_after_s))
     if heat is not None:
         rows.append(_row("winding temperature", heat.final_degC, heat.limit_degC, "°C", heat.limit_after_s))
     return rows

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.design.model import Design
 from analyses.failures import Failures
 from analyses.motion.settling import noticed, told, verdict_of
 from reports import document as doc
@@ -34,11 +36,11 @@ def section(result: Failures) -> doc.Section:
     swing = noticed(result.design, result.before)
     held = "has come to rest"
     if swing is not None:
-        held = f"does not come to rest ({told(result.design, swing, scale, unit)})"
+        held = f"does not come to rest, {told(result.design, swing, scale, unit)},"
     intro = (
         f"Each failure is simulated from a drive that {held} under {asked.load_Nm:g} {load} (positive "
         f"pushes forward). Deflection counts from where the output was; the stop is {stop} away, and "
-        f"detection takes {detected}. The moment is that in the coupling; in a rigid train the motor's "
+        f"detection takes {detected}. The torque is that in the coupling; in a rigid train the motor's "
         "torque times the reduction."
     )
     blocks = [_table(result, scale, unit, near), _figure(result, scale, unit, load)]
@@ -52,15 +54,23 @@ def section(result: Failures) -> doc.Section:
 
 
 def summary(result: Failures) -> str:
-    """Say which failure moves the output most until it is detected."""
+    """Say which failure reaches the stop first, undetected, or else moves the output most until detected."""
     scale, unit = output_unit(result.design.axis)
-    worst = max(result.cases, key=lambda case: case.at_detection_rad)
-    size = short(scale * worst.at_detection_rad, 3)
-    when = f"{1e3 * result.asked.detection_s:.4g} ms"
-    stop = "" if worst.to_stop_s is None else f"; it reaches the stop after {seconds(worst.to_stop_s)}"
+    detection = result.asked.detection_s
+    stopped = {case.name: case.to_stop_s for case in result.cases if case.to_stop_s is not None}
+    worst = min(
+        result.cases, key=lambda case: (min(stopped.get(case.name, inf), detection), -case.at_detection_rad)
+    )
+    when, reached = seconds(detection), stopped.get(worst.name)
+    if reached is not None and reached <= detection:
+        words = f"reaches the stop first, {seconds(reached)} after it occurs; detection takes {when}"
+    else:
+        size = short(scale * worst.at_detection_rad, 3)
+        words = f"moves the output most until it is detected: {size} {unit} in {when}"
+        words += "" if reached is None else f"; it reaches the stop after {seconds(reached)}"
     if verdict_of(result.design, noticed(result.design, result.before)) is not Verdict.MET:
-        stop += "; the drive does not come to rest before it"
-    return f"{NAMES[worst.name]} moves the output most until it is detected: {size} {unit} in {when}{stop}."
+        words += "; the drive does not come to rest before it"
+    return f"{NAMES[worst.name]} {words}."
 
 
 def _table(result: Failures, scale: float, unit: str, near: str) -> doc.Block:
@@ -75,12 +85,16 @@ def _table(result: Failures, scale: float, unit: str, near: str) -> doc.Block:
         doc.of(
             lambda case: case.peak_current_A if has_current else None, "current", "Peak current", "A", **most
         ),
-        doc.of("peak_moment_Nm", "moment", "Peak moment", load_unit(result.design), **most),
+        doc.of("peak_moment_Nm", "moment", f"Peak {_push(result.design)}", load_unit(result.design), **most),
         doc.of("protected_s", "protected", "I²t acts at", **time),
         doc.of("words", "words", "What happens"),
     ]
     note = f"No value: not within the {result.asked.watched_s:g} s watched."
     return doc.listing("Failure cases", result.cases, columns, note)
+
+
+def _push(design: Design) -> str:
+    return "force" if design.axis == "linear" else "torque"
 
 
 def _figure(result: Failures, scale: float, unit: str, load: str) -> doc.Block:
@@ -101,7 +115,10 @@ def _figure(result: Failures, scale: float, unit: str, load: str) -> doc.Block:
     top.rule_y(scale * asked.stop_rad, "stop", seen=True, colour=style.RED, dash=1)
     for panel in (top, bottom):
         panel.rule_x(asked.detection_s * per_s, "detected" if panel is top else "")
-    top.y.label, bottom.y.label = f"deflection, {unit}", f"moment, {load}"
+    top.y.label, bottom.y.label = f"deflection, {unit}", f"{_push(result.design)}, {load}"
     bottom.x.limits(0.0, last * per_s)
-    caption = "Deflection of the output and moment in the train after each failure but the oscillation."
+    caption = (
+        f"Deflection of the output and {_push(result.design)} in the train after each failure but the "
+        "oscillation."
+    )
     return doc.figure("failures", chart, caption)

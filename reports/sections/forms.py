@@ -40,7 +40,7 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[st
     ]
     note = (
         "Sampled: exact. Continuous: PI in s with the exact delays of computing and hold. Ideal: the same "
-        "without any delay, the model of the paper. No form uses a Padé approximation."
+        "without any delay. No form uses a Padé approximation."
     )
     named = {f"{FORMS[form]}, {name}": f for form, result in forms.items() for name, f in result.items()}
     reasons = evidence_notes(named)
@@ -127,7 +127,12 @@ def break_points(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigu
             "A fast loop cut inside slower ones is periodically time-varying; the rows above describe its "
             "fundamental. The exact stability limits follow from the eigenvalues over one period."
         )
-        blocks += [doc.text(words), doc.listing("Stability limits of periodic loops", exact, EXACT_COLUMNS)]
+        note = (
+            "A dash: none within a factor of 10⁴. The delay is that of the computing, which acts at the "
+            "voltage alone."
+        )
+        made = doc.listing("Stability limits of periodic loops", exact, EXACT_COLUMNS, note)
+        blocks += [doc.text(words), made]
     intro = (
         "In the finished drive a gain error or a delay occurs at one point, with every other loop closed. "
         "The matrix shows what the drive tolerates at each point."
@@ -144,8 +149,10 @@ def _most_sensitive(rows: Sequence[Mapping[str, Any]]) -> str:
     if not closed:
         return "No margin of the finished drive is known."
     row = max(closed, key=lambda row: float(row["s_peak_db"]))
+    unknown = [row["point"] for row in rows if row["others"] == "all closed" and row not in closed]
+    of = f" (the {' and the '.join(unknown)} left out)" if unknown else ""
     return (
-        f"With all loops closed the drive is most sensitive at the {row['point']}: peak of S "
+        f"With all loops closed the drive is most sensitive at the {row['point']}{of}: peak of S "
         f"{row['s_peak_db']:.2f} dB."
     )
 

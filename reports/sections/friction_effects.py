@@ -128,6 +128,8 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
     )
     if not any(point.threshold for point in result.points):
         note = "The smoothed law of friction creeps: it has no threshold, and holds no motion at a reversal."
+    elif not all(point.threshold for point in result.points):
+        note += " A load without figures gives a forward step no threshold."
     if result.design.command != Command():
         note += " Steps as they come behind the profile and filter of the command."
     return doc.listing(
@@ -198,7 +200,7 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
         f"size as well. {FROM_THE_LARGEST} Errors below 10⁻⁶ of the step are shown as 0."
     )
     if quiet(result.design) != result.design:
-        note += " Steps that come to rest are those of the drive as it is, counts of its sensors included."
+        note += " Where the drive comes to rest with its counts, it is not simulated again without them."
     return doc.listing(
         "Steady-state error after a step", ends, columns, note,
         lambda pair: "warn" if pair[1].hunting else None,

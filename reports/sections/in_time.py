@@ -170,7 +170,7 @@ def remark(item: AmplitudeMargin) -> str:
     quiet = "" if item.friction_on else ", without dry friction,"
     acting = f" The {words_of(item.limiter)} acts." if item.limiter else ""
     return (
-        f"The {item.loop} loop{quiet} sustains an oscillation{_of(item)} {cause} after release from "
+        f"The {item.loop} loop{quiet} sustains an oscillation{_of(item)} {cause}, started from "
         f"{100.0 * item.part:.0f} % of full range; the linear {item.kind} margin on the validation's "
         f"operating motion is {linear}.{acting}"
     )
@@ -211,8 +211,8 @@ def _amplitudes(items: Sequence[AmplitudeMargin]) -> doc.Block:
     panel.y.limits(min([*values, 1.0]) / 1.3, max([*values, 1.0]) * 1.5)
     panel.y.ticks = [(t, f"{t:g}") for t in (LOWEST, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)]
     caption = (
-        "Margins after release from rest at small, medium and large deviations, limits active; hollow and "
-        "dashed: with dry friction."
+        "Margins by the initial deviation from which the drive is let go: small, medium and large, limits "
+        "active; hollow and dashed: with dry friction."
     )
     return doc.figure("margins_by_amplitude", chart, caption, layout="half")
 
@@ -221,13 +221,13 @@ def _amplitude_table(items: Sequence[AmplitudeMargin]) -> doc.Block:
     columns = [
         doc.of("loop", "loop", "Loop"),
         doc.of(lambda item: KINDS[item.kind], "kind", "Varied"),
-        doc.of(lambda item: f"{100.0 * item.part:.0f} % of full range", "size", "Released from"),
+        doc.of(lambda item: f"{100.0 * item.part:.0f} % of full range", "size", "Initial deviation"),
         doc.of(lambda item: "on" if item.friction_on else "off", "friction", "Dry friction"),
         doc.of(lambda item: _shown(item.linear, item), "linear", "Linear margin", format="sig:4"),
         doc.of(lambda item: _shown(item.value, item), "value", "Oscillation lasts from", format="sig:3"),
         doc.of(_unit, "unit", "Unit"),
         doc.of(lambda item: words_of(item.limiter) if item.limiter else "", "limiter", "Limit acting"),
-        doc.of(_remark, "remark", ""),
+        doc.of(_remark, "remark", "Remark"),
     ]
     made = doc.listing("Margins by amplitude", items, columns)
     return doc.details("Margins from small, medium and large deviations", [made])

@@ -23,6 +23,7 @@ from analyses.large_signal.sawtooth import (
 )
 from reports import document as doc
 from reports.charts import style
+from reports.numbers import short
 from reports.sections.limits import map_chart, words_of
 from reports.sections.names import figure_column, load_unit, output_unit
 from reports.verdict_summary import tally
@@ -150,19 +151,27 @@ def _shift_table(shift: LimitShift, design: Design, scale: float, unit: str) -> 
     small: dict[str, Any] = {"unit": unit, "scale": scale, "format": "sig:4"}
     columns = [
         doc.of(lambda k: shift.frequency_hz[k], "hz", "Frequency", "Hz", format="sig:3"),
-        doc.of(lambda k: shift.linear_rad[k], "linear", "Smallest A_k", **small),
+        doc.of(lambda k: shift.linear_rad[k], "linear", "Predicted", **small),
         doc.of(lambda k: shift.simulated_rad[k], "simulated", "Simulated, with friction", **small),
-        doc.of(lambda k: 100.0 * (shift.ratio[k] - 1.0), "shift", "Shift by friction", "%", format="fix:2"),
+        doc.of(lambda k: _shift(shift, k), "shift", "Shift by friction", "%", format="fix:2"),
         doc.of(lambda k: words_of(shift.linear_limiter[k]), "limiter", "Predicted limiter"),
         doc.of(lambda k: words_of(shift.simulated_limiter[k]), "acts", "Acting limiter"),
     ]
-    note = "The shift by friction is shown, not judged."
+    note = "The shift by friction is shown, not judged; there is none where another limit acts first."
+    if words_of("overload") in map(words_of, shift.linear_limiter):
+        note += " The overload protection takes longer to act than these runs last."
     if shift.coarser:
         note += " Its runs take much work: fewer frequencies."
     if design.command != Command():
         note += " Amplitudes behind the profile and filter of the command."
     places = range(len(shift.frequency_hz))
     return doc.listing("Amplitude at which a limit is first reached", places, columns, note)
+
+
+def _shift(shift: LimitShift, place: int) -> float | None:
+    """In percent, of one and the same limit."""
+    same = shift.linear_limiter[place] == shift.simulated_limiter[place]
+    return 100.0 * (shift.ratio[place] - 1.0) if same else None
 
 
 def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: float) -> doc.Block:
@@ -257,12 +266,13 @@ def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str
         panels[0].y.limits(high=2.6 * highest)  # room for the words
     caption = (
         f"A sine of {scale * sawtooth.amplitude_rad:.3g} {unit} at {sawtooth.frequency_hz:.3g} Hz, three "
-        f"times faster than the rate limit of {limit:.3g} {unit}/s: the output becomes a sawtooth. Simulated "
-        "values; in brackets those of an ideal rate limit: peak πR/2w, gain 4/(πx), lag arccos(π/2x)."
+        f"times faster than the rate limit of {short(limit)} {unit}/s: the output becomes a sawtooth. "
+        "Simulated values; in brackets those of an ideal rate limit: peak πR/2w, gain 4/(πx), lag "
+        "arccos(π/2x)."
     )
     if not sawtooth.applicable:
         caption += (
-            f" Not checked: they need Kv/w >= {FAST:g} (here {sawtooth.gain_over_frequency:.3g}) and a "
+            f" Not checked: they need Kv/w ≥ {FAST:g} (here {sawtooth.gain_over_frequency:.3g}) and a "
             f"reversal within {REVERSAL_DEG:g}° of the period (here {sawtooth.reversal_deg:.3g}°)."
         )
     return [doc.figure("sawtooth", chart, caption)]

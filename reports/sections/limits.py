@@ -89,7 +89,8 @@ def _least(border: Onset, scale: float, unit: str) -> str:
 
 
 def _noun(limiter: str) -> str:
-    return limiter if "limit" in limiter or limiter == words_of("profile") else f"{limiter} limit"
+    whole = limiter in (words_of("profile"), words_of("overload"))
+    return limiter if whole or "limit" in limiter else f"{limiter} limit"
 
 
 def words_of(limiter: str) -> str:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from actuator_lti.design.model import Design, Parameter
 from reports import document as doc
+from reports.numbers import short
 from reports.sections.names import unit_words
 
+_ENDLESS = re.compile(r"-?\d*\.\d{12,}(e-?\d+)?")
 GRADES = (
     "Grades: A maker's document or standard text; B file of a real device or a consistent second source; "
     "C community transcription; D derived; X assumed, to be replaced by whoever has the figure."
@@ -16,7 +19,7 @@ GRADES = (
 COLUMNS = [
     doc.of("path", "path", "Key"),
     doc.of("symbol", "symbol", "Symbol"),
-    doc.of("text", "text", "As written"),
+    doc.of(lambda item: _written(item.text), "text", "As written"),
     doc.of("value", "value", "In SI", format="short:6"),
     doc.of(lambda item: unit_words(item.unit), "unit", "Unit"),
     doc.of("grade", "grade", "Grade"),
@@ -45,8 +48,9 @@ def section(design: Design, warnings: Sequence[str] = ()) -> doc.Section:
         blocks.append(doc.details("Facts that enter no equation", [facts]))
     status: doc.Status = "warn" if warnings else "info"
     findings = [doc.Finding(severity="warn", text=words, where="parameters") for words in warnings]
+    ungraded = sum(not item.grade for item in parameters)
     result = (
-        f"{len(parameters)} values; {assumed} of them are assumed (grade X)."
+        f"{len(parameters)} values; {assumed} of them assumed (grade X), {ungraded} without a grade."
         if parameters
         else "The design carries no record of where its values come from."
     )
@@ -71,6 +75,12 @@ def _derived(design: Design) -> doc.Block:
         doc.fact("Load path", design.load.path),
     ]
     return doc.facts(items)
+
+
+def _written(text: str) -> str:
+    """A value that was derived has all its digits: six are enough to read."""
+    number, gap, unit = text.partition(" ")
+    return f"{short(float(number), 6)}{gap}{unit}" if _ENDLESS.fullmatch(number) else text
 
 
 def tolerance_words(item: Parameter) -> str:

@@ -1,4 +1,4 @@
-"""Stiffness at the output: how far a moment pushes it, powered and unpowered, and what play takes away."""
+"""Stiffness at the output: how far a load pushes it, powered and unpowered, and what play takes away."""
 
 from __future__ import annotations
 
@@ -36,9 +36,10 @@ def section(result: Stiffness) -> doc.Section:
         blocks.append(_at_rest(result, unit))
     if result.checks:
         blocks.append(_checks(result, unit))
+    push = _push(result)
     intro = (
-        "Moment on the output over its deflection, the command held: the inverse of the linear response "
-        "from the moment to the output. Friction slides; dry friction and play are not in the curves."
+        f"Load {push} over the deflection of the output, the command held: the inverse of the linear "
+        "response from load to output. Friction slides; dry friction and play are not in the curves."
     )
     status: doc.Status = result.verdict.role()
     return doc.section(
@@ -46,10 +47,14 @@ def section(result: Stiffness) -> doc.Section:
     )
 
 
+def _push(result: Stiffness) -> str:
+    return "force" if result.design.axis == "linear" else "torque"
+
+
 def _result(result: Stiffness, unit: str) -> str:
     """Say the static stiffness, where the drive is weakest, and what was compared with the simulator."""
     powered = result.curves[0]
-    words = "A moment does not move the output of this drive"
+    words = f"A load {_push(result)} does not move the output of this drive"
     if np.isfinite(powered.stiffness_Nm_rad).any():
         least, at = powered.least
         static = powered.static_Nm_rad
@@ -64,7 +69,7 @@ def _compared(result: Stiffness) -> str:
     if not result.checks:
         return f"nothing is compared: {result.unproven}" if result.unproven else ""
     most = max(check.difference for check in result.checks)
-    words = f"small moments at {len(result.checks)} frequencies agree to {most:.1e}, allowed {AGREED:g}"
+    words = f"small loads at {len(result.checks)} frequencies agree to {most:.1e}, allowed {AGREED:g}"
     if result.lost_motion_difference is not None:
         words += f", the lost motion to {result.lost_motion_difference:.1e}, allowed {READ:g}"
     return f"{words} (relative)"
@@ -88,7 +93,8 @@ def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
 
 
 def _table(result: Stiffness, unit: str) -> doc.Block:
-    note = "Infinite: the output comes back to its place, or does not move at all."
+    infinite = any(math.isinf(value) for one in result.curves for value in (one.static_Nm_rad, one.least[0]))
+    note = "Infinite: the output comes back to its place, or does not move at all." if infinite else ""
     static: dict[str, Any] = {"unit": unit, "format": "sig:4", "better": 1}
     columns = [
         doc.of(lambda one: STATES[one.state], "state", "State"),
@@ -118,7 +124,7 @@ def _lost_motion(result: Stiffness) -> doc.Block:
     rows = [("play", scale * lost.play_rad, None), ("lost motion", scale * lost.foreseen_rad, seen)]
     note = (
         "Lost motion as gear makers read it, the motor held: between the middles of hysteresis at ±3 % of "
-        "the largest load moment, which goes slowly to either side."
+        f"the largest load {_push(result)}, which goes slowly to either side."
     )
     return doc.table("Lost motion at the output", columns, rows, note)
 
@@ -129,7 +135,9 @@ def _at_rest(result: Stiffness, unit: str) -> doc.Block:
         "command held. No value: the output does not move."
     )
     columns = [
-        doc.of("moment_Nm", "moment", "Moment, peak", load_unit(result.design), format="sig:3"),
+        doc.of(
+            "moment_Nm", "moment", f"Load {_push(result)}, peak", load_unit(result.design), format="sig:3"
+        ),
         doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:3"),
         doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Stiffness", unit, format="sig:4"),
     ]
@@ -138,7 +146,7 @@ def _at_rest(result: Stiffness, unit: str) -> doc.Block:
 
 def _checks(result: Stiffness, unit: str) -> doc.Block:
     note = (
-        "The simulator's own derivative from a moment, at rest, without play, counts, dry friction or "
+        "The simulator's own derivative from a load, at rest, without play, counts, dry friction or "
         "friction by load: predicted here is the linear stiffness of that drive, without that "
         "friction, which the curves have."
     )
@@ -150,4 +158,4 @@ def _checks(result: Stiffness, unit: str) -> doc.Block:
         doc.of(lambda one: _or_infinite(abs(one.seen_Nm_rad)), "seen", "Simulated", unit, format="sig:6"),
         doc.of("difference", "difference", "Relative difference", format="sig:2"),
     ]
-    return doc.listing("Small moments", result.checks, columns, note)
+    return doc.listing("Small loads", result.checks, columns, note)

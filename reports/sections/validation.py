@@ -13,7 +13,7 @@ from analyses.motion.settling import waiver_of_rest
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
-from reports.numbers import capital, row_time_unit
+from reports.numbers import capital, prose, row_time_unit
 from reports.sections import beyond, friction_effects, in_time, large_signal, specification
 from reports.sections.names import LOOPS, POINTS, QUANTITIES, loop_words, unit_words
 from reports.terminal import Brief
@@ -27,6 +27,7 @@ MORE = {
     "bandwidth": "bandwidth (−3 dB) of the feedback loop",
     "bandwidth_90deg": "bandwidth at −90° of the feedback loop",
     "complementary_peak": "peak of T",
+    "load_breakaway_moment": "breakaway torque of the load",
     "step": "small step in time, every sample",
     "inside_the_margin": "run just inside the gain margin",
     "outside_the_margin": "run just outside the gain margin",
@@ -132,7 +133,7 @@ def verdict_items(validation: Validation) -> list[doc.VerdictItem]:
     if not items:
         items.append(_item("judged", "Predictions", None, "; ".join(validation.notes), value=0.0))
     for k, failure in enumerate(validation.failures):
-        items.append(_item(f"drive-{k}", "Stable, and at rest where it is sent", False, failure))
+        items.append(_item(f"drive-{k}", "Stable, and comes to rest", False, failure))
     items += [
         _item(f"stable-{name}", f"{loop_name(name)}: stable", None, "not known")
         for name in validation.undecided
@@ -181,8 +182,8 @@ def table(rows: Sequence[Check], caption: str) -> doc.Block:
         doc.of(lambda row: _rounded(row, _error(row), 2), "error", "Error", format="sig:2"),
         doc.of(lambda row: _rounded(row, row.allowed, 2), "allowed", "Allowed", format="sig:2"),
         doc.of(lambda row: str(row.verdict), "verdict", "Verdict"),
-        doc.of("because", "because", "Where"),
-        doc.of("condition", "condition", "Condition"),
+        doc.of(lambda row: prose(row.because), "because", "Where"),
+        doc.of(lambda row: prose(row.condition), "condition", "Condition"),
     ]
     return doc.listing(caption, rows, columns, status=lambda row: row.verdict.role())
 

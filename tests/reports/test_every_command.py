@@ -1,6 +1,7 @@
 """What holds of every command: --json, --set, help, the verdict first, no line wider than the terminal."""
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -49,6 +50,17 @@ def test_every_command_speaks_json_and_takes_changes(name: str) -> None:
     assert command.help
     for parameter in command.params:
         assert getattr(parameter, "help", None), f"{name}: {parameter.name} has no help"
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_help_has_an_example_that_the_command_takes(name: str) -> None:
+    """Cut at the next sentence; click itself parses what is left."""
+    text = COMMANDS[name].help.partition("Try: ")[2].partition("\n\n")[0]
+    tried = re.split(rf"actuator-lti {name}\b", text)[1:]
+    assert tried, f"{name}: no example"
+    for words in tried:
+        line = re.split(r", or\b|: (?=actuator)|; ", words)[0].rstrip(",")
+        COMMANDS[name].make_context(name, shlex.split(line))
 
 
 @pytest.mark.parametrize("words", [[], ["objects"], ["export"]])

@@ -89,7 +89,7 @@ def test_a_large_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field
     )  # fmt: skip
     assert remark(item) == (
         "The position loop sustains an oscillation of 0.0027 deg at the output if its gain is raised by "
-        "6.02 dB or more after release from 50 % of full range; the linear gain margin on the validation's "
+        "6.02 dB or more, started from 50 % of full range; the linear gain margin on the validation's "
         "operating motion is 20 dB. The current limit acts."
     )
 
@@ -101,7 +101,7 @@ def test_a_drive_that_oscillates_as_it_is_is_said_so(kind: str, value: float, wo
         furthest=40.0, period_s=1e-4, limiter="",
     )  # fmt: skip
     assert remark(item) == (
-        "The position loop, without dry friction, sustains an oscillation as designed after release from 2 % "
+        "The position loop, without dry friction, sustains an oscillation as designed, started from 2 % "
         f"of full range; the linear {kind} margin on the validation's operating motion is {words}."
     )
 
@@ -128,7 +128,7 @@ def test_an_unmet_requirement_is_the_weakest_point_and_fails_the_screen() -> Non
     result = glance(document)["weakest"]
     assert result["status"] == "fail"
     assert result["label"] == "Velocity loop"
-    assert result["words"] == "phase margin 73.7 deg, required 90 deg: 16.3 deg beyond"
+    assert result["words"] == "phase margin 73.7 deg, required 90 deg: 16.3 deg below"
 
 
 def test_every_section_opens_with_one_sentence_that_says_its_result(built: Built) -> None:

@@ -19,7 +19,7 @@ EACH, LOOPS = "#answer details.fold > summary", "table.loops"
 QUESTIONS = {
     "Is it good?": ([], ".masthead .overall", r"\d+ of \d+ requirements met"),
     "Which loop is worst?": ([], ".weakest strong", r"(Current|Velocity|Position) loop"),
-    "By how much?": ([], ".weakest", r"not stable|margin [−-]?[\d.]+.*(inside|beyond)"),
+    "By how much?": ([], ".weakest", r"not stable|margin [−-]?[\d.]+.*(above|below)"),
     "Who checked that?": ([], ".said a", r"checked|checks"),
     "Is it linear?": ([], '.said a[href="#limits"]', r"linear (up to [\d.]+ Hz; above, the .+ acts|over)"),
     "What is nearest?": ([], ".bar-row >> nth=0", r"[\d.]+\n?\s*[≥≤] [\d.]+"),

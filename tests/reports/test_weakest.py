@@ -78,7 +78,7 @@ def test_the_weakest_point_of_the_fin_is_where_it_is_not_stable(fin: Design, sur
     assert nominal.limit == CUSTOMARY[nominal.quantity]
     said = words_of(nominal)
     assert said["label"] == "Position loop, motor driven by the load"
-    assert said["words"] == "modulus margin 0.481, customary 0.5: 0.0186 beyond"
+    assert said["words"] == "modulus margin 0.481, customary 0.5: 0.0186 below"
 
 
 def test_a_load_that_is_driven_away_in_the_gap_is_said_and_the_loop_itself_is_drawn(fin: Design) -> None:

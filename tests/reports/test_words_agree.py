@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
+import numpy as np
 import pytest
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import with_values
 from actuator_lti.margins import stability_margins
+from analyses.large_signal.border import LimitShift
+from analyses.limit_cycles import LimitCycles
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import operating_points
 from analyses.margins import margins
+from analyses.motion.settling import Settling
 from analyses.specification.weakest import spread
 from analyses.validation.places import Bench
+from analyses.validation.row import judged
+from nonlinear.settling.rest import Rest
 from reports import document as doc
 from reports.as_json import as_json
 from reports.cli.main import main
+from reports.sections import validation
 from reports.sections.answer import believed
+from reports.sections.cycles import section as cycles_section
+from reports.sections.large_signal import _shift_table
 from reports.sections.margins import DOWNWARDS, margin_table, result, spread_table
+from reports.terminal import print_blocks
 
 
 def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
@@ -93,3 +104,45 @@ def test_the_first_screen_counts_what_is_not_met() -> None:
     ]
     part = doc.section("any", "Any", [doc.verdicts(items, what="checks")])
     assert believed([part]) == "1 of 3 checks by simulation met; 1 not met; 1 not proven."
+
+
+def test_terminal_and_page_round_a_number_once(capsys: pytest.CaptureFixture[str]) -> None:
+    """10.05503 Hz has five certain digits, 10.055; four of these are 10.05, of all of it 10.06."""
+    block = doc.table("Resonance", [doc.column("resonance_hz", "at", "Hz", format="sig:4")], [(10.05503,)])
+    page = doc.certain(block)["rows"][0]["resonance_hz"]
+    print_blocks([block])
+    assert f"{page:.2f}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("seconds", "shown"), [(6.78295, (6.78295, "s")), (0.0023, (2.3, "ms"))])
+def test_a_time_of_seconds_is_not_told_in_ms(seconds: float, shown: tuple[float, str]) -> None:
+    row = validation.table([judged("time", "drive", seconds, seconds, 1e-6, unit="s")], "Times")["rows"][0]
+    assert (row["predicted"], row["unit"]) == shown
+
+
+def test_friction_is_not_blamed_for_another_limit() -> None:
+    """At the second frequency the protection was predicted and the current limit came first: no shift."""
+    shift = LimitShift(
+        np.array([1.0, 5.0]), np.array([0.1, 0.2]), np.array([0.11, 0.3]), ("current", "overload"),
+        ("current", "current"), 1e-3,
+    )  # fmt: skip
+    table = _shift_table(shift, load_design("ilr33-amber"), 1.0, "rad")
+    assert [row["shift"] for row in table["rows"]] == [pytest.approx(10.0), None]
+    assert "overload protection takes longer" in table["note"]
+
+
+def test_a_drive_that_stands_still_unproven_is_not_said_to_rest_after_every_step() -> None:
+    rest = Rest(
+        verdict="still moving", error=0.0, amplitude=0.0, motor_amplitude=0.0, frequency_hz=None, periods=0,
+        limited=(), after_s=319000.0, work=1,
+    )  # fmt: skip
+    steps = (Settling(1e-3, 0.0, rest), Settling(0.1, 0.0, replace(rest, verdict="at rest")))
+    made = cycles_section(LimitCycles(load_design("ilr33-amber"), (), steps, ()))
+    assert made["result"] == (
+        "The drive as it is comes to rest after every step, but after 57.3 mdeg it stands still 319000 s "
+        "later; whether it stays is not known; no cycle is predicted."
+    )
+    assert [row["end"] for row in made["blocks"][-1]["rows"]] == [
+        "stands still, not known for how long",
+        "at rest",
+    ]

@@ -72,6 +72,13 @@ def test_command_and_section(cli) -> None:
     made = section(corners(load_design("emps")))
     assert made["result"].startswith("Every loop is stable")
     fin = corners(load_design("fin"))
+    words = section(fin)["result"]
+    assert words.startswith(
+        "The drive fails at 3 of 7 corners (cold; worst gain margin; worst phase margin): "
+    )
+    assert {*words.rstrip(".").partition("): ")[2].split(", ")} == {
+        one for c in told.values() for one in [v["id"] for v in c["verdicts"] if not v["passes"]]
+    } | {"position loop not stable"}
     left, right = (column.panels[0] for column in chart(fin).columns)
     limits = [
         [item.at for item in panel.items if item.kind == "rule" and item.label] for panel in (left, right)

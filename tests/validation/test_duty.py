@@ -122,3 +122,13 @@ def test_section_figure_and_command(cli) -> None:
     speed = load_design("joint")
     with pytest.raises(InputError, match="position loop"):
         duty(replace(speed, controller=replace(speed.controller, position=None)))
+
+
+def test_a_duty_that_the_drive_cannot_follow_is_said_with_its_rating() -> None:
+    """1 rad at 20 Hz is far beyond 22.7 deg/s: the current may do, the motion is not the one asked for."""
+    design = load_design("ilr33-amber")
+    asked = Asked.of(design, amplitude_rad=0.02, frequency_hz=1.0, load_Nm=0.0)
+    assert "not followed" not in section(duty(design, asked))["result"]
+    made = section(duty(design, replace(asked, amplitude_rad=1.0, frequency_hz=20.0)))
+    assert "it is not followed as asked, limited by" in made["result"]
+    assert made["status"] == "warn"

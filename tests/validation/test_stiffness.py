@@ -123,7 +123,9 @@ def test_command_section_and_figure(cli) -> None:
     part = section(stiffness(load_design("fin")))
     figure = next(block for block in part["blocks"] if block["kind"] == "figure")
     assert "<svg" in draw_svg(figure, page=False)
-    assert section(stiffness(load_design("ilr33-amber"), simulated=False))["result"].startswith("A moment")
+    assert section(stiffness(load_design("ilr33-amber"), simulated=False))["result"].startswith(
+        "A load torque"
+    )
 
 
 def test_without_a_position_loop_nothing_is_proven_and_that_is_no_pass(tmp_path, cli) -> None:
@@ -134,7 +136,7 @@ def test_without_a_position_loop_nothing_is_proven_and_that_is_no_pass(tmp_path,
     assert first.startswith("NOT PROVEN  ")
     assert first.endswith("nothing is compared: no position loop holds the output.")
     first = cli.text("stiffness", "fin").splitlines()[0]
-    assert re.search(r"small moments at 3 frequencies agree to \S+, allowed 1e-06, the lost motion to", first)
+    assert re.search(r"small loads at 3 frequencies agree to \S+, allowed 10⁻⁶, the lost motion to", first)
 
 
 def test_the_least_stiffness_is_never_above_the_static_one() -> None:

@@ -96,8 +96,8 @@ def _notes(base: Findings, result: _Settled) -> tuple[str, ...]:
     ]
     if result.dropped:
         notes.append(
-            f"{result.dropped} crossing(s) of the real axis more than {_FAR_DB:g} dB from -1 are left out: "
-            "not resolved in double precision"
+            f"crossings of the real axis more than {_FAR_DB:g} dB from -1 that are left out, as double "
+            f"precision does not resolve them: {result.dropped}"
         )
     return tuple(notes)
 
