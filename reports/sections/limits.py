@@ -69,13 +69,13 @@ def _full(design: Design) -> float:
 
 
 def _result(rows: Sequence[_Linear], unit: str) -> str:
-    """Say how far the largest command of the table reaches no limit; of friction, other sections speak."""
+    """Say how far the largest command of the table stays linear."""
     row = max(rows, key=lambda row: row.amplitude)
     part = "full deflection" if row.fraction == 1.0 else f"{100.0 * row.fraction:.0f} % of full deflection"
     size = f"{part} ({row.amplitude:.3g} {unit})"
     if row.hz is None:
-        return f"A sine of {size} reaches no limit over the whole frequency range."
-    return f"A sine of {size} reaches no limit up to {row.hz:.3g} Hz; above, the {_noun(row.limiter)} acts."
+        return f"A sine of {size} stays linear over the whole frequency range."
+    return f"A sine of {size} stays linear up to {row.hz:.3g} Hz; above, the {_noun(row.limiter)} acts."
 
 
 def _least(border: Onset, scale: float, unit: str) -> str:
@@ -85,7 +85,7 @@ def _least(border: Onset, scale: float, unit: str) -> str:
     k = int(np.argmin(border.amplitude_rad))
     size, hz = scale * border.amplitude_rad[k], hertz(border.omega_rad_s[k])
     limit = _noun(words_of(border.active[k]))
-    return f"Sines up to {size:.3g} {unit} reach no limit; above, the {limit} acts first, at {hz:.3g} Hz."
+    return f"Sines up to {size:.3g} {unit} stay linear; above, the {limit} acts first, at {hz:.3g} Hz."
 
 
 def _noun(limiter: str) -> str:

@@ -47,7 +47,7 @@ def test_the_first_screen_says_how_far_it_is_believed_and_where_it_is_linear(bui
     assert result["believed"].endswith("checks by simulation met; nothing unproven.")
     assert (
         result["linear"]
-        == "A sine of full deflection (10 deg) reaches no limit up to 0.362 Hz; above, the speed limit acts."
+        == "A sine of full deflection (10 deg) stays linear up to 0.362 Hz; above, the speed limit acts."
     )
     assert len(result["findings"]) == 3
     assert result["linear"] not in [item["text"] for item in result["findings"]]
