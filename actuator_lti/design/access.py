@@ -7,7 +7,7 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
-from actuator_lti.design.checks import check_design
+from actuator_lti.design.checks import check_relations
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in
 from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design, Parameter
@@ -114,7 +114,7 @@ def with_values(design: Design, values: Mapping[str, float], *, check: bool = Tr
         parameters[path] = _changed(design.parameters.get(path), field, path, number, design)
     changed = _replaced(design, changes, parameters)
     if check:
-        check_design(changed, design.origin or design.name)
+        check_relations(changed, design.origin or design.name)
     return changed
 
 

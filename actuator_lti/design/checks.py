@@ -11,6 +11,7 @@ import numpy as np
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.checks_control import CONTROL_CHECKS, check_temperature
 from actuator_lti.design.checks_elastic import ELASTIC_CHECKS, check_place
+from actuator_lti.design.checks_own import out_of_range
 from actuator_lti.design.fields import ALL_FIELDS, Field, Structure
 from actuator_lti.design.mistakes import Findings, Refusal
 from actuator_lti.design.model import Correlation, Design, Requirement
@@ -29,7 +30,23 @@ _ELECTRICAL = {
 
 
 def check_design(design: Design, where: str) -> None:
-    """Refuse a design whose values contradict each other; ``where`` names its file.
+    """Refuse a design that no file may hold: values out of range, or that contradict each other.
+
+    ``where`` names its file.
+
+    Raises
+    ------
+    InputError
+        All at once: key, value and what is allowed.
+    """
+    findings = Findings(where)
+    findings.extend(out_of_range(design))
+    findings.refuse()  # the relations ask for numbers that are some
+    check_relations(design, where)
+
+
+def check_relations(design: Design, where: str) -> None:
+    """Refuse a design whose values, each in its range, contradict each other.
 
     Raises
     ------

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from actuator_lti.design.access import with_values
-from actuator_lti.design.checks import check_design
+from actuator_lti.design.checks import check_relations
 from actuator_lti.design.model import ControllerObject, ControllerObjects, Design
 from actuator_lti.design.object_dictionary import OBJECTS, PER_RPM, KnownObject, model_value, step_of
 from actuator_lti.design.parameters import FrozenMap
@@ -80,7 +80,7 @@ def import_objects(objects: ControllerObjects, base: Design, where: str = "setti
     source, old = f"controller settings {where}", design.parameters
     named = {path: replace(old[path], source=source, grade="B") for path in changes}
     design = replace(design, objects=objects, parameters=FrozenMap({**old, **named}))
-    check_design(design, where)
+    check_relations(design, where)
     notes = _import_notes(given, objects.velocity_gain_factor, design)
     return Imported(design=design, changed=tuple(changes), kept=tuple(kept), notes=notes)
 

@@ -1,13 +1,16 @@
 """Keys of the wider drive: what is read, what is refused and with which words."""
 
 from collections.abc import Callable
-from math import log, pi, sqrt
+from dataclasses import replace
+from math import log, nan, pi, sqrt
 
 import pytest
 
 from actuator_lti.design import check_design, load_design, read_design_text, write_design
 from actuator_lti.design.checks_control import TRACKING_LIMIT
 from actuator_lti.design.checks_elastic import elastic_warnings
+from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.sections import part_at, template_of, with_part
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
 from tests.validation.random_drives import full_drive
@@ -213,3 +216,36 @@ def test_what_the_check_of_a_design_accepts_its_file_may_hold() -> None:
     refused = [drive for drive in drives if drive not in accepted]
     assert not any(_taken(lambda drive=drive: read_design_text(write_design(drive))) for drive in refused)
     assert refused
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "written"),
+    [
+        ("motor.resistance", -1.0, "-1 ohm"),
+        ("motor.inductance", nan, "nan H"),
+        ("control.period", 0.0, "0 s"),
+        ("control.position.every", 0, 0),
+        ("control.position.gain", 1e13, "1e13 1/s"),
+        ("control.velocity.sensor", "load", "load"),
+        ("friction.law", "none", "none"),
+        ("gear.worm.ratio", 0.0, 0.0),
+        ("validation.full_deflection", -0.1, "-0.1 rad"),
+    ],
+)
+def test_a_design_made_in_python_is_refused_with_the_words_of_the_file(
+    key: str, value: object, written: object
+) -> None:
+    section, field = key.rpartition(".")[0], FIELDS[template_of(key)]
+    part = replace(part_at(AMBER, section), **{field.attribute: value})
+    with pytest.raises(InputError) as made:
+        check_design(with_part(AMBER, section, part), "drive")
+    with pytest.raises(InputError) as read:
+        with_overrides(AMBER, {key: written})
+    assert str(made.value).startswith(f"drive: {key} = ")
+    if value == value:  # of nan the file says more
+        assert str(made.value).rpartition("allowed: ")[2] == str(read.value).rpartition("allowed: ")[2]
+
+
+def test_an_axis_that_is_none_is_refused_before_its_units_are_asked() -> None:
+    with pytest.raises(InputError, match='axis = "round": allowed: "rotary" or "linear"'):
+        check_design(replace(AMBER, axis="round"), "drive")  # type: ignore[arg-type]
