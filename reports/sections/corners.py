@@ -42,9 +42,9 @@ def summary(result: Corners) -> str:
     if not failed:
         every = "every other requirement" if more else "every requirement"
         return f"Every loop is stable and {every} met at all {len(result.corners)} corners.{more}"
-    every = len(failed) == len(result.corners)
-    where = f"all {len(failed)}" if every else f"{len(failed)} of {len(result.corners)}"
-    names = "" if every else f" ({'; '.join(failed)})"
+    everywhere = len(failed) == len(result.corners)
+    where = f"all {len(failed)}" if everywhere else f"{len(failed)} of {len(result.corners)}"
+    names = "" if everywhere else f" ({'; '.join(failed)})"
     what = dict.fromkeys(name for corner in result.corners for name in _failings(corner))
     return f"The drive fails at {where} corners{names}: {', '.join(what)}.{more}"
 
