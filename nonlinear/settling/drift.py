@@ -14,6 +14,7 @@ import numpy.typing as npt
 from nonlinear._kernels import elastic_layout as ES
 from nonlinear._kernels import layout as at
 from nonlinear.runs.running import Piece, Running
+from nonlinear.settling.protection import overload
 
 Floats = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -34,15 +35,6 @@ def matter(drive: Running) -> Places:
     kept = np.ones(s.size, dtype=bool)
     kept[left] = False
     return drive.matter[kept[drive.matter]]
-
-
-def stays_overloaded(drive: Running) -> bool:
-    """Whether the overload memory, on its way to what the current makes of it, stays where it limits."""
-    p, s = drive.p, drive.s
-    if s[at.S_OVERLOADED] == 0.0:
-        return False
-    reached = (s[at.S_CURRENT] / p[at.CONTINUOUS_CURRENT]) ** 2
-    return bool(min(reached, s[at.S_OVERLOAD]) >= p[at.OVERLOAD_RELEASE])
 
 
 def eventless(piece: Piece) -> bool:
@@ -140,14 +132,3 @@ def _undisturbed(drive: Running, ticks: int) -> bool:
         return False
     drive.s[:] = before
     return eventless(drive.advance(ticks))
-
-
-def overload(p: Floats, s: Floats, current_A: float, ticks: int) -> float:
-    """The overload memory ``x += a ((i/i_cont)^2 - x)`` after ticks in which the current grows evenly."""
-    if ticks == 0:
-        return float(s[at.S_OVERLOAD])
-    a, size = p[at.OVERLOAD_RATE], p[at.CONTINUOUS_CURRENT]
-    start, slope = s[at.S_CURRENT] / size, (current_A - s[at.S_CURRENT]) / (ticks * size)
-    C, B = slope**2, 2.0 * slope * (start - slope / a)
-    A = start**2 - (B + C) / a
-    return float(A + B * ticks + C * ticks**2 + (1.0 - a) ** ticks * (s[at.S_OVERLOAD] - A))

@@ -40,8 +40,8 @@ from nonlinear.settling.drift import (
     leap,
     matter,
     small,
-    stays_overloaded,
 )
+from nonlinear.settling.protection import overload, stays_overloaded, ticks_until_it_acts
 from nonlinear.settling.scales import Scales
 
 Floats = npt.NDArray[np.float64]
@@ -242,10 +242,15 @@ class _Watch:
         scale, coarse = self.scales.states[places], self.coarse[places]
         before, step = change(states[1], states[0]), change(states[2], states[1])
         kept = (places == at.S_OVERLOAD) & stays_overloaded(drive)
-        nothing = bool((kept | (small(before, scale) & small(step, scale))).all())
-        if all(self._still(piece) for piece in pieces) and (nothing or self._turning):
+        still = small(before, scale) & small(step, scale)
+        if all(self._still(piece) for piece in pieces) and ((kept | still).all() or self._turning):
             return True
-        if not all(eventless(piece) for piece in pieces) or not even(step, before, scale, coarse):
+        if not all(eventless(piece) for piece in pieces):
+            return False
+        if places[~still].tolist() == [at.S_OVERLOAD]:
+            self._wait_for_overload()
+            return False
+        if not even(step, before, scale, coarse):
             return False
         windows = leap(drive, places, step, before, scale, coarse)
         self.periods += windows * DRIFT
@@ -253,6 +258,13 @@ class _Watch:
             followed, motor = (float(values[-1]) for values in self.seen[-1][1:])
             self.stood.append(_Stand(self.period_s * self.periods, len(self.seen), followed, motor))
         return windows >= MOST_LEAPS
+
+    def _wait_for_overload(self) -> None:
+        """Nothing moves but the overload memory: set it forward to the window before the one it acts in."""
+        p, s, window = self.drive.p, self.drive.s, DRIFT * self.drive.base_ticks
+        windows = max(ticks_until_it_acts(p, s) // window - 1, 0)
+        s[at.S_OVERLOAD] = overload(p, s, float(s[at.S_CURRENT]), windows * window)
+        self.periods += windows * DRIFT
 
     def _returns(self) -> tuple[_Swing, int] | None:
         """The swing between two returns to where the drive stands, and its first piece; None: not yet known.
