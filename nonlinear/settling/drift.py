@@ -80,6 +80,9 @@ def even(step: Floats, other: Floats, scale: Floats, coarse: Floats) -> bool:
 def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Floats, coarse: Floats) -> int:
     """Set a drive forward by windows of one change each, as many as have no event.
 
+    Rounding of the change adds up until numbers no longer fit each other.  So behind each leap a window is
+    run, in which they find each other again, and the change is taken anew over the whole way.
+
     Parameters
     ----------
     step, before : ndarray
@@ -96,8 +99,22 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
     angles = (places == at.S_ANGLE) | (places == at.S_OUTPUT)
     if (angles & ~small(step, scale)).any():
         return 0
-    stay, start = drive.s.copy(), drive.s[places]
+    start, gone = drive.s[places], 0
     step = np.where(small(step, scale) & (np.abs(step - before) > EVEN * np.abs(step)), 0.0, step)
+    while gone < MOST_LEAPS:
+        windows = _furthest(drive, places, step, scale, coarse)
+        stay, gone = drive.s.copy(), gone + windows
+        if windows == 0 or not _undisturbed(drive, DRIFT * drive.base_ticks):
+            drive.s[:] = stay
+            break
+        drive.s[at.S_TICK], gone = 0.0, gone + 1
+        step = change(drive.s[places], start) / gone
+    return gone
+
+
+def _furthest(drive: Running, places: Places, step: Floats, scale: Floats, coarse: Floats) -> int:
+    """Set a drive forward by as many windows of one change as have no event and end evenly; how many."""
+    stay, start = drive.s.copy(), drive.s[places]
 
     def holds(windows: int) -> bool:
         drive.s[:] = stay

@@ -204,7 +204,7 @@ def test_a_filter_s_rounding_ends_no_leap() -> None:
     joint = quiet(load_design("joint"))
     rest = settle(joint, 0.0, 1e-3 * joint.validation.full_deflection_rad).rest
     assert rest.verdict == "limit cycle"
-    assert rest.work < 3_000_000
+    assert rest.work < 1_800_000
     drive = Rows.of(joint).running()
     a1, a2 = drive.p[at.TORQUE_CHAIN + 3 : at.TORQUE_CHAIN + 5]
     now = before = total = 0.0
