@@ -29,13 +29,17 @@ class Row:
     @classmethod
     def of(cls, name: str) -> Row:
         """The state or input itself."""
-        return cls({name: 1.0})
+        return cls._made({name: 1.0})
+
+    @classmethod
+    def _made(cls, terms: dict[str, Any]) -> Row:
+        """Of terms that nobody else holds: without a copy."""
+        row = cls.__new__(cls)
+        row.terms = terms
+        return row
 
     def __add__(self, other: Row) -> Row:
-        terms = dict(self.terms)
-        for name, value in other.terms.items():
-            terms[name] = terms[name] + value if name in terms else value
-        return Row(terms)
+        return total((self, other))
 
     def __sub__(self, other: Row) -> Row:
         return self + -1.0 * other
@@ -43,7 +47,7 @@ class Row:
     def __mul__(self, factor: Any) -> Row:
         if isinstance(factor, float) and factor == 0.0:
             return Row()
-        return Row({name: factor * value for name, value in self.terms.items()})
+        return Row._made({name: factor * value for name, value in self.terms.items()})
 
     __rmul__ = __mul__
 
@@ -57,8 +61,10 @@ class Row:
 def total(rows: Iterable[Row]) -> Row:
     """The sum of rows."""
     result = Row()
+    terms = result.terms
     for row in rows:
-        result = result + row
+        for name, value in row.terms.items():
+            terms[name] = terms[name] + value if name in terms else value
     return result
 
 
@@ -66,7 +72,8 @@ def table(rows: Iterable[Row], names: tuple[str, ...]) -> np.ndarray:
     """Coefficients of rows over names, shape (..., rows, names)."""
     listed = list(rows)
     place = {name: k for k, name in enumerate(names)}
-    stack = np.broadcast_shapes(*(np.shape(v) for row in listed for v in row.terms.values()))
+    values = (v for row in listed for v in row.terms.values() if not isinstance(v, float))
+    stack = np.broadcast_shapes(*{np.shape(v) for v in values})
     out = np.zeros((*stack, len(listed), len(names)))
     for r, row in enumerate(listed):
         for name, value in row.terms.items():
