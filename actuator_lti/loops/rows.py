@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -23,20 +23,13 @@ class Row:
     __slots__ = ("terms",)
     __array_ufunc__ = None  # an array times a row is a row
 
-    def __init__(self, terms: Mapping[str, Any] | None = None) -> None:
-        self.terms = dict(terms or {})
+    def __init__(self, terms: dict[str, Any] | None = None) -> None:
+        self.terms = {} if terms is None else terms  # its own: nobody else writes them
 
     @classmethod
     def of(cls, name: str) -> Row:
         """The state or input itself."""
-        return cls._made({name: 1.0})
-
-    @classmethod
-    def _made(cls, terms: dict[str, Any]) -> Row:
-        """Of terms that nobody else holds: without a copy."""
-        row = cls.__new__(cls)
-        row.terms = terms
-        return row
+        return cls({name: 1.0})
 
     def __add__(self, other: Row) -> Row:
         return total((self, other))
@@ -47,7 +40,7 @@ class Row:
     def __mul__(self, factor: Any) -> Row:
         if isinstance(factor, float) and factor == 0.0:
             return Row()
-        return Row._made({name: factor * value for name, value in self.terms.items()})
+        return Row({name: factor * value for name, value in self.terms.items()})
 
     __rmul__ = __mul__
 
