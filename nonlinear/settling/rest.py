@@ -36,7 +36,6 @@ from nonlinear.settling.drift import (
     change,
     even,
     eventless,
-    grain,
     leap,
     matter,
     small,
@@ -153,13 +152,11 @@ class _Watch:
     stood: list[_Stand] = field(default_factory=list)  # before it broke away
     scales: Scales = field(init=False)
     period_s: float = field(init=False)
-    coarse: Floats = field(init=False)
 
     def __post_init__(self) -> None:
         """Begin with the state that is there."""
         self.period_s = self.drive.base_ticks * float(self.drive.p[at.PERIOD])
         self.scales = Scales(self.drive, DRIFT * self.period_s)
-        self.coarse = grain(self.drive.p, self.drive.s.size)
 
     def judged(self) -> Rest:
         """Go on until the verdict is known."""
@@ -239,7 +236,7 @@ class _Watch:
             states.append(drive.s[places])
         if any(piece.flags.size < DRIFT for piece in pieces):
             return False  # cut short, as the work is done
-        scale, coarse = self.scales.states[places], self.coarse[places]
+        scale = self.scales.states[places]
         before, step = change(states[1], states[0]), change(states[2], states[1])
         kept = (places == at.S_OVERLOAD) & stays_overloaded(drive)
         still = small(before, scale) & small(step, scale)
@@ -250,9 +247,9 @@ class _Watch:
         if places[~still].tolist() == [at.S_OVERLOAD]:
             self._wait_for_overload()
             return False
-        if not even(step, before, scale, coarse):
+        if not even(step, before, scale):
             return False
-        windows = leap(drive, places, step, before, scale, coarse)
+        windows = leap(drive, places, step, before, scale)
         self.periods += windows * DRIFT
         if windows:
             followed, motor = (float(values[-1]) for values in self.seen[-1][1:])

@@ -13,7 +13,6 @@ from analyses.motion.settling import settle
 from nonlinear import Rows, State, commands, simulate
 from nonlinear._kernels import layout as at
 from nonlinear.bench.on_the_bench import quiet
-from nonlinear.settling.drift import grain
 from nonlinear.settling.protection import overload, ticks_until_it_acts
 from nonlinear.settling.rest import first_motion_s, judge
 from tests.nonlinear.rest_agreement import answers
@@ -205,13 +204,6 @@ def test_a_filter_s_rounding_ends_no_leap() -> None:
     rest = settle(joint, 0.0, 1e-3 * joint.validation.full_deflection_rad).rest
     assert rest.verdict == "limit cycle"
     assert rest.work < 1_800_000
-    drive = Rows.of(joint).running()
-    a1, a2 = drive.p[at.TORQUE_CHAIN + 3 : at.TORQUE_CHAIN + 5]
-    now = before = total = 0.0
-    for k in range(100_000):  # what unit rounding, once, adds up to
-        now, before = float(k == 0) - a1 * now - a2 * before, now
-        total += now
-    assert grain(drive.p, drive.s.size)[at.S_TORQUE_CHAIN] == pytest.approx(total, rel=1e-9)
 
 
 def test_overload_that_stays_is_not_waited_for() -> None:
