@@ -91,8 +91,10 @@ def _released(
     asked = [] if release.too_long else _asked(kind, linear, coarser=release.coarser)
     value, seen = _first(release, asked)
     found = (linear, value, FURTHEST * linear, bench.setup(name).period_s, *seen, bench.design.axis)
-    how = {"coarser": release.coarser, "too_long": release.too_long}
-    return AmplitudeMargin(name, kind, size, SIZES[size], friction_on, *found, **how)
+    return AmplitudeMargin(
+        name, kind, size, SIZES[size], friction_on, *found, coarser=release.coarser,
+        too_long=release.too_long,
+    )  # fmt: skip
 
 
 def _first(release: _Release, asked: Sequence[float]) -> tuple[float | None, tuple[str, float]]:
