@@ -15,6 +15,7 @@ from math import ceil, nan
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import rubs
 from analyses.large_signal.settling_ticks import full_range, settling_ticks_of
 from analyses.large_signal.tones_run import TANH_TOLERANCE
 from analyses.validation.places import Bench
@@ -65,8 +66,7 @@ class AmplitudeMargin:
 
 def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
     """Gain and delay margins of every stable loop from small, medium and large deviations."""
-    friction = bench.design.friction
-    rough = friction.dry_torque_Nm > 0.0 or friction.offset_torque_Nm != 0.0
+    rough = rubs(bench.design) or bench.design.friction.offset_torque_Nm != 0.0
     for name, figures in bench.figures.items():
         margins = figures.margins
         if margins.stable is not True:
