@@ -119,6 +119,11 @@ def dry_torque(design: Design, load_Nm: float, direction: int) -> Any:
     return points[0].torque_Nm + design.friction.load_coefficient * abs(load_Nm)
 
 
+def rubs(design: Design) -> bool:
+    """Whether there is dry friction without load, either way; of a friction map its first torque."""
+    return any(dry_torque(design, 0.0, way) > 0.0 for way in (1, -1))
+
+
 def segments(points: tuple[FrictionPoint, ...]) -> list[tuple[float, float]]:
     """(speed from which it holds, slope) of each straight piece of a friction map; the last continues."""
     result = [

@@ -36,7 +36,8 @@ class Drive:
     ``stages``: the stages present, innermost first, of ``"current"``, ``"velocity"``, ``"position"``.
     ``interval``: ticks between two updates of each stage, and of the speed measurement (``"speed"``).
     ``target``: the signal that each stage drives: ``"u"``, ``"i_ref"`` or ``"w_ref"``.
-    ``blocks_at``: loops cut at a break point, kept by `actuator_lti.loops.periodic`.
+    ``blocks_at``, ``margins_at``: loops cut at a break point, and how far they are from their border, kept by
+    `actuator_lti.loops.periodic`.
     """
 
     design: Design
@@ -45,6 +46,7 @@ class Drive:
     interval: dict[str, int]
     target: dict[str, str]
     blocks_at: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
+    margins_at: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @cached_property
     def plant(self) -> Plant:

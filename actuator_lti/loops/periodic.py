@@ -245,7 +245,15 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
         raise InputError(f"form = {loops.form!r}: exact_margins needs form='sampled'")
     if point not in loops.break_points:
         raise InputError(f"break point {point!r}: one of {', '.join(loops.break_points)}")
-    wired = _wired(loops)
+    wired, asked = _wired(loops), (point, longest_delay_ticks)
+    if asked not in wired.margins_at:
+        wired.margins_at[asked] = _margins_of(wired, *asked)
+    found: ExactMargins = wired.margins_at[asked]
+    return found
+
+
+def _margins_of(wired: Drive, point: str, longest_delay_ticks: float) -> ExactMargins:
+    """The same of a wired drive."""
     moved, others = (_moved(part, wired.tick_s) for part in _parts(point_blocks(wired, point)))
     radius = float(max(moved.radius(), others.radius()))
     nan = float("nan")

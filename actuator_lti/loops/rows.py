@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -23,8 +23,8 @@ class Row:
     __slots__ = ("terms",)
     __array_ufunc__ = None  # an array times a row is a row
 
-    def __init__(self, terms: Mapping[str, Any] | None = None) -> None:
-        self.terms = dict(terms or {})
+    def __init__(self, terms: dict[str, Any] | None = None) -> None:
+        self.terms = {} if terms is None else terms  # its own: nobody else writes them
 
     @classmethod
     def of(cls, name: str) -> Row:
@@ -32,10 +32,7 @@ class Row:
         return cls({name: 1.0})
 
     def __add__(self, other: Row) -> Row:
-        terms = dict(self.terms)
-        for name, value in other.terms.items():
-            terms[name] = terms[name] + value if name in terms else value
-        return Row(terms)
+        return total((self, other))
 
     def __sub__(self, other: Row) -> Row:
         return self + -1.0 * other
@@ -57,8 +54,10 @@ class Row:
 def total(rows: Iterable[Row]) -> Row:
     """The sum of rows."""
     result = Row()
+    terms = result.terms
     for row in rows:
-        result = result + row
+        for name, value in row.terms.items():
+            terms[name] = terms[name] + value if name in terms else value
     return result
 
 
@@ -66,7 +65,8 @@ def table(rows: Iterable[Row], names: tuple[str, ...]) -> np.ndarray:
     """Coefficients of rows over names, shape (..., rows, names)."""
     listed = list(rows)
     place = {name: k for k, name in enumerate(names)}
-    stack = np.broadcast_shapes(*(np.shape(v) for row in listed for v in row.terms.values()))
+    values = (v for row in listed for v in row.terms.values() if not isinstance(v, float))
+    stack = np.broadcast_shapes(*{np.shape(v) for v in values})
     out = np.zeros((*stack, len(listed), len(names)))
     for r, row in enumerate(listed):
         for name, value in row.terms.items():

@@ -15,6 +15,7 @@ from math import ceil, nan
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import rubs
 from analyses.large_signal.settling_ticks import full_range, settling_ticks_of
 from analyses.large_signal.tones_run import TANH_TOLERANCE
 from analyses.validation.places import Bench
@@ -27,6 +28,7 @@ LASTING = 0.985  # over `CYCLES`
 CYCLES, CLOSE, FURTHEST = 4, 0.03, 4.0
 VALUES, MOST_TICKS = 12, 150_000  # asked about a margin, and of their runs; else fewer
 MOST_SETTLING = 2000  # ticks
+TOO_MANY = 40_000_000  # ticks of the values asked about one margin, as where the way back takes hours
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class AmplitudeMargin:
     ``output``: amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value.
     ``coarser``: whether fewer than `VALUES` were asked, nearer to the linear margin: those take over
     `MOST_TICKS`.
+    ``too_long``: whether none was asked, as they take over `TOO_MANY` ticks.
     """
 
     loop: str
@@ -58,12 +61,12 @@ class AmplitudeMargin:
     output: float = nan
     axis: str = "rotary"
     coarser: bool = False
+    too_long: bool = False
 
 
 def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
     """Gain and delay margins of every stable loop from small, medium and large deviations."""
-    friction = bench.design.friction
-    rough = friction.dry_torque_Nm > 0.0 or friction.offset_torque_Nm != 0.0
+    rough = rubs(bench.design) or bench.design.friction.offset_torque_Nm != 0.0
     for name, figures in bench.figures.items():
         margins = figures.margins
         if margins.stable is not True:
@@ -85,9 +88,13 @@ def _released(
 ) -> AmplitudeMargin:
     """Where an oscillation lasts, and what limits it there."""
     release = _Release(bench, name, kind, hertz, SIZES[size], friction_on)
-    value, seen = _first(release, _asked(kind, linear, coarser=release.coarser))
+    asked = [] if release.too_long else _asked(kind, linear, coarser=release.coarser)
+    value, seen = _first(release, asked)
     found = (linear, value, FURTHEST * linear, bench.setup(name).period_s, *seen, bench.design.axis)
-    return AmplitudeMargin(name, kind, size, SIZES[size], friction_on, *found, coarser=release.coarser)
+    return AmplitudeMargin(
+        name, kind, size, SIZES[size], friction_on, *found, coarser=release.coarser,
+        too_long=release.too_long,
+    )  # fmt: skip
 
 
 def _first(release: _Release, asked: Sequence[float]) -> tuple[float | None, tuple[str, float]]:
@@ -133,6 +140,7 @@ class _Release:
         self.cycles = CYCLES // 2 if self.coarser else CYCLES  # of thousands of ticks each, then
         self.window, self.lasts = ceil(self.cycles * cycle), LASTING ** (self.cycles / CYCLES)
         self.wait = travel + max(self.window, settling)
+        self.too_long = VALUES * (self.wait + 2 * self.window) > TOO_MANY
 
     def lasting(self, value: float) -> tuple[str, float] | None:
         """What limits the oscillation at a gain, or a delay in samples, and its amplitude at the output.

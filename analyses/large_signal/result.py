@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import rubs
 from actuator_lti.loops import assemble_loops
 from analyses.large_signal.bode import AmplitudeBode, amplitude_bode
 from analyses.large_signal.border import LimitShift, limit_shift
@@ -61,6 +62,5 @@ def large_signals(
     """
     loops = assemble_loops(design) if loops is None else loops
     map_ = amplitude_map(design, loops, counts=counts)
-    rubs = any(design.friction.dry_Nm(0.0, direction) > 0.0 for direction in (1, -1))
-    shift = limit_shift(design, loops) if rubs else None
+    shift = limit_shift(design, loops) if rubs(design) else None
     return LargeSignals(design, map_, shift, amplitude_bode(design, loops, map_), sawtooth(design))

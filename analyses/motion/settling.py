@@ -11,6 +11,7 @@ from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design, Requirement, Waiver
+from analyses.large_signal.tones_run import TANH_TOLERANCE
 from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
 from nonlinear.settling.rest import Rest, judge
@@ -61,7 +62,7 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
     'at rest'
     """
     rows = Rows.of(design)
-    rows["load"] = load_Nm
+    rows["load"], rows["tanh_tolerance"] = load_Nm, TANH_TOLERANCE
     rows.step("command", step_rad)
     rest = judge(rows.running())
     assert rest is not None  # a step and a load that stay

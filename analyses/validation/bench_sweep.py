@@ -15,6 +15,7 @@ import numpy.typing as npt
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import Place
 from nonlinear.bench.loop_setup import LoopSetup
+from nonlinear.runs.running import Running
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
@@ -59,9 +60,10 @@ def _found(setup: LoopSetup, place: Place, angle: float, samples: int) -> comple
     event, rounding in a small one: from size to size the answer changes least where neither does.
     """
     best, change, last = complex(np.nan, np.nan), np.inf, None
+    run = _Sines(setup, place, angle, samples)
     turn = np.exp(-1j * angle * np.arange(samples))
     for size in SIZES:
-        back = _sine(setup, place, size, angle, samples)
+        back = run.returned(size)
         if back is None:
             continue
         closed = 2.0 / samples * np.sum(back * turn)
@@ -82,19 +84,30 @@ def _turns(share: float) -> tuple[int, int]:
     return cycles, ceil(2.0 * cycles / share)
 
 
-def _sine(setup: LoopSetup, place: Place, part: float, angle: float, samples: int) -> Floats | None:
-    """What comes back from a cosine of a part of a large signal, over its size; None after an event."""
-    size = part * (setup.range if np.isfinite(setup.range) else 1.0)
-    rows = setup.rows()
-    rows.sine(setup.point, size, angle / (2.0 * np.pi * place.tangent.hold_s), 0.5 * np.pi)
-    drive, calm = rows.running(), setup.rows().running()
-    t = place.tangent
-    updates = t.B.shape[1]
-    turned = np.exp(1j * angle * updates) * np.eye(len(t.A)) - t.A
-    held = np.exp(1j * angle * np.arange(updates))
-    drive.s[t.places] += size * np.linalg.solve(turned, t.B @ held).real
-    back, steady = (
-        one.returned(one.advance(samples * setup.hold_ticks, setup.hold_ticks), setup.point)
-        for one in (drive, calm)
-    )
-    return (steady - back) / size if drive.happened == calm.happened else None
+class _Sines:
+    """Cosines of one frequency and several sizes, and the run without one that they are told from."""
+
+    def __init__(self, setup: LoopSetup, place: Place, angle: float, samples: int) -> None:
+        self.setup, self.tangent, self.samples, self.rows = setup, place.tangent, samples, setup.rows()
+        self.frequency_hz = angle / (2.0 * np.pi * place.tangent.hold_s)
+        self.calm = self.rows.running()
+        self.steady = self._advanced(self.calm)
+        t = place.tangent
+        updates = t.B.shape[1]
+        turned = np.exp(1j * angle * updates) * np.eye(len(t.A)) - t.A
+        held = np.exp(1j * angle * np.arange(updates))
+        self.begin = np.linalg.solve(turned, t.B @ held).real  # of a cosine of size 1
+
+    def _advanced(self, drive: Running) -> Floats:
+        hold = self.setup.hold_ticks
+        return drive.returned(drive.advance(self.samples * hold, hold), self.setup.point)
+
+    def returned(self, part: float) -> Floats | None:
+        """What comes back from a cosine of a part of a large signal, over its size; None after an event."""
+        size = part * (self.setup.range if np.isfinite(self.setup.range) else 1.0)
+        rows = self.rows.copy()
+        rows.sine(self.setup.point, size, self.frequency_hz, 0.5 * np.pi)
+        drive = rows.running()
+        drive.s[self.tangent.places] += size * self.begin
+        back = self._advanced(drive)
+        return (self.steady - back) / size if drive.happened == self.calm.happened else None

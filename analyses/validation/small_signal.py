@@ -139,29 +139,43 @@ def _marks(place: Place) -> list[float]:
 
 def _poles(place: Place) -> Row:
     """Each predicted pole beside the tangent's nearest eigenvalue, by their rates."""
+    found, errors, rounding = _eigenvalues(place.tangent)
+    resolved = [
+        (pole, k)
+        for pole in place.poles[np.abs(place.poles) > 0.0]
+        if rounding[k := int(np.argmin(np.abs(found - pole)))] <= WITHIN * abs(pole)
+    ]
+    words = f"{len(resolved)} of {place.poles.size} poles resolved in double precision"
+    off, within, worst = 0.0, WITHIN, 0j
+    for pole, k in resolved:
+        size = abs(pole) * (abs(np.log(complex(pole))) + rounding[k] / (WITHIN * abs(pole)))
+        now, allowed = float(abs(found[k] - pole) / size), max(WITHIN, SURE * float(errors[k] / size))
+        if _worse(now, allowed, off, within):
+            off, within, worst = now, allowed, complex(pole)
+    if worst:
+        words += f"; worst at |z| = {abs(worst):.6g} over {place.tangent.period_s:.3g} s"
+    row = place.judged("poles", 0.0, off, within, 1.0, "1", words)
+    return replace(row, predicted=None, found=None, error=off)
+
+
+def _worse(off: float, within: float, other: float, other_within: float) -> bool:
+    """Whether a difference is farther out than another, or, where both are within, less well known."""
+    if off <= within and other <= other_within and max(within, other_within) > RESOLVED:
+        return within > other_within
+    return off / within > other / other_within
+
+
+def _eigenvalues(t: Tangent) -> tuple[Complexes, Floats, Floats]:
+    """Those of A, what the stated errors of its entries do to each, and what rounding does."""
     from scipy.linalg import eig
 
-    A = balanced(place.tangent.A)[0]
+    A, scale = balanced(t.A)
+    entries = t.entry_errors[: len(A), : len(A)] / scale[:, None] * scale
     found, left, right = eig(A, left=True)
     sharp = np.abs(np.sum(left.conj() * right, axis=0))  # of unit vectors: 1 over the condition number
-    rounding = ROUNDING * float(np.linalg.norm(A))
-    worst, at, resolved = 0.0, 0j, 0
-    for pole in place.poles[np.abs(place.poles) > 0.0]:
-        k = int(np.argmin(np.abs(found - pole)))
-        blur = rounding / max(float(sharp[k]), 1e-300)
-        if blur > WITHIN * abs(pole):
-            continue
-        resolved += 1
-        rate = abs(np.log(complex(pole)))
-        off = abs(found[k] - pole) / abs(pole) / (rate + blur / WITHIN)
-        if off > worst:
-            worst, at = float(off), complex(pole)
-    size = abs(at)
-    words = f"{resolved} of {place.poles.size} poles resolved in double precision"
-    if worst:
-        words += f"; worst at |z| = {size:.6g} over {place.tangent.period_s:.3g} s"
-    row = place.judged("poles", 0.0, worst, place.within, 1.0, "1", words)
-    return replace(row, predicted=None, found=None, error=worst)
+    sharp = np.maximum(sharp, np.finfo(float).tiny)
+    felt = np.einsum("ik,ij,jk->k", np.abs(left), entries, np.abs(right)) / sharp
+    return found, felt, ROUNDING * float(np.linalg.norm(A)) / sharp
 
 
 @dataclass(frozen=True)

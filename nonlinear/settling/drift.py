@@ -14,11 +14,12 @@ import numpy.typing as npt
 from nonlinear._kernels import elastic_layout as ES
 from nonlinear._kernels import layout as at
 from nonlinear.runs.running import Piece, Running
+from nonlinear.settling.protection import overload
 
 Floats = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 DRIFT, CHECKED, EVEN = 64, 16, 1e-4  # periods of a window, of a look ahead; how alike two changes are
-STILL, ROUNDING = 2.0**-30, 2.0**-42  # of the largest value: a change in a window that counts; rounding
+STILL = 2.0**-30  # of the largest value: a change in a window that counts
 MOST_LEAPS = int(1.0 / STILL)  # windows until what changes by `STILL` in each has changed by its own size
 _ANGLES = [at.S_ANGLE, at.S_OUTPUT]
 _MODES = (at.S_DIRECTION, ES.ES_SEGMENT, ES.ES_LOAD, ES.ES_CONTACT, ES.ES_BEND)  # they follow from the rest
@@ -34,15 +35,6 @@ def matter(drive: Running) -> Places:
     kept = np.ones(s.size, dtype=bool)
     kept[left] = False
     return drive.matter[kept[drive.matter]]
-
-
-def stays_overloaded(drive: Running) -> bool:
-    """Whether the overload memory, on its way to what the current makes of it, stays where it limits."""
-    p, s = drive.p, drive.s
-    if s[at.S_OVERLOADED] == 0.0:
-        return False
-    reached = (s[at.S_CURRENT] / p[at.CONTINUOUS_CURRENT]) ** 2
-    return bool(min(reached, s[at.S_OVERLOAD]) >= p[at.OVERLOAD_RELEASE])
 
 
 def eventless(piece: Piece) -> bool:
@@ -61,40 +53,25 @@ def small(step: Floats, scale: Floats) -> npt.NDArray[np.bool_]:
     return np.abs(step) <= STILL * np.where(np.isfinite(scale), scale, 0.0)
 
 
-def grain(p: Floats, size: int) -> Floats:
-    """How many times coarser than by its own size each number of a state is rounded.
-
-    A filter's states by the DC gain of its poles, ``1/(1 + a1 + a2)``: a slow one sums up rounding for long.
-    """
-    coarse = np.ones(size)
-    for filters, place, states in (
-        (at.COMMAND_FILTERS, at.COMMAND_CHAIN, at.S_COMMAND_CHAIN),
-        (at.SPEED_FILTERS, at.SPEED_CHAIN, at.S_SPEED_CHAIN),
-        (at.TORQUE_FILTERS, at.TORQUE_CHAIN, at.S_TORQUE_CHAIN),
-    ):
-        for k in range(int(p[filters])):
-            a = p[place + k * at.SECTION + 3 : place + (k + 1) * at.SECTION]
-            coarse[states + 2 * k : states + 2 * k + 2] = max(1.0, 1.0 / abs(1.0 + a.sum()))
-    return coarse
-
-
-def even(step: Floats, other: Floats, scale: Floats, coarse: Floats) -> bool:
-    """Whether two changes of a state are one, number by number, or both next to nothing (`grain`)."""
-    rounding = ROUNDING * coarse * np.where(np.isfinite(scale), scale, 0.0)
-    same = np.abs(step - other) <= EVEN * np.abs(step) + rounding
+def even(step: Floats, other: Floats, scale: Floats) -> bool:
+    """Whether two changes of a state are one, number by number, or both next to nothing."""
+    same = np.abs(step - other) <= EVEN * np.abs(step)
     return bool((same | (small(step, scale) & small(other, scale))).all())
 
 
-def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Floats, coarse: Floats) -> int:
+def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Floats) -> int:
     """Set a drive forward by windows of one change each, as many as have no event.
+
+    Rounding of the change adds up until numbers no longer fit each other.  So behind each leap a window is
+    run, in which they find each other again, and the change is taken anew over the whole way.
 
     Parameters
     ----------
     step, before : ndarray
         Change of the state at ``places`` in the last window, and in the one before it; next to nothing that
         differs between them is rounding, which does not add up.
-    scale, coarse : ndarray
-        Largest values at ``places``, and their `grain`.
+    scale : ndarray
+        Largest values at ``places``.
 
     Returns
     -------
@@ -104,8 +81,22 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
     angles = (places == at.S_ANGLE) | (places == at.S_OUTPUT)
     if (angles & ~small(step, scale)).any():
         return 0
-    stay, start = drive.s.copy(), drive.s[places]
+    start, gone = drive.s[places], 0
     step = np.where(small(step, scale) & (np.abs(step - before) > EVEN * np.abs(step)), 0.0, step)
+    while gone < MOST_LEAPS:
+        windows = _furthest(drive, places, step, scale)
+        stay, gone = drive.s.copy(), gone + windows
+        if windows == 0 or not _undisturbed(drive, DRIFT * drive.base_ticks):
+            drive.s[:] = stay
+            break
+        drive.s[at.S_TICK], gone = 0.0, gone + 1
+        step = change(drive.s[places], start) / gone
+    return gone
+
+
+def _furthest(drive: Running, places: Places, step: Floats, scale: Floats) -> int:
+    """Set a drive forward by as many windows of one change as have no event and end evenly; how many."""
+    stay, start = drive.s.copy(), drive.s[places]
 
     def holds(windows: int) -> bool:
         drive.s[:] = stay
@@ -113,7 +104,7 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
         if not _undisturbed(drive, CHECKED * drive.base_ticks):
             return False
         after = change(drive.s[places], ahead)
-        return even(after, CHECKED / DRIFT * step, np.maximum(scale, np.abs(ahead)), coarse)
+        return even(after, CHECKED / DRIFT * step, np.maximum(scale, np.abs(ahead)))
 
     low, high = 0, 1
     while high <= MOST_LEAPS and holds(high):
@@ -140,14 +131,3 @@ def _undisturbed(drive: Running, ticks: int) -> bool:
         return False
     drive.s[:] = before
     return eventless(drive.advance(ticks))
-
-
-def overload(p: Floats, s: Floats, current_A: float, ticks: int) -> float:
-    """The overload memory ``x += a ((i/i_cont)^2 - x)`` after ticks in which the current grows evenly."""
-    if ticks == 0:
-        return float(s[at.S_OVERLOAD])
-    a, size = p[at.OVERLOAD_RATE], p[at.CONTINUOUS_CURRENT]
-    start, slope = s[at.S_CURRENT] / size, (current_A - s[at.S_CURRENT]) / (ticks * size)
-    C, B = slope**2, 2.0 * slope * (start - slope / a)
-    A = start**2 - (B + C) / a
-    return float(A + B * ticks + C * ticks**2 + (1.0 - a) ** ticks * (s[at.S_OVERLOAD] - A))

@@ -37,12 +37,11 @@ from nonlinear.settling.drift import (
     change,
     even,
     eventless,
-    grain,
     leap,
     matter,
     small,
-    stays_overloaded,
 )
+from nonlinear.settling.protection import overload, stays_overloaded, ticks_until_it_acts
 from nonlinear.settling.scales import Scales
 
 Floats = npt.NDArray[np.float64]
@@ -154,13 +153,11 @@ class _Watch:
     stood: list[_Stand] = field(default_factory=list)  # before it broke away
     scales: Scales = field(init=False)
     period_s: float = field(init=False)
-    coarse: Floats = field(init=False)
 
     def __post_init__(self) -> None:
         """Begin with the state that is there."""
         self.period_s = self.drive.base_ticks * float(self.drive.p[at.PERIOD])
         self.scales = Scales(self.drive, DRIFT * self.period_s)
-        self.coarse = grain(self.drive.p, self.drive.s.size)
 
     def judged(self) -> Rest:
         """Go on until the verdict is known."""
@@ -244,20 +241,32 @@ class _Watch:
             states.append(drive.s[places])
         if any(piece.flags.size < DRIFT for piece in pieces):
             return False  # cut short, as the work is done
-        scale, coarse = self.scales.states[places], self.coarse[places]
+        scale = self.scales.states[places]
         before, step = change(states[1], states[0]), change(states[2], states[1])
         kept = (places == at.S_OVERLOAD) & stays_overloaded(drive)
-        nothing = bool((kept | (small(before, scale) & small(step, scale))).all())
-        if all(self._still(piece) for piece in pieces) and (nothing or self._turning):
+        still = small(before, scale) & small(step, scale)
+        if all(self._still(piece) for piece in pieces) and ((kept | still).all() or self._turning):
             return True
-        if not all(eventless(piece) for piece in pieces) or not even(step, before, scale, coarse):
+        if not all(eventless(piece) for piece in pieces):
             return False
-        windows = leap(drive, places, step, before, scale, coarse)
+        if places[~still].tolist() == [at.S_OVERLOAD]:
+            self._wait_for_overload()
+            return False
+        if not even(step, before, scale):
+            return False
+        windows = leap(drive, places, step, before, scale)
         self.periods += windows * DRIFT
         if windows:
             followed, motor = (float(values[-1]) for values in self.seen[-1][1:])
             self.stood.append(_Stand(self.period_s * self.periods, len(self.seen), followed, motor))
         return windows >= MOST_LEAPS
+
+    def _wait_for_overload(self) -> None:
+        """Nothing moves but the overload memory: set it forward to the window before the one it acts in."""
+        p, s, window = self.drive.p, self.drive.s, DRIFT * self.drive.base_ticks
+        windows = max(ticks_until_it_acts(p, s) // window - 1, 0)
+        s[at.S_OVERLOAD] = overload(p, s, float(s[at.S_CURRENT]), windows * window)
+        self.periods += windows * DRIFT
 
     def _returns(self) -> tuple[_Swing, int] | None:
         """The swing between two returns to where the drive stands, and its first piece; None: not yet known.

@@ -234,6 +234,8 @@ def _amplitude_table(items: Sequence[AmplitudeMargin]) -> doc.Block:
 
 
 def _remark(item: AmplitudeMargin) -> str:
+    if item.too_long:
+        return "not asked: the way back takes too long"
     if item.value is None:
         return f"no oscillation lasts up to {_text(item.furthest, item)}"
     if item.value == (0.0 if item.kind == "delay" else 1.0):

@@ -13,7 +13,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.loops import Loops, exact_margins, periodic_loop
 from analyses.validation import CHECKS, validate
 from analyses.validation.places import Bench
-from analyses.validation.small_signal import small_signal
+from analyses.validation.small_signal import nearest_pole, small_signal
 from nonlinear import tangent
 from nonlinear.bench.derivative import Tangent
 from nonlinear.bench.lifted import GRID, relative
@@ -131,6 +131,20 @@ def test_drives_that_failed_once(seed: int) -> None:
     """
     result = validate(full_drive(seed), CHECKS)
     assert result.passed, [str(row) for row in result.not_met]
+
+
+def test_a_slow_pole_is_judged_by_its_own_error() -> None:
+    """One drive has the same poles wherever it is cut: two tangents say how well each knows the slow one."""
+    drive = full_drive(1_500_687)
+    bench = Bench(drive, drive)
+    places = [bench.place(name) for name in ("position", "u")]
+    slow = complex(max(places[0].poles, key=abs))
+    seen = [nearest_pole(place.tangent.A, slow) for place in places]
+    assert abs(seen[1] - seen[0]) > 1e-6 * abs(np.log(slow))  # more than is allowed of a pole that is known
+    assert places[1].tangent.stated_error < 1e-7  # of the response at that place, which hardly has it
+    rows = [row for place in places for row in small_signal(place) if row.name == "poles"]
+    assert all(row.verdict != Verdict.NOT_MET for row in rows)
+    assert rows[1].allowed > abs(seen[1] - seen[0])
 
 
 @pytest.mark.parametrize("seed", [1_211_006, 1_211_041])
