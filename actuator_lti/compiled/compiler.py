@@ -18,7 +18,8 @@ from actuator_lti.errors import InputError
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-strict-aliasing")
 # values do not depend on these: nobody reads errno or the flags of exceptions
-LIBRARY_FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math")
+# and numbers of a row are stored one by one: read as a pair soon after, they would be waited for
+LIBRARY_FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-slp-vectorize")
 ZIG_TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu", "wasm": "wasm32-wasi"}
 
 

@@ -47,7 +47,7 @@ def elastic_motion(p, s, part, held, M, extra):
     s[at.ES_INPUT + at.IN_U], s[at.ES_INPUT + at.IN_M] = held, M
     s[at.ES_INPUT + at.IN_ABS_M], s[at.ES_INPUT + at.IN_EXTRA] = abs(M), extra
     put_torques(p, s)
-    if p[layout.WITH_ENERGY] == 0.0 and stride(p, s, part):
+    if p[layout.WITH_ENERGY] == 0.0 and stride(p, s, part, whole):
         return layout.OK
     return walk(p, s, whole)
 
@@ -72,10 +72,29 @@ def speed_of_change(p, s):
 
 
 @kernel
-def stride(p, s, number):
-    """Take one precomputed step if no guard can cross in it: 0, 1 the segments, 2 + j the step Ts/2^j."""
+def guards_hold(p, s, chord, i, w, W, d):
+    """Whether no guard can cross on the way to a state; notes how much room there is behind it."""
+    room = LARGEST
+    for j in range(int(s[at.ES_GUARDS])):
+        g = at.ES_GUARD + j * at.GUARD_SIZE
+        offset = guard_offset(s, g)
+        before = guard_state(s, g) + offset
+        after = s[g + at.G_I] * i + s[g + at.G_W] * w + (s[g + at.G_V] * W + s[g + at.G_D] * d) + offset
+        if not (min(before, after) > s[g + at.G_CURVE] * chord):
+            return False
+        room = min(room, after * s[g + at.G_ROOM])
+    s[at.ES_ROOM] = room
+    return True
+
+
+@kernel
+def stride(p, s, number, h):
+    """Take one precomputed step if no guard can cross in it: 0, 1 the segments, 2 + j the step Ts/2^j.
+
+    ``h`` is its length.  The guards are looked at only where the state may have come near one since.
+    """
     m = int(s[at.ES_MODE])
-    o = m + at.MODE_CHORD + 3 + int(p[at.EL_LEVELS]) + number * at.STEP_SIZE
+    o = m + at.MODE_REACH + 3 + int(p[at.EL_LEVELS]) + number * at.STEP_SIZE
     i, w, W, d = s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST]
     x = at.ES_INPUT
     u, a, b = s[x + at.IN_U], s[x + at.IN_MOTOR], s[x + at.IN_LOAD]
@@ -89,18 +108,12 @@ def stride(p, s, number):
     o += 7
     turned = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d
     turned += p[o + 4] * u + p[o + 5] * a + p[o + 6] * b
-    guards = int(s[at.ES_GUARDS])
-    if guards > 0:
-        chord = p[m + at.MODE_CHORD + number] * speed_of_change(p, s)
-        for j in range(guards):
-            g = at.ES_GUARD + j * at.GUARD_SIZE
-            offset = guard_offset(s, g)
-            before = guard_state(s, g) + offset
-            after = (
-                s[g + at.G_I] * i1 + s[g + at.G_W] * w1 + (s[g + at.G_V] * W1 + s[g + at.G_D] * d1) + offset
-            )
-            if not (min(before, after) > s[g + at.G_CURVE] * chord):
-                return False
+    if s[at.ES_GUARDS] > 0.0:
+        reach = p[m + at.MODE_REACH + number] * speed_of_change(p, s)
+        if s[at.ES_ROOM] > 2.0 * reach:  # twice: rounding does not decide
+            s[at.ES_ROOM] -= reach
+        elif not guards_hold(p, s, 0.125 * h * reach, i1, w1, W1, d1):
+            return False
     put_state(p, s, i1, w1, W1, d1, turned)
     return True
 
@@ -132,14 +145,16 @@ def walk(p, s, whole):
         if levels > 0 and not energy and left > shortest:
             while level < levels and math.ldexp(p[layout.PERIOD], -level) > left:
                 level += 1
-            if stride(p, s, 2 + level):
-                left -= math.ldexp(p[layout.PERIOD], -level)
+            h = math.ldexp(p[layout.PERIOD], -level)
+            if stride(p, s, 2 + level, h):
+                left -= h
                 level = max(level - 1, 0)
                 continue
             if level < levels:
                 level += 1
                 continue
         h = min(left, shortest)
+        s[at.ES_ROOM] = 0.0  # what is walked is not counted
         fill_series(p, s)
         t, event = first_event(p, s, h)
         if energy:

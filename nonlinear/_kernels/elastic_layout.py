@@ -54,11 +54,11 @@ EL_MODES = EL_MAP + 2 * MAP_SIDE  # first mode
 ) = range(14)
 MODE_WEIGHT = 14  # of i, w, W, delta in the norm of the energy
 MODE_GROWTH = 18  # growth of that norm over Ts/2^K
-MODE_CHORD = 19  # h^2/8 times the growth over h: for both segments, then for Ts, Ts/2, ... Ts/2^K
+MODE_REACH = 19  # h times the growth over h: for both segments, then for Ts, Ts/2, ... Ts/2^K
 # one transition: rows i, w, W, delta, angle increment over columns i, w, W, delta, u, torque, torque
 STEP_COLUMNS = 7
 STEP_SIZE = 35
-EL_LEAST = EL_MODES + MODE_CHORD  # length of the row that is needed to work out its length
+EL_LEAST = EL_MODES + MODE_REACH  # length of the row that is needed to work out its length
 
 # --- state; current, speed, angle and direction of slip of the motor are those of every drive -----------
 ES_LOAD_SPEED: layout.Continuous = layout.ELASTIC_STATE  # W
@@ -77,9 +77,11 @@ ES_LOAD_TORQUE: layout.Flag = layout.ELASTIC_STATE + 11  # constant torque on th
 ES_GUARDS: layout.Flag = layout.ELASTIC_STATE + 12  # number of guards
 ES_GUARD: layout.Flag = layout.ELASTIC_STATE + 13
 # one guard: an affine function of state and inputs that stays positive in this mode
-(G_I, G_W, G_V, G_D, G_ONE, G_U, G_M, G_ABS_M, G_EXTRA, G_CURVE, G_EVENT, GUARD_SIZE) = range(12)
+(G_I, G_W, G_V, G_D, G_ONE, G_U, G_M, G_ABS_M, G_EXTRA, G_CURVE, G_ROOM, G_EVENT, GUARD_SIZE) = range(13)
+# how far the state may yet go, in the norm of the energy, before a guard has to be looked at
+ES_ROOM: layout.Work = ES_GUARD + MAX_GUARDS * GUARD_SIZE
 # work space: the held inputs, then the Taylor coefficients of (i, w, W, delta) and of one guard
-ES_INPUT: layout.Note = ES_GUARD + MAX_GUARDS * GUARD_SIZE
+ES_INPUT: layout.Note = ES_ROOM + 1
 # u, motor torque, load torque, M_ext, |M_ext|, extra torque
 IN_U, IN_MOTOR, IN_LOAD, IN_M, IN_ABS_M, IN_EXTRA, IN_SIZE = range(7)
 ES_SERIES: layout.Work = ES_INPUT + IN_SIZE

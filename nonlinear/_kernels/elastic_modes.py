@@ -79,7 +79,7 @@ def enter_mode(p, s):
     s[at.ES_MOTOR_TORQUE] = share * preload - p[layout.OFFSET] - direction * level
     s[at.ES_MOTOR_DRY] = -direction * p[at.EL_LOAD_COEFFICIENT] if p[layout.RIGID] > 0.0 else 0.0
     s[at.ES_LOAD_TORQUE] = -preload - load * p[layout.LOAD_DRY] - p[layout.LOAD_OFFSET]
-    s[at.ES_GUARDS] = 0.0
+    s[at.ES_GUARDS] = s[at.ES_ROOM] = 0.0
     if p[layout.RIGID] == 0.0:
         contact_guards(p, s)
     if p[at.EL_SMOOTH] == 0.0:
@@ -88,6 +88,7 @@ def enter_mode(p, s):
         load_guards(p, s)
     for j in range(int(s[at.ES_GUARDS])):
         put_curvature(p, s, mode, at.ES_GUARD + j * at.GUARD_SIZE)
+        put_room(p, s, mode, at.ES_GUARD + j * at.GUARD_SIZE)
 
 
 @kernel
@@ -234,6 +235,21 @@ def put_curvature(p, s, mode, g):
     if p[at_weight + 3] > 0.0:
         total += (row_d / p[at_weight + 3]) * (row_d / p[at_weight + 3])
     s[g + at.G_CURVE] = math.sqrt(total)
+
+
+@kernel
+def put_room(p, s, mode, g):
+    """How far the state may go for each unit of the guard's value; 0 where inputs move the guard at once.
+
+    Over no more than that the chord bound of a whole period holds too: |g| and Ts/8 |g''| for |x'| = 1.
+    """
+    steep, moved = 0.125 * p[layout.PERIOD] * s[g + at.G_CURVE], 0.0
+    for j in range(4):
+        weight = p[mode + at.MODE_WEIGHT + j]
+        if s[g + j] != 0.0:
+            steep += abs(s[g + j]) / weight if weight > 0.0 else math.inf
+        moved += abs(s[g + at.G_U + j])
+    s[g + at.G_ROOM] = 1.0 / steep if moved == 0.0 and steep > 0.0 else 0.0
 
 
 @kernel

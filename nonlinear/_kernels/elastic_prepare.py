@@ -42,7 +42,7 @@ def prepare_elastic_sizes(p):
         product *= 0.5
         levels += 1
     p[at.EL_LEVELS], p[at.EL_TERMS] = float(levels), float(terms_of(product))
-    size = at.MODE_CHORD + (3 + levels) * (1 + at.STEP_SIZE)
+    size = at.MODE_REACH + (3 + levels) * (1 + at.STEP_SIZE)
     p[at.EL_MODE_SIZE] = float(size)
     p[layout.PARAMETER_SIZE] = float(at.EL_MODES + modes * size)
 
@@ -137,7 +137,7 @@ def motor_of(p, motor):
 @kernel
 def put_mode(p, number, m):
     """Coefficients and weights of a mode at ``p[m]``, numbered as in `elastic_modes.mode_number`."""
-    for j in range(at.MODE_CHORD):
+    for j in range(at.MODE_REACH):
         p[m + j] = 0.0
     each = 2 + 4 * int(p[at.EL_SPRINGS])
     motor = int(number / each)
@@ -220,20 +220,20 @@ def terms_of(product):
 
 @kernel
 def put_bounds(p, m, growth):
-    """Growth of the energy's norm over the shortest interval, and the chord bounds h^2/8 exp(growth h)."""
+    """Growth of the energy's norm over the shortest interval; how far |x'| = 1 goes in h, h exp(growth h)."""
     levels = int(p[at.EL_LEVELS])
     h = math.ldexp(p[layout.PERIOD], -levels)
     p[m + at.MODE_GROWTH] = math.exp(min(growth * h, LARGEST_POWER))
     for j in range(3 + levels):
         h = p[layout.LENGTH + j] if j < 2 else math.ldexp(p[layout.PERIOD], 2 - j)
-        p[m + at.MODE_CHORD + j] = h * h / 8.0 * math.exp(min(growth * h, LARGEST_POWER))
+        p[m + at.MODE_REACH + j] = h * math.exp(min(growth * h, LARGEST_POWER))
 
 
 @kernel
 def put_steps(p, m, s, work):
     """Transitions over both held segments, and over Ts/2^j from the shortest up."""
     levels = int(p[at.EL_LEVELS])
-    o = m + at.MODE_CHORD + 3 + levels
+    o = m + at.MODE_REACH + 3 + levels
     for part in range(2):
         put_short_step(p, m, math.ldexp(p[layout.LENGTH + part], -levels), s, work)
         for _ in range(levels):

@@ -30,7 +30,7 @@ def forms() -> tuple[Form, ...]:
     """
     unseen = dict.fromkeys(_UNSEEN, 0.0)
     plain = dict.fromkeys(_ABSENT, 0.0) | dict.fromkeys(_PRESENT, 1.0)
-    wide = {"rigid": {at.ELASTIC_DRIVE: 0.0}, "two_sided": {at.ELASTIC_DRIVE: 1.0}}
+    wide = {"rigid": {at.ELASTIC_DRIVE: 0.0}, "two_sided": _PLANTS["elastic"]}
     return (
         *(Form("run_block", name, "p", unseen | known) for name, known in wide.items()),
         *(

@@ -388,7 +388,7 @@ S_SPEED_CHAIN: Continuous = S_COMMAND_CHAIN + 2
 S_TORQUE_CHAIN: Continuous = S_SPEED_CHAIN + 2 * MAX_SECTIONS
 S_PROBE_PLACES: Counter = S_TORQUE_CHAIN + 2 * MAX_SECTIONS  # next place in each probe's ring
 ELASTIC_STATE = S_PROBE_PLACES + 4
-ELASTIC_STATE_SIZE = 202
+ELASTIC_STATE_SIZE = 211
 S_QUEUE: Continuous = (
     ELASTIC_STATE + ELASTIC_STATE_SIZE
 )  # delay line, oldest first; then angles, average, states of a law of one's own, rings

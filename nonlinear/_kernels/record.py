@@ -26,11 +26,12 @@ def record(p, io, history, rows, flag_history, row):
 def record_more(p, io, history, rows, row):
     """Write both sides of each active probe, by point, then an elastic drive's load side, then the load."""
     col = layout.HISTORY_PROBES
-    for point in range(4):
-        if p[layout.PROBES + point * layout.PROBE_SIZE] > 0.0:
-            history[col * rows + row] = io[layout.IO_PROBES + 2 * point]
-            history[(col + 1) * rows + row] = io[layout.IO_PROBES + 2 * point + 1]
-            col += 2
+    if p[layout.PROBING] > 0.0:
+        for point in range(4):
+            if p[layout.PROBES + point * layout.PROBE_SIZE] > 0.0:
+                history[col * rows + row] = io[layout.IO_PROBES + 2 * point]
+                history[(col + 1) * rows + row] = io[layout.IO_PROBES + 2 * point + 1]
+                col += 2
     if p[layout.ELASTIC_DRIVE] > 0.0:
         for j in range(layout.ELASTIC_COLUMNS):
             history[(col + j) * rows + row] = io[layout.IO_OUTPUT_SPEED + j]

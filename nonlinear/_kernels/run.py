@@ -71,6 +71,7 @@ def run(p, s, io, block, tables, history, flag_history, out, shared):
     the run.
     """
     clear(p, out)
+    s[elastic_layout.ES_ROOM] = 0.0  # the state may have been changed
     ticks, k = int(p[layout.TICKS]), int(s[layout.S_TICK])
     # nobody sees the command between updates of the outermost stage unless the run is looked at
     looked_at = flag_history.shape[0] > 0 or p[layout.WINDOW] > 0.0 or p[layout.WITH_EXTREMES] > 0.0

@@ -155,11 +155,12 @@ def note_more(p, s, io):
         io[layout.IO_COUPLING_TORQUE] = coupling_torque(p, s)
     if p[layout.OVERLOAD] > 0.0:
         io[layout.IO_CURRENT_COMMAND] = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
-    at = layout.IO_PROBES
-    io[at], io[at + 1] = s[layout.S_VOLTAGE_BEFORE], s[layout.S_VOLTAGE]
-    io[at + 2], io[at + 3] = s[layout.S_CURRENT_BEFORE], s[layout.S_CURRENT_REFERENCE]
-    io[at + 4], io[at + 5] = s[layout.S_SPEED_COMMAND], s[layout.S_SPEED_REFERENCE]
-    io[at + 6], io[at + 7] = s[layout.S_OUTPUT_BEFORE], s[layout.S_OUTPUT_AFTER]
+    if p[layout.PROBING] > 0.0:
+        at = layout.IO_PROBES
+        io[at], io[at + 1] = s[layout.S_VOLTAGE_BEFORE], s[layout.S_VOLTAGE]
+        io[at + 2], io[at + 3] = s[layout.S_CURRENT_BEFORE], s[layout.S_CURRENT_REFERENCE]
+        io[at + 4], io[at + 5] = s[layout.S_SPEED_COMMAND], s[layout.S_SPEED_REFERENCE]
+        io[at + 6], io[at + 7] = s[layout.S_OUTPUT_BEFORE], s[layout.S_OUTPUT_AFTER]
 
 
 @kernel
@@ -173,6 +174,7 @@ def step(p, s, io):
 @kernel
 def tick(p, s, io):
     """`step` to be called from outside; returns the status."""
+    s[elastic_layout.ES_ROOM] = 0.0  # the state may have been changed
     step(p, s, io)
     return int(s[layout.S_STATUS])
 
