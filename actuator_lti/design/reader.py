@@ -338,6 +338,7 @@ class Reader:
     def part(self, section: Section, raw: Any, path: str) -> Any:
         """What one table becomes, with the tables inside it."""
         inner = children(section.path)
+        raw = _rows_flat(raw) if issubclass(section.kind, model.StateSpace) else raw
         raw = self.law(raw, path) if section.kind is model.Law else raw
         names = [*(item.key for item in inner), *(["name"] if section.many == "named" else [])]
         values, meant = self.values(section.template, raw, path, names)
@@ -353,11 +354,7 @@ class Reader:
 
     def law(self, raw: Any, path: str) -> Any:
         """The table of a law, with what stands in its file."""
-        if not isinstance(raw, dict):
-            return raw
-        flat = {key: raw[key] for key in ("C", "D", "L") if _one_row(raw.get(key))}
-        raw = {**raw, **{key: [each for row in value for each in row] for key, value in flat.items()}}
-        if "file" not in raw:
+        if not isinstance(raw, dict) or "file" not in raw:
             return raw
         file, rest = raw["file"], {key: value for key, value in raw.items() if key != "file"}
         held = dict.fromkeys((*PARTS, "L", "period"), UNREAD)
@@ -444,6 +441,12 @@ def _meant(table: Tree, path: str) -> Any:
     field = FIELDS[path]
     default = field.choices[0]
     return meant_of(f"{table.get(field.key, default)}", field.choices) or default
+
+
+def _rows_flat(raw: Any) -> Any:
+    """The table of a law or of its continuous counterpart, C, D and L of one row as lists of numbers."""
+    flat = [key for key in ("C", "D", "L") if isinstance(raw, dict) and _one_row(raw.get(key))]
+    return {**raw, **{key: [each for row in raw[key] for each in row] for key in flat}} if flat else raw
 
 
 def _one_row(value: Any) -> bool:

@@ -96,6 +96,12 @@ _WORDS: dict[str, dict[str, str]] = {
         "frequency cycle_time sample_time": _MULTIPLE,
         "bandwidth": "gain: 2 pi f times L (current), J/kM (velocity) or 1 (position)",
     },
+    ".law": {
+        "num numerator den denominator": "A, B, C and D, in MATLAB [A,B,C,D] = tf2ss(num,den), at the period "
+        "of the stage; in Python with_law(stage, control.tf(num, den, T))",
+        "kp ki kd p i d tn ti": "a number of D; or, without a law, gain, integral_time, derivative_time "
+        "of the stage",
+    },
 }
 _HINTS = {
     table: {word: hint for words, hint in hints.items() for word in words.split()}
@@ -114,4 +120,5 @@ def key_for(table: str, word: str) -> str:
     first, *rest = re.split(r"[.\[]", table)
     plain = word.lower().replace("-", "_")
     tables = (f"{first}.",) if first == "control" and rest else (first, f"{first}.")
+    tables = (".law",) if "law" in rest else tables
     return next((_HINTS[one][plain] for one in tables if plain in _HINTS.get(one, {})), "")
