@@ -122,3 +122,33 @@ def test_constants_that_disagree_are_told_as_they_are_written(written: str, want
     number, _, same = text.partition("10 % of ")[2].partition("(")[2].partition(")")[0].partition(" ")
     assert same == unit
     assert float(number) == pytest.approx(wanted, rel=1e-3)  # four digits are told
+
+
+def test_what_a_sheet_states_besides_follows_from_the_keys(cli, tmp_path) -> None:
+    # by hand: 0.45 mH/5.9 ohm; 5.9 ohm 4.1e-7 kg m2/(12.7 mN m/A)^2; 12 V/(1.33 V/krpm); 12 V/5.9 ohm
+    (tmp_path / "first.toml").write_text(DRIVE + '[load]\ninertia = "30 gcm2"\n', encoding="utf-8")
+    data = cli.data("keys", "--explain", f"{tmp_path / 'first.toml'}")["figures"]
+    assert [one["unit"] for one in data] == ["ms", "ms", "rpm", "A", "N*m", "kg*m^2", "kg*m^2"]
+    assert [one["value"] for one in data] == pytest.approx(
+        [0.0762712, 14.99783, 9022.556, 2.033898, 0.0258305, 8.138021e-9, 4.181380e-7], rel=2e-6
+    )
+    assert "Follows from the design" in cli.text("keys", "--explain", f"{tmp_path / 'first.toml'}")
+
+
+@pytest.mark.parametrize(
+    ("word", "key"),
+    [
+        ("Kt", "motor.torque_constant"),
+        ("Kv", "control.position.gain"),
+        ("kp", "control.current.gain"),
+        ("proportional gain", "control.velocity.gain"),
+        ("k1", "coupling.stiffness"),
+        ("state feedback", "control.position.law.inputs"),
+    ],
+)
+def test_keys_are_found_by_the_words_of_sheets_and_controllers(cli, word: str, key: str) -> None:
+    assert key in [one["path"] for one in cli.data("keys", word)["keys"]]
+
+
+def test_a_controllers_name_is_answered_with_the_command_that_reads_its_settings(cli) -> None:
+    assert "objects import" in cli.refused("keys", "odrive")
