@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import re
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from math import inf, log, pi
 
@@ -17,6 +18,7 @@ from actuator_lti.design.mistakes import Findings, Refusal
 from actuator_lti.design.model import Correlation, Design, Requirement
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.sections import part_at
+from actuator_lti.design.spellings import split_quantity
 from actuator_lti.design.unread import UNREAD, readable
 from actuator_lti.files.reading import shown
 
@@ -94,28 +96,52 @@ def _motor(design: Design) -> Iterator[Refusal]:
     for key, value in given.items():
         if value is None:
             words = "R, L, kM and kE together, or motor.source_gain alone"
-            yield f"motor.{key}", "", f"missing; allowed: {words}{_without(key, given)}"
+            yield f"motor.{key}", "", f"missing; allowed: {words}{_without(key, design)}"
     same = design.effective_motor
     kM, kE = same.torque_constant_Nm_A, same.back_emf_constant_Vs_rad
     if kM is not None and kE is not None and abs(kE - kM) > 0.1 * kM * (1 + 1e-12):
-        wanted, torque = given["back_emf_constant"] * kM / kE, given["torque_constant"]
+        wanted = given["back_emf_constant"] * kM / kE
+        as_written = _as_written(design, "back_emf_constant", kM / kE)
         yield (
             "motor.back_emf_constant",
-            f"{given['back_emf_constant']:g}",
-            f"allowed: within 10 % of {wanted:g}, as motor.torque_constant = {torque:g} has it "
+            _stated(design, "back_emf_constant"),
+            f"allowed: within 10 % of {wanted:g}{as_written}, as motor.torque_constant = "
+            f"{_stated(design, 'torque_constant')} has it "
             f"(in SI the two are one constant){_factor_named(kE / kM)}",
         )
 
 
-def _without(key: str, given: Mapping[str, float | None]) -> str:
+def _stated(design: Design, key: str) -> str:
+    """A constant of the motor in SI, and as the file has it."""
+    return f"{getattr(design.motor, _ELECTRICAL[key]):g}{_as_written(design, key, 1.0)}"
+
+
+def _as_written(design: Design, key: str, times: float) -> str:
+    """So many times a constant in the unit of its file, in brackets; nothing where no file has it so."""
+    item = design.parameters.get(f"motor.{key}")
+    if item is None or item.value != getattr(design.motor, _ELECTRICAL[key]):
+        return ""
+    number, unit = split_quantity(item.text)
+    upside_down = _PER_VOLT.search(unit) is not None
+    return f" ({number * (1.0 / times if upside_down else times):.4g} {unit})"
+
+
+def _without(key: str, design: Design) -> str:
     """What to write where the sheet does not have it."""
     other = {"torque_constant": "back_emf_constant", "back_emf_constant": "torque_constant"}.get(key, "")
-    if given.get(other) is not None:
-        return f"; of a DC motor it is the number of motor.{other} in SI, {given[other]:g}"
+    held = getattr(design.motor, _ELECTRICAL[other]) if other else None
+    if held is not None and design.motor.constants == "dc":
+        return f"; of a DC motor it is the number of motor.{other} in SI, {held:g}"
+    if held is not None:
+        ratio, words = _TORQUE_OVER_VOLTAGE[design.motor.constants]
+        number, sign = (held * ratio, "times") if key == "torque_constant" else (held / ratio, "over")
+        return f"; with these motor.constants it is motor.{other} {sign} {words} in SI, {number:g}"
     usual = "; where the sheet has none, R times the electrical time constant, 0.1 to 1 ms of a small motor"
     return usual if key == "inductance" else ""
 
 
+_TORQUE_OVER_VOLTAGE = {"rms-line": (3**0.5, "sqrt(3)"), "peak-phase": (1.5, "3/2")}
+_PER_VOLT = re.compile(r"/ ?V|\bV\^?-1|V⁻¹|KV\b")  # a speed constant, kE upside down
 _AC = ": see motor.constants, if it is an AC motor"
 _FACTORS = {
     f"sqrt(2), rms against peak{_AC}": 2**0.5,

@@ -210,6 +210,12 @@ def _written(design: Design, key: str, value: float) -> str:
     return f"{value:.6g} {_unit(design, key)}" if parameter is None else parameter.text
 
 
+_RUNS = (
+    "missing; allowed: the law as it runs, A, B, C, D sampled at its stage's period; continuous is only what "
+    'the continuous form takes in their place; Python samples it: with_law(..., method="tustin")'
+)
+
+
 def _laws(design: Design) -> Iterator[Refusal]:
     """A law of one's own: one in the drive, of matrices that fit, beside none of what it replaces."""
     control = design.controller
@@ -254,7 +260,12 @@ def _replaced(design: Design, stage: str) -> Iterator[Refusal]:
 
 
 def _matrices(law: Law, path: str) -> Iterator[Refusal]:
-    """Shapes of a law's matrices."""
+    """Shapes of a law's matrices, and that they give anything at all."""
+    if law.continuous is not None and not (law.A or law.B or law.C or law.D):
+        yield f"{path}.D", "", _RUNS
+        return
+    if (law.C or law.D) and not any((*law.C, *law.D)):
+        yield f"{path}.{'D' if law.D else 'C'}", "zero", "the law gives nothing; allowed: not C and D zero"
     if len(law.A) > MOST_STATES:
         yield f"{path}.A", f"{len(law.A)} states", f"allowed: at most {MOST_STATES}"
     if len(law.L) not in (0, len(law.A)):

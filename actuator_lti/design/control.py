@@ -52,7 +52,8 @@ class Encoder:
     filter_time_s: Annotated[float, not_negative(
         "filter_time", "s", "T_F", "first-order filter of the speed", example="0 us")] = 0.0
     bandwidth_rad_s: Annotated[float | None, positive(
-        "bandwidth", "rad/s", "w0", "natural frequency of the tracking loop", example="300 Hz")] = None
+        "bandwidth", "rad/s", "w0", "natural frequency of the tracking loop (damping 1)",
+        example="300 Hz")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,7 +226,9 @@ class PositionLoop:
     (A; V without a current loop) whose sign follows the command's motion.
     """
 
-    gain: Annotated[float, positive("gain", "{drive}/{angle}", "Kv", "gain of the position P controller",
+    gain: Annotated[float, positive("gain", "{drive}/{angle}", "Kv",
+        "gain of the position P controller; without a velocity loop in A or V per rad of the motor "
+        "(an output sensor's angle counts times the ratio)",
         example="120 1/s", required=True)] = ABSENT
     every: Annotated[int, integer("every", 10000, "n_p",
         "the position loop runs every so many ticks, a multiple of control.velocity.every")] = 1

@@ -25,7 +25,17 @@ def _declared(kind: type, template: str) -> Iterator[Field]:
                 attribute=item.name,
                 required=field.required or (item.default is MISSING and item.default_factory is MISSING),
                 choices=field.choices or (_words(annotated) if field.kind in ("choice", "names") else ()),
+                description=f"{_of_form(template)}{field.description}",
             )
+
+
+def _of_form(template: str) -> str:
+    """That the continuous part of a law is not the one that runs."""
+    return (
+        "for the continuous form alone, beside the law that runs: "
+        if template.endswith(".continuous")
+        else ""
+    )
 
 
 def _words(kind: Any) -> tuple[str, ...]:

@@ -73,7 +73,8 @@ class Law(StateSpace):
     """A discrete linear law of one stage, at that stage's period."""
 
     inputs: Annotated[tuple[LawInput, ...], names(
-        "inputs", "the signals that it takes, a column of B and D each")]
+        "inputs", "the signals that it takes, a column of B and D each (state feedback: D alone), in SI: "
+        "output_angle and output_speed of the output shaft, the others of the motor")]
     file: Annotated[str, text(
         "a .mat or .json file with A, B, C, D and Ts, beside the design file; read in their place")] = ""
     L: Annotated[tuple[float, ...], quantities(

@@ -253,7 +253,8 @@ class Load:
     moment_max_Nm: Annotated[float, not_negative(
         "moment_max", "{torque}", "M_ext", "largest load torque at the output", example="8 N*m")] = 0.0
     moment_slope_Nm_rad: Annotated[float, quantity("moment_slope", "{torque}/{angle}", "",
-        "load torque per output deflection", example="0 N*m/rad")] = 0.0
+        "load torque per output deflection: above 0 it pushes away, below 0 back to zero",
+        example="0 N*m/rad")] = 0.0
     moment_damping_Nms_rad: Annotated[float, not_negative(
         "moment_damping", "{torque}*s/{angle}", "D", "load torque against the motion, per output speed",
         most=_largest_damping, example="0.02 N*m*s/rad")] = 0.0

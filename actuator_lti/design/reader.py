@@ -37,7 +37,7 @@ _ENTRY = ("value", "source", "grade", "tolerance")
 _FIELD_OF_LEAD = FIELDS["screw.lead"]
 _CONVENTION = re.compile(r"(?<=[AV])[ _]?(rms|eff|peak|pk)\b", re.IGNORECASE)
 _DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
-_PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev
+_PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
 _AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
 _PEAK = {"rms-line": sqrt(2.0), "peak-phase": 1.0}  # of one ampere or volt of a sheet
 _DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}  # section 1 of model.md
@@ -267,7 +267,7 @@ class Reader:
         amperes rms or peak as those of the motor that the model has.
         """
         unit, power = field.unit(self.structure), field.travel_power()
-        if field is _FIELD_OF_LEAD and isinstance(text, str):
+        if isinstance(text, str) and (field is _FIELD_OF_LEAD or field.key == "counts_per_rev"):
             text = _PER_TURN.sub("", text)
         if isinstance(text, str) and (convention := _CONVENTION.search(text)):
             plain = _CONVENTION.sub(" dc", text)
@@ -338,6 +338,7 @@ class Reader:
     def part(self, section: Section, raw: Any, path: str) -> Any:
         """What one table becomes, with the tables inside it."""
         inner = children(section.path)
+        raw = _rows_flat(raw) if issubclass(section.kind, model.StateSpace) else raw
         raw = self.law(raw, path) if section.kind is model.Law else raw
         names = [*(item.key for item in inner), *(["name"] if section.many == "named" else [])]
         values, meant = self.values(section.template, raw, path, names)
@@ -353,11 +354,7 @@ class Reader:
 
     def law(self, raw: Any, path: str) -> Any:
         """The table of a law, with what stands in its file."""
-        if not isinstance(raw, dict):
-            return raw
-        flat = {key: raw[key] for key in ("C", "D", "L") if _one_row(raw.get(key))}
-        raw = {**raw, **{key: [each for row in value for each in row] for key, value in flat.items()}}
-        if "file" not in raw:
+        if not isinstance(raw, dict) or "file" not in raw:
             return raw
         file, rest = raw["file"], {key: value for key, value in raw.items() if key != "file"}
         held = dict.fromkeys((*PARTS, "L", "period"), UNREAD)
@@ -444,6 +441,12 @@ def _meant(table: Tree, path: str) -> Any:
     field = FIELDS[path]
     default = field.choices[0]
     return meant_of(f"{table.get(field.key, default)}", field.choices) or default
+
+
+def _rows_flat(raw: Any) -> Any:
+    """The table of a law or of its continuous counterpart, C, D and L of one row as lists of numbers."""
+    flat = [key for key in ("C", "D", "L") if isinstance(raw, dict) and _one_row(raw.get(key))]
+    return {**raw, **{key: [each for row in raw[key] for each in row] for key in flat}} if flat else raw
 
 
 def _one_row(value: Any) -> bool:

@@ -85,16 +85,22 @@ _WORDS: dict[str, dict[str, str]] = {
     },
     "control": {
         "frequency sampling_frequency cycle_time sample_time sampling_time ts": _PERIOD,
-        "pwm pwm_frequency": "not needed; what it delays is part of computing_delay",
+        "pwm pwm_frequency switching_frequency": "not needed; what it delays is part of computing_delay",
         "delay deadtime dead_time": "computing_delay",
     },
     "control.": {  # a loop of it
-        "kp kv p proportional_gain": "gain",
+        "kp kv p proportional proportional_gain": "gain",
         "ki integral_gain": "integral_time = gain/integral gain",
         "kd derivative_gain": "derivative_time = derivative gain/gain",
         "tn ti reset_time": "integral_time",
         "frequency cycle_time sample_time": _MULTIPLE,
         "bandwidth": "gain: 2 pi f times L (current), J/kM (velocity) or 1 (position)",
+    },
+    ".law": {
+        "num numerator den denominator": "A, B, C and D, in MATLAB [A,B,C,D] = tf2ss(num,den), at the period "
+        "of the stage; in Python with_law(stage, control.tf(num, den, T))",
+        "kp ki kd p i d tn ti": "a number of D; or, without a law, gain, integral_time, derivative_time "
+        "of the stage",
     },
 }
 _HINTS = {
@@ -112,6 +118,7 @@ def key_for(table: str, word: str) -> str:
     ('torque_constant', 'gain', 'ratio, which takes "60/20" too')
     """
     first, *rest = re.split(r"[.\[]", table)
-    plain = word.lower().replace("-", "_")
+    plain = re.sub(r"[- ]", "_", word.lower())
     tables = (f"{first}.",) if first == "control" and rest else (first, f"{first}.")
+    tables = (".law",) if "law" in rest else tables
     return next((_HINTS[one][plain] for one in tables if plain in _HINTS.get(one, {})), "")

@@ -17,7 +17,9 @@ _GROUPS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:[ \u00a0\u2009\u202f][0-9]{3})+
 _SPELLINGS = (
     (re.compile(r"\*\*"), "^"),
     (re.compile(r"^/"), "1/"),  # 25/s
-    (re.compile(r"°C"), " degC"),
+    (re.compile(r"°C|℃|\bdeg(?:rees?)? ?C\b"), " degC"),
+    (re.compile(r"\barc[- ](?=min|sec)"), "arc"),
+    (re.compile(r"\bK(?:RPM|rpm)\b"), "krpm"),
     (re.compile(r"°"), " deg"),
     (re.compile(r"%"), " percent"),
     (re.compile(r"''|\""), " arcsec"),
@@ -27,6 +29,7 @@ _SPELLINGS = (
     (re.compile(r"(?<=[A-Za-z])([23])(?![0-9])"), r"^\1"),  # cm2
     (re.compile(r"(?<=[A-Za-z23])[-.](?=[A-Za-z])"), "*"),  # oz-in, g.cm2
     (re.compile(r"\b(?:r|U|tr|rev)/min\b"), "rpm"),
+    (re.compile(r"/ *rps\b(?!\^)"), "/(rev/s)"),
     (re.compile(r"\brps\b"), "rev/s"),
     (re.compile(r"/ *\(? *1000 *(rpm|1/min|min\^-1)\b *\)?"), r"/(1000*(\1))"),
     (re.compile(r"\b(k?g)(c?m\^2)"), r"\1*\2"),  # gcm2

@@ -24,7 +24,7 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     """
     design = as_design(design)
     checks = (
-        _sampling, _crossovers, _law, _limits, _unused, _loads, _pedigree, _encoder,
+        _sampling, _crossovers, _law, _limits, _unused, _gears, _loads, _pedigree, _encoder,
         elastic_warnings,
     )  # fmt: skip
     return tuple(line for check in checks for line in check(design))
@@ -109,6 +109,15 @@ def _unused(design: Design) -> Iterator[str]:
                 yield f"limits.{key}: clamps nothing, the design has no velocity loop"
     if design.friction.law == "tanh" and design.friction.breakaway_ratio != 1.0:
         yield "friction.breakaway_ratio: not used by the tanh law"
+
+
+def _gears(design: Design) -> Iterator[str]:
+    if design.total_ratio < 1.0:
+        for gear in (one for one in design.gears if one.ratio < 1.0):
+            yield (
+                f"gear.{gear.name}.ratio: {gear.ratio:.4g} turns the output faster than the motor; "
+                f'a reduction is written "{1.0 / gear.ratio:.6g}:1"'
+            )
 
 
 def _loads(design: Design) -> Iterator[str]:

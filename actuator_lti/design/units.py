@@ -27,7 +27,7 @@ _PREFIXES = {
 _BASE = {
     "m meter metre": "[length]", "s second sec": "[time]", "kg kilogram": "[mass]",
     "A ampere amp": "[current]", "rad radian": "[angle]",
-    "K kelvin": "[temperature]", "degC celsius": "[celsius]",
+    "K kelvin": "[temperature]", "degC celsius C": "[celsius]",
 }  # fmt: skip
 # What each is, in units that stand above it.
 _DERIVED = {
@@ -54,6 +54,8 @@ _DERIVED = {
     "lbin inlb": ("1", "lbf*in"),
     "lbft ftlb": ("1", "lbf*ft"),
     "kgcm": ("1", "kgf*cm"),
+    "kgfm": ("1", "kgf*m"),
+    "kgfcm": ("1", "kgf*cm"),
     "W watt": ("1", "J/s"),
     "V volt": ("1", "W/A"),
     "ohm Ω Ohm": ("1", "V/A"),
@@ -66,11 +68,12 @@ _DERIVED = {
     "arcsec arcsecond": ("4.84813681109536e-06", "rad"),
     "rev turn revolution": ("6.283185307179586", "rad"),
     "rpm RPM": ("0.10471975511965977", "rad/s"),
-    "KV": ("0.10471975511965977", "rad/(V*s)"),
+    "KV Kv": ("0.10471975511965977", "rad/(V*s)"),
     "Hz hertz": ("6.283185307179586", "rad/s"),
-    "count cpr": ("1", "1"),
+    "count cpr inc increment": ("1", "1"),
     "line": ("4", "1"),  # of an encoder: two edges of two tracks
 }
+_PULSES = ("ppr", "cpt", "ppt", "pulse", "pulses")  # of an encoder: makers mean lines or counts
 _WORD = 4  # letters from which a name may stand in the plural: "volts", but "As" is no unit
 _PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")
 _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
@@ -216,6 +219,8 @@ def parse_unit(unit: str) -> UnitValue:
 
 
 def _unknown(name: str, units: Units) -> str:
+    if name.lower() in _PULSES:
+        return f'"{name}" is not the same of all makers; write "lines" (4 counts each) or "counts"'
     near = get_close_matches(name, [known for known in units if known[0] != "1"], 1, 0.5)
     return f'unknown unit "{name}"' + (f' (nearest known: "{near[0]}")' if near else "")
 
@@ -273,7 +278,19 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
         return "; a mass m on a screw of lead p is the inertia m (p/2 pi)^2"
     if pair == ("torque", "force"):
         return "; a screw of lead p turns a torque T into the force 2 pi T/p"
+    if (pair[0], wanted.dimension) in _GAINS_OF_TORQUE:
+        return (
+            "; such a gain over kM, and over the ratio squared where it is of the output, is one in amperes"
+        )
+    if value.angle == 0 < wanted.angle and value.without_angle() == wanted.without_angle():
+        return "; write rev or rad into it, whichever is meant"
     return ""
+
+
+_GAINS_OF_TORQUE = {
+    ("stiffness", parse_unit("A/rad").dimension),
+    ("viscous friction", parse_unit("A*s/rad").dimension),
+}
 
 
 def compatible(value: UnitValue, wanted: UnitValue) -> bool:

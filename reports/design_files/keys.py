@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.explained import Explained
     from actuator_lti.design.key_reference import KeyEntry
     from actuator_lti.design.model import Design
+    from actuator_lti.drive.sheet_figures import SheetFigure
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,24 +26,29 @@ class Asked:
     ] = ""
     explain: Annotated[
         str | None,
-        Option(words="The numbers of a design: written, read as, in the model as.", metavar="FILE"),
+        Option(
+            words="The numbers of a design: written, read as, in the model as; and what follows.",
+            metavar="FILE",
+        ),
     ] = None
     linear: Annotated[bool, Option(words="Units of a linear axis (m, N, kg).")] = False
 
 
 @dataclass(frozen=True)
 class Keys:
-    """Keys that there are, or (of a design) its numbers."""
+    """Keys that there are, or (of a design) its numbers and what follows from them."""
 
     keys: tuple[KeyEntry, ...] | tuple[Explained, ...]
     design: Design | None = None
+    figures: tuple[SheetFigure, ...] = ()
 
     def __str__(self) -> str:
-        return f"{len(self.keys)} {'numbers of ' + self.design.name if self.design else 'keys'}"
+        what = f"number{'s' * (len(self.keys) != 1)} of {self.design.name}" if self.design else ""
+        return f"{len(self.keys)} {what or 'key' + 's' * (len(self.keys) != 1)}"
 
 
 def keys(asked: Asked) -> Keys:
-    """The keys whose name or meaning holds a text.
+    """The keys whose name or meaning holds a text, or that a data sheet or a controller calls so.
 
     Raises
     ------
@@ -51,18 +58,27 @@ def keys(asked: Asked) -> Keys:
     from actuator_lti.design import load_design
     from actuator_lti.design.explained import explained
     from actuator_lti.design.key_reference import key_reference
+    from actuator_lti.drive.sheet_figures import sheet_figures
 
     text = asked.match.lower()
     if asked.explain is not None:
         design = load_design(asked.explain)
-        return Keys(tuple(item for item in explained(design) if text in item.path), design)
-    found = [
-        key
-        for key in key_reference("linear" if asked.linear else "rotary")
-        if text in key.path.lower() or text in key.description.lower()
-    ]
+        figures = tuple(one for one in sheet_figures(design) if text in one.name.lower())
+        return Keys(tuple(item for item in explained(design) if text in item.path), design, figures)
+    listed = key_reference("linear" if asked.linear else "rotary")
+    found = tuple(key for key in listed if _is_called(key, text))
     if not found:
         raise InputError(
-            f"{asked.match!r}: no key has it in its name or meaning; allowed: see actuator-lti keys"
+            f"{asked.match!r}: no key has it in its name or meaning; allowed: see actuator-lti keys; "
+            "settings of a controller as a file: actuator-lti objects import"
         )
-    return Keys(tuple(found))
+    return Keys(found)
+
+
+def _is_called(key: KeyEntry, text: str) -> bool:
+    """Whether a text stands in a key's name or meaning, or is the word of a data sheet for it."""
+    from actuator_lti.design.sheet_words import key_for
+
+    if text in key.path.lower() or text in key.description.lower():
+        return True
+    return re.match(rf"{key.key}\b(?! of)", key_for(key.section, text)) is not None

@@ -1,4 +1,4 @@
-"""A result that is a list: its sentence, and a table by the headings that the fields of a row state."""
+"""A result that is one list or more: its sentence, and tables headed as the fields of a row state."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from reports import document as doc
 
 
 def section(result: Any) -> doc.Section:
-    """Make the section of a result whose one tuple, if there is any, holds the rows."""
-    rows = next((value for value in vars(result).values() if isinstance(value, tuple)), ())
-    columns = _columns(type(rows[0])) if rows else []
-    blocks = [doc.listing("", rows, columns)] if columns else []
+    """Make the section of a result, a table of each tuple of rows that it has."""
+    listed = [value for value in vars(result).values() if isinstance(value, tuple) and value]
+    blocks = [doc.listing("", rows, columns) for rows in listed if (columns := _columns(type(rows[0])))]
     return doc.section("list", "List", blocks, result=str(result))
 
 

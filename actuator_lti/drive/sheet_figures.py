@@ -1,0 +1,61 @@
+"""What data sheets state beside a design's own keys, from those keys: to hold against the sheet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import TYPE_CHECKING, Annotated
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+
+@dataclass(frozen=True)
+class SheetFigure:
+    """One figure: what it is, its formula of the model's DC motor, its value in SI or the unit named."""
+
+    name: Annotated[str, "Follows from the design"]
+    value: Annotated[float, "Value"]
+    unit: Annotated[str, "Unit"]
+
+
+def sheet_figures(design: Design) -> tuple[SheetFigure, ...]:
+    """Time constants, stall, no-load speed and inertia at the motor, at the design's temperature and supply.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> for one in sheet_figures(load_design("ilr33-amber"))[:2]:
+    ...     print(f"{one.name}: {one.value:.4g} {one.unit}")
+    electrical time constant L/R: 0.1091 ms
+    mechanical time constant of the rotor alone R J/kM^2: 1.454 ms
+    """
+    return (*_motor(design), *_inertia(design))
+
+
+def _motor(design: Design) -> tuple[SheetFigure, ...]:
+    """Of the motor by itself, without friction; nothing of an ideal source."""
+    motor, U, linear = design.effective_motor, design.limits.voltage_V, design.axis == "linear"
+    R, L, J = motor.resistance_ohm, motor.inductance_H, motor.rotor_inertia_kgm2
+    kM, kE = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
+    if R is None or L is None or kM is None or kE is None:
+        return ()
+    amperes = "A" if design.motor.constants == "dc" else "A dc"
+    speed, rpm = U / kE, U / kE * 30.0 / pi
+    return (
+        SheetFigure("electrical time constant L/R", 1e3 * L / R, "ms"),
+        SheetFigure("mechanical time constant of the rotor alone R J/kM^2", 1e3 * R * J / kM**2, "ms"),
+        SheetFigure("no-load speed without friction U/kE", *((speed, "m/s") if linear else (rpm, "rpm"))),
+        SheetFigure("stall current U/R", U / R, amperes),
+        SheetFigure(f"stall {'force' if linear else 'torque'} kM U/R", kM * U / R, "N" if linear else "N*m"),
+    )
+
+
+def _inertia(design: Design) -> tuple[SheetFigure, ...]:
+    """What the motor has to turn."""
+    unit, ratio = "kg" if design.axis == "linear" else "kg*m^2", design.total_ratio
+    load = design.load.inertia_kgm2 / ratio**2
+    return (
+        SheetFigure("load inertia at the motor, over the ratio squared", load, unit),
+        SheetFigure("all inertia at the motor", design.inertia_kgm2, unit),
+    )

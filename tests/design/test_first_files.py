@@ -1,0 +1,198 @@
+"""What a first design file is written with from data sheets, and what it is answered with."""
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import Design, read_design_text
+from actuator_lti.design.suspicions import warnings_of
+from actuator_lti.errors import InputError, Mistakes
+
+DRIVE = """
+[design]
+name = "first"
+[motor]
+resistance = "5.9 ohm"
+inductance = "0.45 mH"
+torque_constant = "12.7 mNm/A"
+back_emf_constant = "1.33 V/1000 rpm"
+rotor_inertia = "4.1e-7 kgm2"
+[[gear]]
+name = "R22"
+ratio = 19.2
+[limits]
+voltage = "12 V"
+[control]
+period = "1 ms"
+computing_delay = "0.1 ms"
+"""
+
+
+def with_law(text: str) -> Design:
+    """The drive with a law of its position loop."""
+    return read_design_text(f'{DRIVE}[control.position.law]\ninputs = ["error"]\n{text}')
+
+
+def told(text: str) -> str:
+    """What a file is answered with, a line a mistake."""
+    with pytest.raises((InputError, Mistakes)) as caught:
+        read_design_text(text)
+    return str(caught.value)
+
+
+def test_a_continuous_law_alone_is_told_that_the_law_that_runs_is_missing() -> None:
+    text = DRIVE + '[control.position.law]\ninputs = ["error"]\n[control.position.law.continuous]\nD = [3]\n'
+    assert told(text).count("\n") == 0
+    assert "control.position.law.D: missing; allowed: the law as it runs" in told(text)
+
+
+def test_matrices_of_one_row_are_read_in_the_continuous_part_as_in_the_law() -> None:
+    flat = "A = [[0.5]]\nB = [[1]]\nC = [2]\nD = [3]\n[control.position.law.continuous]\n"
+    flat += "A = [[-5000, 0], [1, 0]]\nB = [[1], [0]]\nC = [-7, 9]\nD = [253]\n"
+    nested = flat.replace("[2]", "[[2]]").replace("[3]", "[[3]]")
+    nested = nested.replace("[-7, 9]", "[[-7, 9]]").replace("[253]", "[[253]]")
+    assert with_law(nested).controller == with_law(flat).controller
+
+
+STATE = "A = [[0.5]]\nB = [[1]]\nC = [0]"
+
+
+@pytest.mark.parametrize("zero", ["D = [0]", "D = [[0]]", STATE, f"{STATE}\nD = [0]"])
+def test_a_law_that_gives_nothing_is_refused(zero: str) -> None:
+    with pytest.raises(InputError, match="the law gives nothing"):
+        with_law(zero)
+
+
+@pytest.mark.parametrize("part", ["", "[control.position.law.continuous]\n"])
+def test_a_transfer_function_is_told_how_to_become_matrices(part: str) -> None:
+    law = '[control.position.law]\ninputs = ["error"]\n'
+    text = told(f"{DRIVE}{law}{'D = [1]' if part else ''}\n{part}num = [185.0, -150.0]\nden = [1.0, -0.65]\n")
+    assert text.count("tf2ss(num,den)") == 2
+    assert "other sizes" not in text
+
+
+def test_gains_in_a_law_are_not_said_to_be_its_factor() -> None:
+    law = '[control.position.law]\ninputs = ["error"]\n'
+    assert "a number of D" in told(f"{DRIVE}{law}D = [1]\nkp = 3\n")
+
+
+def motor(constants: str, **values: str) -> str:
+    """The drive with another motor."""
+    lines = "\n".join(f'{key} = "{value}"' for key, value in values.items())
+    head, tail = DRIVE.split("[[gear]]")
+    before = head.split("torque_constant")[0]
+    own = f'constants = "{constants}"\nrotor_inertia = "1 gcm2"\n{lines}\n'
+    return f"{before}{own}[[gear]]{tail}"
+
+
+@pytest.mark.parametrize(
+    ("constants", "values"),
+    [
+        ("rms-line", {"torque_constant": "0.03 Nm/Arms"}),
+        ("rms-line", {"back_emf_constant": "1.8 Vrms/krpm"}),
+        ("peak-phase", {"back_emf_constant": "100 KV"}),
+        ("peak-phase", {"torque_constant": "0.08 Nm/A"}),
+        ("dc", {"torque_constant": "0.08 Nm/A"}),
+        ("dc", {"back_emf_constant": "100 KV"}),
+    ],
+)
+def test_a_missing_constant_is_answered_with_the_number_that_is_then_taken(
+    constants: str, values: dict[str, str]
+) -> None:
+    missing, unit = ("back_emf_constant", "V*s/rad")
+    if missing in values:
+        missing, unit = "torque_constant", "N*m/A"
+    answer = told(motor(constants, **values)).rpartition(" ")[2]
+    design = read_design_text(motor(constants, **values, **{missing: f"{answer} {unit}"}))
+    same = design.effective_motor
+    # six digits are told
+    assert same.torque_constant_Nm_A == pytest.approx(same.back_emf_constant_Vs_rad, rel=1e-5)
+
+
+# 44 oz-in/A rms is 0.31071 N m/A rms; over sqrt(3) it is kE in V rms line-line
+KE = 44 * 0.0070615518 / 3**0.5
+
+
+@pytest.mark.parametrize(
+    ("written", "wanted", "unit"),
+    [("23 Vrms/krpm", KE * 1000 * np.pi / 30, "Vrms/krpm"), ("415 rpm/V", 30 / np.pi / KE, "rpm/V")],
+)
+def test_constants_that_disagree_are_told_as_they_are_written(written: str, wanted: float, unit: str) -> None:
+    text = told(motor("rms-line", torque_constant="44 oz-in/Arms", back_emf_constant=written))
+    assert f"({written}): allowed: within 10 %" in text
+    assert "(44 oz-in/Arms) has it" in text
+    number, _, same = text.partition("10 % of ")[2].partition("(")[2].partition(")")[0].partition(" ")
+    assert same == unit
+    assert float(number) == pytest.approx(wanted, rel=1e-3)  # four digits are told
+
+
+def test_what_a_sheet_states_besides_follows_from_the_keys(cli, tmp_path) -> None:
+    # by hand: 0.45 mH/5.9 ohm; 5.9 ohm 4.1e-7 kg m2/(12.7 mN m/A)^2; 12 V/(1.33 V/krpm); 12 V/5.9 ohm
+    (tmp_path / "first.toml").write_text(DRIVE + '[load]\ninertia = "30 gcm2"\n', encoding="utf-8")
+    data = cli.data("keys", "--explain", f"{tmp_path / 'first.toml'}")["figures"]
+    assert [one["unit"] for one in data] == ["ms", "ms", "rpm", "A", "N*m", "kg*m^2", "kg*m^2"]
+    assert [one["value"] for one in data] == pytest.approx(
+        [0.0762712, 14.99783, 9022.556, 2.033898, 0.0258305, 8.138021e-9, 4.181380e-7], rel=2e-6
+    )
+    assert "Follows from the design" in cli.text("keys", "--explain", f"{tmp_path / 'first.toml'}")
+
+
+@pytest.mark.parametrize(
+    ("word", "key"),
+    [
+        ("Kt", "motor.torque_constant"),
+        ("Kv", "control.position.gain"),
+        ("kp", "control.current.gain"),
+        ("proportional gain", "control.velocity.gain"),
+        ("k1", "coupling.stiffness"),
+        ("state feedback", "control.position.law.inputs"),
+    ],
+)
+def test_keys_are_found_by_the_words_of_sheets_and_controllers(cli, word: str, key: str) -> None:
+    assert key in [one["path"] for one in cli.data("keys", word)["keys"]]
+
+
+def test_a_controllers_name_is_answered_with_the_command_that_reads_its_settings(cli) -> None:
+    assert "objects import" in cli.refused("keys", "odrive")
+
+
+@pytest.mark.parametrize(
+    ("written", "counts"), [("4096 counts/rev", 4096), ("1024 lines/turn", 4096), ("4000 inc/rev", 4000)]
+)
+def test_counts_may_be_said_to_be_per_turn(written: str, counts: int) -> None:
+    assert (
+        read_design_text(f'{DRIVE}[encoder]\ncounts_per_rev = "{written}"\n').encoder.counts_per_rev == counts
+    )
+
+
+@pytest.mark.parametrize("word", ["ppr", "CPT", "pulses"])
+def test_pulses_are_not_guessed_to_be_counts(word: str) -> None:
+    # of one maker 1024 ppr are 4096 counts after quadrature, of another 1024
+    text = told(f'{DRIVE}[encoder]\ncounts_per_rev = "1024 {word}"\n')
+    assert 'write "lines" (4 counts each) or "counts"' in text
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ('acceleration = "1500 1/s²"', "write rev or rad into it"),
+        ('speed = "100 1/s"', "write rev or rad into it"),
+    ],
+)
+def test_a_speed_without_an_angle_is_asked_for_it(table: str, words: str) -> None:
+    assert words in told(DRIVE.replace("[limits]\n", f"[limits]\n{table}\n"))
+
+
+def test_a_gain_in_torque_is_told_how_to_become_one_in_amperes() -> None:
+    current = '[control.current]\ngain = "1 V/A"\n'
+    for stage, gain in (("position", "50 Nm/rev"), ("velocity", "0.16 Nm/(rev/s)")):
+        text = told(f'{DRIVE}{current}[control.{stage}]\ngain = "{gain}"\n')
+        assert "over kM, and over the ratio squared" in text
+
+
+@pytest.mark.parametrize(
+    ("ratio", "told_of"), [('"1/86"', True), ('"86/1"', False), ("0.5", True), ("1", False)]
+)
+def test_a_gear_that_speeds_up_is_suspicious(ratio: str, told_of: bool) -> None:
+    warnings = warnings_of(read_design_text(DRIVE.replace("ratio = 19.2", f"ratio = {ratio}")))
+    assert any("faster than the motor" in line for line in warnings) is told_of
+    assert (ratio != '"1/86"') or any('written "86:1"' in line for line in warnings)
