@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from math import inf, log, pi
+from math import inf, isclose, log, pi
 
 import numpy as np
 
@@ -117,11 +117,13 @@ def _stated(design: Design, key: str) -> str:
 
 
 def _as_written(design: Design, key: str, times: float) -> str:
-    """So many times a constant in the unit of its file, in brackets; nothing where no file has it so."""
+    """So many times a constant in the unit of its file, in brackets; nothing where that is the SI one."""
     item = design.parameters.get(f"motor.{key}")
     if item is None or item.value != getattr(design.motor, _ELECTRICAL[key]):
         return ""
     number, unit = split_quantity(item.text)
+    if isclose(number, item.value, rel_tol=1e-4):
+        return ""
     upside_down = _PER_VOLT.search(unit) is not None
     return f" ({number * (1.0 / times if upside_down else times):.4g} {unit})"
 

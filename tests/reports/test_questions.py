@@ -26,7 +26,7 @@ QUESTIONS = {
     "How fast is it?": ([EACH], LOOPS, r"bandwidth[\s\S]+[\d.]+ "),
     "How much delay can I add?": ([HANDS], "#hands-on .now", r"Delay margin ms[\s\S]+loop\t[\s\S]+\d"),
     "What happens at 20?": ([HANDS, SIZE], ".acting", r"^(No limit acts|Limits that act).+changed"),
-    "What is assumed?": (['.toc a[href="#parameters"]'], "#parameters", r"\d+ of them are assumed"),
+    "What is assumed?": (['.toc a[href="#parameters"]'], "#parameters", r"\d+ of them assumed"),
     "Where is phase lost?": (['.toc a[href="#delays"]'], "#delays", r"delay[\s\S]+deg"),
 }  # fmt: skip
 
