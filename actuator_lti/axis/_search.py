@@ -30,12 +30,18 @@ def half_turns(phase):
 
 
 @kernel
+def _far(bounds):
+    """Whether the gain stays beyond 200 dB, up or down: its crossings of the real axis are only counted."""
+    return bounds[MOST] < -FAR_LOG or bounds[0] > FAR_LOG
+
+
+@kernel
 def _clear(kind, level, listed_to, slack, low, bounds):
     if kind != CIRCLE:
         return one_way(bounds, kind) or bounds[kind] > level or bounds[MOST + kind] < level
     if not one_way(bounds, 0) and not bounds[0] > slack and not bounds[MOST] < -slack:
         return False
-    if one_way(bounds, 1) or bounds[MOST] < -FAR_LOG or low >= listed_to:
+    if one_way(bounds, 1) or _far(bounds) or low >= listed_to:
         return True
     return half_turns(bounds[1] - slack) == half_turns(bounds[MOST + 1] + slack)
 
@@ -72,7 +78,7 @@ def _turned(m, factors, listed_to, parts, right, bounds, room, reals, found):
         found[LEAVING] = 0.0
     if step == 0.0:
         return DONE
-    if low >= listed_to or bounds[MOST] < -FAR_LOG:
+    if low >= listed_to or _far(bounds):
         if low < listed_to:
             found[FAR] += abs(step)
         if bounds[0] > 0.0:

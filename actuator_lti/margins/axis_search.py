@@ -25,7 +25,7 @@ from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.trust import Doubtful
 
 _NEXT_TO_AXIS = 1e-14  # relative: a root on the axis itself is held this far from it
-_ROOM, _MORE, _MOST = 1 << 11, 8, 1 << 23  # intervals: asked for first, each time more, and no more than that
+_ROOM, _MORE, _MOST = 1 << 11, 8, 1 << 17  # intervals: asked for first, each time more, and no more than that
 Place = tuple[float, float]
 
 
@@ -112,7 +112,7 @@ class Found:
     gain_w: Real  # in order
     real_w: Real
     rising: Mask  # whether the phase rises at each of ``real_w``
-    far: int  # crossings of the negative real axis with a gain below -200 dB, which are not looked for
+    far: int  # crossings of the negative real axis beyond 200 dB, up or down, which are not looked for
     turns: int  # rising less falling ones among those not listed where the gain is above one
     rate: float  # of the phase, at the beginning
     intervals: int  # into how many the axis was split

@@ -31,7 +31,8 @@ def stability_margins(
 
     A rational loop, alone or behind a delay, is taken as its factors: the change of each over an interval of
     frequency is known, and intervals are split until the loop stays off the unit circle and the negative real
-    axis in each, or moves over them one way; no crossing is left out. Stability is found twice where it can
+    axis in each, or moves over them one way; no crossing is left out. Behind a delay the factors are those of
+    the exact polynomials where double precision does not place them. Stability is found twice where it can
     be, from closed-loop poles (behind a delay, from those without it) and from the Nyquist curve. Delays
     inside, and what double precision cannot check in this way, are worked out in exact arithmetic;
     ``.evidence`` says how the answer is known. Quoted are, see
@@ -114,26 +115,32 @@ def _rational(given: Given, certify: bool) -> StabilityMargins:
 def _behind_delay(
     given: Given, delay_s: float, band: tuple[float, float] | None, certify: bool
 ) -> StabilityMargins:
-    """A rational loop behind a delay, which may be part of a sample: by its factors, else certified."""
-    margins, doubt = None, ""
+    """A rational loop behind a delay, which may be part of a sample: by its factors, of double precision or
+    of exact polynomials; a continuous one where asked for, or where these fail, by certified intervals.
+    """
     try:
         margins = checked_margins(loop_of(given, warp=True), delay_s, band)
     except Doubtful as error:
-        doubt = str(error)
-    if margins is not None and (given.period_s is not None or not certify):
+        margins = _late(given, delay_s, band, str(error))
+    if given.period_s is not None or not (certify or margins.withheld):
         return margins
-    if given.period_s is not None:
-        reason = f"part of a sample is worked out in double precision alone, and {doubt}"
-        return _withheld(given.period_s, delay_s, "factors of the loop", reason)
     from actuator_lti.margins.delays.certified import certified_delayed_margins  # python-flint if needed
     from actuator_lti.margins.delays.exact import exact_behind_delay
 
     try:
         return certified_delayed_margins(exact_behind_delay(given, delay_s), delay_s, band, margins)
     except (NumericalError, InputError) as error:
-        if margins is not None:
-            return replace(margins, evidence_reason=f"{margins.evidence_reason}; not certified: {error}")
-        return _withheld(None, delay_s, "certified intervals", f"{doubt}; {error}")
+        return replace(margins, evidence_reason=f"{margins.evidence_reason}; not certified: {error}")
+
+
+def _late(given: Given, delay_s: float, band: tuple[float, float] | None, doubt: str) -> StabilityMargins:
+    """By the zeros and poles of the exact polynomials, or withheld."""
+    from actuator_lti.margins.exact.product import late_margins  # python-flint only where it is needed
+
+    try:
+        return late_margins(given, delay_s, band)
+    except Doubtful as error:
+        return _withheld(given.period_s, delay_s, "factors of the loop", f"{doubt}; {error}")
 
 
 def _inside_delays(form: DelayForm, band: tuple[float, float] | None) -> StabilityMargins:

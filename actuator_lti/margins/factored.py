@@ -13,13 +13,14 @@ from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.poles import SortedPoles, eigenvalues, polynomial_roots
 from actuator_lti.margins.trust import Doubtful
 
-_LEAST_SLACK = 1e-8
+LEAST_SLACK = 1e-8
 _SAME = 1e-4  # relative: the loop and the product of its factors
 _NEARLY_REAL = 1e-12
 _SEEN = math.log(1e10)  # of L, to either side of one
 _NEWTON_STEPS = 6
 _NEWTON_STEP = 1e-9
 _ROUNDED = 1e-13  # of gain and phase: no step says more
+_FAR, _FAR_ROUNDED = math.log(10.0**1.5), 1e-7  # 30 dB from one, where a steep gain leaves fewer digits
 _FAR_OFF = 1e-4  # relative: a crossing of the factors and one of the loop
 
 
@@ -108,7 +109,8 @@ class Response:
             L = self._late(x, L)
             step = _newton_step(L, rate, gain)
             x = x - step
-            if (np.abs(step) <= _NEWTON_STEP * x).all() or (np.abs(step * rate) <= _ROUNDED).all():
+            rounded = np.where(np.abs(np.log(np.abs(L))) > _FAR, _FAR_ROUNDED, _ROUNDED)
+            if ((np.abs(step) <= _NEWTON_STEP * x) | (np.abs(step * rate) <= rounded)).all():
                 break
         else:
             raise Doubtful("a crossing did not settle")
@@ -142,11 +144,16 @@ def factored(response: Response, poles: SortedPoles) -> Factored:
     above = _zeros(loop, below)
     roots = np.concatenate((above, below))
     weights = np.concatenate((np.ones(above.size), -np.ones(below.size)))
-    delay = response.delay
-    if delay and loop.period_s is not None:
-        roots, weights, delay = np.append(roots, (1.0, -1.0)), np.append(weights, (delay, -delay)), 0.0
     with np.errstate(all="ignore"):
-        return _fitted(Factored(roots, weights, delay), response, below)
+        return _fitted(with_delay(roots, weights, response), response, below)
+
+
+def with_delay(roots: Complex, weights: Real, response: Response) -> Factored:
+    """The factors of a response from those of its loop; the constants of gain and phase are left out."""
+    delay = response.delay
+    if delay and response.loop.period_s is not None:
+        roots, weights, delay = np.append(roots, (1.0, -1.0)), np.append(weights, (delay, -delay)), 0.0
+    return Factored(roots, weights, delay, slack=LEAST_SLACK)
 
 
 def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
@@ -166,7 +173,7 @@ def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
     if not off.size or not apart <= _SAME or not math.isfinite(log_gain):
         raise Doubtful("poles and zeros in double precision do not make up the loop")
     return Factored(
-        factors.roots, factors.weights, factors.delay, log_gain, turn, max(_LEAST_SLACK, 10.0 * apart)
+        factors.roots, factors.weights, factors.delay, log_gain, turn, max(LEAST_SLACK, 10.0 * apart)
     )
 
 

@@ -12,10 +12,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from margin_families import FAMILIES, Loop, near_the_border, over_twelve_decades
-from margin_truth import difference, facts, towards_the_border, truth_of, unlike
+from margin_truth import ULP, difference, facts, towards_the_border, truth_of, unlike
 
 from actuator_lti.margins import stability_margins
-from tests.margins.differential import ALL, tried
+from tests.margins.differential import ALL, behind_part_of_a_sample, tried
 
 LOOPS = 120  # of each family, double precision against exact arithmetic
 ROUNDS = 24  # of each family, in all forms against the truth
@@ -33,6 +33,15 @@ def test_one_answer_in_every_form(family: int, capfd: pytest.CaptureFixture[str]
                 wrong.append((k, what))
     assert not wrong
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("family", range(len(ALL)), ids=lambda k: f"{k}-{ALL[k].__name__}")
+def test_behind_part_of_a_sample_only_what_8_ulp_decide_is_withheld(family: int) -> None:
+    answers = [behind_part_of_a_sample(ALL[family], 2027, k * len(ALL) + family) for k in range(ROUNDS)]
+    assert not [what for kind, what in answers if kind in ("wrong", "refused")]
+    withheld = [what for kind, what in answers if kind == "withheld"]
+    assert all(f"{ULP} ulp of the entries" in what for what in withheld)
+    assert len(withheld) < ROUNDS // 2
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from flint import acb, acb_poly, arb, fmpq, fmpq_mat, fmpq_poly
+from flint import acb, acb_poly, arb, arb_poly, fmpq, fmpq_mat, fmpq_poly
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.delays.form import DelayForm
@@ -98,14 +98,16 @@ class ExactDelayLoop:
                 )
             if tau != 0:
                 sizes.append(1.0 / float(arb(tau).mid()))
-        return 0.1 * min(sizes[1:] or sizes)
+        if not (low := 0.1 * min(sizes[1:] or sizes)) > 0.0:
+            raise NumericalError("the coefficients of the loop are too far apart")
+        return low
 
     def beyond(self, gain: float) -> float:
         """A frequency above which |L| < gain: the leading power against all other coefficients together."""
+        sizes_N, sizes_D = _sizes(self.N), _sizes(self.D)
 
         def holds(x: float) -> bool:
-            above = sum((_size(p, x) for p, _ in self.N.terms), arb(0))
-            rest = sum((_size(p, x) for p, _ in self.D.terms), arb(0))
+            above, rest = sizes_N(arb(x)), sizes_D(arb(x))
             return bool(above < gain * (2 * abs(self.lead) * arb(x) ** self.degree - rest))
 
         x = max(self.lowest, 1e-300)
@@ -116,12 +118,9 @@ class ExactDelayLoop:
         return x
 
 
-def _size(p: fmpq_poly, x: float) -> arb:
-    total, power = arb(0), arb(1)
-    for c in p.coeffs():
-        total += abs(arb(c)) * power
-        power = power * x
-    return total
+def _sizes(f: Quasi) -> arb_poly:
+    """The polynomial that no f(j x) exceeds."""
+    return sum((arb_poly([abs(arb(c)) for c in p.coeffs()]) for p, _ in f.terms), arb_poly())
 
 
 def neighbour(form: DelayForm, way: float) -> DelayForm:

@@ -6,7 +6,9 @@ What the data determine is the answer that is the same for neighbours 8 ulp away
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass, replace
+from itertools import islice, takewhile
 
 import numpy as np
 
@@ -27,6 +29,7 @@ _FAR_DB = 30.0
 _FAR = 10.0 ** (_FAR_DB / 20.0)  # a real-axis crossing farther from -1 than this is of no consequence
 _SAME_W = 0.05
 _SAME_GAIN = 0.5
+_BESIDE = 4
 _SHARP = 1e-3  # a pole is placed where its own error is below this part of its modulus
 _TOLD = 1e-6
 Crossings = tuple[Crossing, ...]
@@ -80,26 +83,36 @@ def _margins(given: Given, base: Findings, result: _Settled) -> StabilityMargins
 
 
 def _reason(result: _Settled) -> str:
-    moved = f"move a crossing by {result.moved:.1g}" if result.moved > _MOVED else "change nothing"
     if result.border:
         return "exact arithmetic on the given doubles: poles lie exactly on the stability boundary"
-    return f"exact arithmetic on the given doubles, certified roots; {ULP} ulp of the entries {moved}"
+    return f"exact arithmetic on the given doubles, certified roots; {moved_text(result.moved)}"
+
+
+def moved_text(moved: float) -> str:
+    """What neighbours of the data change."""
+    what = f"move a crossing by {moved:.1g}" if moved > _MOVED else "change nothing"
+    return f"{ULP} ulp of the entries {what}"
 
 
 def _notes(base: Findings, result: _Settled) -> tuple[str, ...]:
     hidden = base.hidden
     if result.hidden_at_dc > hidden.at_zero:  # one that the data do not tell from a mode at zero
         hidden = replace(hidden, at_zero=result.hidden_at_dc)
-    notes = [
+    return (
         *hidden_notes(hidden.at_zero, hidden.pairs, hidden.right),
         *far_note(sum(out_of_sight(c.L) for c in result.reals)),
-    ]
-    if result.dropped:
-        notes.append(
-            f"crossings of the real axis more than {_FAR_DB:g} dB from -1 that are left out, as double "
-            f"precision does not resolve them: {result.dropped}"
-        )
-    return tuple(notes)
+        *dropped_note(result.dropped),
+    )
+
+
+def dropped_note(dropped: int) -> tuple[str, ...]:
+    """What is said of crossings far from -1 that the data do not determine."""
+    if not dropped:
+        return ()
+    return (
+        f"crossings of the real axis more than {_FAR_DB:g} dB from -1 that are left out, as double "
+        f"precision does not resolve them: {dropped}",
+    )
 
 
 @dataclass(frozen=True)
@@ -119,17 +132,18 @@ class _Settled:
 def _settled(base: Findings, others: list[Findings]) -> _Settled:
     """Compare the findings of the given doubles with those of their neighbours: poles first."""
     unstable, border, hidden, problem = _poles(base, others)
-    compared: Compared = (), (), 0, 0.0, problem
+    agreed: Compared = (), (), 0, 0.0, problem
     if problem is None:
         for merge in (False, True):
             lists = [crossings(f.loop, merge) for f in (base, *others)]
-            compared = _compared(lists[0], lists[1:])
-            if compared[-1] is None:
+            agreed = compared(lists[0], lists[1:])
+            if agreed[-1] is None:
                 break
-    return _Settled(unstable, border, hidden, *compared)
+    return _Settled(unstable, border, hidden, *agreed)
 
 
-def _compared(ours: Lists, others: list[Lists]) -> Compared:
+def compared(ours: Lists, others: list[Lists]) -> Compared:
+    """Both lists of crossings, less those far from -1 that neighbours do not share, and what else differs."""
     (gains, reals), dropped = ours, 0
     for _, theirs in others:
         kept = tuple(c for c in reals if not _far(c) or _partner(c, theirs))
@@ -148,12 +162,15 @@ def _far(c: Crossing) -> bool:
 
 
 def _partner(c: Crossing, others: tuple[Crossing, ...]) -> Crossing | None:
-    """The crossing that is the same one in another list."""
-    for other in others:
-        same_w = c.w == other.w or (0.0 < c.w * other.w < math.inf and abs(math.log(c.w / other.w)) < _SAME_W)
-        if same_w and c.touch == other.touch and _same_size(abs(c.L), abs(other.L)):
-            return other
-    return None
+    """The crossing that is the same one in another list, which is in order."""
+    first = bisect_left(others, c.w / (1.0 + _SAME_W), key=_place)
+    beside = takewhile(lambda other: other.w <= c.w * (1.0 + _SAME_W), islice(others, first, None))
+    same = (other for other in beside if c.touch == other.touch and _same_size(abs(c.L), abs(other.L)))
+    return next(same, None)
+
+
+def _place(c: Crossing) -> float:
+    return c.w
 
 
 def _same_size(a: float, b: float) -> bool:
@@ -175,7 +192,9 @@ def difference(ours: tuple[Crossing, ...], theirs: tuple[Crossing, ...], line: s
 
 
 def _movement(c: Crossing, others: tuple[Crossing, ...]) -> float:
-    other = min(others, key=lambda o: abs(o.L - c.L) + abs(o.w - c.w) / (c.w or 1.0), default=None)
+    at = bisect_left(others, c.w, key=_place)
+    beside = others[max(at - _BESIDE, 0) : at + _BESIDE]
+    other = min(beside, key=lambda o: abs(o.L - c.L) + abs(o.w - c.w) / (c.w or 1.0), default=None)
     if other is None or not 0.0 < c.w < math.inf or not c.L:
         return 0.0
     return max(abs(other.w / c.w - 1.0), abs(other.L / c.L - 1.0))

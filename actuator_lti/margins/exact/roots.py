@@ -80,7 +80,12 @@ class HalfPlanes:
     right: int  # roots with a positive real part, multiplicities counted
     at_zero: int  # multiplicity of the root zero
     border: tuple[tuple[arb, int], ...]  # w > 0 of the roots +-j w, with their multiplicity
-    values: tuple[complex, ...]  # all of them, in double precision
+    roots: tuple[acb, ...]  # all of them, each as often as it is repeated
+
+    @property
+    def values(self) -> tuple[complex, ...]:
+        """All of them, in double precision."""
+        return tuple(complex(root) for root in self.roots)
 
     @property
     def pairs(self) -> tuple[tuple[float, int], ...]:
@@ -108,21 +113,23 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
     parts = split(p)
     symmetric = parts.even.gcd(parts.odd) if parts.odd.degree() >= 0 else parts.even
     border: list[tuple[arb, int]] = []
-    right, values = 0, [0j] * at_zero
+    right, placed = 0, [(acb(0), at_zero)]
     if symmetric.degree() > 0:
         mirrored = symmetric(_SQUARE)
-        mirrored = mirrored // mirrored.content()
-        border = [(v.sqrt(), times) for v, times in positive_roots(all_roots(symmetric))]
+        p = p // (mirrored // mirrored.content())
+        squares = all_roots(symmetric)
+        border = [(v.sqrt(), times) for v, times in positive_roots(squares)]
         right = symmetric.degree() - sum(times for _, times in border)
-        values += _in_doubles(all_roots(mirrored))
-        p = p // mirrored
+        placed += [(side * _root_of(v), times) for v, times in squares for side in (1, -1)]
     roots = at_enough_bits(partial(_told_from_axis, p), ctx.prec, "a closed-loop pole")
     right += sum(times for root, times in roots if root.real > 0)
-    return HalfPlanes(right, at_zero, tuple(border), (*values, *_in_doubles(roots)))
+    every = tuple(root for root, times in (*placed, *roots) for _ in range(times))
+    return HalfPlanes(right, at_zero, tuple(border), every)
 
 
-def _in_doubles(roots: list[tuple[acb, int]]) -> list[complex]:
-    return [complex(root) for root, times in roots for _ in range(times)]
+def _root_of(v: acb) -> acb:
+    """s with v = -s^2, on the axis exactly where v is real and positive."""
+    return acb(0, v.real.sqrt()) if v.imag.is_zero() and v.real > 0 else (-v).sqrt()
 
 
 def _told_from_axis(p: fmpz_poly) -> list[tuple[acb, int]] | None:
