@@ -48,9 +48,10 @@ class StabilityMargins:
       for data 8 ulp away.
     - ``"checked"``: in double precision; poles and Nyquist count agree, the parity of the crossovers is
       right, no pole lies within its own error of the stability boundary, and each figure has a small bound
-      of its error.
-    - ``"withheld"``: 8 ulp of the entries change the answer, so the data do not determine it; behind part
-      of a sample also what double precision cannot check. The reason says which.
+      of its error; behind a delay also from the zeros and poles of the exact polynomials, if 8 ulp of the
+      entries change nothing.
+    - ``"withheld"``: 8 ulp of the entries change the answer, so the data do not determine it, or a search
+      came to its end. The reason says which.
 
     Attributes
     ----------
