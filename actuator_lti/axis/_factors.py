@@ -99,10 +99,9 @@ def root(m, factors, kind, level, parts, left, right, at):
         else:
             high = w
         ahead = w - here / parts[at + 4 * m + 2 + kind]
-        if not (ahead >= low and ahead <= high):
-            ahead = halved(low, high)
-        near = abs(ahead - w) <= STEP * w
-        w = ahead
+        inside = ahead >= low and ahead <= high
+        near = inside and abs(ahead - w) <= STEP * w
+        w = ahead if inside else halved(low, high)
         if near:
             break
     return w

@@ -51,7 +51,7 @@ class Along:
         parts, listed_to, floor = axis_parts(factors, band)
         ends = axis_ends(factors, response)
         gain_w, real_w, rising, far = merged(parts)
-        gains, reals = response.polished(gain_w, gain=True), response.polished(real_w, gain=False)
+        gains, reals = response.polished(gain_w, gain=True), _polished(factors, response, real_w)
         turned = half_turns_about(factors, response, parts, ends, reals[1], rising)
         far += int(np.count_nonzero(np.abs(np.log(np.abs(reals[1]))) > FAR_LOG))
         far += sum(-math.inf < value.real < 0.0 and out_of_sight(value) for value in ends)
@@ -125,3 +125,12 @@ class Along:
             )
         quiet = -20.0 * math.log10(floor)
         return (f"gain margins above {quiet:.4g} dB beyond {top:.4g} rad/s are not listed",)
+
+
+def _polished(factors: Factored, response: Response, w: Real) -> tuple[Real, Complex]:
+    """Crossings of the real axis; those beyond 200 dB, which are not listed, as the factors have them."""
+    log_gain = factors.log_value(w)[0]
+    listed = np.abs(log_gain) <= FAR_LOG
+    x, L = response.x(w), -np.exp(log_gain).astype(complex)
+    x[listed], L[listed] = response.polished(w[listed], gain=False)
+    return x, L

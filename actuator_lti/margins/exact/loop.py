@@ -45,14 +45,15 @@ class ExactLoop:
         return self.N[self.degree], self.D[self.degree]
 
 
-def neighbours(given: Given, loop: ExactLoop) -> list[ExactLoop]:
+def neighbours(given: Given, loop: ExactLoop, told: int = 1) -> list[ExactLoop]:
     """The same from data 8 ulp away.
 
-    Where modes on the border cancel exactly, what is seen is moved and they stay: data next to these would
+    Where more modes on the border cancel exactly than are ``told`` by their place, what is seen is moved and
+    they stay: data next to these would
     have a pole beside a zero there, and nothing in common with the loop.
     """
     hidden = half_planes(loop.hidden)
-    if hidden.on_border < 2 and not loop.hidden_at_end:
+    if hidden.on_border <= told and not loop.hidden_at_end:
         return [exact_loop(near) for near in given.neighbours()]
     return [replace(loop, N=_moved(loop.N, way), D=_moved(loop.D, way)) for way in (1, -1)]
 

@@ -17,7 +17,14 @@ from flint import acb, arb, ctx
 from actuator_lti.margins.along import Along
 from actuator_lti.margins.assemble import hidden_notes
 from actuator_lti.margins.checked import in_double_precision, passed_into
-from actuator_lti.margins.exact.certified import Crossings, Lists, compared, dropped_note, moved_text
+from actuator_lti.margins.exact.certified import (
+    Crossings,
+    Lists,
+    certified_margins,
+    compared,
+    dropped_note,
+    moved_text,
+)
 from actuator_lti.margins.exact.crossings import Crossing
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.exact.roots import HalfPlanes, half_planes
@@ -67,10 +74,12 @@ def late_margins(given: Given, delay_s: float, band: tuple[float, float] | None)
 
 def _margins(given: Given, delay_s: float, band: tuple[float, float] | None) -> StabilityMargins:
     loop = exact_loop(given)
+    if loop.N.degree() < 0:  # nothing is fed back, early or late
+        return replace(certified_margins(given), delay_s=delay_s)
     hidden = half_planes(loop.hidden)
     base, *others = [
         _found(near, given.period_s, delay_s + way * ULP * float(np.spacing(delay_s)), band)
-        for near, way in zip((loop, *neighbours(given, loop)), (0.0, 1.0, -1.0), strict=True)
+        for near, way in zip((loop, *neighbours(given, loop, told=0)), (0.0, 1.0, -1.0), strict=True)
     ]
     found, nyquist, poles = base
     if any(other != nyquist for _, other, _ in others):
@@ -93,8 +102,8 @@ def _found(
     loop: ExactLoop, period_s: float | None, delay_s: float, band: tuple[float, float] | None
 ) -> tuple[Along, int, int | None]:
     """What one of them does along the axis, and its unstable closed-loop poles by both ways."""
-    if loop.N.degree() < 0 or loop.D.degree() < loop.degree:
-        raise Doubtful("a loop that is zero, or has a pole at z = -1")
+    if loop.D.degree() < loop.degree:
+        raise Doubtful("a pole at z = -1, where L behind part of a sample jumps")
     zeros, poles, free = half_planes(loop.N), half_planes(loop.D), half_planes(loop.closed)
     product = _product(loop, zeros, poles, period_s)
     response = Response(product, delay_s / (period_s or 1.0))
