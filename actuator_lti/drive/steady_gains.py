@@ -48,31 +48,31 @@ def drive_gain(design: Design) -> Any:
     if current is None:
         return motor.torque_constant_Nm_A / motor.resistance_ohm
     stiff = _held_ohm(design)
-    if stiff == math.inf:
+    if stiff is None:
         return motor.torque_constant_Nm_A
     fed = current.gain_V_A if current.law is None else current.law.steady("command")
     return motor.torque_constant_Nm_A * (fed + current.resistance_feedforward * motor.resistance_ohm) / stiff
 
 
 def _held_ohm(design: Design) -> Any:
-    """Volts per ampere that a settled current is off by: R and the current loop's P gain; inf behind an I."""
+    """Volts per ampere of a settled current: R and the current loop's P gain; None behind an integral."""
     current, resistance = design.controller.current, design.effective_motor.resistance_ohm
     if current is None:
         return resistance
     law = current.law
     if law is None:
-        return math.inf if current.integral_time_s is not None else current.gain_V_A + resistance
-    return math.inf if law.integrates else resistance + law.steady("error") - law.steady("current")
+        return None if current.integral_time_s is not None else current.gain_V_A + resistance
+    return None if law.integrates else resistance + law.steady("error") - law.steady("current")
 
 
 def back_emf_Nms_rad(design: Design) -> Any:
     """Motor torque lost per speed to back-EMF that no current integral and no feed-forward makes up for."""
     motor, current = design.effective_motor, design.controller.current
-    if motor.source_gain_Nm_V is not None:
+    stiff = None if motor.source_gain_Nm_V is not None else _held_ohm(design)
+    if stiff is None:
         return 0.0
-    assert motor.torque_constant_Nm_A is not None
     left = 1.0 if current is None else 1.0 - current.back_emf_feedforward
-    return motor.torque_constant_Nm_A * left * motor.back_emf_constant_Vs_rad / _held_ohm(design)
+    return motor.torque_constant_Nm_A * left * motor.back_emf_constant_Vs_rad / stiff
 
 
 def droop(design: Design) -> tuple[Any, Any] | None:

@@ -163,3 +163,23 @@ def test_an_integral_or_a_drive_without_friction_leaves_no_droop() -> None:
     current = 0.01 / held.motor.torque_constant_Nm_A
     below = held.limits.speed_rad_s - current / control.velocity.gain
     assert capability(held).output_rate_rad_s * held.total_ratio == pytest.approx(below, rel=1e-12)
+
+
+def test_the_droop_of_many_drives_with_p_loops_is_that_of_each() -> None:
+    """Voltage of a P current loop: kp (i_ref - i) = R i + kE w."""
+    base = amber()
+    control = replace(
+        base.controller,
+        velocity=replace(base.controller.velocity, integral_time_s=None),
+        current=replace(base.controller.current, integral_time_s=None),
+    )
+    design = replace(base, controller=control)
+    gains = np.array([0.5, 1.0, 2.0]) * control.current.gain_V_A
+    many = capability(stacked(design, {"control.current.gain": gains})).output_rate_rad_s * design.total_ratio
+    motor, friction, kp = design.effective_motor, design.friction, control.velocity.gain
+    for gain, found in zip(gains, many, strict=True):
+        total = gain + motor.resistance_ohm
+        pull, back = motor.torque_constant_Nm_A * gain * kp / total, motor.torque_constant_Nm_A / total
+        slope = pull + back * motor.back_emf_constant_Vs_rad + friction.viscous()
+        w = (pull * design.limits.speed_rad_s - friction.dry_torque_Nm - friction.offset_torque_Nm) / slope
+        assert found == pytest.approx(w, rel=1e-12)
