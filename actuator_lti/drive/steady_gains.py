@@ -57,6 +57,7 @@ def drive_gain(design: Design) -> Any:
 def _held_ohm(design: Design) -> Any:
     """Volts per ampere of a settled current: R and the current loop's P gain; None behind an integral."""
     current, resistance = design.controller.current, design.effective_motor.resistance_ohm
+    assert resistance is not None
     if current is None:
         return resistance
     law = current.law
@@ -71,6 +72,8 @@ def back_emf_Nms_rad(design: Design) -> Any:
     stiff = None if motor.source_gain_Nm_V is not None else _held_ohm(design)
     if stiff is None:
         return 0.0
+    assert motor.torque_constant_Nm_A is not None
+    assert motor.back_emf_constant_Vs_rad is not None
     left = 1.0 if current is None else 1.0 - current.back_emf_feedforward
     return motor.torque_constant_Nm_A * left * motor.back_emf_constant_Vs_rad / stiff
 
