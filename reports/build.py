@@ -231,9 +231,13 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
             try:
                 part = attempt(f"section {name}", partial(_further, one, design), None)
             except InputError as error:
-                part = doc.section(name, name.capitalize(), [], result=f"Not for this drive: {error}.")
+                part = doc.section(name, name.capitalize(), [], result=_not_for(name, error))
             made += [part] if part is not None else []
     return [*made, *notices(missing, "further")]
+
+
+def _not_for(name: str, error: InputError) -> str:
+    return f"Not for this drive: {error.message.removeprefix(f'{name}: ')}."
 
 
 def _further(one: Analysis, design: Design) -> doc.Section:

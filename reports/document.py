@@ -159,8 +159,11 @@ def listing(
     columns: Sequence[Shown],
     note: str = "",
     status: Callable[[T], Status | None] | None = None,
+    more: Callable[[T], Mapping[str, Any]] | None = None,
 ) -> Block:
     """Make a table of items, a row each: every column with what it shows of an item.
+
+    ``more``: what a row says besides, as ``_scale`` (see `reports.document_schema`).
 
     Examples
     --------
@@ -168,7 +171,9 @@ def listing(
     [{'y': 3000.0}]
     """
     rows = [
-        {one["key"]: read(item) for one, read in columns} | ({"_status": status(item)} if status else {})
+        {one["key"]: read(item) for one, read in columns}
+        | ({"_status": status(item)} if status else {})
+        | (dict(more(item)) if more else {})
         for item in items
     ]
     return table(caption, [one for one, _ in columns], rows, note)

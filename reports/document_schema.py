@@ -64,7 +64,8 @@ def _row_state(row: Tree) -> Tree:
     return row
 
 
-# by the keys of the columns; ``_status`` colours the row
+# by the keys of the columns; ``_status`` colours the row; ``_scale``: what its numbers were multiplied by to
+# be shown in its unit, ``_unit`` the one that they have without
 Row = Annotated[dict[str, Cell], AfterValidator(_row_state)]
 
 

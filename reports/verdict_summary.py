@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, cast
@@ -90,10 +91,15 @@ def walk(part: Mapping[str, Any]) -> Iterable[Block]:
 
 
 def gathered(sections: Iterable[Mapping[str, Any]]) -> list[Finding]:
-    """Collect the findings that sections carry, the gravest first, each once."""
+    """Collect the findings that sections carry, each once: the gravest first, of every section in turn."""
     every = [item for part in sections for item in part.get("findings", ())]
     apart = {(item["severity"], item["text"], item["where"]): item for item in every}
-    return sorted(apart.values(), key=lambda item: SEVERITIES.index(item["severity"]))
+    before: Counter[tuple[str, str]] = Counter()
+    turns: list[tuple[int, int, Finding]] = []
+    for (severity, _, where), item in apart.items():
+        turns.append((SEVERITIES.index(severity), before[severity, where], item))
+        before[severity, where] += 1
+    return [item for *_, item in sorted(turns, key=lambda one: one[:2])]
 
 
 def verdict_words(verdict: Mapping[str, Any]) -> list[str]:

@@ -13,16 +13,17 @@ from typing import TYPE_CHECKING, Any
 
 from actuator_lti.drive.choice import finite, larger, smaller, where
 from actuator_lti.drive.operating import dry_torque, segments
+from actuator_lti.drive.steady_gains import droop
 from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:
-    from actuator_lti.design.law import Law
     from actuator_lti.design.model import Design
 
-NOTHING, SPEED_LIMIT, FORCE, VOLTAGE = range(4)
-RATE_LIMITS = ("nothing", "speed limit", "force", "voltage")
+NOTHING, SPEED_LIMIT, FORCE, VOLTAGE, DROOP = range(5)
+RATE_LIMITS = ("nothing", "speed limit", "force", "voltage", "speed limit less droop of the P velocity loop")
 """What sets the largest speed, by the number that `Capability.rate_limit` holds."""
+ROUNDING = 1e-12  # of a speed: nearer than that, two bounds are one
 
 
 @dataclass(frozen=True)
@@ -71,52 +72,12 @@ def circuit_resistance_ohm(design: Design) -> Any:
     return resistance if design.supply is None else resistance + design.supply.resistance_ohm
 
 
-def stage_gain(gain: Any, law: Law | None) -> Any:
-    """Gain of a stage on a command at rest: of a law of one's own at zero frequency, inf if it integrates."""
-    return gain if law is None else law.steady("command")
-
-
-def torque_gain_Nm_rad(design: Design) -> Any:
-    """Motor torque per position error at the output: rotor at rest, current settled, no speed integral."""
-    control, motor = design.controller, design.effective_motor
-    gain = stage_gain(control.position_loop.gain, control.position_loop.law) * design.total_ratio
-    if control.velocity is not None:
-        gain = gain * stage_gain(control.velocity.gain, control.velocity.law)
-        for item in control.velocity.filters_on("torque"):
-            gain = gain * steady_gain(item)
-    if motor.source_gain_Nm_V is not None:
-        return gain * motor.source_gain_Nm_V
-    assert motor.torque_constant_Nm_A is not None
-    assert motor.resistance_ohm is not None
-    if control.current is None:
-        return gain * motor.torque_constant_Nm_A / motor.resistance_ohm
-    gain = gain * motor.torque_constant_Nm_A
-    law = control.current.law
-    if law is not None:
-        if law.integrates:
-            return gain
-        fed = law.steady("command") + control.current.resistance_feedforward * motor.resistance_ohm
-        return gain * fed / (motor.resistance_ohm + law.steady("error") - law.steady("current"))
-    if control.current.integral_time_s is None:
-        kp, fed = control.current.gain_V_A, control.current.resistance_feedforward * motor.resistance_ohm
-        gain = gain * (kp + fed) / (kp + motor.resistance_ohm)
-    return gain
-
-
 def resonance_rad_s(design: Design) -> Any:
     """Resonance of motor and load on the coupling, undamped: ``sqrt(k (1/J_l + 1/(J_m N_c^2)))``."""
     coupling, ratio = design.coupling, design.ratio_to_coupling
     assert coupling is not None
     inverse = 1.0 / design.load_side_inertia_kgm2 + 1.0 / (design.motor_side_inertia_kgm2 * ratio**2)
     return (coupling.stiffness_Nm_rad * inverse) ** 0.5
-
-
-def steady_gain(item: Any) -> Any:
-    """Gain of a filter at DC: 1 but for a sampled biquad."""
-    if item.kind != "biquad":
-        return 1.0
-    b, a = item.polynomials
-    return sum(b) / sum(a)
 
 
 def passed_moment_Nm(design: Design, load_Nm: float) -> Any:
@@ -184,6 +145,9 @@ def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) ->
     bounds: list[tuple[int, Any]] = []
     if design.controller.velocity is not None and "position" in design.controller.stages:
         bounds.append((SPEED_LIMIT, limits.speed_rad_s))
+        if (pulls := droop(design)) is not None:
+            rises = _first_root(against - pulls[0], slopes, pulls[1])
+            bounds.append((DROOP, where(pulls[0] > against, rises, 0.0)))
     bounds.append((FORCE, _first_root(against - stall, slopes, 0.0)))
     if motor.source_gain_Nm_V is None:
         R, kM, kE = circuit_resistance_ohm(design), motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
@@ -194,7 +158,7 @@ def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) ->
     speed: Any = math.inf
     cause: Any = NOTHING
     for kind, bound in bounds:
-        nearer = bound < speed
+        nearer = bound < speed * (1.0 - ROUNDING)
         speed, cause = where(nearer, bound, speed), where(nearer, kind, cause)
     moves = stall > against
     speed, cause = where(moves, speed, 0.0), where(moves, cause, FORCE)

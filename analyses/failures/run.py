@@ -13,7 +13,7 @@ from actuator_lti.loops.stiffness import compliance
 from analyses.failures.cases import Case, cases_of
 from analyses.failures.result import Asked, FailureCase, Failures, Floats
 from analyses.failures.rig import Rig
-from analyses.motion.settling import settle
+from analyses.motion.settling import outcome
 from analyses.specification.drive_figures import drive_figures
 
 SETTLED = 1e-3
@@ -58,7 +58,7 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
             made.append(_run(rig, asked, case))
         else:
             left_out |= {case.name: f"its output does not get half-way to the stop in {LONGEST_S:g} s"}
-    before = tuple(settle(design, asked.load_Nm, start) for start in sorted(settled))
+    before = tuple(outcome(design, asked.load_Nm, start) for start in sorted(settled))
     return Failures(design, asked, tuple(made), left_out, before)
 
 

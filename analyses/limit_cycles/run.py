@@ -43,7 +43,7 @@ def limit_cycles(design: Design) -> LimitCycles:
     ('play', 'quantisation')
     """
     if design.controller.position is None:
-        raise InputError("limit cycles: needs a drive with a position loop")
+        raise InputError("cycles: needs a drive with a position loop")
     has_play = design.coupling is not None and design.coupling.play_rad > 0.0
     predicted = [*cycles_of_play(design, friction=False), *cycles_of_play(design, friction=True)]
     predicted += cycles_of_quantisation(design)

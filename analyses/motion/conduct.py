@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.files.tree import Tree
-from analyses.motion.settling import words
+from analyses.motion.settling import counted, faint_words, words
 from nonlinear.runs.trajectory import COMMAND_UNITS, Trajectory
 from nonlinear.settling.rest import judge
 
@@ -31,8 +31,10 @@ class Conduct:
         return self.status in ("comes to rest", "becomes steady", "following")
 
 
-def conduct(run: Trajectory) -> Conduct:
+def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     """Judge a run; where its end comes too early, the drive is followed beyond it.
+
+    Swings that are too small beside full deflection (m on a linear axis) are rest.
 
     Examples
     --------
@@ -46,24 +48,27 @@ def conduct(run: Trajectory) -> Conduct:
     if rest is None:
         return Conduct("following")
     unit, factor = COMMAND_UNITS[run.axis, "velocity" if run.stage == "voltage" else run.stage]
+    if run.stage == "position":
+        rest = counted(rest, full_deflection_rad)
     if not rest.comes_to_rest:
         text = words(rest, factor, unit).removeprefix("limit cycle of ").removeprefix("still moving ")
         return Conduct(rest.verdict, text)
     limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]
     if limits:
         return Conduct("sits on a limit", ", ".join(limits))
-    return Conduct("comes to rest" if run.stage == "position" else "becomes steady")
+    left = faint_words(rest, factor, unit) if rest.amplitude else ""
+    return Conduct("comes to rest" if run.stage == "position" else "becomes steady", left)
 
 
-def summary(run: Trajectory) -> Tree:
-    """What happened, in numbers, SI."""
+def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:
+    """What happened, in numbers, SI; full deflection as in `conduct`."""
     limits = {
         name: {"limit": u.limit, "unit": u.unit, "fraction": u.fraction, "first_time_s": u.first_time_s}
         for name, u in run.limits.items()
     }
     angle = "m" if run.axis == "linear" else "rad"
     si = {"position": angle, "velocity": f"{angle}_s", "current": "A", "voltage": "V"}[run.stage]
-    ended = conduct(run)
+    ended = conduct(run, full_deflection_rad)
     out = {
         "design": run.design_name,
         "status": ended.status,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees, inf, radians
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from actuator_lti.loops import Loops
 
 SMALL = 1e-3  # of full deflection: a step beside those that the design asks for
-NOTICED = 1e-6  # of full deflection: a smaller swing is listed, it fails nothing
+NOTICED = 1e-6  # of full deflection: a smaller swing is listed, and is rest
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,16 @@ class Settling:
         return known.get(self.rest.verdict, self.swing_rad)
 
 
+def counted(rest: Rest, full_deflection_rad: float) -> Rest:
+    """What a motion ended in as it counts: a swing below `NOTICED` of full deflection is rest.
+
+    It keeps its size and frequency. What stands, not known for how long, is no swing.
+    """
+    swings = rest.verdict in ("limit cycle", "still moving")
+    small = 0.0 < max(rest.amplitude, rest.motor_amplitude) < NOTICED * full_deflection_rad
+    return replace(rest, verdict="at rest") if swings and small else rest
+
+
 def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
     """Step and wait; the command is of the position loop.
 
@@ -67,6 +77,12 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
     rest = judge(rows.running())
     assert rest is not None  # a step and a load that stay
     return Settling(step_rad, load_Nm, rest)
+
+
+def outcome(design: Design, load_Nm: float, step_rad: float) -> Settling:
+    """What a step ends in as it counts: `settle`, and swings that are too small are rest."""
+    one = settle(design, load_Nm, step_rad)
+    return replace(one, rest=counted(one.rest, design.validation.full_deflection_rad))
 
 
 def settlings_of(
@@ -107,7 +123,7 @@ def _until_known(
     """Steps in this order, up to the one after which the verdict of the load is known."""
     known = {one.amplitude_rad: one for one in resting if one.load_Nm == load_Nm}
     for size in sizes_rad:
-        one = known[size] if size in known else settle(design, load_Nm, size)
+        one = known[size] if size in known else outcome(design, load_Nm, size)
         yield one
         if accepted(design) is None and verdict_of(design, noticed(design, [one])) is Verdict.NOT_MET:
             return
@@ -190,17 +206,29 @@ def words(rest: Rest, factor: float, unit: str) -> str:
     'comes to rest'
     """
     if rest.verdict == "at rest":
-        return "comes to rest"
+        left = f" but for {faint_words(rest, factor, unit)}" if rest.amplitude or rest.motor_amplitude else ""
+        return f"comes to rest{left}"
     if rest.verdict == "diverging":
         return "diverges"
     after = f"{float(f'{rest.after_s:.3g}'):g}"
     if rest.verdict == "still moving" and not (rest.amplitude or rest.motor_amplitude):
         return f"stands still {after} s later; whether it stays is not known"
-    size = f"±{factor * rest.amplitude:.3g} {unit}"
-    if rest.motor_amplitude > 1.05 * rest.amplitude:
-        size += f" (motor ±{factor * rest.motor_amplitude:.3g} {unit})"
+    size = _size(rest, factor, unit)
     if rest.verdict == "still moving":
         return f"still moving {after} s later, by {size}"
     limits = f", {' and '.join(rest.limited)} limit acting" if rest.limited else ""
     seen = f"{rest.periods} periods seen{limits}"
     return f"limit cycle of {size} at {rest.frequency_hz:.3g} Hz ({seen})"
+
+
+def faint_words(rest: Rest, factor: float, unit: str) -> str:
+    """Say the swing that is too small to count (`counted`)."""
+    at = f" at {rest.frequency_hz:.3g} Hz" if rest.frequency_hz else ""
+    return f"a swing of {_size(rest, factor, unit)}{at}, too small to count"
+
+
+def _size(rest: Rest, factor: float, unit: str) -> str:
+    size = f"±{factor * rest.amplitude:.3g} {unit}"
+    if rest.motor_amplitude > 1.05 * rest.amplitude:
+        size += f" (motor ±{factor * rest.motor_amplitude:.3g} {unit})"
+    return size

@@ -17,7 +17,7 @@ class DriveFigures:
     # Largest steady speed of the output within the speed, voltage and peak current limits; 0 if it cannot
     # move; ``inf`` without any limit
     output_rate_rad_s: float
-    rate_limit: str  # what sets it: ``"speed limit"``, ``"voltage"``, ``"force"`` or ``"nothing"``
+    rate_limit: str  # what sets it: one of `RATE_LIMITS`
     # Current needed at that speed; ``None`` without a motor current (ideal source) or where the speed has no
     # bound
     motor_current_A: float | None

@@ -14,6 +14,7 @@ from actuator_lti.asked.quantities import LOOPS, QUANTITIES, judged_loops
 from actuator_lti.asked.verdict import Role, Tally, Verdict
 from actuator_lti.design.asked import ResponseTo
 from actuator_lti.design.model import Design, Requirement, Waiver
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.linear.held_loops import by_itself
@@ -160,7 +161,7 @@ def _judge_loop(
             id=id, requirement=requirement, loop=name, verdict=Verdict.NOT_MET, reason=why
         )
     value = QUANTITIES[requirement.quantity].read(result)
-    reason = which_response(requirement.quantity, name, requirement.to or "command")
+    reason = which_response(requirement.quantity, name, requirement.to or "command", design)
     if value is None:
         reason = "not found in the band of this loop"
     if figures[name].held is not None and requirement.rotor != "locked":
@@ -168,12 +169,12 @@ def _judge_loop(
     return _verdict(requirement, id, name, value, reason)
 
 
-def which_response(quantity: str, loop: str, to: ResponseTo = "command") -> str:
+def which_response(quantity: str, loop: str, to: ResponseTo = "command", design: Design | None = None) -> str:
     """Which of several responses a figure is taken of, in words; empty for a figure that they share.
 
     Bandwidth, resonance and step of the position loop are those of the response to the user's command,
     with profile, filter and feed-forward, or to the reference behind profile and filter; of an inner loop,
-    those of the feedback loop.
+    those of the feedback loop. Of ``design`` only the parts are named that it has.
 
     Examples
     --------
@@ -186,7 +187,23 @@ def which_response(quantity: str, loop: str, to: ResponseTo = "command") -> str:
         return "of the feedback loop"
     if to == "reference":
         return "of the response to the reference, behind profile and filter of the command"
-    return "of the response to the command: mean of its profile, filter and feed-forward included"
+    parts = _in_front(design)
+    included = f": {', '.join(parts[:-1])}{' and ' * (len(parts) > 1)}{parts[-1]} included" if parts else ""
+    return f"of the response to the command{included}"
+
+
+def _in_front(design: Design | None) -> list[str]:
+    """What acts between the command and the feedback loop; of no design all that may."""
+    if design is None:
+        return ["mean of its profile", "filter", "feed-forward"]
+    position = design.controller.position
+    fed = position is not None and bool(position.feedforward or position.acceleration_feedforward)
+    there = {
+        "mean of its profile": command_mean(design) is not None,
+        "filter": design.command.filter_time_s > 0.0,
+        "feed-forward": fed,
+    }
+    return [name for name, has in there.items() if has]
 
 
 def _verdict(

@@ -161,7 +161,14 @@ def _of_table(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
         for column in numeric:
             value, words = row.get(column["key"]), one_line(column["label"] or column["key"], 40)
             if value is None or _is_number(value):
-                yield _figure(f"{section} / {caption} / {label} / {words}", value, column)
+                yield _figure(f"{section} / {caption} / {label} / {words}", *_unscaled(value, row, column))
+
+
+def _unscaled(value: Any, row: Mapping[str, Any], column: Mapping[str, Any]) -> tuple[Any, Mapping[str, Any]]:
+    """A value in the one unit of its row, whatever unit it is shown in tonight."""
+    if column["unit"] or "_scale" not in row:
+        return value, column
+    return None if value is None else value / row["_scale"], {**column, "unit": row["_unit"]}
 
 
 def _figure(name: str, value: object, shown: Mapping[str, Any]) -> Figure:

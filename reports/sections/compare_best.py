@@ -79,11 +79,12 @@ def weakest(one: Compared) -> tuple[float, RequirementVerdict | None]:
 def designs(comparison: Comparison, note: str = _NOTE) -> doc.Block:
     """One row a design: what it meets and misses, its weakest point, gains and losses against the base."""
     base = comparison.base
+    open_ones = any(_those(one, Verdict.NOT_PROVEN) for one in comparison.all)
     columns = [
         doc.of("variant.name", "design", "Design"),
         doc.of(lambda o: f"{tally(o.verdicts).met} of {len(o.verdicts)}", "met", "Met"),
         doc.of(lambda o: _those(o, Verdict.NOT_MET), "missed", "Not met"),
-        doc.of(lambda o: _those(o, Verdict.NOT_PROVEN), "unproven", "Not proven"),
+        *([doc.of(lambda o: _those(o, Verdict.NOT_PROVEN), "unproven", "Not proven")] if open_ones else []),
         doc.of(_weakest_words, "weakest", "Nearest to its limit"),
         doc.of(lambda o: "the base" if o is base else _changes(o, comparison, 1), "gains", "Gains most"),
         doc.of(lambda o: "" if o is base else _changes(o, comparison, -1), "gives", "Gives up most"),

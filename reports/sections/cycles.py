@@ -59,7 +59,7 @@ def summary(result: LimitCycles) -> str:
 
 def _still(result: LimitCycles, fine: float, small: str) -> str:
     """Say what is too small to count as motion, or stands for longer than it was followed."""
-    left = [one for one in result.rests if one.hunting]
+    left = [one for one in result.rests if one.hunting or one.swing_rad]
     ends = (f"{fine * one.amplitude_rad:.3g} {small} it {words(one.rest, fine, small)}" for one in left)
     return f", but after {', after '.join(ends)}" if left else ""
 

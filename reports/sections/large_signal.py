@@ -23,7 +23,7 @@ from analyses.large_signal.sawtooth import (
 )
 from reports import document as doc
 from reports.charts import style
-from reports.numbers import short
+from reports.numbers import short, significant
 from reports.sections.limits import map_chart, words_of
 from reports.sections.names import figure_column, load_unit, output_unit
 from reports.verdict_summary import tally
@@ -270,7 +270,10 @@ def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str
         "Simulated values; in brackets those of an ideal rate limit: peak πR/2w, gain 4/(πx), lag "
         "arccos(π/2x)."
     )
-    if not sawtooth.applicable:
+    if sawtooth.droops:
+        slowest = significant(scale * sawtooth.slowest_rad_s)
+        caption += f" Not checked: under load the P velocity loop droops to {slowest} {unit}/s."
+    elif not sawtooth.applicable:
         caption += (
             f" Not checked: they need Kv/w ≥ {FAST:g} (here {sawtooth.gain_over_frequency:.3g}) and a "
             f"reversal within {REVERSAL_DEG:g}° of the period (here {sawtooth.reversal_deg:.3g}°)."

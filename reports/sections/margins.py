@@ -263,13 +263,15 @@ def response_table(named: Mapping[str, LoopFigures]) -> doc.Block:
     note = (
         "−3 dB: where the closed loop has fallen to 1/√2 of its gain at DC. −90°: where its phase reaches "
         "−90°. Current and velocity: the feedback loop. Position: the response from the user's command to "
-        "the output shaft, feed-forward, mean of the profile and filter of the command included; to the "
-        "reference: behind profile and filter."
+        "the output shaft, with what the drive has of feed-forward, jerk limit and filter of the command; to "
+        "the reference: behind profile and filter."
     )
     rows = [{"loop": name, **response_row(loop_figures)} for name, loop_figures in named.items()]
+    note += NONE_THERE if any(None in row.values() for row in rows) else ""
     return doc.table("Closed-loop bandwidth, resonance and step", RESPONSE_COLUMNS, rows, note)
 
 
+NONE_THERE = " A dash: the response never falls or peaks so far, or the loop is not stable."
 SPREAD_COLUMNS = [
     LOOP,
     doc.column("gain", "Gain margin, operating points", "dB"),

@@ -15,7 +15,7 @@ from analyses.monte_carlo.statistics import ColumnStatistics
 from analyses.specification.requirements import RequirementVerdict
 from reports import document as doc
 from reports.charts import style
-from reports.numbers import or_none
+from reports.numbers import capital, or_none
 from reports.sections.margins import finite
 from reports.sections.names import unit_words
 from reports.sections.requirements import label, limit_words
@@ -91,7 +91,7 @@ def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
         reason = f"{100 * odds.low:.3f} % with 95 % confidence"
     return doc.verdict(
         f"tolerance/{odds.id}",
-        f"{odds.label}: met within the tolerances",
+        f"{capital(odds.label)}: met within the tolerances",
         value=100.0 * odds.probability,
         limit=100.0 * wanted,
         unit="%",

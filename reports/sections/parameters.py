@@ -47,7 +47,7 @@ def section(design: Design, warnings: Sequence[str] = ()) -> doc.Section:
         facts = doc.listing("Facts", design.facts, FACTS)
         blocks.append(doc.details("Facts that enter no equation", [facts]))
     status: doc.Status = "warn" if warnings else "info"
-    findings = [doc.Finding(severity="warn", text=words, where="parameters") for words in warnings]
+    findings = [doc.Finding(severity="warn", text=f"{words}.", where="parameters") for words in warnings]
     ungraded = sum(not item.grade for item in parameters)
     result = (
         f"{len(parameters)} values; {assumed} of them assumed (grade X), {ungraded} without a grade."

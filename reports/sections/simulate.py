@@ -23,7 +23,7 @@ LONGEST_GAP_S = 0.002  # spans of an active limit closer than this fraction of t
 
 
 def section(result: Motion) -> doc.Section:
-    run, ended = result.run, conduct(result.run)
+    run, ended = result.run, conduct(result.run, result.design.validation.full_deflection_rad)
     detail = f" ({ended.detail})" if ended.detail else ""
     blocks = [_table(run), _limits(run), *([_energy(run)] if run.energy else [])]
     figure = doc.figure("trajectory", chart_of(run), caption="The motion over time.", alt="The motion.")
@@ -34,7 +34,8 @@ def section(result: Motion) -> doc.Section:
 
 def data(result: Motion) -> Tree:
     """What happened in numbers, without the rows."""
-    return {**summary(result.run), "files": result.asked.files}
+    full = result.design.validation.full_deflection_rad
+    return {**summary(result.run, full), "files": result.asked.files}
 
 
 def write(result: Motion, folder: Path | None) -> list[str]:

@@ -247,4 +247,6 @@ def _step_table(result: Specification) -> doc.Block:
         doc.of(lambda one: ", ".join(map(words_of, one.limits)) or "none", "limits", "Limits that act"),
     ]
     note = "Simulated with friction and all limits; a load sets in with the step, and its motion counts."
+    if any(None in (one.rise_time_s, one.settling_time_s) for one in result.steps):
+        note += " A dash: not reached in the time simulated, as where friction holds the output short of it."
     return doc.listing("Steps, small and large", result.steps, columns, note)

@@ -185,7 +185,10 @@ def table(rows: Sequence[Check], caption: str) -> doc.Block:
         doc.of(lambda row: prose(row.because), "because", "Where"),
         doc.of(lambda row: prose(row.condition), "condition", "Condition"),
     ]
-    return doc.listing(caption, rows, columns, status=lambda row: row.verdict.role())
+    return doc.listing(
+        caption, rows, columns, status=lambda row: row.verdict.role(),
+        more=lambda row: {"_scale": _scaled(row)[0], "_unit": row.unit},  # back to what a night compares
+    )  # fmt: skip
 
 
 def _error(row: Check) -> float:

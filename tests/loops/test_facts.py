@@ -8,6 +8,7 @@ from loop_designs import amber, emps, without
 from test_stacked import DRIVES, scattered
 from two_mass import drive_d, drive_e
 
+from actuator_lti import load_design
 from actuator_lti.design import model
 from actuator_lti.design.access import stacked
 from actuator_lti.drive.facts import (
@@ -16,8 +17,8 @@ from actuator_lti.drive.facts import (
     breakaway_torque_Nm,
     capability,
     stall_torque_Nm,
-    torque_gain_Nm_rad,
 )
+from actuator_lti.drive.steady_gains import torque_gain_Nm_rad
 from analyses.specification.drive_figures import drive_figures
 
 
@@ -133,3 +134,52 @@ def test_a_sagging_supply_slows_the_drive(load: float) -> None:
     assert stall_torque_Nm(design) == pytest.approx(kM * design.limits.voltage_V / total)
     ran = simulate(design, commands.step(1e3), load_Nm=-load, duration_s=0.5)
     assert ran.motor_speed_rad_s[-1] == pytest.approx(w, rel=1e-6)
+
+
+@pytest.mark.parametrize(("load", "deg_s"), [(0.0, 454.844), (8.0, 423.775)])
+def test_a_p_velocity_loop_stays_below_its_limit_by_its_droop(load: float, deg_s: float) -> None:
+    """The fin: kM (Kp (w_lim - w) - kE w)/R against friction, bearing and load, solved by hand for w."""
+    from nonlinear import commands, simulate
+
+    fin = load_design("fin")
+    torque = 8e-3 + 1.7e-3 * (load + 0.05) + (load + 0.05) / 60.0  # and what grows with w:
+    viscous = 1e-5 + 0.02 / 60.0 * (1.7e-3 + 1.0 / 60.0)
+    w = (0.03 * 0.12 * 600.0 - torque) / (0.03 * (0.12 + 0.03) + viscous)
+    assert np.degrees(w / 60.0) == pytest.approx(deg_s, abs=1e-3)
+    figures = drive_figures(fin, load)
+    assert figures.output_rate_rad_s * 60.0 == pytest.approx(w, rel=1e-12)
+    assert figures.rate_limit == "speed limit less droop of the P velocity loop"
+    level = replace(fin, load=fin.load.level())
+    ran = simulate(level, commands.ramp(20.0), duration_s=1.0, load_Nm=-load)
+    assert ran.motor_speed_rad_s[-1] == pytest.approx(w, rel=1e-6)
+
+
+def test_an_integral_or_a_drive_without_friction_leaves_no_droop() -> None:
+    """Kp (w_lim - w) is nothing where nothing holds the motor back: a current integral feeds the back-EMF."""
+    control = replace(amber().controller, velocity=replace(amber().controller.velocity, integral_time_s=None))
+    free = replace(amber(), friction=model.Friction(), controller=control)
+    assert drive_figures(free) == replace(drive_figures(replace(free, controller=amber().controller)))
+    held = replace(free, friction=model.Friction(dry_torque_Nm=0.01))
+    current = 0.01 / held.motor.torque_constant_Nm_A
+    below = held.limits.speed_rad_s - current / control.velocity.gain
+    assert capability(held).output_rate_rad_s * held.total_ratio == pytest.approx(below, rel=1e-12)
+
+
+def test_the_droop_of_many_drives_with_p_loops_is_that_of_each() -> None:
+    """Voltage of a P current loop: kp (i_ref - i) = R i + kE w."""
+    base = amber()
+    control = replace(
+        base.controller,
+        velocity=replace(base.controller.velocity, integral_time_s=None),
+        current=replace(base.controller.current, integral_time_s=None),
+    )
+    design = replace(base, controller=control)
+    gains = np.array([0.5, 1.0, 2.0]) * control.current.gain_V_A
+    many = capability(stacked(design, {"control.current.gain": gains})).output_rate_rad_s * design.total_ratio
+    motor, friction, kp = design.effective_motor, design.friction, control.velocity.gain
+    for gain, found in zip(gains, many, strict=True):
+        total = gain + motor.resistance_ohm
+        pull, back = motor.torque_constant_Nm_A * gain * kp / total, motor.torque_constant_Nm_A / total
+        slope = pull + back * motor.back_emf_constant_Vs_rad + friction.viscous()
+        w = (pull * design.limits.speed_rad_s - friction.dry_torque_Nm - friction.offset_torque_Nm) / slope
+        assert found == pytest.approx(w, rel=1e-12)

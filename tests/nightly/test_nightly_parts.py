@@ -12,6 +12,7 @@ from nightly_fakes import fake_document
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.errors import InputError
 from analyses.slugs import hashed, slug
+from analyses.validation.row import judged
 from reports.nightly.cache import Cache, CorruptEntry, sealed
 from reports.nightly.changes import Columns
 from reports.nightly.code_version import code_version, commits_between
@@ -20,6 +21,7 @@ from reports.nightly.lock import hold
 from reports.nightly.text import csv_cell, one_line
 from reports.nightly.tolerance import Tolerances, read_tolerances
 from reports.sections.margins import MARGIN_COLUMNS, RESPONSE_COLUMNS
+from reports.sections.validation import table
 
 
 @given(st.text())
@@ -93,6 +95,20 @@ def test_digest_knows_verdicts_and_every_number_of_a_table() -> None:
     assert values["GM: met"][0] == 0.0
     assert values["margins / Margins / velocity / phase margin"] == (46.0, "deg", 1)
     assert values["margins / Margins / position / crossover"] == (300.0, "rad/s", 0)
+
+
+@pytest.mark.parametrize("night", [(9.9, 10.1), (0.02, 0.03), (30.0, 2.0)])
+def test_a_time_is_compared_in_seconds_whatever_unit_it_is_shown_in(night: tuple[float, float]) -> None:
+    """From 10 s on a row says s, below it ms."""
+    found = []
+    for value in night:
+        row = judged("settling_time", "position", value, value, 1e-3, unit="s")
+        block = table([row], "Position loop")
+        (shown,) = block["rows"]
+        assert shown["predicted"] * {"s": 1.0, "ms": 1e-3}[shown["unit"]] == pytest.approx(value, rel=1e-12)
+        made = figures_of({"sections": [{"id": "validation", "blocks": [block]}]})
+        found += [(f.value, f.unit) for f in made if f.name.endswith("/ Predicted")]
+    assert found == [(pytest.approx(value, rel=1e-12), "s") for value in night]
 
 
 def test_figures_keep_their_names_when_values_change() -> None:

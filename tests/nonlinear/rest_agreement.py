@@ -9,7 +9,7 @@ judges it after runs of two lengths.
 import sys
 
 from actuator_lti.design.model import Design
-from analyses.motion.settling import settle
+from analyses.motion.settling import counted, outcome
 from nonlinear import commands, simulate
 from nonlinear.settling.rest import judge
 from tests.validation.random_drives import stable_drives
@@ -19,12 +19,13 @@ LENGTHS = (1_000, 20_000)  # ticks of the runs
 
 def answers(design: Design) -> list[str]:
     """Verdicts on one step: of the wait, then of the runs."""
-    step = 0.01 * design.validation.full_deflection_rad
-    result = [settle(design, 0.0, step).rest.verdict]
+    full = design.validation.full_deflection_rad
+    step = 0.01 * full
+    result = [outcome(design, 0.0, step).rest.verdict]
     for ticks in LENGTHS:
         run = simulate(design, commands.step(step), ticks * design.controller.period_s)
         rest = None if run.running is None else judge(run.running)
-        result.append("none" if rest is None else rest.verdict)
+        result.append("none" if rest is None else counted(rest, full).verdict)
     return result
 
 

@@ -82,6 +82,20 @@ def test_findings_come_from_the_sections_gravest_first_and_once() -> None:
     assert gathered(sections) == [grave, mild]
 
 
+def test_sections_take_turns_on_the_first_screen() -> None:
+    """One that has much to say leaves room for what the others have to say of the same weight."""
+
+    def finding(text: str, where: str, severity: doc.Severity = "warn") -> doc.Finding:
+        return doc.Finding(severity=severity, text=text, where=where)
+
+    loud = [finding(text, "loud") for text in "abcd"]
+    sections = [
+        doc.section("loud", "Loud", [], findings=loud),
+        doc.section("quiet", "Quiet", [], findings=[finding("e", "quiet"), finding("f", "quiet", "fail")]),
+    ]
+    assert "".join(item["text"] for item in gathered(sections)) == "faebcd"
+
+
 def test_a_large_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field() -> None:
     item = AmplitudeMargin(
         loop="position", kind="gain", size="large", part=0.5, friction_on=True, linear=10.0, value=2.0,

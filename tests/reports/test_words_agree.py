@@ -17,12 +17,14 @@ from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import operating_points
 from analyses.margins import margins
 from analyses.motion.settling import Settling
+from analyses.specification.requirements import which_response
 from analyses.specification.weakest import spread
 from analyses.validation.places import Bench
 from analyses.validation.row import judged
 from nonlinear.settling.rest import Rest
 from reports import document as doc
 from reports.as_json import as_json
+from reports.build import further_sections
 from reports.cli.main import main
 from reports.sections import validation
 from reports.sections.answer import believed
@@ -85,6 +87,33 @@ def test_a_bandwidth_says_by_its_name_of_which_response_it_is() -> None:
     assert {name for name in tested if name.startswith("feedback_")} == {
         f"feedback_{name}" for name in set(to_command) - set(tested) - {"to_reference"}
     }
+
+
+@pytest.mark.parametrize(
+    ("changes", "parts"),
+    [
+        ({}, ""),
+        ({"control.position.feedforward": 1.0}, ": feed-forward included"),
+        (
+            {
+                "command.filter_time": 0.01,
+                "command.rate": 0.3,
+                "command.acceleration": 10.0,
+                "command.jerk": 100.0,
+            },
+            ": mean of its profile and filter included",
+        ),
+    ],
+)
+def test_a_response_to_the_command_names_what_the_drive_has(changes: dict[str, float], parts: str) -> None:
+    design = with_values(load_design("ilr33-amber"), changes)
+    said = which_response("bandwidth", "position", "command", design)
+    assert said == f"of the response to the command{parts}"
+
+
+def test_a_section_that_a_drive_cannot_have_says_why_in_one_sentence() -> None:
+    (made,) = further_sections(load_design("emps"), ["duty"])
+    assert made["result"] == "Not for this drive: an ideal torque source has no current."
 
 
 def test_a_current_loop_says_how_its_rotor_stands() -> None:

@@ -11,6 +11,7 @@ from actuator_lti import load_design
 from actuator_lti.design import with_values
 from analyses.motion import Asked, Motion
 from analyses.motion.conduct import conduct
+from analyses.motion.settling import outcome, settle
 from nonlinear import commands, simulate
 from nonlinear.settling.rest import PERIODS
 from reports.sections.simulate import section
@@ -31,6 +32,23 @@ def test_a_linear_loop_beyond_its_gain_margin_keeps_oscillating() -> None:
     result = conduct(simulate(loud, commands.step(0.05), 0.5))
     assert result.status == "limit cycle"
     assert "Hz" in result.detail
+
+
+@pytest.mark.parametrize(("millionths", "verdict"), [(0.5, "at rest"), (2.0, "limit cycle")])
+def test_a_swing_too_small_to_count_is_rest_for_all_who_ask(millionths: float, verdict: str) -> None:
+    """The joint hunts by its counts; beside a full deflection of two or half a million such swings."""
+    joint, step = load_design("joint"), 1e-3
+    run = simulate(joint, commands.step(step), 0.5)
+    swing = settle(joint, 0.0, step).swing_rad
+    full = 1e6 * swing / millionths
+    design = replace(joint, validation=replace(joint.validation, full_deflection_rad=full))
+    assert settle(design, 0.0, step).rest.verdict == "limit cycle"  # as the drive moves, whoever looks
+    assert outcome(design, 0.0, step).rest.verdict == verdict
+    said, result = section(Motion(design, Asked(), run)), conduct(run, full)
+    assert result.status == ("comes to rest" if verdict == "at rest" else verdict)
+    assert result.detail.startswith("a swing of ±") == (verdict == "at rest")
+    assert result.status in said["result"]
+    assert said["status"] == ("info" if result.wanted else "warn")
 
 
 def test_a_drive_that_is_held_sits_on_its_limit() -> None:
