@@ -320,6 +320,22 @@ def test_a_cluster_that_is_slow_to_close_takes_no_result_back(monkeypatch):
         Engine(workers=1).map(sum, [(1, 2)], lost)
 
 
+def test_a_scheduler_that_dies_before_the_first_part_is_the_same_line(monkeypatch) -> None:
+    """Its client has closed itself when the study is sent to it."""
+    from distributed.client import ClosedClientError
+
+    class Left:
+        def __getattr__(self, name: str) -> object:
+            return lambda *_asked, **_how: {}
+
+        def submit(self, *_asked: object, **_how: object) -> None:
+            raise ClosedClientError("Client is closed. Can't send update-graph message.")
+
+    monkeypatch.setattr(Engine, "_client", lambda _self: contextlib.nullcontext(Left()))
+    with pytest.raises(NumericalError, match=r"the connection is lost; .* the same command goes on"):
+        Engine(scheduler="tcp://127.0.0.1:9").map(doubled, [1], lambda *_: None)
+
+
 def test_certificates_that_are_none_are_named(tmp_path) -> None:
     for made in range(3):
         with pytest.raises(InputError, match=r"\.pem"):
