@@ -11,6 +11,7 @@ import logging
 import signal
 import warnings
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -122,6 +123,18 @@ def quiet() -> Iterator[None]:
             handler.setLevel(level)
 
 
+@contextmanager
+def _closed_is_lost() -> Iterator[None]:
+    """A client that its scheduler has left is asked for more: `CancelledError`, as for what it was asked."""
+    from distributed.client import ClosedClientError
+
+    try:
+        yield
+    except ClosedClientError as error:
+        raise CancelledError from error
+
+
+@_closed_is_lost()
 def submit(
     client: Any, work: Callable[[Any], Any], todo: list[Any], sink: Callable[[Any, Any], None]
 ) -> None:

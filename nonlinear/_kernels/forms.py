@@ -1,7 +1,7 @@
 """Forms of the loop: the parts that a drive lacks cost nothing.
 
-Two for any drive that is run without instruments, energies or a law of its own, rigid and elastic; the others
-for drives of three plain loops.
+Two for any drive that is run without instruments, energies or a law of its own, rigid and elastic; two for
+an elastic drive whose output is measured and whose load depends on it; the others for three plain loops.
 """
 
 from __future__ import annotations
@@ -15,6 +15,10 @@ _ABSENT = (
     *_UNSEEN, at.RARE_LOAD, at.RARE_SENSE, at.RARE_COMMAND, at.RARE_SPEED, at.RARE_VELOCITY, at.RARE_CURRENT,
     at.OVERLOAD, at.SUPPLY, at.WINDOW, at.WITH_EXTREMES, at.STEP_TARGET,
 )  # fmt: skip
+_ORDINARY = (at.SUPPLY, at.WINDOW, at.WITH_EXTREMES, at.STEP_TARGET, at.JITTER, at.RIGID)
+_MEASURED = (at.RARE_LOAD, at.RARE_SENSE, at.RARE_COMMAND, at.HAS_POSITION, at.HAS_VELOCITY)
+# a voltage set by the velocity loop, with nothing around it; or a current loop, and all that may be around it
+_INNER = (at.HAS_CURRENT, at.RARE_SPEED, at.RARE_VELOCITY, at.RARE_CURRENT, at.OVERLOAD)
 _PRESENT = (at.HAS_POSITION, at.HAS_VELOCITY, at.HAS_CURRENT)
 _PLANTS = {
     "dry": {at.LAW: 0.0, at.LOOK: 0.0, at.ELASTIC_DRIVE: 0.0, at.NOTING: 0.0},
@@ -30,9 +34,15 @@ def forms() -> tuple[Form, ...]:
     """
     unseen = dict.fromkeys(_UNSEEN, 0.0)
     plain = dict.fromkeys(_ABSENT, 0.0) | dict.fromkeys(_PRESENT, 1.0)
+    common = dict.fromkeys((*_UNSEEN, *_ORDINARY), 0.0) | dict.fromkeys(_MEASURED, 1.0) | _PLANTS["elastic"]
+    measured = {
+        name: common | dict.fromkeys(_INNER, there)
+        for name, there in (("measured_voltage", 0.0), ("measured_current", 1.0))
+    }
     wide = {"rigid": {at.ELASTIC_DRIVE: 0.0}, "two_sided": _PLANTS["elastic"]}
     return (
         *(Form("run_block", name, "p", unseen | known) for name, known in wide.items()),
+        *(Form("run_block", name, "p", known) for name, known in measured.items()),
         *(
             Form("run_block", f"{name}_{line}", "p", plain | plant | {at.DELAY_LINE: float(line)})
             for name, plant in _PLANTS.items()

@@ -355,27 +355,6 @@ def test_what_a_sheet_states_is_read_again_with_what_is_changed(old: str, new: s
     assert again.friction.viscous_Nms_rad == other.friction.viscous_Nms_rad
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ('no_load_speed = "7580 rpm"\n', "", "motor.no_load_speed: missing"),
-        ('no_load_current = "137 mA"\n', "", "no_load_speed = 7580 rpm: needs motor.no_load_current"),
-        ("efficiency = 0.9", "efficiency = 1.1", "gear.second.efficiency = 1.1: allowed"),
-        (
-            "efficiency = 0.9",
-            'efficiency = {value = 0.9, tolerance = "2 %"}',
-            "efficiency.tolerance: allowed",
-        ),
-        ("[limits]", '[friction]\ndry_torque = "1 mN*m"\n[limits]', "beside friction.dry_torque"),
-        ("[limits]", "[friction]\nload_coefficient = 0.1\n[limits]", "beside friction.load_coefficient"),
-        ('torque_constant = "30.2 mN*m/A"\n', "", "no_load_current = 137 mA: needs motor.torque_constant"),
-    ],
-)
-def test_a_sheet_that_says_it_twice_or_by_half(old: str, new: str, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        read_design_text(SHEET.replace(old, new), "sheet")
-
-
 def test_a_phase_margin_that_no_operating_point_bounds_is_infinite(tmp_path: Path, cli) -> None:
     """A current loop by a gain below R never crosses 0 dB, at no operating point."""
     file = tmp_path / "mine.toml"
@@ -406,6 +385,19 @@ def test_a_self_locking_drive_of_good_gears_is_warned_of(path: str, first: str, 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
+        # said twice, or by half
+        ('no_load_speed = "7580 rpm"\n', "", "motor.no_load_speed: missing"),
+        ('no_load_current = "137 mA"\n', "", "no_load_speed = 7580 rpm: needs motor.no_load_current"),
+        ("efficiency = 0.9", "efficiency = 1.1", "gear.second.efficiency = 1.1: allowed"),
+        (
+            "efficiency = 0.9",
+            'efficiency = {value = 0.9, tolerance = "2 %"}',
+            "efficiency.tolerance: allowed",
+        ),
+        ("[limits]", '[friction]\ndry_torque = "1 mN*m"\n[limits]', "beside friction.dry_torque"),
+        ("[limits]", "[friction]\nload_coefficient = 0.1\n[limits]", "beside friction.load_coefficient"),
+        ('torque_constant = "30.2 mN*m/A"\n', "", "no_load_current = 137 mA: needs motor.torque_constant"),
+        # a word of data sheets, answered with its key
         ('back_emf_constant = "317', 'speed_constant = "317', 'back_emf_constant, which takes "317 rpm/V"'),
         ('torque_constant = "30', 'Kt = "30', r"motor.Kt = .* \(it is torque_constant\)\Z"),
         ("[limits]", '[limits]\nrated_current = "3 A"', r"\(it is continuous_current\)"),
@@ -423,6 +415,6 @@ def test_a_self_locking_drive_of_good_gears_is_warned_of(path: str, first: str, 
         ("efficiency = 0.9", "self_locking = true", r'it is path = "self-locking" of \[load\]'),
     ],
 )
-def test_a_data_sheets_word_is_answered_with_the_key(old: str, new: str, words: str) -> None:
+def test_a_sheet_is_refused_with_what_it_wants(old: str, new: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read_design_text(SHEET.replace(old, new), "sheet")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -22,6 +23,11 @@ def named(path: Path) -> str:
 
 
 MODULES = {named(path): path for package in PACKAGES for path in (ROOT / package).rglob("*.py")}
+
+
+@cache
+def read(path: Path) -> ast.Module:
+    return ast.parse(path.read_text())
 
 
 def imports(body: list[ast.stmt]) -> Iterator[Node]:
@@ -60,7 +66,7 @@ def targets(node: Node, module: str) -> set[str]:
 def graph(with_functions: bool) -> dict[str, set[str]]:
     result = {}
     for module, path in MODULES.items():
-        tree = ast.parse(path.read_text())
+        tree = read(path)
         nodes = list(imports(tree.body))
         if with_functions and module not in CONVENIENCES and path.stem != "__init__":
             nodes += later(tree)
@@ -106,14 +112,15 @@ def everything_loaded(module: str, direct: dict[str, set[str]]) -> set[str]:
 def test_no_function_imports_what_is_loaded_anyway() -> None:
     """An import in a function is for start-up or for an extra; else it stands at the top."""
     direct, idle = graph(False), []
+    loaded = cache(lambda name: everything_loaded(name, direct))
     for module, path in MODULES.items():
         if module in CONVENIENCES:
             continue
-        there = everything_loaded(module, direct) - {module}
-        for node in later(ast.parse(path.read_text())):
+        there = loaded(module) - {module}
+        for node in later(read(path)):
             named_ones = targets(node, module)
             if not named_ones or named_ones & LAZY or not named_ones <= there:
                 continue
-            if not any(module in everything_loaded(name, direct) for name in named_ones):
+            if not any(module in loaded(name) for name in named_ones):
                 idle.append(f"{path.relative_to(ROOT)}:{node.lineno}: {ast.unparse(node)}")
     assert not idle, "\n".join(sorted(set(idle)))

@@ -56,7 +56,8 @@ def test_runs_have_the_bits_of_the_kernels_as_written(seed: int) -> None:
         *((f"ilr33-amber{name}", delay, f"{form}_{2 if delay < 1.0 else 3}")
           for name, form in (("", "dry"), ("-tanh", "tanh"), ("-compliant", "elastic"))
           for delay in (0.0, 0.3, 1.0, 1.7)),
-        ("emps", 0.0, "rigid"), ("joint", 1.0, "two_sided"),
+        ("emps", 0.0, "rigid"), ("ballscrew", 1.0, "two_sided"),
+        ("fin", 0.5, "measured_voltage"), ("joint", 1.0, "measured_current"),
     ],
 )  # fmt: skip
 def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(

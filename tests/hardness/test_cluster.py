@@ -217,17 +217,18 @@ def slowly(number: int) -> int:
     return number
 
 
-@pytest.mark.parametrize("name", ["code", "numpy", "a sample of linear algebra", "sample 0 of the study"])
-def test_every_part_of_a_proof_counts(name: str) -> None:
+def test_every_part_of_a_proof_counts() -> None:
     class Study:
         def sample(self) -> bytes:
             return b"1.5"
 
     here = proof.prove(proof.CODE, Study())
+    assert len(here) == 6 + len(proof.ARITHMETIC)
     proof.hold_against(here, dict(here), "w")
-    for there in ({**here, name: "other"}, {key: value for key, value in here.items() if key != name}):
-        with pytest.raises(InputError, match=f"worker w is refused: {name} is .*, here {here[name]}"):
-            proof.hold_against(here, there, "w")
+    for name, own in here.items():
+        for there in ({**here, name: "other"}, {key: value for key, value in here.items() if key != name}):
+            with pytest.raises(InputError, match=f"worker w is refused: {name} is .*, here {own}"):
+                proof.hold_against(here, there, "w")
     with pytest.raises(InputError, match="does not say what it computes with"):
         proof.hold_against(here, AttributeError("prove"), "w")
 
@@ -318,6 +319,22 @@ def test_a_cluster_that_is_slow_to_close_takes_no_result_back(monkeypatch):
 
     with pytest.raises(NumericalError, match="no answer in time"):
         Engine(workers=1).map(sum, [(1, 2)], lost)
+
+
+def test_a_scheduler_that_dies_before_the_first_part_is_the_same_line(monkeypatch) -> None:
+    """Its client has closed itself when the study is sent to it."""
+    from distributed.client import ClosedClientError
+
+    class Left:
+        def __getattr__(self, name: str) -> object:
+            return lambda *_asked, **_how: {}
+
+        def submit(self, *_asked: object, **_how: object) -> None:
+            raise ClosedClientError("Client is closed. Can't send update-graph message.")
+
+    monkeypatch.setattr(Engine, "_client", lambda _self: contextlib.nullcontext(Left()))
+    with pytest.raises(NumericalError, match=r"the connection is lost; .* the same command goes on"):
+        Engine(scheduler="tcp://127.0.0.1:9").map(doubled, [1], lambda *_: None)
 
 
 def test_certificates_that_are_none_are_named(tmp_path) -> None:

@@ -12,7 +12,8 @@ from targets import CAMPAIGN, SPEC
 from actuator_lti import bounds
 from actuator_lti.bounds import JSON_DEPTH, KEY_PARTS, TEXT_CHARACTERS, TOML_BYTES, TOML_DEPTH, TOML_VALUES
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import parse_json, parse_toml
+from actuator_lti.files import reading
+from actuator_lti.files.reading import parse_json, parse_toml, read_bytes, read_json
 from analyses.records.campaign_file import load_campaign
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.open_record import open_record
@@ -106,10 +107,22 @@ KINDS: dict[str, Callable[[Path], object]] = {
 def test_a_pipe_or_a_device_is_refused_without_waiting(suffix, tmp_path) -> None:
     pipe = tmp_path / f"pipe{suffix}"
     os.mkfifo(pipe)
-    for path in (pipe, Path("/dev/zero"), tmp_path, tmp_path / "a\0b"):
-        with pytest.raises(InputError) as caught:
+    other = {pipe: "is no regular file", Path("/dev/zero"): "is no regular file", tmp_path: "is a directory"}
+    for path, words in {**other, tmp_path / "a\0b": "null|is no file"}.items():
+        with pytest.raises(InputError, match=words) as caught:
             KINDS[suffix](path)
         assert str(caught.value).isprintable()
+
+
+def test_a_file_of_any_kind_has_a_largest_size(tmp_path, monkeypatch) -> None:
+    path, most = tmp_path / "f", bounds.Bound("of a file", 9, "small", unit="bytes")
+    monkeypatch.setattr(reading, "REPORT_BYTES", most)
+    for read, whole in ((lambda file: read_bytes(file, most=most), b'"1234567"'), (read_json, "1234567")):
+        path.write_bytes(b'"1234567"')
+        assert read(path) == whole
+        path.write_bytes(b'"12345678"')
+        with pytest.raises(InputError, match="is larger than allowed: at most 9 bytes"):
+            read(path)
 
 
 def packed_zeros(count: int) -> bytes:

@@ -28,31 +28,27 @@ def test_the_periodic_response_is_that_of_the_time_invariant_system(name: str) -
     assert result.slowest == pytest.approx(np.abs(lifted.poles()).max(), rel=1e-9)
 
 
-def test_stacked_designs_have_the_figures_of_each_alone() -> None:
-    design = load_design("ballscrew")
-    values = {
-        "coupling.stiffness": np.array([4e7, 1e8, 3e8]),
-        "control.position.gain": np.array([20.0, 60.0, 90.0]),
-    }
-    population = Population(design, values, 3)
-    for quantity in ("static_stiffness", "least_stiffness", "lost_motion"):
-        together = many(population, quantity)
-        for k in range(3):
-            alone = Population(design, {path: array[k : k + 1] for path, array in values.items()}, 1)
+@pytest.mark.parametrize(
+    ("name", "values", "quantities"),
+    [
+        ("ballscrew", {"coupling.stiffness": [4e7, 1e8, 3e8], "control.position.gain": [20.0, 60.0, 90.0]},
+         ("static_stiffness", "least_stiffness", "lost_motion")),
+        # delays of whole and broken ticks, damping of zero: other states, other zeros, taken group by group
+        ("fin",
+         {"control.computing_delay": [0.0, 1e-4, 2e-4, 5e-4], "coupling.damping": [0.0, 0.05, 0.05, 0.0]},
+         ("least_stiffness",)),
+    ],
+)  # fmt: skip
+def test_stacked_designs_have_the_figures_of_each_alone(
+    name: str, values: dict[str, list[float]], quantities: tuple[str, ...]
+) -> None:
+    design, count = load_design(name), len(next(iter(values.values())))
+    stacked = {path: np.array(each) for path, each in values.items()}
+    for quantity in quantities:
+        together = many(Population(design, stacked, count), quantity)
+        for k in range(count):
+            alone = Population(design, {path: each[k : k + 1] for path, each in stacked.items()}, 1)
             assert together[k] == pytest.approx(many(alone, quantity)[0], rel=1e-9)
-
-
-def test_designs_of_other_structure_are_taken_group_by_group() -> None:
-    """Computing delays of whole and of broken ticks, damping of zero: other states, other zeros."""
-    design = load_design("fin")
-    values = {
-        "control.computing_delay": np.array([0.0, 1e-4, 2e-4, 5e-4]),
-        "coupling.damping": np.array([0.0, 0.05, 0.05, 0.0]),
-    }
-    result = many(Population(design, values, 4), "least_stiffness")
-    for k in range(4):
-        alone = Population(design, {path: array[k : k + 1] for path, array in values.items()}, 1)
-        assert result[k] == pytest.approx(many(alone, "least_stiffness")[0], rel=1e-9)
 
 
 def test_static_stiffness_by_hand() -> None:

@@ -93,27 +93,21 @@ def test_the_overload_memory_over_a_leap_is_its_own_recursion() -> None:
 
 @pytest.mark.parametrize(
     ("current_A", "start", "overloaded"),
-    [(6.0, 0.0, 0.0), (5.5, 0.99, 0.0), (4.0, 1.3, 1.0), (0.0, 0.91, 1.0)],
-)
+    [
+        (6.0, 0.0, 0.0), (5.5, 0.99, 0.0), (4.0, 1.3, 1.0), (0.0, 0.91, 1.0),
+        (4.9, 0.5, 0.0), (4.9, 1.3, 1.0), (5.0, 0.5, 0.0),  # never: the last values lie this side of it
+    ],
+)  # fmt: skip
 def test_overload_acts_when_its_own_recursion_does(current_A: float, start: float, overloaded: float) -> None:
     """Trips at 1, lets go below 0.9; one tick before it has not."""
     p, s = np.zeros(at.SIZE + 400), np.zeros(at.S_QUEUE)
     p[at.OVERLOAD_RATE], p[at.CONTINUOUS_CURRENT], p[at.OVERLOAD_RELEASE] = 3e-4, 5.0, 0.9
     s[at.S_CURRENT], s[at.S_OVERLOAD], s[at.S_OVERLOADED] = current_A, start, overloaded
-    x, ticks = start, 0
-    while x >= 0.9 if overloaded else x < 1.0:
-        x, ticks = x + 3e-4 * ((current_A / 5.0) ** 2 - x), ticks + 1
-    assert ticks_until_it_acts(p, s) == ticks - 1
-
-
-@pytest.mark.parametrize(
-    ("current_A", "start", "overloaded"), [(4.9, 0.5, 0.0), (4.9, 1.3, 1.0), (5.0, 0.5, 0.0)]
-)
-def test_overload_that_never_acts(current_A: float, start: float, overloaded: float) -> None:
-    p, s = np.zeros(at.SIZE + 400), np.zeros(at.S_QUEUE)
-    p[at.OVERLOAD_RATE], p[at.CONTINUOUS_CURRENT], p[at.OVERLOAD_RELEASE] = 3e-4, 5.0, 0.9
-    s[at.S_CURRENT], s[at.S_OVERLOAD], s[at.S_OVERLOADED] = current_A, start, overloaded
-    assert ticks_until_it_acts(p, s) == 0
+    x, last, ticks = start, (current_A / 5.0) ** 2, 0
+    acts = last < 0.9 if overloaded else last > 1.0
+    while acts and (x >= 0.9 if overloaded else x < 1.0):
+        x, ticks = x + 3e-4 * (last - x), ticks + 1
+    assert ticks_until_it_acts(p, s) == max(ticks - 1, 0)
 
 
 def test_overload_on_its_way_is_leapt_over() -> None:

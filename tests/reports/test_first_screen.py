@@ -96,28 +96,28 @@ def test_sections_take_turns_on_the_first_screen() -> None:
     assert "".join(item["text"] for item in gathered(sections)) == "faebcd"
 
 
-def test_a_large_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field() -> None:
-    item = AmplitudeMargin(
-        loop="position", kind="gain", size="large", part=0.5, friction_on=True, linear=10.0, value=2.0,
-        furthest=40.0, period_s=1e-4, limiter="current", output=4.7e-5,
-    )  # fmt: skip
-    assert remark(item) == (
-        "The position loop sustains an oscillation of 0.0027 deg at the output if its gain is raised by "
-        "6.02 dB or more, started from 50 % of full range; the linear gain margin on the validation's "
-        "operating motion is 20 dB. The current limit acts."
-    )
+AS_IT_IS = (
+    "The position loop, without dry friction, sustains an oscillation as designed, started from 2 %% of full "
+    "range; the linear %s margin on the validation's operating motion is %s."
+)
+SMALL = {"size": "small", "part": 0.02, "friction_on": False, "limiter": ""}
+LARGE = {"size": "large", "part": 0.5, "friction_on": True, "limiter": "current", "output": 4.7e-5}
 
 
-@pytest.mark.parametrize(("kind", "value", "words"), [("gain", 1.0, "20 dB"), ("delay", 1e-5, "1 ms")])
-def test_a_drive_that_oscillates_as_it_is_is_said_so(kind: str, value: float, words: str) -> None:
-    item = AmplitudeMargin(
-        loop="position", kind=kind, size="small", part=0.02, friction_on=False, linear=10.0, value=value,
-        furthest=40.0, period_s=1e-4, limiter="",
-    )  # fmt: skip
-    assert remark(item) == (
-        "The position loop, without dry friction, sustains an oscillation as designed, started from 2 % "
-        f"of full range; the linear {kind} margin on the validation's operating motion is {words}."
-    )
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({**LARGE, "kind": "gain", "value": 2.0},
+         "The position loop sustains an oscillation of 0.0027 deg at the output if its gain is raised by "
+         "6.02 dB or more, started from 50 % of full range; the linear gain margin on the validation's "
+         "operating motion is 20 dB. The current limit acts."),
+        ({**SMALL, "kind": "gain", "value": 1.0}, AS_IT_IS % ("gain", "20 dB")),
+        ({**SMALL, "kind": "delay", "value": 1e-5}, AS_IT_IS % ("delay", "1 ms")),
+    ],
+)  # fmt: skip
+def test_a_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field(more: Any, said: str) -> None:
+    item = AmplitudeMargin(loop="position", linear=10.0, furthest=40.0, period_s=1e-4, **more)
+    assert remark(item) == said
 
 
 def test_what_to_watch_leads_to_a_section(built: Built) -> None:

@@ -47,34 +47,28 @@ def _joint_rate(loop: Hysteresis) -> float:
 
 
 @pytest.mark.parametrize(
-    ("name", "expected", "within"),
+    ("name", "load_Nm", "expected", "within"),
     [
-        ("ilr33-amber", lambda loop: 0.0, 0.0),
-        ("emps", lambda loop: 2.0 * 20.3935 / (35.15065 * 243.45 * 160.18), 1e-9),
-        ("ilr33-amber-compliant", lambda loop: 2.0 * 0.05 / 1500.0 + 1e-3, 1e-9),  # at rest in the play
-        ("ballscrew", lambda loop: 2.0 * 30.0 / 1e8, 1e-9),
-        ("joint", _joint_rate, 1e-4),
+        ("ilr33-amber", 0.0, lambda loop: 0.0, 0.0),
+        ("emps", 0.0, lambda loop: 2.0 * 20.3935 / (35.15065 * 243.45 * 160.18), 1e-9),
+        ("ilr33-amber-compliant", 0.0, lambda loop: 2.0 * 0.05 / 1500.0 + 1e-3, 1e-9),  # at rest in the play
+        ("ilr33-amber-compliant", 8.0, lambda loop: 2.0 * 0.05 / 1500.0, 1e-9),  # which the load takes out
+        ("ballscrew", 0.0, lambda loop: 2.0 * 30.0 / 1e8, 1e-9),
+        ("joint", 0.0, _joint_rate, 1e-4),
         # (T0 + C0_l f)/(gain + 30 f), f the motor's torque per torque on the fin, which the moment relieves
-        ("fin", lambda loop: 2.0 * (0.008 + 0.05 * FIN) / (60 * 0.03 * 0.12 * 110 + 30 * FIN), 2e-3),
+        ("fin", 0.0, lambda loop: 2.0 * (0.008 + 0.05 * FIN) / (60 * 0.03 * 0.12 * 110 + 30 * FIN), 2e-3),
     ],
 )
 def test_what_a_reversal_loses_is_predicted(
-    name: str, expected: Callable[[Hysteresis], float], within: float
+    name: str, load_Nm: float, expected: Callable[[Hysteresis], float], within: float
 ) -> None:
     """Behind a motor's sensor 2 C0_l/k and the play; in front of it the error that friction asks for."""
     design = quiet(load_design(name))
-    loop = hysteresis(design, 0.0, threshold(design, 0.0).static, 150_000 if name == "joint" else 3000)
+    static = threshold(design, load_Nm).static
+    loop = hysteresis(design, load_Nm, static, 150_000 if name == "joint" else 3000)
     rounding = 1e-12 * loop.amplitude_rad
     assert loop.predicted_rad == pytest.approx(expected(loop), rel=1e-6 + within, abs=rounding)
     assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=within, abs=rounding)
-
-
-def test_lost_motion_under_a_load_is_the_twist_alone() -> None:
-    """8 N m keep the play on one side: 2 C0_l/k is lost."""
-    design = quiet(load_design("ilr33-amber-compliant"))
-    loop = hysteresis(design, 8.0, threshold(design, 8.0).static, 3000)
-    assert loop.predicted_rad == pytest.approx(2.0 * 0.05 / 1500.0, rel=1e-9)
-    assert loop.lost_motion_rad == pytest.approx(loop.predicted_rad, rel=1e-9)
 
 
 def test_the_error_that_stays_of_a_force_source_is_less_than_its_threshold() -> None:
