@@ -102,6 +102,27 @@ WRITTEN = [
     ("140 Kv", "rad/(V*s)", 140 * pi / 30),
     *[(f"80 {unit}", "degC", 80.0) for unit in ("C", "deg C", "degrees C", "℃", "°C")],
     ("4000 inc", "1", 4000.0),
+    *[(f"5 {unit}/W", "K/W", 5.0) for unit in ("K", "degC", "°C", "℃", "C", "deg C", "°K", "celsius")],
+    *[(f"0.39 %/{unit}", "1/K", 0.0039) for unit in ("K", "degC", "°C", "C")],
+    *[(f"0.0039 {unit}", "1/K", 0.0039) for unit in ("1/K", "1/°C", "/°C", "K^-1", "°C^-1")],
+    ("3900 ppm/°C", "1/K", 0.0039),
+    ("−40 °C", "degC", -40.0),
+    # a speed without its brackets, where nothing else can be meant
+    *[(f"0.1 V/rad/{unit}", "V*s/rad", 0.1) for unit in ("s", "sec")],
+    ("0.25 V/rev/s", "V*s/rad", 0.125 / pi),
+    ("2 N*m/rad/s", "N*m*s/rad", 2.0),
+    ("0.1 A/rad/s", "A*s/rad", 0.1),
+    # powers of ten as the heads of columns have them
+    *[
+        (text, "kg*m^2", 1.18e-4)
+        for text in (
+            "1.18 10^-4 kg·m²",
+            "1.18 10⁻⁴ kg m2",
+            "1.18 (10^-4 kg·m²)",
+            "1.18 kg-m² ×10⁻⁴",
+            "1.18 kgm2 10-4",
+        )
+    ],
     ("3×10^-5 kg m²", "kg*m^2", 3e-5),
     ("3 x 10⁻⁵ kg m2", "kg*m^2", 3e-5),
 ]
@@ -136,6 +157,18 @@ def test_a_decimal_prefix_costs_no_digit(text: str, unit: str, value: float) -> 
         ("0", "degC", "no unit"),
         ("10 60 rpm", "rad/s", "not a unit"),
         (55, "ohm", "no unit"),
+        ("1.9 / 8.9 K/W", "K/W", "a number in it"),
+        ("0.17 s/60°", "rad/s", "a number in it"),
+        ("24 VDC ±5%", "V", 'write "24 VDC"; "±5%" is one for tolerance'),
+        ("≤ 3 arcmin", "rad", 'write "3 arcmin"'),
+        ("24 V max.", "V", 'write "24 V"'),
+        ("5 N*m 100", "N*m", "not a unit"),
+        ("3 x 1000 N", "N", "unknown unit"),
+        ("1.2 Ω/phase", "ohm", "motor.constants"),
+        ("3 mS", "s", 'nearest known: "ms"'),
+        ("3 Kg", "kg", 'nearest known: "kg"'),
+        ("0.1 V rad/s", "V*s/rad", "wrong dimension"),
+        ("2 degC", "K/W", "wrong dimension"),
         ("1:43", "1", 'a reduction is written "43:1"'),
         ("16 kHz", "s", "a period of 6.25e-05 s"),
         ("5 kg", "N", "a weight is written kgf"),
