@@ -89,6 +89,14 @@ def test_loops_are_indexed_and_iterated_by_name() -> None:
     assert list(loops) == ["current", "velocity", "position", "u", "i_ref", "w_ref", "output"]
     assert loops["velocity"] is loops.velocity
     assert loops["output"] is loops.break_points["output"]
+    assert dict(loops) == dict(loops.items()) == {name: loops[name] for name in loops}
+    assert (len(loops), loops.values()[1]) == (len(loops.keys()), loops.velocity)
+    with pytest.raises(InputError, match="of a Loop its open_loop"):
+        stability_margins(loops.velocity)
+
+
+def test_a_design_is_loaded_as_it_is() -> None:
+    assert load_design(DESIGN) is DESIGN
 
 
 def test_a_sweep_changes_one_key_and_says_so() -> None:
