@@ -35,7 +35,7 @@ MAX_LIST = 200
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
 _FIELD_OF_LEAD = FIELDS["screw.lead"]
-_CONVENTION = re.compile(r"(?<=[AV])[ _]?(rms|eff|peak|pk)\b", re.IGNORECASE)
+_CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk)\b\)?", re.IGNORECASE)
 _DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
 _PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
 _AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
@@ -87,7 +87,7 @@ class Reader:
             tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control", "motor")
         )
         axis, self.constants = _meant(head, "design.axis"), _meant(motor, "motor.constants")
-        stages = {meant_of(f"{key}", LOOPS) for key in control}
+        stages = {meant_of(f"{key}", LOOPS) or key_for("control", f"{key}") for key in control}
         self.structure = Structure(axis, "velocity" in stages, "current" in stages)
         self.travel_m_rad: float | None = None
         self.travel_m_rad = self._travel(tree.get("screw"))

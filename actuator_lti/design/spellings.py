@@ -18,6 +18,8 @@ _GROUPS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:[ \u00a0\u2009\u202f][0-9]{3})+
 # How data sheets write what is not a product of names: each becomes one, in this order.
 _SPELLINGS = (
     (re.compile(r"\*\*"), "^"),
+    (re.compile(r"\bKg"), "kg"),
+    (re.compile(r"\bAmp(s?)\b"), r"amp\1"),
     (re.compile(r"^/"), "1/"),  # 25/s
     (re.compile(r"°C|℃|\bdeg(?:rees?)? ?C\b"), " degC"),
     (re.compile(r"\barc[- ](?=min|sec)"), "arc"),
@@ -40,7 +42,7 @@ _SPELLINGS = (
 _POWER_OF_TEN = re.compile(r"(?<=[0-9.])\s*(?:[x×·*]|(?<=\s)\.)\s*10\s*(?:\^|(?=[+-]))\s*([+-]?[0-9]{1,3})\b")
 # A column's power of ten, before its unit or behind it: "1.18 (10^-4 kg m2)", "0.1 kg-m2 x 10^-3".
 _COLUMN = (
-    (re.compile(r"\A(\s*[+-]?[0-9.]+)\s+\(?\s*10\^([+-]?[0-9]{1,2})\s+(.*?)\)?\s*\Z"), r"\1e\2 \3"),
+    (re.compile(r"\A(\s*[+-]?[0-9.]+)\s+\(?\s*[x×]?\s*10\^([+-]?[0-9]{1,2})\s+(.*?)\)?\s*\Z"), r"\1e\2 \3"),
     (
         re.compile(r"\A(\s*[+-]?[0-9.]+)\s*([^0-9\s].*?)[\sx×·*]+10(?:\^|(?=[+-]))([+-]?[0-9]{1,2})\s*\Z"),
         r"\1e\3 \2",

@@ -52,7 +52,7 @@ def _state_space(system: Any) -> tuple[Any, Any, Any, Any, Any]:
 def _inputs(system: Any, inputs: Sequence[str] | None) -> list[str]:
     """The names of the inputs: as given, else the system's own labels."""
     given = getattr(system, "input_labels", None) if inputs is None else inputs
-    listed = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+    listed: list[Any] = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     for name in listed:
         if name not in LAW_INPUTS or given is name:
             raise InputError(f"inputs = {shown(name)}: allowed: a list of {', '.join(LAW_INPUTS)}")

@@ -452,6 +452,15 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
         ("[control]", f'{CURRENT}gain = "40 Hz"\n[control]', ("251.327 rad/s becomes a gain times J/kM",)),
         ("[control]", f'{CURRENT}vel_gain = "2 Nms/rad"\n[control]', ("(it is gain)", "over kM, and over")),
         ('[[gear]]\nname = "second"\nratio = 2\nefficiency = 0.9\n', "", ()),
+        (
+            'computing_delay = "0 s"\n',
+            'computing_delay = "0 s"\n'
+            + CURRENT.replace("velocity", "speed")
+            + 'KVP = 1\n[control.position]\nKPP = "35/s"\n',
+            ("control.speed = a table: unknown key (it is velocity)", "control.position.KPP"),
+        ),
+        ("resistance", "resistance_line_to_line", ("(it is resistance)",)),
+        ("[load]", '[load]\ncoulomb_friction = "6 mNm"', ("dry_torque of [load.friction]",)),
         ("voltage = ", 'speed = "19 krpm"\nrated_voltage = ', ("the supply cannot reach", "(it is voltage)")),
     ],
 )
