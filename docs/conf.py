@@ -51,6 +51,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "actuator-lti"
 html_show_sourcelink = False
 html_copy_source = False
+html_static_path, html_css_files = ["_static"], ["site.css"]
 html_sidebars = {"index": []}  # elsewhere the theme's own: the pages of the part that one is in
 html_theme_options = {
     "show_prev_next": True,

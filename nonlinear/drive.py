@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from os import PathLike
+
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError, finite_number
 from nonlinear._kernels import layout as at
@@ -30,7 +33,7 @@ class Drive:
 
     Parameters
     ----------
-    design : Design
+    design : Design, or its name or path
     initial : State, optional
         Default: everything at rest at zero.
     load_Nm : float
@@ -54,13 +57,14 @@ class Drive:
 
     def __init__(
         self,
-        design: Design,
+        design: Design | str | PathLike[str],
         initial: State | None = None,
         load_Nm: float = 0.0,
         *,
         friction_on: bool = True,
         limits_on: bool = True,
     ) -> None:
+        design = as_design(design)
         row = design_row(design, friction_on=friction_on, limits_on=limits_on)
         put_state(row, initial or State())
         row[at.LOAD] = finite_number("load_Nm", load_Nm)

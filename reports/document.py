@@ -100,7 +100,8 @@ def column(
     """Describe a table's column.
 
     ``format``: ``"text"``, ``"sig:3"`` (significant digits), ``"short:4"`` (the same without trailing zeros),
-    ``"fix:1"`` (decimals), ``"int"`` (a count), ``"ms:3"`` (ms, or s for a long time) or ``"yesno"``.
+    ``"fix:1"`` (decimals), ``"gain:1"`` (a gain margin), ``"int"`` (a count), ``"ms:3"`` (ms, or s for a long
+    time) or ``"yesno"``.
     ``better`` from night to night: +1 more, -1 less, +2 or -2 that of the magnitude; 0: neither.
     """
     side: Align = align or ("left" if format in ("text", "yesno") else "right")

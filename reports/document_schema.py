@@ -35,7 +35,7 @@ Align = Literal["left", "right", "center"]
 Severity = Literal["fail", "warn", "info"]
 Judged = Literal["met", "not met", "not proven"]
 Scalar = None | bool | int | float | str
-Format = Annotated[str, Field(pattern=r"^(text|yesno|int|fix:1?[0-9]|(sig|short|ms):(1?[1-9]|10))$")]
+Format = Annotated[str, Field(pattern=r"^(text|yesno|int|(fix|gain):1?[0-9]|(sig|short|ms):(1?[1-9]|10))$")]
 
 
 class Mark(TypedDict):

@@ -33,6 +33,8 @@ def show(value: Any, format: str = "text") -> str:
         return to_minus(f"{value:.0f}")
     if kind == "fix":
         return fixed(value, int(digits))
+    if kind == "gain":
+        return gain_margin(value, int(digits))
     if kind == "sig":
         return significant(value, int(digits))
     return short(value, int(digits) if kind == "short" else 4)
@@ -42,6 +44,17 @@ def fixed(value: float, decimals: int) -> str:
     """Write a number with so many decimals."""
     text = f"{value:.{decimals}f}"
     return to_minus(text.lstrip("-") if float(text) == 0 else text)
+
+
+def gain_margin(decibel: float, decimals: int) -> str:
+    """Write a gain margin in dB; one below 0 dB is that down to which the gain may fall.
+
+    Examples
+    --------
+    >>> gain_margin(9.54, 1), gain_margin(-3.64, 1)
+    ('9.5', 'down to −3.6')
+    """
+    return f"{'down to ' if decibel < 0.0 else ''}{fixed(decibel, decimals)}"
 
 
 def short(value: float, digits: int = 4) -> str:

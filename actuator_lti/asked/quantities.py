@@ -97,7 +97,7 @@ class Quantity:
 _LIST = (
     Quantity("gain_margin", "dB", "loop", "smallest gain margin, up or down", "gain margin",
              "margins.gain_margin_db", 1, absolute=True, closed=False, size=6.0,
-             heading="Gain margin", at_a_glance="fix:1", followed=True, tolerance=0.01),
+             heading="Gain margin", at_a_glance="gain:1", followed=True, tolerance=0.01),
     Quantity("phase_margin", "deg", "loop", "smallest phase margin", "phase margin",
              "margins.phase_margin_deg", 1, absolute=True, closed=False, size=45.0,
              heading="Phase margin", at_a_glance="fix:1", followed=True, tolerance=0.05),

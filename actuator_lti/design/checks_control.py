@@ -274,7 +274,7 @@ def _matrices(law: Law, path: str) -> Iterator[Refusal]:
     for place, part in (("", law), (".continuous", law.continuous)):
         for key, (shape, fits) in ({} if part is None else part.sizes(m)).items():
             if not fits:
-                yield f"{path}{place}.{key}", "other sizes", f"allowed: {shape}"
+                yield f"{path}{place}.{key}", "other sizes", f"allowed: {shape}, with {m} inputs"
 
 
 def _gravity(design: Design) -> Iterator[Refusal]:

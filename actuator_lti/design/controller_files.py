@@ -78,7 +78,8 @@ def _flat(tree: Any, prefix: str = "") -> Tree:
     for key, value in tree.items():
         result |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
     newer = {"axis0.config.motor.": "axis0.motor.config.", "current_soft_max": "current_lim",
-             "axis0.config.encoder_bandwidth": "axis0.encoder.config.bandwidth"}  # fmt: skip
+             "axis0.config.encoder_bandwidth": "axis0.encoder.config.bandwidth",
+             "inc_encoder0.config.cpr": "axis0.encoder.config.cpr"}  # fmt: skip
     for name, older in newer.items():
         result = {key.replace(name, older): value for key, value in result.items()}
     return result
@@ -230,6 +231,7 @@ def _overrides(
         numbers = [_number(given.get(name)) for name in item.names]
         known = [number for number in numbers if number is not None]
         if not item.holds(base) or len(known) < len(numbers):
+            notes += _wanted(item, given) if known and item.holds(base) else []
             continue
         used |= {*item.names}
         value = item.of(known)
@@ -242,6 +244,12 @@ def _overrides(
         else:
             notes.append(f"{stated}: not taken, {item.key} stays as it is")
     return overrides, used, notes
+
+
+def _wanted(item: Setting, given: Tree) -> list[str]:
+    """What a file lacks of the numbers that make a key together, where it has the first of them."""
+    lacking = [name for name in item.names if _number(given.get(name)) is None]
+    return [] if item.names[0] in lacking else [f"{item.names[0]}: needs {', '.join(lacking)} for {item.key}"]
 
 
 def _number(raw: object) -> float | None:

@@ -17,8 +17,8 @@ from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown
 from actuator_lti.files.tree import Tree
 
 
-def load_design(name_or_path: str | PathLike[str]) -> Design:
-    """Read a shipped design by name, or a design file by path.
+def load_design(name_or_path: Design | str | PathLike[str]) -> Design:
+    """Read a shipped design by name, or a design file by path; a design is given back as it is.
 
     Parameters
     ----------
@@ -40,6 +40,8 @@ def load_design(name_or_path: str | PathLike[str]) -> Design:
     >>> load_design("ilr33-amber").total_ratio
     2376.0
     """
+    if isinstance(name_or_path, Design):
+        return name_or_path
     name = _name_of(name_or_path)
     if name in shipped_designs():
         return _shipped(name)
@@ -47,14 +49,8 @@ def load_design(name_or_path: str | PathLike[str]) -> Design:
 
 
 def as_design(design: Design | str | PathLike[str]) -> Design:
-    """A design as it is, or read by :func:`load_design` where a name or path is given.
-
-    Raises
-    ------
-    InputError
-        As :func:`load_design`, and for anything else that is no design.
-    """
-    return design if isinstance(design, Design) else load_design(design)
+    """A design as it is, or read by name or path: `load_design` for what a function is given as a design."""
+    return load_design(design)
 
 
 def _name_of(given: object) -> str:

@@ -37,7 +37,7 @@ class Findings:
 
     def __init__(self, where: str, lines: Mapping[str, int] | None = None, folder: Path = Path()) -> None:
         self.where, self.folder = where, folder
-        self.lines = lines or {}
+        self.lines = dict(lines or {})
         self.found: list[tuple[int, InputError]] = []
 
     def note(self, path: str, given: object, reason: str) -> None:
@@ -46,6 +46,10 @@ class Findings:
         at = f"line {line}: " if line else ""
         text = f"{at}{refusal_text((path, given, reason))}"
         self.found.append((line, InputError(text, where=self.where)))
+
+    def alias(self, path: str, written: str) -> None:
+        """A key stands in the file under another name: its mistakes are in that line."""
+        self.lines[path] = self._line(written)
 
     def extend(self, refusals: Iterable[Refusal]) -> None:
         """Keep many."""

@@ -6,7 +6,7 @@ A mistake is noted and the walk goes on, past what is `UNREAD` then, so that all
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from datetime import date
 from math import isinf, pi, sqrt
@@ -35,7 +35,7 @@ MAX_LIST = 200
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
 _FIELD_OF_LEAD = FIELDS["screw.lead"]
-_CONVENTION = re.compile(r"(?<=[AV])[ _]?(rms|eff|peak|pk)\b", re.IGNORECASE)
+_CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk)\b\)?", re.IGNORECASE)
 _DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
 _PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
 _AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
@@ -87,7 +87,7 @@ class Reader:
             tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control", "motor")
         )
         axis, self.constants = _meant(head, "design.axis"), _meant(motor, "motor.constants")
-        stages = {meant_of(f"{key}", LOOPS) for key in control}
+        stages = {meant_of(f"{key}", LOOPS) or key_for("control", f"{key}") for key in control}
         self.structure = Structure(axis, "velocity" in stages, "current" in stages)
         self.travel_m_rad: float | None = None
         self.travel_m_rad = self._travel(tree.get("screw"))
@@ -102,27 +102,32 @@ class Reader:
         self.findings.note(path, "", f"missing{_example(field)}")
         return UNREAD
 
-    def known(self, table: Tree, known: Iterable[str], path: str) -> list[str]:
-        """Note unknown keys; gives the known ones that they are near to."""
-        known, meant = list(known), []
+    def known(self, table: Tree, known: Iterable[str], path: str) -> dict[str, str]:
+        """Note unknown keys; gives those that they are near to, with what only renames one."""
+        known, meant = list(known), dict[str, str]()
         for key in table:
             if key not in known:
-                word = key_for(path, key)
+                word = key_for(path, key, known)
                 said = f" ({word})" if word.startswith("not ") else f" (it is {word})"
                 hint = said if word else nearest(key, known)
                 where = f"{path}.{key}" if path else key
                 self.refuse(where, table[key], f"unknown key{hint or '; allowed: ' + ', '.join(known)}")
-                meant += [one for one in known if re.search(rf"\b{one}\b(?! of)", hint)]
+                for one in (one for one in known if re.search(rf"(?<![\[.])\b{one}\b(?! of)", hint)):
+                    renamed = key if word.partition(", which takes")[0] == one else ""
+                    meant[one] = meant.get(one) or renamed
         return meant
 
     def values(
         self, template: str, table: Any, path: str, inner: Iterable[str] = ()
-    ) -> tuple[Tree, list[str]]:
-        """Attributes and values of the keys of one table, and the keys that unknown ones are near to."""
+    ) -> tuple[Tree, Collection[str]]:
+        """Attributes and values of the keys of one table, and the keys that unknown ones are near to.
+
+        What stands under another name is read as well, so that all that is wrong with it is told at once.
+        """
         if not isinstance(table, dict):
             allowed = f"allowed: a table{f', [{path}]' if path in BY_PATH else ''}"
             self.missing(path) if table is None else self.refuse(path, table, allowed)
-            return {}, []
+            return {}, ()
         fields, stated = fields_in(template), sheet_fields(template)
         meant = self.known(table, (*(field.key for field in (*fields, *stated)), *inner), path)
         for field in stated:
@@ -136,6 +141,9 @@ class Reader:
             where = f"{path}.{field.key}"
             if field.key in table:
                 values[field.attribute] = self.value(field, table, where)
+            elif meant.get(field.key):
+                self.findings.alias(where, f"{path}.{meant[field.key]}")
+                values[field.attribute] = self.value(field, {field.key: table[meant[field.key]]}, where)
             elif field.key in meant:
                 values[field.attribute] = self.parameters[where] = UNREAD
             elif field.required and not (field.key == "gain" and "law" in table):
@@ -383,6 +391,9 @@ class Reader:
     def items(self, section: Section, raw: Any) -> Any:
         """The parts of repeated tables, each known by its name, id or number."""
         most = MAX_GEARS if section.many == "named" else MAX_LIST
+        if isinstance(raw, dict):
+            self.refuse(section.path, raw, f"allowed: [[{section.path}]] tables")
+            raw = [raw]
         if not isinstance(raw, list):
             return self.refuse(section.path, raw, f"allowed: [[{section.path}]] tables")
         if len(raw) > most:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 
 _STALL = (
     "resistance = voltage/stall current, torque_constant = stall torque/(stall current - no-load current)"
@@ -11,9 +12,20 @@ _MULTIPLE = "every, so many ticks of control.period"
 _PERIOD = 'period, which takes "16 kHz" too'
 _VOLTAGE = "nominal_voltage rated_voltage supply_voltage bus_voltage vbus un"
 _CONTINUOUS = "nominal_current rated_current"
+_FRICTION = "friction friction_force friction_torque frictional_torque"
+_LINES = "lines lines_per_revolution ppr pulses_per_revolution cpt counts_per_turn"
 _SPEED = "nominal_speed rated_speed max_speed"
 _WORDS: dict[str, dict[str, str]] = {
-    "": {"feedback": "encoder", "controller drive": "control", "gearbox gearhead": "a [[gear]]"},
+    "": {
+        "feedback sensor resolver": "encoder",
+        "controller drive amplifier": "control",
+        "gearbox gearhead belt pulley transmission": "a [[gear]]",
+        "spindle ballscrew leadscrew": "screw",
+        "thermal": "temperature",
+        "gravity": "the table [load.gravity]",
+        "current velocity speed position loop": "a table of control, as [control.position]",
+        "filter notch lowpass": "a [[control.velocity.filter]]",
+    },
     "motor": {
         "km kt": "torque_constant",
         "ki current_constant": "torque_constant, one over it",
@@ -28,21 +40,27 @@ _WORDS: dict[str, dict[str, str]] = {
         "force_constant": "torque_constant, in N/A on a linear axis",
         "io i0": "no_load_current",
         "no n0": "no_load_speed",
-        "tf friction_torque friction_torque_static static_friction": "dry_torque of [friction]",
-        "kvisc damping viscous viscous_damping friction_torque_dynamic": "viscous of [friction]",
+        "tf friction friction_torque friction_torque_static static_friction": "dry_torque of [friction]",
+        "kvisc damping damping_constant viscous friction_torque_dynamic": "viscous of [friction]",
         f"voltage {_VOLTAGE}": "voltage of [limits]",
         f"continuous_current {_CONTINUOUS}": "continuous_current of [limits]",
         "peak_current max_current": "peak_current of [limits]",
+        "torque": "peak_current of [limits], the torque over torque_constant",
+        "weight power": "not needed; it may stand as a [[fact]]",
         "stall_current stall_torque": f"not asked for, but what follows: {_STALL}",
         f"speed {_SPEED}": "speed of [limits]",
         "cogging_torque torque_ripple detent_torque": "cogging",
+        "thermal_resistance": "thermal_resistance of [temperature], the sum of a sheet's two",
+        "thermal_time_constant": "thermal_time of [temperature]",
+        "speed_torque_gradient": "not needed: it follows from R and kM",
         "mechanical_time_constant electrical_time_constant": "not needed: it follows from R, L, J and kM",
-        "pole_pairs poles": "not needed: constants are per mechanical radian",
+        "pole_pairs poles pole_number": "not needed: constants are per mechanical radian",
     },
     "gear": {
         "teeth i": 'ratio, which takes "60/20" too',
         "inertia": "input_inertia",
-        "backlash": "play of [coupling], beside its stiffness",
+        "backlash lost_motion play": "play of [coupling], beside its stiffness; without one left out",
+        "stiffness rigidity": "stiffness of [coupling]",
         "self_locking": 'path = "self-locking" of [load]',
     },
     "screw": {
@@ -60,9 +78,12 @@ _WORDS: dict[str, dict[str, str]] = {
         "hysteresis hysteresis_loss": "play, or dry_torque of [load.friction]",
     },
     "load": {
+        "j jl": "inertia",
         "mass": "inertia, in kg on a linear axis",
+        "inertia_ratio": "inertia, the ratio times rotor_inertia and the gears' ratio squared",
         "force torque max_torque": "moment_max",
-        "friction_force friction_torque": "dry_torque of [load.friction] behind a coupling; [friction]",
+        _FRICTION: "dry_torque of [load.friction] behind a coupling, else of [friction]",
+        "damping": "moment_damping, per output speed",
         "imbalance unbalance": "the table [load.gravity]",
         "self_locking": 'path = "self-locking"',
     },
@@ -71,28 +92,39 @@ _WORDS: dict[str, dict[str, str]] = {
         "static_friction coulomb_friction friction_torque": "dry_torque",
         "viscous_friction damping": "viscous",
     },
+    "temperature": {"winding_max max_winding_temperature maximum_winding_temperature": "winding_limit"},
     "encoder": {
-        "lines lines_per_revolution ppr cpt counts_per_turn": 'counts_per_rev, which takes "1024 lines"',
+        "counts": "counts_per_rev",
+        _LINES: 'counts_per_rev, which takes "1024 lines"',
         "resolution cpr bits": 'counts_per_rev, 4096 or "17 bit"; without a screw per metre of a linear axis',
         "hall_sensors": "counts_per_rev, 6 for each pole pair",
     },
     "limits": {
         f"supply {_VOLTAGE}": "voltage",
-        _CONTINUOUS: "continuous_current",
-        "max_current stall_current": "peak_current",
+        f"i_cont i_rms {_CONTINUOUS}": "continuous_current",
+        "i_peak i_max current max_current current_limit current_lim stall_current": "peak_current",
+        "velocity velocity_limit vel_limit speed_limit": "speed",
+        "accel accel_limit": "acceleration",
+        "rated_torque continuous_torque": "continuous_current, the torque over torque_constant and ratio",
         "torque max_torque peak_torque": "peak_current, the torque over torque_constant and ratio",
         _SPEED: "speed",
     },
     "control": {
-        "frequency sampling_frequency cycle_time sample_time sampling_time ts": _PERIOD,
-        "pwm pwm_frequency switching_frequency": "not needed; what it delays is part of computing_delay",
+        "speed speed_loop": "velocity",
+        "current_loop velocity_loop position_loop": "that name without _loop",
+        "cycle sample_rate frequency sampling_frequency cycle_time sample_time sampling_time ts": _PERIOD,
+        "pwm pwm_frequency pwm_period switching_frequency": "not needed, part of computing_delay",
         "delay deadtime dead_time": "computing_delay",
     },
     "control.": {  # a loop of it
-        "kp kv p proportional proportional_gain": "gain",
-        "ki integral_gain": "integral_time = gain/integral gain",
+        "kp kv kvp kpp p proportional proportional_gain": "gain",
+        "ki kvi integral_gain integrator_gain": "integral_time = gain/integral gain; of one in Hz 1/(2 pi f)",
         "kd derivative_gain": "derivative_time = derivative gain/gain",
-        "tn ti reset_time": "integral_time",
+        "tn ti reset_time integral_time_constant": "integral_time",
+        "time_constant": "frequency, 1/(2 pi time constant), where it is that of a low-pass",
+        "pff kff velocity_feedforward": "feedforward",
+        "notch lowpass low_pass": "a [[control.velocity.filter]] with its kind",
+        "q": "width, the frequency over Q",
         "frequency cycle_time sample_time": _MULTIPLE,
         "bandwidth": "gain: 2 pi f times L (current), J/kM (velocity) or 1 (position)",
     },
@@ -103,22 +135,32 @@ _WORDS: dict[str, dict[str, str]] = {
         "of the stage",
     },
 }
+_AFTER = re.compile(r"(?<=.)(?:_(?:line|phase|terminal|to|l_l|ll|pp|typ|nom))+\Z")  # resistance_line_to_line
 _HINTS = {
     table: {word: hint for words, hint in hints.items() for word in words.split()}
     for table, hints in _WORDS.items()
 }
 
 
-def key_for(table: str, word: str) -> str:
+def key_for(table: str, word: str, known: Iterable[str] = ()) -> str:
     """The key that a word of a data sheet stands for in a table such as ``"control.position"``, or nothing.
+
+    Of a word in several parts also what its end stands for, or which of the keys that are ``known`` it is.
 
     Examples
     --------
     >>> key_for("motor", "Kt"), key_for("control.position", "Kv"), key_for("gear.worm", "i")
     ('torque_constant', 'gain', 'ratio, which takes "60/20" too')
+    >>> key_for("motor", "rotor_moment_of_inertia"), key_for("gear.worm", "reduction ratio", ["ratio"])
+    ('rotor_inertia', 'ratio')
     """
     first, *rest = re.split(r"[.\[]", table)
-    plain = re.sub(r"[- ]", "_", word.lower())
+    plain = _AFTER.sub("", re.sub(r"[- ]", "_", word.lower()))
     tables = (f"{first}.",) if first == "control" and rest else (first, f"{first}.")
     tables = (".law",) if "law" in rest else tables
-    return next((_HINTS[one][plain] for one in tables if plain in _HINTS.get(one, {})), "")
+    own = {key: key for key in known}
+    words = plain.split("_")
+    ends = ("_".join(words[k:]) for k in range(len(words)))
+    return next(
+        (hints[end] for end in ends for one in tables if end in (hints := own | _HINTS.get(one, {}))), ""
+    )

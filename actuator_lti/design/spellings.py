@@ -10,16 +10,21 @@ from actuator_lti.files.reading import shown
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9])")
 _COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
-_SIGNS = str.maketrans({"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"'})
+_SIGNS = str.maketrans(
+    {"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"', "−": "-", "–": "-"}
+)
 _POWER = re.compile(r"[-⁻]?[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")  # min⁻¹
 _GROUPS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:[ \u00a0\u2009\u202f][0-9]{3})+(?![0-9/])")  # 10 600
 # How data sheets write what is not a product of names: each becomes one, in this order.
 _SPELLINGS = (
     (re.compile(r"\*\*"), "^"),
+    (re.compile(r"\bKg"), "kg"),
+    (re.compile(r"\bAmp(s?)\b"), r"amp\1"),
     (re.compile(r"^/"), "1/"),  # 25/s
     (re.compile(r"°C|℃|\bdeg(?:rees?)? ?C\b"), " degC"),
     (re.compile(r"\barc[- ](?=min|sec)"), "arc"),
     (re.compile(r"\bK(?:RPM|rpm)\b"), "krpm"),
+    (re.compile(r"°K\b"), " K"),
     (re.compile(r"°"), " deg"),
     (re.compile(r"%"), " percent"),
     (re.compile(r"''|\""), " arcsec"),
@@ -34,7 +39,19 @@ _SPELLINGS = (
     (re.compile(r"/ *\(? *1000 *(rpm|1/min|min\^-1)\b *\)?"), r"/(1000*(\1))"),
     (re.compile(r"\b(k?g)(c?m\^2)"), r"\1*\2"),  # gcm2
 )
-_POWER_OF_TEN = re.compile(r"(?<=[0-9.])\s*(?:[x×·*]|(?<=\s)\.)\s*10\s*\^?\s*([+-]?[0-9]{1,3})\b")
+_POWER_OF_TEN = re.compile(r"(?<=[0-9.])\s*(?:[x×·*]|(?<=\s)\.)\s*10\s*(?:\^|(?=[+-]))\s*([+-]?[0-9]{1,3})\b")
+# A column's power of ten, before its unit or behind it: "1.18 (10^-4 kg m2)", "0.1 kg-m2 x 10^-3".
+_COLUMN = (
+    (re.compile(r"\A(\s*[+-]?[0-9.]+)\s+\(?\s*[x×]?\s*10\^([+-]?[0-9]{1,2})\s+(.*?)\)?\s*\Z"), r"\1e\2 \3"),
+    (
+        re.compile(r"\A(\s*[+-]?[0-9.]+)\s*([^0-9\s].*?)[\sx×·*]+10(?:\^|(?=[+-]))([+-]?[0-9]{1,2})\s*\Z"),
+        r"\1e\3 \2",
+    ),
+)
+_TEN = re.compile(r"\b10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
+_BOUND = re.compile(r"\s*(±|\+/-|[≤≥<>~≈]=?|max\.?|typ\.?|ca\.?|approx\.?)\s*(?=[0-9.])", re.IGNORECASE)
+_SPREAD = re.compile(r"\s*((?:±|\+/-).*|\(?(?:max|typ|nom)\b\.?\)?)\s*\Z", re.IGNORECASE)
+_SECOND = re.compile(r"(?<![\w^.-])(?!1(?:000)?(?![0-9.]))[0-9]")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _OVER = re.compile(r"\s*([0-9]+\.?[0-9]*)\s*([/:])\s*([0-9]+\.?[0-9]*)\s*\Z")
 _BITS = re.compile(r"\s*(?:([0-9]{1,2})[ -]?bits?|2\^([0-9]{1,2}))\s*\Z")  # of an encoder
@@ -49,6 +66,18 @@ def tidy(unit: str) -> str:
     return text.rstrip()
 
 
+def _alone(text: str) -> str:
+    """A number in one power of ten and its unit; what a sheet says of its bounds is refused."""
+    for aside in (_BOUND, _SPREAD):
+        if found := aside.search(text) if aside is _SPREAD else aside.match(text):
+            plain = f"{text[: found.start()]}{text[found.end() :]}".strip()
+            raise ValueError(f"write {shown(plain)}; {shown(found[1])} is one for tolerance or source")
+    text = _TEN.sub(lambda found: f"10^{found[1].translate(_RAISED)}", text)
+    for column, product in _COLUMN:
+        text = column.sub(product, text)
+    return text
+
+
 def split_quantity(text: str) -> tuple[float, str]:
     """Number and unit of a written quantity; ``43:1``, ``343/8`` and ``17 bit`` are numbers without one."""
     if bits := _BITS.match(text) if len(text) <= LONGEST else None:
@@ -58,6 +87,7 @@ def split_quantity(text: str) -> tuple[float, str]:
         if over[2] == ":" and above < below:
             raise ValueError(f'a reduction is written "{over[3]}:{over[1]}"')
         return above / below if below else nan, ""
+    text = _alone(text.replace("−", "-")) if len(text) <= LONGEST else text
     if len(text) <= LONGEST and (grouped := _GROUPS.match(text)):
         text = "".join(grouped[0].split()) + text[grouped.end() :]
     text = _POWER_OF_TEN.sub(r"e\1", text.translate(_RAISED) if "10" in text else text)
@@ -70,6 +100,8 @@ def split_quantity(text: str) -> tuple[float, str]:
         )
     if _COMMA.match(text):
         raise ValueError(f"a decimal comma; use a decimal point: {shown(text.replace(',', '.', 1))}")
+    if _SECOND.search(match.group(2)):
+        raise ValueError(f"{shown(match.group(2))} is not a unit, it has a number in it; write one number")
     number = float(match.group(1))
     if not isfinite(number):
         raise ValueError("must be finite")

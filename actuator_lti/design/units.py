@@ -15,6 +15,7 @@ from difflib import get_close_matches
 from fractions import Fraction
 from functools import lru_cache
 from math import isfinite, pi
+from operator import ne
 
 from actuator_lti.design.spellings import LONGEST, split_quantity, tidy
 from actuator_lti.errors import InputError
@@ -32,6 +33,7 @@ _BASE = {
 # What each is, in units that stand above it.
 _DERIVED = {
     "percent": ("0.01", "1"),
+    "ppm": ("0.000001", "1"),
     "g gram": ("0.001", "kg"),
     "in inch": ("0.0254", "m"),
     "ft foot": ("0.3048", "m"),
@@ -73,7 +75,14 @@ _DERIVED = {
     "count cpr inc increment": ("1", "1"),
     "line": ("4", "1"),  # of an encoder: two edges of two tracks
 }
-_PULSES = ("ppr", "cpt", "ppt", "pulse", "pulses")  # of an encoder: makers mean lines or counts
+# What makers write into a unit that is none, and what is to be written instead.
+_PULSES = 'is not the same of all makers; write "lines" (4 counts each) or "counts"'
+_ASIDE = {
+    **dict.fromkeys(("ppr", "cpt", "ppt", "pulse", "pulses"), _PULSES),
+    "phase": "is no unit; leave it out: motor.constants says of which winding R and L are",
+    "tpi": "is no lead; write one over it, in inches",
+    "ipm": 'is written "in/min"',
+}
 _WORD = 4  # letters from which a name may stand in the plural: "volts", but "As" is no unit
 _PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")
 _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
@@ -83,6 +92,12 @@ _TOKEN = re.compile(
     r"\s*(?:(?P<name>[A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))|(?P<power>\^-?[1-6])|(?P<sign>[*/()]))"
 )
 _WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)(?=[* ]c?m\b)")
+# Read as meant only where the unit wanted is no other: V/rad/s, %/degC.
+_MEANT = (
+    (_WEIGHTS, r"\1\2f"),
+    (re.compile(r"/ *(rad|deg|rev|turn) */ *(s|sec|min)\b(?!\^)"), r"/(\1/\2)"),
+    (re.compile(r"\b(?:degC|C|celsius)\b"), "K"),
+)
 
 Dimension = tuple[tuple[str, int], ...]
 Exact = tuple[Fraction, Counter[str]]  # a factor to SI, and exponents
@@ -219,10 +234,17 @@ def parse_unit(unit: str) -> UnitValue:
 
 
 def _unknown(name: str, units: Units) -> str:
-    if name.lower() in _PULSES:
-        return f'"{name}" is not the same of all makers; write "lines" (4 counts each) or "counts"'
-    near = get_close_matches(name, [known for known in units if known[0] != "1"], 1, 0.5)
+    if name.lower() in _ASIDE:
+        return f'"{name}" {_ASIDE[name.lower()]}'
+    names = [known for known in units if known[0] != "1"]
+    cased = [one for known in names for prefix in ("", *_PREFIXES) if _same(one := prefix + known, name)]
+    cased.sort(key=lambda one: sum(map(ne, one, name)))  # of "mS" ms before Ms
+    near = cased or get_close_matches(name, names, 1, 0.5)
     return f'unknown unit "{name}"' + (f' (nearest known: "{near[0]}")' if near else "")
+
+
+def _same(known: str, name: str) -> bool:
+    return known.lower() == name.lower()
 
 
 def scaled(number: float, factor: float) -> float:
@@ -278,6 +300,9 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
         return "; a mass m on a screw of lead p is the inertia m (p/2 pi)^2"
     if pair == ("torque", "force"):
         return "; a screw of lead p turns a torque T into the force 2 pi T/p"
+    if pair[0] == "speed or angular frequency" and wanted.dimension in _GAINS_OF_BANDWIDTH:
+        of = _GAINS_OF_BANDWIDTH[wanted.dimension]
+        return f"; a bandwidth of {number * value.factor:.6g} rad/s becomes a gain times {of}"
     if (pair[0], wanted.dimension) in _GAINS_OF_TORQUE:
         return (
             "; such a gain over kM, and over the ratio squared where it is of the output, is one in amperes"
@@ -290,6 +315,11 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
 _GAINS_OF_TORQUE = {
     ("stiffness", parse_unit("A/rad").dimension),
     ("viscous friction", parse_unit("A*s/rad").dimension),
+}
+_GAINS_OF_BANDWIDTH = {
+    parse_unit("A*s/rad").dimension: "J/kM, J of all that turns, seen at the motor",
+    parse_unit("V*s/rad").dimension: "J R/kM, J of all that turns, seen at the motor",
+    parse_unit("V/A").dimension: "L",
 }
 
 
@@ -304,16 +334,18 @@ def _as_meant(written: str, wanted: UnitValue) -> UnitValue:
     """A unit, as data sheets mean it where another one is wanted.
 
     Minutes without an angle are those of a speed in revolutions per minute (``mV/(1/min)``); ounces, pounds
-    and kilograms are weights where no mass is wanted (``oz-in``, ``lb-in-s2``, ``kg-cm``).
+    and kilograms are weights where no mass is wanted (``oz-in``, ``lb-in-s2``, ``kg-cm``); a speed may lack
+    its brackets (``V/rad/s``); a difference of temperatures may be in degC (``degC/W``).
     """
     value = parse_unit(written)
     if value.minutes and wanted.angle and not value.angle:
         turns = -value.minutes
         dimension = tuple(sorted((*value.dimension, ("[angle]", turns))))
         value = UnitValue(value.factor * (2.0 * pi) ** turns, dimension)
-    if not compatible(value, wanted) and _WEIGHTS.search(tidy(written)):
-        force = parse_unit(_WEIGHTS.sub(r"\1\2f", tidy(written)))
-        return force if compatible(force, wanted) else value
+    for spelling, meant in _MEANT:
+        if not compatible(value, wanted) and spelling.search(tidy(written)):
+            other = parse_unit(spelling.sub(meant, tidy(written)))
+            value = other if compatible(other, wanted) else value
     return value
 
 

@@ -52,9 +52,11 @@ def _state_space(system: Any) -> tuple[Any, Any, Any, Any, Any]:
 def _inputs(system: Any, inputs: Sequence[str] | None) -> list[str]:
     """The names of the inputs: as given, else the system's own labels."""
     given = getattr(system, "input_labels", None) if inputs is None else inputs
-    if isinstance(given, str) or not isinstance(given, Sequence) or not {*given} <= {*LAW_INPUTS}:
-        raise InputError(f"inputs = {shown(given)}: allowed: a list of {', '.join(LAW_INPUTS)}")
-    return list(given)
+    listed: list[Any] = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
+    for name in listed:
+        if name not in LAW_INPUTS or given is name:
+            raise InputError(f"inputs = {shown(name)}: allowed: a list of {', '.join(LAW_INPUTS)}")
+    return listed
 
 
 def with_law(
@@ -88,7 +90,10 @@ def with_law(
         )
     law = {**law_tree(A, B, C, D, L, dt), "inputs": _inputs(system, inputs), "gain": gain}
     if continuous is not None:
-        law["continuous"] = law_tree(*_state_space(continuous)[:4])
+        *parts, step = _state_space(continuous)
+        if step:
+            raise InputError(f"continuous: sampled, dt = {step}; allowed: a continuous system")
+        law["continuous"] = law_tree(*parts)
     return with_overrides(design, {f"control.{stage}": {**table, "law": law}})
 
 

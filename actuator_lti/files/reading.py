@@ -15,6 +15,7 @@ import tomllib
 import unicodedata
 from difflib import get_close_matches
 from os import PathLike
+from pathlib import Path
 from typing import Any, BinaryIO
 
 from actuator_lti.bounds import (
@@ -63,6 +64,12 @@ def shown_path(path: str | PathLike[str]) -> str:
     if not isinstance(path, str | bytes | PathLike):
         raise InputError(f"{path!r}: allowed: the path of a file")
     return shown(os.fspath(path), 200)[1:-1]
+
+
+def as_path(path: str | PathLike[str]) -> Path:
+    """A path; what is none is refused."""
+    shown_path(path)
+    return Path(os.fspath(path))
 
 
 def open_regular(path: str | PathLike[str], what: str = "file") -> BinaryIO:

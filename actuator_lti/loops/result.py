@@ -210,14 +210,30 @@ class Loops:
 
     def __getitem__(self, name: str) -> Loop:
         """A loop or break point by its name."""
-        known = self.present | dict(self.break_points)
+        known = dict(self.items())
         if name not in known:
             raise InputError(f"loops[{name!r}]: allowed: {', '.join(known)}")
         return known[name]
 
     def __iter__(self) -> Iterator[str]:
         """The names of the loops, innermost first, and of the break points."""
-        return iter((*self.present, *self.break_points))
+        return iter(self.keys())
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.items())
+
+    def keys(self) -> list[str]:
+        """The names, as a mapping has them."""
+        return [name for name, _ in self.items()]
+
+    def values(self) -> list[Loop]:
+        """The loops by themselves."""
+        return [loop for _, loop in self.items()]
+
+    def items(self) -> list[tuple[str, Loop]]:
+        """Names and loops, innermost first, then the break points."""
+        return [*self.present.items(), *self.break_points.items()]
 
     def plot_bode(self, axes: Any = None) -> list[Axes]:
         """Draw the open loops of all stages in one Bode figure; gives matplotlib's axes."""

@@ -72,8 +72,10 @@ def _signs(count: int) -> Real:
 def given_of(system: Any) -> Given:
     """Read a SISO python-control state space or transfer function, proper and finite."""
     if not hasattr(system, "ninputs"):
+        inner = "; of a Loop its open_loop" if hasattr(system, "open_loop") else ""
         raise InputError(
-            f"{type(system).__name__}: a StateSpace, TransferFunction, DelaySystem or FrequencyResponseData"
+            f"{type(system).__name__}: a StateSpace, TransferFunction, DelaySystem or "
+            f"FrequencyResponseData{inner}"
         )
     if system.ninputs != 1 or system.noutputs != 1:
         raise InputError(

@@ -44,7 +44,7 @@ from typing import Annotated, Literal
 
 from actuator_lti.bounds import CAMPAIGN_RUNS
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import read_campaign_toml, shown_path
+from actuator_lti.files.reading import as_path, read_campaign_toml, shown_path
 from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.toml_tables import Table, key_of
@@ -123,7 +123,7 @@ def load_campaign(path: str | Path) -> Campaign:
     InputError
         Names the file, the key, its value and what is allowed.
     """
-    path = Path(path)
+    path = as_path(path)
     root = Table(read_campaign_toml(path), "", str(path))
     refuse_design(root)
     root.only(("campaign", "drive", "sensor", "join", "instruments", "run"))

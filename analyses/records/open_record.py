@@ -12,7 +12,7 @@ from typing import Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import MatContent
-from actuator_lti.files.reading import open_regular, read_campaign_toml, shown_path
+from actuator_lti.files.reading import as_path, open_regular, read_campaign_toml, shown_path
 from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
 from analyses.records.csv_rows import STAMP
 from analyses.records.inputs import spec_of_names
@@ -75,7 +75,7 @@ def open_records(path: str | Path) -> list[Record]:
     InputError
         Names the file and what is wrong, or how to describe it.
     """
-    path = Path(path)
+    path = as_path(path)
     suffix = path.suffix.lower()
     if suffix == ".toml":
         return _described(path)

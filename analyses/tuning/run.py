@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from actuator_lti.asked.quantities import LOOP_QUANTITIES
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
+from actuator_lti.design.loader import as_design
 from analyses.monte_carlo.judging import in_populations, label
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.checking import confirm, nonlinear_checks
@@ -32,7 +34,10 @@ _BINDS = 0.02  # relative distance above the smallest within which a requirement
 
 
 def tune(
-    design: Design, settings: TuningSettings | None = None, *, progress: Progress | None = None
+    design: Design | str | PathLike[str],
+    settings: TuningSettings | None = None,
+    *,
+    progress: Progress | None = None,
 ) -> TuningResult:
     """Find gains that meet the requirements on loops over all corners of the tolerances.
 
@@ -52,7 +57,7 @@ def tune(
     InputError
         If there is no requirement on a loop, or an element has no place in the drive.
     """
-    settings = settings or TuningSettings()
+    design, settings = as_design(design), settings or TuningSettings()
     wanted = loop_requirements(design, settings.requirements)
     choices = list(subsets(checked(design, settings.place)))
     stages = len(choices) + 3

@@ -19,7 +19,8 @@ ROWS: tuple[tuple[tuple[str, ...], ...], ...] = (
 )  # fmt: skip
 """Sections of each box, row by row: controller; sensors and limits; drive train, load to motor."""
 _STYLE = """<style>
-.keys-diagram { width: 100%; height: auto; font-size: 12px; }
+.keys-wide { overflow-x: auto; }
+.keys-diagram { width: 100%; min-width: 820px; height: auto; font-size: 12px; }
 .keys-diagram text { fill: var(--pst-color-text-base); }
 .keys-diagram a text { fill: var(--pst-color-link); }
 .keys-diagram .head { font-weight: 600; }
@@ -113,7 +114,7 @@ def diagram_page() -> str:
             "",
             "```{raw} html",
             _STYLE,
-            diagram_svg(),
+            f'<div class="keys-wide" tabindex="0">{diagram_svg()}</div>',
             "```",
             "",
             f"Elsewhere: {', '.join(rest)}.",

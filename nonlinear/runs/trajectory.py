@@ -14,6 +14,8 @@ import numpy.typing as npt
 from actuator_lti.design.control import Stage
 from actuator_lti.design.model import Axis
 from actuator_lti.drawing.faces import draw
+from actuator_lti.errors import InputError
+from actuator_lti.files.reading import shown
 from nonlinear._kernels import layout as at
 
 if TYPE_CHECKING:
@@ -243,6 +245,8 @@ class Trajectory:
 
     def limit_active(self, name: str) -> npt.NDArray[np.bool_]:
         """Rows in which a limiter acts; ``current`` not while the overload protection holds it down."""
+        if name not in at.LIMITERS:
+            raise InputError(f"limiter = {shown(name)}: allowed: {', '.join(at.LIMITERS)}")
         rows = (self.limit_flags & at.LIMITER_BITS[at.LIMITERS.index(name)]) != 0
         overload, current = self.limits.get("overload"), self.limits.get("current")
         if name != "current" or overload is None or current is None or overload.limit >= current.limit:

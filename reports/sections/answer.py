@@ -158,7 +158,9 @@ def _loop(
                 "comparison": nearest["comparison"] if nearest else "",
                 "distance": nearest["distance"] if nearest else None,
                 "verdict": nearest["verdict"] if nearest else None,
-                "spread": range_words(ranges[quantity.name]) if quantity.name in ranges else "",
+                "spread": range_words(ranges[quantity.name], quantity.name)
+                if quantity.name in ranges
+                else "",
             }
         )
     stable = margin_row(figures.judged)["stable"]

@@ -22,7 +22,7 @@ COLUMNS = [
     doc.column("crossover_hz", "Crossover", "Hz", format="sig:4"),
     figure_column("phase_margin", "phase_margin_deg", format="fix:2"),
     doc.column("phase_cost_deg", "against ideal", "deg", format="fix:2"),
-    figure_column("gain_margin", "gain_margin_db", format="fix:2"),
+    figure_column("gain_margin", "gain_margin_db", format="gain:2"),
     figure_column("delay_margin", "delay_margin_ms", format="sig:3"),
     figure_column("sensitivity_peak", "s_peak_db", format="fix:2"),
     figure_column("bandwidth", "minus3db_hz", format="sig:4"),
@@ -176,7 +176,7 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
         label = name.capitalize()
         columns += [
             figure_column("phase_margin", f"{name}_phase", label=f"{label} PM", format="fix:1"),
-            figure_column("gain_margin", f"{name}_gain", label=f"{label} GM", format="fix:1"),
+            figure_column("gain_margin", f"{name}_gain", label=f"{label} GM", format="gain:1"),
             figure_column(
                 "bandwidth", f"{name}_band", label=f"{label} −3\N{NO-BREAK SPACE}dB", format="sig:3"
             ),

@@ -21,6 +21,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.sections import identify_campaign, identify_records
 from reports.sections.identified import finding_table, input_table, judged, parameter_table, value_words
+from reports.sections.measured import decibels_and_degrees
 
 
 def section(result: BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan) -> doc.Section:
@@ -138,17 +139,18 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         f"sampled loop, {noise}."
     )
     blocks: list[doc.Block] = [parameter_table("Identified values", fit)]
-    for label, of in (("magnitude", np.abs), ("phase, deg", lambda z: np.degrees(np.angle(z)))):
+    both = decibels_and_degrees(measured.response, result.modelled)
+    for label, found, fitted in zip(("magnitude, dB", "phase, deg"), *both, strict=True):
         chart = style.Chart(width=style.WIDE, height=280.0)
-        panel = chart.panel("frequency, Hz", label, "xy" if label == "magnitude" else "x")
-        panel.points(measured.frequency_hz, of(measured.response), "measured", colour=style.BLUE)
-        panel.curve(measured.frequency_hz, of(result.modelled), "identified design", **style.series(1))
+        panel = chart.panel("frequency, Hz", label, "x")
+        panel.points(measured.frequency_hz, found, "measured", colour=style.BLUE)
+        panel.curve(measured.frequency_hz, fitted, "identified design", **style.series(1))
         what = label.partition(",")[0].capitalize()
         words = f"{what} of the {SEEN[result.of]} of {result.loop}, measured and fitted"
         blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
-    found = "; ".join(f"{parameter(name).key} {value_words(fit, name)}" for name in fit.names)
+    values = "; ".join(f"{parameter(name).key} {value_words(fit, name)}" for name in fit.names)
     return judged(
-        "response-identification", "Measured response", result, blocks, result=f"{found}.", intro=intro
+        "response-identification", "Measured response", result, blocks, result=f"{values}.", intro=intro
     )
 
 

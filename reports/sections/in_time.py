@@ -17,6 +17,7 @@ from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.in_time import MarginShown, StepShown
 from reports import document as doc
 from reports.charts import style
+from reports.numbers import gain_margin
 from reports.sections.limits import words_of
 from reports.sections.names import loop_words, output_unit
 
@@ -125,7 +126,7 @@ def _margin(shown: MarginShown) -> doc.Block:
         panel.points(scale * run.time_s, run.amplitude, f"{words}, simulated", **look | {"size": 4.0})
     decibel = 20.0 * math.log10(shown.ratio)
     caption = (
-        f"{_tested(shown.place)}: gain margin on the operating motion {decibel:.2f} dB at "
+        f"{_tested(shown.place)}: gain margin on the operating motion {gain_margin(decibel, 2)} dB at "
         f"{shown.frequency_hz:.4g} Hz. The run inside dies out, the run outside grows (circles), each by the "
         "predicted factor (lines)."
     )

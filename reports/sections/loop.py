@@ -14,7 +14,7 @@ from analyses.linear.responses import frequency_grid, response_at, sampled_step
 from analyses.specification.command_limits import said_of
 from reports import document as doc
 from reports.charts import style
-from reports.numbers import capital, fixed, seconds, to_minus
+from reports.numbers import capital, fixed, gain_margin, seconds, to_minus
 from reports.sections import loop_charts
 from reports.sections.margins import (
     MEANING,
@@ -64,12 +64,12 @@ def result(figures: LoopFigures) -> str:
     """Say in one sentence what the loop is like."""
     row, bandwidth = margin_row(figures), response_row(figures)["minus3db_hz"]
     parts = [
-        ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"]),
-        ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"]),
+        ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"], gain_margin),
+        ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"], fixed),
     ]
     words = [
-        f"{name} {value:.1f} {unit}" + (f" at {style.hertz(hz)}" if hz else "")
-        for name, value, unit, hz in parts
+        f"{name} {write(value, 1)} {unit}" + (f" at {style.hertz(hz)}" if hz else "")
+        for name, value, unit, hz, write in parts
         if value is not None
     ]
     if bandwidth is not None:
@@ -104,7 +104,7 @@ def _short(value: float | None, format: str) -> float | None:
     if value is None:
         return None
     kind, _, places = format.partition(":")
-    return round(value, int(places)) if kind == "fix" else float(f"{value:.{places}g}")
+    return round(value, int(places)) if kind in ("fix", "gain") else float(f"{value:.{places}g}")
 
 
 def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:

@@ -13,6 +13,7 @@ from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.responses import Curve, answer_curve, curve, nyquist_curve, response_at
 from reports import document as doc
 from reports.charts import style
+from reports.numbers import gain_margin
 from reports.sections.margins import finite, margin_row
 
 Curves = Sequence[tuple[str, Curve]]
@@ -48,7 +49,7 @@ def open_bode(
 def margin_words(title: str, figures: LoopFigures) -> str:
     """Say what an open-loop figure shows."""
     row = margin_row(figures)
-    gain = "none" if row["gain_margin_db"] is None else f"{row['gain_margin_db']:.1f} dB"
+    gain = "none" if row["gain_margin_db"] is None else f"{gain_margin(row['gain_margin_db'], 1)} dB"
     phase = "none" if row["phase_margin_deg"] is None else f"{row['phase_margin_deg']:.1f} deg"
     name = title[:1].lower() + title[1:]
     return f"Open-loop Bode diagram of the {name}: gain margin {gain}, phase margin {phase}."
@@ -66,7 +67,7 @@ def _gain_margins(curve: Curve, margins: StabilityMargins, top: style.Panel, sho
         top.points([f], [seen], marker="s", size=6.0, **look)
         if k < shown and (k == 0 or low < level < high):
             off = "" if low < level < high else " (off scale)"
-            top.note(f"GM {style.to_minus(f'{-level:.1f}')} dB{off}\n{style.hertz(f)}", (f, seen))
+            top.note(f"GM {gain_margin(-level, 1)} dB{off}\n{style.hertz(f)}", (f, seen))
 
 
 def _phase_margins(

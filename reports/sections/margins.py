@@ -15,7 +15,7 @@ from analyses.linear.loop_survey import OperatingPointFigures
 from analyses.margins import Margins
 from analyses.specification.weakest import Spread, figures_of, spread
 from reports import document as doc
-from reports.numbers import short, to_minus
+from reports.numbers import fixed, gain_margin, short, to_minus
 from reports.sections import measured, requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words, unit_words
 from reports.terminal import Brief, SideBySide
@@ -31,7 +31,7 @@ MEANING = {
 }
 
 DOWNWARDS = (
-    " A negative gain margin is downwards: the gain may fall by so much. Limits and compare take its size."
+    " Down to: so far the gain may fall before the loop is unstable. Limits and compare take the size of it."
 )
 
 
@@ -47,7 +47,7 @@ def _at(name: str) -> Callable[[LoopFigures], float | None]:
 MARGINS = [
     doc.of(lambda figures: _state(figures), "stable", "Closed loop"),
     doc.of(lambda figures: _evidence(figures), "evidence", "Margins are"),
-    _figure("gain_margin", "gain_margin_db", "fix:2"),
+    _figure("gain_margin", "gain_margin_db", "gain:2"),
     doc.of(_at("gain_margin"), "gain_margin_hz", "at", "Hz", format="sig:4"),
     _figure("phase_margin", "phase_margin_deg", "fix:2"),
     doc.of(_at("phase_margin"), "crossover_hz", "at", "Hz", format="sig:4"),
@@ -208,12 +208,15 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
         return " ".join(doubts)
     rows = {loop_words(name, one.rotor).lower(): margin_row(one.judged) for name, one in figures.items()}
     words = []
-    both = (("gain_margin_db", "gain margin", "dB"), ("phase_margin_deg", "phase margin", "deg"))
-    for key, what, unit in both:
+    both = (
+        ("gain_margin_db", "gain margin", "dB", gain_margin),
+        ("phase_margin_deg", "phase margin", "deg", fixed),
+    )
+    for key, what, unit, write in both:
         known = {name: row[key] for name, row in rows.items() if row[key] is not None}
         if known:
             name = min(known, key=lambda n: abs(known[n]))
-            words.append(f"the smallest {what} is {known[name]:.1f} {unit} ({name})")
+            words.append(f"the smallest {what} is {write(known[name], 1)} {unit} ({name})")
     count = {1: "The loop is", 2: "Both loops are"}.get(len(rows), f"All {len(rows)} loops are")
     count = f"{count} stable, {evidence_words(figures)}"
     held = [f"{LOOPS[name].lower()} with the {HELD[name]}" for name, one in figures.items() if one.held]
@@ -288,7 +291,7 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
     for label, figures in zip(labels, named.values(), strict=True):
         name, own = figures.loop.name, spread(seen).get(figures.loop.name, {})
         row: doc.Row = {"loop": label}
-        row |= {key: range_words(own[f"{key}_margin"]) for key in ("gain", "phase") if f"{key}_margin" in own}
+        row |= {name.split("_")[0]: range_words(range_, name) for name, range_ in own.items()}
         doubts = [p.place or "sliding" for p in seen if name in p.figures and not p.figures[name].sound]
         row |= {"gain": f"not stable {'; '.join(doubts)}"} if doubts else {}
         rows += [row] if len(row) > 1 else []
@@ -298,9 +301,12 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
     return doc.table("Margins over the operating points", SPREAD_COLUMNS, rows, note)
 
 
-def range_words(range_: Spread) -> str:
-    """Say between which values a figure lies over the operating points; empty where they agree."""
-    least, most = ("∞" if math.isinf(end) else to_minus(short(end, 3)) for end in (range_.least, range_.most))
+def range_words(range_: Spread, quantity: str) -> str:
+    """Say between which values a margin lies over the operating points; empty where they agree."""
+    least, most = ("∞" if math.isinf(end) else short(end, 3) for end in (range_.least, range_.most))
+    least, most = (
+        f"down to {end}" if quantity == "gain_margin" and end[0] == "−" else end for end in (least, most)
+    )
     return least if least == most else f"{least} ({range_.where}) to {most}"
 
 

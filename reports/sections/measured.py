@@ -89,9 +89,7 @@ def _bode(one: Measured) -> doc.Block:
     top, bottom = chart.column(1.15, 1.0)
     top.x.log = bottom.x.log = True
     f, reach = one.frequency_hz, np.minimum(one.radius / np.abs(one.measured), 0.999)
-    both = (one.measured, one.model)
-    found, model = ((20.0 * np.log10(np.abs(L)), np.degrees(np.unwrap(np.angle(L)))) for L in both)
-    model[1][:] += 360.0 * np.round((found[1][0] - model[1][0]) / 360.0)  # of the same turn
+    found, model = decibels_and_degrees(one.measured, one.model)
     ends = 20.0 * np.log10(1.0 - reach), 20.0 * np.log10(1.0 + reach)
     around = np.degrees(np.arcsin(reach))
     spread = (ends, (-around, around))
@@ -104,6 +102,15 @@ def _bode(one: Measured) -> doc.Block:
     style.phase_axis(bottom, [*found[1], *model[1]])
     caption = f"{one.name}: measured {_place(one)} with its spread, and the model"
     return doc.figure("measured", chart, caption, alt="Measured and modelled open loop over frequency")
+
+
+def decibels_and_degrees(
+    measured: np.ndarray, model: np.ndarray
+) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """Magnitude in dB and unwrapped phase in degrees of a measurement and of its model, on the same turn."""
+    phases = [np.degrees(np.unwrap(np.angle(L))) for L in (measured, model)]
+    phases[1] += 360.0 * np.round((phases[0][0] - phases[1][0]) / 360.0)
+    return tuple((20.0 * np.log10(np.abs(L)), y) for L, y in zip((measured, model), phases, strict=True))
 
 
 def _nyquist(one: Measured) -> doc.Block:

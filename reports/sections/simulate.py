@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.control import Stage
+from actuator_lti.drive.signals import LIMITERS, Limiter
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
 from analyses.motion import Motion
@@ -19,6 +20,7 @@ from reports.charts import style
 from reports.charts.svg import paper_svg
 
 Signals = list[tuple[str, npt.NDArray[np.float64]]]
+Acting = tuple[Limiter, ...]
 LONGEST_GAP_S = 0.002  # spans of an active limit closer than this fraction of the run are drawn as one
 
 
@@ -122,28 +124,39 @@ def chart_of(run: Trajectory) -> style.Chart:
     if run.stage in ("position", "velocity") and run.current_command_A.any():
         current.append(("commanded", run.current_command_A))
     position = _scaled([("output", run.output_angle_rad), *command.get("position", [])], angle)
-    parts: list[tuple[str, Signals, str]] = [
-        (f"output position, {unit}", position, ""),
-        (f"{'axis' if linear else 'motor'} speed, {'m/s' if linear else 'rad/s'}", speed, "speed"),
-        *([("motor current, A", current, "current")] if run.current_A.any() else []),
-        ("voltage, V", [("voltage", run.voltage_V), *command.get("voltage", [])], "voltage"),
+    parts: list[tuple[str, Signals, Acting]] = [
+        (f"output position, {unit}", position, ()),
+        (f"{'axis' if linear else 'motor'} speed, {'m/s' if linear else 'rad/s'}", speed, _limiters("w_ref")),
+        *(
+            [("motor current, A", current, _limiters("i_ref", "i", "torque_command"))]
+            if run.current_A.any()
+            else []
+        ),
+        ("voltage, V", [("voltage", run.voltage_V), *command.get("voltage", [])], _limiters("u")),
     ]
     rows = style.kept_rows([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])
     chart = style.Chart(width=style.WIDE, height=60.0 + 150.0 * len(parts), legend=True)
     panels = chart.column(*(1.0 for _ in parts))
     scale = style.time_axis(panels[-1], float(run.time_s[rows][-1]))
     time = run.time_s[rows] * scale
-    for panel, (label, signals, limiter) in zip(panels, parts, strict=True):
+    for panel, (label, signals, limiters) in zip(panels, parts, strict=True):
         panel.y.label = label
-        for start, stop in spans(run.limit_active(limiter), run.time_s) if limiter else []:
-            panel.band_x(start * scale, stop * scale, f"{limiter} limit acts", colour=style.RED)
+        for one in (each for each in limiters if each.name in run.limits):
+            colour = style.RED if one.kind == "value" else style.ORANGE
+            for start, stop in spans(run.limit_active(one.name), run.time_s):
+                panel.band_x(start * scale, stop * scale, f"{one.words} acts", colour=colour)
         # the command lies under the response: drawn last in the list, first on the paper
         for k, (name, values) in reversed(list(enumerate(signals))):
             panel.curve(time, values[rows], name, width=2.0 if k == 0 else 1.5, **style.series(k))
-        if limiter and np.isfinite(run.limits[limiter].limit):
-            _limit(panel, run.limits[limiter].limit, max(np.abs(v[rows]).max() for _, v in signals))
+        if limiters and np.isfinite(limit := run.limits[limiters[0].name].limit):
+            _limit(panel, limit, max(np.abs(v[rows]).max() for _, v in signals))
     panels[-1].x.limits(time[0], time[-1])
     return chart
+
+
+def _limiters(*signals: str) -> Acting:
+    """What limits the signals of a panel, the clamp first; what shapes the command is no limit."""
+    return tuple(one for one in LIMITERS.values() if one.signal in signals and one.kind != "command")
 
 
 def _scaled(signals: Signals, factor: float) -> Signals:

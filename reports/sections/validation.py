@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any, cast
@@ -13,7 +14,7 @@ from analyses.motion.settling import waiver_of_rest
 from analyses.validation import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
-from reports.numbers import capital, prose, row_time_unit
+from reports.numbers import capital, gain_margin, prose, row_time_unit
 from reports.sections import beyond, friction_effects, in_time, large_signal, specification
 from reports.sections.names import LOOPS, POINTS, QUANTITIES, loop_words, unit_words
 from reports.terminal import Brief
@@ -208,8 +209,11 @@ def _rounded(row: Check, value: float | None, digits: int) -> float | None:
 
 
 def quantity_name(row: Check) -> str:
-    """Words for a quantity."""
-    return MORE.get(row.name) or QUANTITIES.get(row.name, row.name.replace("_", " "))
+    """Words for a quantity; a gain margin, which the simulator has as a ratio, in dB as elsewhere."""
+    words = MORE.get(row.name) or QUANTITIES.get(row.name, row.name.replace("_", " "))
+    if not row.name.startswith("gain_margin") or not row.predicted:
+        return words
+    return f"{words}, {gain_margin(20.0 * math.log10(row.predicted), 2)} dB"
 
 
 def loop_name(name: str) -> str:

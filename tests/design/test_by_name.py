@@ -9,7 +9,8 @@ from scipy import signal
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins, sweep, write_design
 from actuator_lti.design import design_hash, parameter_value, read_design_text
-from nonlinear import State, commands, simulate
+from analyses import load_campaign, open_record, tune
+from nonlinear import Drive, State, commands, simulate
 
 DESIGN = load_design("ilr33-amber")
 
@@ -73,6 +74,11 @@ BAD = {
     "rows": lambda: simulate(DESIGN, commands.step(0.01), 0.1, record_every=1.5),
     "events": lambda: simulate(DESIGN, commands.step(0.01), 0.1, max_events=None),
     "tolerance": lambda: simulate(DESIGN, commands.step(0.01), 0.1, tanh_tolerance="x"),
+    "limiter": lambda: simulate(DESIGN, commands.step(0.01), 0.001).limit_active("brake"),
+    "drive": lambda: Drive(3),
+    "tune": lambda: tune(3),
+    "a record's path": lambda: open_record(3),
+    "a campaign's path": lambda: load_campaign(3),
     "filter": lambda: DESIGN.add_filter("velocity", kind="lowpass", frequency=[1.0]),
 }
 
@@ -89,6 +95,14 @@ def test_loops_are_indexed_and_iterated_by_name() -> None:
     assert list(loops) == ["current", "velocity", "position", "u", "i_ref", "w_ref", "output"]
     assert loops["velocity"] is loops.velocity
     assert loops["output"] is loops.break_points["output"]
+    assert dict(loops) == dict(loops.items()) == {name: loops[name] for name in loops}
+    assert (len(loops), loops.values()[1]) == (len(loops.keys()), loops.velocity)
+    with pytest.raises(InputError, match="of a Loop its open_loop"):
+        stability_margins(loops.velocity)
+
+
+def test_a_design_is_loaded_as_it_is() -> None:
+    assert load_design(DESIGN) is DESIGN
 
 
 def test_a_sweep_changes_one_key_and_says_so() -> None:

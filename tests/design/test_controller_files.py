@@ -140,6 +140,17 @@ def test_numbers_that_say_nothing_are_left_and_said(
         assert any(note.endswith(f"not taken, {key} stays as it is") for note in result.notes)
 
 
+def test_numbers_that_make_a_key_together_are_asked_for(tmp_path: Path) -> None:
+    """A gain in torque without the constant that turns it into amperes; the newest firmware's encoder."""
+    text = ODRIVE.replace('"torque_constant": 0.04,', "").replace('"cpr": 8192', '"use_index": true')
+    text = text[:-1] + ', "inc_encoder0": {"config": {"cpr": 4000}}}'
+    (tmp_path / "settings").write_text(text)
+    result = import_controller_file(tmp_path / "settings", BASE)
+    wanted = "vel_gain: needs axis0.motor.config.torque_constant for control.velocity.gain"
+    assert sum(note.endswith(wanted) for note in result.notes) == 1
+    assert parameter_value(result.design, "encoder.counts_per_rev") == 4000
+
+
 def test_the_command_says_what_it_took_and_what_it_left(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -18,7 +18,7 @@ from actuator_lti.design import (
 from actuator_lti.design.explained import explained
 from actuator_lti.drive.facts import capability
 from actuator_lti.drive.steady import steady_torque_Nm
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, Mistakes
 from analyses.linear.loop_survey import survey_loops
 from analyses.studies.sampling import sampler_of
 from nonlinear import commands, simulate
@@ -402,7 +402,7 @@ def test_a_self_locking_drive_of_good_gears_is_warned_of(path: str, first: str, 
         ('torque_constant = "30', 'Kt = "30', r"motor.Kt = .* \(it is torque_constant\)\Z"),
         ("[limits]", '[limits]\nrated_current = "3 A"', r"\(it is continuous_current\)"),
         ("[control]", '[control]\npwm-frequency = "8 kHz"', "part of computing_delay"),
-        ("[control]", '[control.position]\nKv = "40 1/s"\n[control]', r"position.Kv = .* \(it is gain\)\Z"),
+        ("[control]", '[control.position]\nKv = "40 V/rad"\n[control]', r"position.Kv = .* \(it is gain\)\Z"),
         ("[load]", '[load]\nfriction = "6 N"', r"allowed: a table, \[load.friction\]"),
         ("[load]", '[load]\nmass = "6 kg"', r"inertia, in kg on a linear axis"),
         ('"48 V"', '"48 V"\nspeed = "2 m/s"', 'm/s with design.axis = "linear"'),
@@ -411,6 +411,9 @@ def test_a_self_locking_drive_of_good_gears_is_warned_of(path: str, first: str, 
         ('"48 V"', '"48 V', "a quote that is opened in this line is not closed"),
         ('inductance = "0.082 mH"\n', "", "R times the electrical time constant"),
         ('back_emf_constant = "317 rpm/V"\n', "", r"number of motor.torque_constant in SI, 0\.0302"),
+        ("efficiency = 0.9", 'lost_motion = "5 arcmin"', r"it is play of \[coupling\]"),
+        ("[load]", '[load]\nfrictional_torque = "6 mNm"', r"dry_torque of \[load.friction\][^\n]*\Z"),
+        ("[load]", "[belt]\nratio = 3\n[load]", r"it is a \[\[gear\]\]"),
         ("efficiency = 0.9", 'backlash = "0.8 deg"', r"it is play of \[coupling\]"),
         ("efficiency = 0.9", "self_locking = true", r'it is path = "self-locking" of \[load\]'),
     ],
@@ -418,3 +421,49 @@ def test_a_self_locking_drive_of_good_gears_is_warned_of(path: str, first: str, 
 def test_a_sheet_is_refused_with_what_it_wants(old: str, new: str, words: str) -> None:
     with pytest.raises(InputError, match=words):
         read_design_text(SHEET.replace(old, new), "sheet")
+
+
+CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            'ratio = "43:1"',
+            'reduction_ratio = "43:1"',
+            ('reduction_ratio = "43:1": unknown key (it is ratio)',),
+        ),
+        ("resistance", "terminal_resistance", ("(it is resistance)",)),
+        (
+            'inductance = "0.082 mH"',
+            'rotor_L = "0.082 mHz"',
+            ("(it is inductance)", "line 6: motor.inductance = "),
+        ),
+        ("[load]", '[load]\nmax_torque = "2 Nms"', ("(it is moment_max)", "load.moment_max = ")),
+        ("[control]", f'{CURRENT}gain = "40 Hz"\n[control]', ("251.327 rad/s becomes a gain times J/kM",)),
+        ("[control]", f'{CURRENT}vel_gain = "2 Nms/rad"\n[control]', ("(it is gain)", "over kM, and over")),
+        ('[[gear]]\nname = "second"\nratio = 2\nefficiency = 0.9\n', "", ()),
+        (
+            'computing_delay = "0 s"\n',
+            'computing_delay = "0 s"\n'
+            + CURRENT.replace("velocity", "speed")
+            + 'KVP = 1\n[control.position]\nKPP = "35/s"\n',
+            ("control.speed = a table: unknown key (it is velocity)", "control.position.KPP"),
+        ),
+        ("resistance", "resistance_line_to_line", ("(it is resistance)",)),
+        ("[load]", '[load]\ncoulomb_friction = "6 mNm"', ("dry_torque of [load.friction]",)),
+        ("voltage = ", 'speed = "19 krpm"\nrated_voltage = ', ("the supply cannot reach", "(it is voltage)")),
+    ],
+)
+def test_what_stands_under_a_sheets_own_word_is_read_too(old: str, new: str, words: tuple[str, ...]) -> None:
+    """So that a wrong unit behind it is told in the same run, and nothing that follows from it is missing."""
+    text = SHEET.replace(old, new, 1)
+    if not words:
+        text = text.replace("[[gear]]", "[gear]").replace('efficiency = "80 %"', 'backlash = "1 deg"')
+        words = ("gear = a table: allowed: [[gear]] tables", "gear.first.backlash")
+    with pytest.raises((InputError, Mistakes)) as caught:
+        read_design_text(text, "sheet")
+    told = str(caught.value).splitlines()
+    assert len(told) == len(words)
+    assert all(word in line for word, line in zip(words, told, strict=True))

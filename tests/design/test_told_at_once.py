@@ -88,7 +88,7 @@ def test_what_is_not_read_hides_what_needs_it_and_nothing_else(contradicted: Any
     for path, *_ in _leaves(contradicted):
         tree = copy.deepcopy(contradicted)
         _, table, key = next(leaf for leaf in _leaves(tree) if leaf[0] == path)
-        wrong = key if manner == "unreadable" else f"{key[0]}{key}"
+        wrong = key if manner == "unreadable" else f"{key}{key[-1]}"
         table[wrong] = table.pop(key) if manner == "misspelled" else [{}]
         others = {relation for _, relation, needs in RELATIONS if path not in needs}
         assert _told(tree) == {path.removesuffix(key) + wrong} | others, path

@@ -61,6 +61,7 @@ def test_every_part_of_a_drive_has_its_place_in_the_diagram(monkeypatch: pytest.
     sections = {section.template for section in SECTIONS} - free - {"control", "validation"}
     assert diagram.drawn_sections() == sections
     page = diagram.diagram_page()
+    assert page.index('<div class="keys-wide"') < page.index("<svg")  # scrolls where it does not fit
     assert all(f">{field.key}</text>" in page for field in FIELDS.values() if field.section in sections)
 
 

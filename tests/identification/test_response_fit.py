@@ -8,6 +8,9 @@ from scipy.linalg import expm
 
 from actuator_lti.design import load_design, parameter_value
 from analyses.identification.measured_response import ResponseResult, identify_response
+from reports.charts.chart import Curve
+from reports.charts.data import chart_of
+from reports.sections.identify import section
 
 TICK, GAIN, N = 1e-3, 0.8, 50.0
 TRUTH = {
@@ -157,3 +160,18 @@ def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
 def test_what_cannot_be_is_refused(more: tuple[str, ...], reason: str, tmp_path, cli) -> None:
     file, design = _measured(tmp_path, "L", 0.01, 0), _design(tmp_path, {})
     assert reason in cli.refused("identify", "--response", file, "--design", design, *more)
+
+
+def test_a_fit_is_drawn_in_decibels_with_a_phase_that_does_not_wrap(tmp_path) -> None:
+    result = _found(tmp_path, "L", 1e-7, 0, stated=False)
+    drawn = {}
+    for block in (one for one in section(result)["blocks"] if one["kind"] == "figure"):
+        panel = chart_of(block["chart"]).columns[0].panels[0]
+        drawn[panel.y.label] = [np.asarray(item.y) for item in panel.items if isinstance(item, Curve)]
+    loop = open_loop(HERTZ)
+    turned = np.degrees(np.unwrap(np.angle(loop)))
+    assert turned.min() < -300.0  # beyond -180 deg, where an angle by itself would wrap
+    for curve in drawn["magnitude, dB"]:
+        assert curve == pytest.approx(20.0 * np.log10(np.abs(loop)), abs=1e-2)
+    for curve in drawn["phase, deg"]:
+        assert curve == pytest.approx(turned, abs=0.1)

@@ -263,7 +263,9 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     assert "current, velocity, position" in made(unit, stage="torque")
     for system, inputs in ((unit, ["sped"]), (unit, None), (control.ss(*unit), None), (unit, "error")):
         assert "allowed: a list of command, error, speed" in made(system, inputs)
-    assert "B = other sizes: allowed: 1 x 2" in made(unit, ["error", "speed"])
+    assert "B = other sizes: allowed: 1 x 2, with 2 inputs" in made(unit, ["error", "speed"])
+    assert 'inputs = "omega": allowed' in made(unit, ["error", "omega"])
+    assert "continuous: sampled, dt = 0.0001" in made(unit, continuous=unit)
     assert "one row, a law has one output" in made(([[0.5]], [[1.0]], [[1.0], [1.0]], [[0.0], [0.0]], T))
     assert "as many rows as columns" in made(([[0.5, 1.0]], [[1.0]], [[1.0]], [[0.0]], T))
     assert "real numbers" in made(([["a"]], [[1.0]], [[1.0]], [[0.0]], T))

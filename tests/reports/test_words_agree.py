@@ -45,12 +45,12 @@ def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
     assert (found.least, found.where) == (pytest.approx(downwards), "at rest, load 8 N m")
     table = spread_table(points, points[0].figures)
     row = next(row for row in table["rows"] if row["loop"] == "position")
-    assert row["gain"] == "−3.64 (at rest, load 8 N m) to 43.3"
+    assert row["gain"] == "down to −3.64 (at rest, load 8 N m) to 43.3"
     held = next(one for one in points if one.place == "at rest, load 8 N m").figures
     quoted = margin_table(held)
     own = next(row for row in quoted["rows"] if row["loop"] == "position")
     assert own["gain_margin_db"] == pytest.approx(downwards)
-    assert "the smallest gain margin is −3.6 dB (position loop)" in result(held)
+    assert "the smallest gain margin is down to −3.6 dB (position loop)" in result(held)
     assert table["note"].endswith(DOWNWARDS)
     assert quoted["note"].endswith(DOWNWARDS)
     assert DOWNWARDS not in margin_table(points[0].figures)["note"]
@@ -175,3 +175,10 @@ def test_a_drive_that_stands_still_unproven_is_not_said_to_rest_after_every_step
         "stands still, not known for how long",
         "at rest",
     ]
+
+
+def test_gain_margins_of_predictions_are_in_decibels_as_elsewhere() -> None:
+    up = judged("gain_margin", "velocity", 4.0, 4.0, 1e-9, unit="1")
+    down = judged("gain_margin", "position", 0.5, 0.5, 1e-9, unit="1")
+    names = [row["quantity"] for row in validation.table([up, down], "")["rows"]]
+    assert names == ["gain margin, 12.04 dB", "gain margin, down to −6.02 dB"]  # 20 log10 4, 20 log10 1/2
