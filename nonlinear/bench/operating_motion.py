@@ -29,6 +29,7 @@ SLOWEST = 1e-9  # of that
 COMMANDED = 0.7  # of a limit that a command may take
 ROOM = 0.7  # of the way to standstill, or to the next bend of a friction map, that a test may use
 PRESSED = (0.15, 0.05, 0.015, 0.005)  # of the full torque: what presses the coupling
+CLOSED = 1e-3  # of the play: a drive that stands is pressed past it by as much, or rounding shows
 FLAT = 1e-12  # of Tc/w_s: a smaller slope of the tanh law is none
 
 
@@ -162,7 +163,9 @@ def standing(design: Design) -> OperatingMotion:
     if coupling is None or coupling.play_rad == 0.0:
         return OperatingMotion(0.0, 0.0, 0.0, False, holding_moment_Nm(design), extra_Nm=torque)
     press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
-    coupling_Nm = press / design.ratio_behind_coupling
+    closed = CLOSED * coupling.play_rad * coupling.stiffness_Nm_rad
+    coupling_Nm = max(press / design.ratio_behind_coupling, closed)
+    press = coupling_Nm * design.ratio_behind_coupling
     twist = coupling.twist_rad(coupling_Nm)
     passed = 1.0 if load.path == "back-drivable" else 0.0
     torque += passed * coupling_Nm / design.ratio_to_coupling

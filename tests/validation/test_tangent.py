@@ -118,7 +118,7 @@ def test_python_control_draws_it() -> None:
 
 FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035, 740_026,
                741_646, 90_006, 770_155, 910_883, 1_010_043,
-               1_010_057, 1_101_223, 1_101_436, 1_102_029, 1_102_211, 1_301_202]  # fmt: skip
+               1_010_057, 1_101_223, 1_101_436, 1_102_029, 1_102_211, 1_301_202, 2_100_068]  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", FAILED_ONCE)
@@ -127,7 +127,7 @@ def test_drives_that_failed_once(seed: int) -> None:
 
     A slow pair was taken for the rest that an integral holds; a response of 1e-10 was left to rounding.
     A slow pole was taken for the one that passes 1 beside it; a quotient of roundings led away from a margin.
-    A mode at rest was taken out over an integrator that hardly takes part in it.
+    A mode at rest was taken out over an integrator that hardly takes part in it, or a soft spring was one.
     """
     result = validate(full_drive(seed), CHECKS)
     assert result.passed, [str(row) for row in result.not_met]
@@ -167,6 +167,13 @@ def test_a_gain_margin_beyond_200_db_is_no_check(seed: int) -> None:
         (1_010_199, ("position", "i_ref")),
         (1_010_254, ("w_ref", "i_ref")),
         (1_010_187, ("velocity", "u", "output", "command")),
+        (1_500_430, ("velocity", "load")),
+        (1_400_122, ("command",)),
+        (1_400_214, ("velocity",)),
+        (1_400_330, ("position", "output")),
+        (1_400_195, ("command",)),
+        (1_500_506, ("velocity",)),
+        (1_500_082, ("velocity",)),
     ],
 )
 def test_drives_that_were_not_proven_once(seed: int, places: tuple[str, ...]) -> None:
@@ -175,7 +182,10 @@ def test_drives_that_were_not_proven_once(seed: int, places: tuple[str, ...]) ->
     A drive that stands with its coupling pressed was fed forward to the angle of its output (240).  The pole
     that crosses at 0 Hz was taken for half a pair with the mode at rest (800 742).  Within a long period the
     speed left the flat part of tanh unseen (1 010 199, 1 010 254); a pressed coupling parted at steps of
-    which tenths were lost in rounding (1 010 187).
+    which tenths were lost in rounding (1 010 187).  What pressed a coupling was 5e-10 or 6e-6 of its play
+    (1 500 430, 1 400 122).  An output moved by 1e-15 was lost beside the speed (1 400 214, 1 400 330); the
+    motion began with a jump of its feed-forward (1 400 195).  A rest that an integral and a hanging load hold
+    was sought evenly in all rows, of which some are known to rounding (1 500 506, 1 500 082).
     """
     design = full_drive(seed)
     bench = Bench(design, design)
