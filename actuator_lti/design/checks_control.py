@@ -164,6 +164,15 @@ def _hot(heat: Any, key: str) -> Iterator[Refusal]:
         yield f"temperature.{key}", f"{value:g} degC", "R, kM and kE must keep 5 % of their value"
 
 
+def _command_filter(design: Design) -> Iterator[Refusal]:
+    """Its frequency has to lie below pi/T of the stage that takes the command."""
+    control, filter_time_s = design.controller, design.command.filter_time_s
+    period_s = control.period_s * getattr(getattr(control, control.outermost, None), "every", 1)
+    if 0.0 < filter_time_s <= period_s / pi:
+        least = f"allowed: 0, or above T/pi of the outermost loop, {period_s / pi:.6g} s"
+        yield "command.filter_time", _written(design, "filter_time", filter_time_s), least
+
+
 def _command(design: Design) -> Iterator[Refusal]:
     for field in fields_in("command"):
         if field.key in _PROFILE:
@@ -200,12 +209,14 @@ def _slow_enough(design: Design, key: str, value: float) -> Iterator[Refusal]:
 
 
 def _unit(design: Design, key: str) -> str:
-    """SI unit of a profile's limit."""
+    """SI unit of a key of the command."""
+    if key not in _PROFILE:
+        return "s"
     return ("m/s" if design.axis == "linear" else "rad/s") + _PROFILE[key][0]
 
 
 def _written(design: Design, key: str, value: float) -> str:
-    """A profile's limit as the file has it, else in SI."""
+    """A key of the command as the file has it, else in SI."""
     parameter = design.parameters.get(f"command.{key}")
     return f"{value:.6g} {_unit(design, key)}" if parameter is None else parameter.text
 
@@ -315,6 +326,7 @@ def _instruments(design: Design) -> Iterator[Refusal]:
 
 CONTROL_CHECKS = (
     _filters, _filter_count, _speed_sensor, _anti_windup, _windup, _position, _overload, _supply, _brake,
-    _regenerative, _winding, _command, _laws, _gravity, _friction_map, _friction_points, _instruments,
+    _regenerative, _winding, _command, _command_filter, _laws, _gravity, _friction_map, _friction_points,
+    _instruments,
 )  # fmt: skip
 """Each gives the settings that contradict each other: key, value, what is allowed."""

@@ -4,7 +4,7 @@ A stage that the drive does not have is ``None``; a limit that it does not have 
 """
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, pi
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -273,6 +273,22 @@ class Command:
         "largest acceleration of the command, output side", example="400 deg/s^2")] = inf
     jerk_rad_s3: Annotated[float, positive(
         "jerk", "{angle}/s^3", "", "largest jerk of the command, output side", example="8000 deg/s^3")] = inf
+
+    def lowpass(self, period_s: Any, where: str = "") -> Filter:
+        """The filter, w0 = 1/`filter_time_s`, for the period of the outermost stage in s.
+
+        Raises
+        ------
+        InputError
+            For a time constant of T/pi or less: w0 has to lie below pi/T.
+        """
+        w0 = 1.0 / self.filter_time_s
+        if np.any(w0 * np.asarray(period_s) >= pi):
+            message = f"command.filter_time = {np.min(self.filter_time_s):g} s"
+            raise InputError(f"{message}: must be above T/pi = {np.max(period_s) / pi:g} s", where=where)
+        return Filter(
+            kind="lowpass", frequency_rad_s=w0, order=self.filter_order, damping=self.filter_damping
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -109,19 +109,11 @@ class Drive:
     @property
     def command_filter(self) -> Block | None:
         """The filter of the command at the period of the outermost stage, in Tustin's form."""
-        from actuator_lti.design.model import Filter
-
         command = self.design.command
         if not present(command.filter_time_s):
             return None
-        item = Filter(
-            kind="lowpass",
-            frequency_rad_s=1 / command.filter_time_s,
-            order=command.filter_order,
-            damping=command.filter_damping,
-        )
         T = self.period_s(self.outermost) if self.stages else self.tick_s
-        return blocks.biquad(item, T)
+        return blocks.biquad(command.lowpass(T, self.design.name), T)
 
     @property
     def torque_per_target(self) -> Any:

@@ -110,8 +110,12 @@ class PeriodicLoop:
     hidden: int = 0
 
     def modes(self, gain: npt.ArrayLike = 1.0) -> np.ndarray:
-        """Eigenvalues over one period with the loop closed through a gain, or through each of several."""
-        modes = np.asarray(np.linalg.eigvals(self._over(gain)), dtype=complex)
+        """Eigenvalues over one period with the loop closed through a gain, or through each of several.
+
+        By what a period changes: of slow ones rounding leaves their distance from 1, some of 1e-11 too.
+        """
+        over = self._over(gain)
+        modes = 1.0 + np.asarray(np.linalg.eigvals(over - np.eye(over.shape[-1])), dtype=complex)
         if not self.hidden:
             return modes
         return np.take_along_axis(modes, np.argsort(np.abs(modes - 1.0))[..., self.hidden :], axis=-1)

@@ -77,8 +77,10 @@ def _at_rest(As: np.ndarray, Cs: np.ndarray, at: float, j: int, alone: bool) -> 
     """The vector v with v_j = 1, A v = ``at`` v and C v = 0 within rounding; ``None`` where there is none."""
     n = As.shape[-1]
     o = np.arange(n) != j
-    rows = (As - at * np.eye(n)).reshape(-1, n)
-    allowed = (np.abs(As) + abs(at) * np.eye(n)).reshape(-1, n)
+    turned = As - at * np.eye(n)
+    rows = turned.reshape(-1, n)
+    rounded = (As != at) & np.eye(n, dtype=bool)  # of an integrator only what it sums is, not itself
+    allowed = np.where(rounded, np.abs(As) + abs(at), np.abs(turned)).reshape(-1, n)
     c = Cs.reshape(-1, n)
     v = np.zeros(n)
     v[j] = 1.0

@@ -4,9 +4,9 @@ Which numbers take part, a kick at the place shows: those that it moves.  The ti
 which are seen, and for what bends, of which the design says over how far: a moment over its angle, the tanh
 law beside its flat part.  So the steps begin far above the kick's own motion, or with the largest without an
 event, or where what bends is moved by `BENT` of that and the tanh law is flat in every tick; and they fall by
-tens while a smaller one agrees better: larger ones bend, smaller ones are lost in rounding.  Each column is
-taken where two successive steps agree best, by what their difference does to the response.  The sum of these
-differences is the stated error.
+tens while a smaller one agrees better: larger ones bend, smaller ones are lost in rounding.  Where even the
+largest is lost in it, they grow.  Each column is taken where two successive steps agree best, by what their
+difference does to the response.  The sum of these differences is the stated error.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.systems.resolvent import balanced
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.state_kinds import CONTINUOUS, COUNTER, FLAG, names_of, places_of
 from nonlinear.bench.injection import Injection, Watched
@@ -29,7 +30,9 @@ MOST_DECADES = 40  # of steps, where events forbid the larger ones
 TENFOLD = 100.0  # what the truncation of central differences grows by with a step ten times as large
 FAR = 1e8  # times a kick's first motion: the largest step
 BENT = 1e-3  # of the way over which a torque bends, that the largest step may move it
+GROWN, KNOWN = 8, 1e-9  # decades that a column's steps may grow by, while its error is more than that
 LEAST = 3  # steps of a column: two differences, of which the second says whether it bends
+SLOWEST = 1e-13  # rad a sample: what is slower is at rest
 FRESH = 4  # periods from when a number is first moved, in which its motion gives its scale
 
 
@@ -51,12 +54,7 @@ class Differences:
         self.injected = Injection(setup, place, watched)
         self.drive = self.injected.rows.running()
         self.injected.prepare(self.drive.p)
-        control = setup.design.controller
-        if setup.bias.speed_rad_s == 0.0 and control.position and control.position.sensor == "output":
-            stands = setup.design.total_ratio * setup.bias.output_rad(setup.design)
-            self.drive.start[[at.S_REFERENCE, at.S_REFERENCE_BEFORE]] = (
-                stands  # else it is fed forward to there
-            )
+        self._led()
         self.base, self.hold = setup.base_ticks, self.injected.hold_ticks
         self.updates, self.size = self.base // self.hold, self.drive.start.size
         self.watched = places_of(self.drive.p, FLAG, COUNTER)
@@ -67,6 +65,19 @@ class Differences:
         self.moved, scale, self.kick = self._reached()
         self.places = np.concatenate([self.moved, self.size + np.arange(self.updates)])
         self.scale = np.concatenate([scale, np.full(self.updates, self.kick)])
+
+    def _led(self) -> None:
+        """Let the commands before the first be those of the motion: else it is fed forward to there."""
+        setup, start = self.setup, self.drive.start
+        place, N, speed = setup.design.controller.position, setup.design.total_ratio, setup.bias.speed_rad_s
+        if place is None or setup.outer != "position" or (speed == 0.0 and place.sensor != "output"):
+            return
+        now = N * setup.bias.output_rad(setup.design)
+        if speed:
+            size, since_s = self.injected.rows.values[0, [at.BIAS + 1, at.BIAS + 2]]
+            now = -N * size * since_s
+        period_s = place.every * setup.design.controller.period_s
+        start[[at.S_REFERENCE, at.S_REFERENCE_BEFORE]] = now - speed * period_s * np.array([1.0, 2.0])
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -86,18 +97,29 @@ class Differences:
         ]
         for columns, (left, right) in self._tried(rows):
             whole, off = columns.best(left, right)
-            yield self._split(whole), off, float(np.max(np.einsum("zi,ik,zk->z", left, off, right)))
+            g = GRID.size
+            yield self._split(whole), off, float(np.max(np.einsum("zi,ik,zk->z", left[:g], off, right[:g])))
 
     def _split(self, whole: Floats) -> Parts:
         n = self.moved.size
         return whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]
 
     def _felt(self, whole: Floats) -> tuple[Floats, Floats]:
-        """What errors of the entries do to the response, over its size, see `sensitivities`."""
-        n = self.moved.size
-        left, right = sensitivities(*self._split(whole), np.exp(1j * GRID))
+        """What errors of the entries do to the response, over its size, see `sensitivities`.
+
+        At `GRID`, and behind it where slow poles are.
+        """
+        n, slow = self.moved.size, self._slow(whole)
+        left, right = sensitivities(*self._split(whole), np.exp(1j * np.concatenate([GRID, slow])))
         answer = np.einsum("zi,ik,zk->z", left[:, n:], whole[n:], right)
         return np.abs(left) / sized(answer)[:, None], np.abs(right)
+
+    def _slow(self, whole: Floats) -> Floats:
+        """Angles a sample of poles below `GRID`, but of those at rest."""
+        n = self.moved.size
+        poles = np.linalg.eigvals(balanced(whole[:n, :n])[0] - np.eye(n))
+        angles = np.abs(poles) / self.updates
+        return np.asarray(angles[(angles > SLOWEST) & (angles < GRID[0])])
 
     def _runs(self, rows: Floats) -> tuple[Floats, Floats, Floats]:
         """States behind one base period, what is read at each update, and flags on the way."""
@@ -198,7 +220,8 @@ class Differences:
             free = np.isfinite(values).all(axis=1)
             small = free & ~seen & (tries > 1)
             values[small] = np.nan
-            steps, seen = np.where(small, 5.0, np.where(seen & ~free, 0.5, 0.1)) * steps, seen | free
+            smaller = np.where(small, 5.0, np.where(seen & ~free, 0.5, 0.1))
+            steps, seen = np.where(going, smaller, 1.0) * steps, seen | free
             tried.append((values, rounding))
             for row, far in self._bends:
                 moved = np.abs(values[:, row])
@@ -206,16 +229,35 @@ class Differences:
                 steps = np.fmin(steps, far / np.maximum(moved, 1e-250))
             if tries < LEAST:
                 continue
-            whole, off = (np.stack(each) for each in zip(*tried, strict=True))
-            columns = [_Columns(whole[:, :, each], off[:, :, each]) for each in rows]
+            columns = _columns(rows, tried)
             going = ~columns[0].free
             if not going.any():
                 felt = felt or [self._felt(each.last) for each in columns]
                 for one, (left, right) in zip(columns, felt, strict=True):
                     going = going | one.bend(left, right)
                 if not going.any():
-                    return list(zip(columns, felt, strict=True))
+                    return self._grown(rows, tried, felt)
         raise self._refused(~going)
+
+    def _grown(
+        self,
+        rows: list[npt.NDArray[np.intp]],
+        tried: list[tuple[Floats, Floats]],
+        felt: list[tuple[Floats, Floats]],
+    ) -> list[tuple[_Columns, tuple[Floats, Floats]]]:
+        """The same with larger steps of columns that the largest knows best, while they agree better.
+
+        A number that hardly moves beside large ones is lost in their rounding at steps by its own motion.
+        """
+        steps = self._largest()
+        for _ in range(GROWN):
+            columns = _columns(rows, tried)
+            going = np.any([one.grow(*each) for one, each in zip(columns, felt, strict=True)], axis=0)
+            if not going.any():
+                break
+            steps = np.where(going, 10.0 * steps, 0.0)
+            tried.insert(0, self._differences(steps))
+        return list(zip(_columns(rows, tried), felt, strict=True))
 
     def _refused(self, free: npt.NDArray[np.bool_]) -> NumericalError:
         """No step without an event."""
@@ -281,6 +323,12 @@ class _Columns:
         felt, last, columns = _felt(self.off, left, right), self._smallest, np.arange(right.shape[1])
         return np.asarray(felt[last, columns] * np.sqrt(TENFOLD) < felt[last - 1, columns])
 
+    def grow(self, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
+        """Which the largest step of all knows best, but not well."""
+        felt = _felt(self.off, left, right)
+        known = np.where(np.isfinite(felt), felt, np.inf)
+        return np.asarray((np.argmin(known, axis=0) == 0) & np.isfinite(felt[0]) & (felt[0] > KNOWN))
+
     def best(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:
         """Each column by the step whose error does least to the response; and that error."""
         felt = _felt(self.off, left, right)
@@ -290,6 +338,12 @@ class _Columns:
     @staticmethod
     def _taken(chosen: npt.NDArray[np.intp], values: Floats) -> Floats:
         return values[chosen, np.arange(chosen.size)].T
+
+
+def _columns(rows: list[npt.NDArray[np.intp]], tried: list[tuple[Floats, Floats]]) -> list[_Columns]:
+    """Of the rows of each thing that is read."""
+    whole, off = (np.stack(each) for each in zip(*tried, strict=True))
+    return [_Columns(whole[:, :, each], off[:, :, each]) for each in rows]
 
 
 def _felt(off: Floats, left: Floats, right: Floats) -> Floats:

@@ -32,15 +32,27 @@ def without_rest(A: Floats, errors: Floats, most: int) -> tuple[Floats, Floats]:
         if left == 0 or len(A) < 2:
             break
         own, size = np.eye(len(A)), len(A) * EPS * np.max(np.abs(A), axis=1, initial=1.0)
-        v = _nearest_to_rest(A - own)
+        v, allowed = _at_rest(A - own, errors, size)
         j = int(np.argmax(np.abs(v)))
-        v /= v[j]
-        if (np.abs((A - own) @ v) > errors @ np.abs(v) + size).any():
+        if (np.abs((A - own) @ v) > allowed).any():
             break
         o = np.arange(len(v)) != j
         errors = (errors + np.outer(np.abs(v), errors[j]))[np.ix_(o, o)]
         A = (A - np.outer(v, A[j]))[np.ix_(o, o)]
     return A, errors
+
+
+def _at_rest(turned: Floats, errors: Floats, size: Floats) -> tuple[Floats, Floats]:
+    """The v, its largest part 1, that A - 1 makes least of by what is allowed of each row; and what that is.
+
+    An integrator's row is known to rounding, a bent load's to the errors of its columns.
+    """
+    v, allowed = np.zeros(len(turned)), np.ones(len(turned))
+    for _ in range(3):
+        v = _nearest_to_rest(turned / allowed[:, None])
+        v /= v[int(np.argmax(np.abs(v)))]
+        allowed = errors @ np.abs(v) + size
+    return v, allowed
 
 
 def _nearest_to_rest(turned: Floats) -> Floats:

@@ -229,7 +229,7 @@ class LoopSetup:
                 speed = self.bias.speed_rad_s / self.design.total_ratio
                 row.ramp("bias", speed, -command / speed)
             return
-        ahead = wanted / row["position_gain"]
+        ahead = (wanted - row["feedforward"] * self.bias.speed_rad_s) / row["position_gain"]
         at_output = self.design.controller.position_loop.sensor == "output"
         seen = self.design.total_ratio * self.bias.output_rad(self.design) if at_output else 0.0
         if self.bias.speed_rad_s == 0.0:

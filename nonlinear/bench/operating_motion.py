@@ -14,7 +14,7 @@ from math import copysign, cosh, inf, isfinite
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design, FilterPlace, Friction, LoadFriction
+from actuator_lti.design.model import Coupling, Design, FilterPlace, Friction, LoadFriction
 from actuator_lti.drive.angle import follows_angle, holding_moment_Nm, holding_torque_Nm
 from actuator_lti.drive.operating import Operating, segments
 from actuator_lti.errors import InputError
@@ -29,6 +29,7 @@ SLOWEST = 1e-9  # of that
 COMMANDED = 0.7  # of a limit that a command may take
 ROOM = 0.7  # of the way to standstill, or to the next bend of a friction map, that a test may use
 PRESSED = (0.15, 0.05, 0.015, 0.005)  # of the full torque: what presses the coupling
+CLOSED = 0.01  # of the play: a coupling is pressed past it by as much, or rounding shows
 FLAT = 1e-12  # of Tc/w_s: a smaller slope of the tanh law is none
 
 
@@ -49,7 +50,8 @@ class OperatingMotion:
     twist_rad, coupling_Nm : float
         Of the coupling, at its own shaft; 0 where the drive train is rigid.
     extra_Nm : float
-        Constant torque at the motor shaft of a drive that stands, against what presses it and its own.
+        Constant torque at the motor shaft: against what presses the coupling past its play, and on a drive
+        that stands against its own.
     room_rad_s : float
         How far the motor speed may move before the friction is another.
     """
@@ -110,7 +112,7 @@ def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
         for moment in loads:
             motion = _fastest(design, moment, share)
             if motion is not None:
-                return motion
+                return _closed(design, motion)
     least, limits = operating_motion_at(design, SLOWEST * FASTEST_RAD_S, loads[-1]), design.limits
     stuck = least.voltage_V > limits.voltage_V or least.current_A > limits.peak_current_A
     if stuck or bent_about_rest(design):
@@ -162,12 +164,37 @@ def standing(design: Design) -> OperatingMotion:
     if coupling is None or coupling.play_rad == 0.0:
         return OperatingMotion(0.0, 0.0, 0.0, False, holding_moment_Nm(design), extra_Nm=torque)
     press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
-    coupling_Nm = press / design.ratio_behind_coupling
+    coupling_Nm = max(press / design.ratio_behind_coupling, _closing_Nm(coupling))
+    press = coupling_Nm * design.ratio_behind_coupling
     twist = coupling.twist_rad(coupling_Nm)
     passed = 1.0 if load.path == "back-drivable" else 0.0
     torque += passed * coupling_Nm / design.ratio_to_coupling
     moment = holding_moment_Nm(design, -twist / design.ratio_behind_coupling) - press
     return OperatingMotion(0.0, 0.0, 0.0, False, moment, twist, coupling_Nm, extra_Nm=torque)
+
+
+def _closing_Nm(coupling: Coupling) -> float:
+    """What presses a coupling past its play, on its first piece."""
+    piece = inf if coupling.torque_1_Nm is None else 0.5 * coupling.torque_1_Nm
+    return min(CLOSED * coupling.play_rad * coupling.stiffness_Nm_rad, piece)
+
+
+def _closed(design: Design, motion: OperatingMotion) -> OperatingMotion:
+    """The same with the coupling pressed past its play; a torque at the motor shaft carries what it takes."""
+    coupling, pressed = design.coupling, motion.coupling_Nm
+    if coupling is None or abs(pressed) >= _closing_Nm(coupling):
+        return motion
+    more = copysign(_closing_Nm(coupling), pressed) - pressed
+    load_Nm = motion.load_Nm - more * design.ratio_behind_coupling
+    held = operating_motion_at(design, motion.speed_rad_s, load_Nm)
+    motor = design.effective_motor
+    if motor.source_gain_Nm_V is not None:
+        extra = motor.source_gain_Nm_V * (held.voltage_V - motion.voltage_V)
+    else:
+        extra = (motor.torque_constant_Nm_A or 0.0) * (held.current_A - motion.current_A)
+    return replace(
+        motion, load_Nm=load_Nm, twist_rad=held.twist_rad, coupling_Nm=held.coupling_Nm, extra_Nm=extra
+    )
 
 
 def full_torque_Nm(design: Design) -> float:

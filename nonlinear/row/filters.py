@@ -69,14 +69,7 @@ def section(item: Filter, period_s: Any, where: str = "") -> Section:
 
 def command_section(command: Command, period_s: Any, where: str = "") -> Section:
     """The command filter at the period of the outermost stage: a low-pass with w0 = 1/filter_time."""
-    w0 = 1.0 / command.filter_time_s
-    lowpass = Filter(
-        kind="lowpass", frequency_rad_s=w0, order=command.filter_order, damping=command.filter_damping
-    )
-    if np.any(w0 * np.asarray(period_s) >= pi):
-        message = f"command.filter_time = {np.min(command.filter_time_s):g} s"
-        raise InputError(f"{message}: must be above T/pi = {np.max(period_s) / pi:g} s", where=where)
-    return section(lowpass, period_s, where)
+    return section(command.lowpass(period_s, where), period_s, where)
 
 
 def _given(item: Filter, name: str, where: str) -> Any:

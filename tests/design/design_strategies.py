@@ -77,6 +77,7 @@ _NO_OVERLOAD = {"speed": None, "continuous_current": None, "peak_time": None}
 _overload = st.sampled_from(
     [_NO_OVERLOAD, {"speed": None, "peak_current": "12 A", "continuous_current": "4 A", "peak_time": "1 s"}]
 )
+_filter_times = st.sampled_from([None, "0 s", "3 ms", {"value": "0.5 s", "grade": "A", "tolerance": "5 %"}])
 _FILTERS: list[dict[str, Any]] = [
     {"kind": "lowpass", "frequency": "20 Hz", "order": 2, "damping": 0.7},
     {"kind": "lowpass", "frequency": {"value": "30 Hz", "source": "tuned", "tolerance": "5 %"}},
@@ -141,7 +142,8 @@ def design_trees(draw: st.DrawFn) -> dict[str, Any]:
         "instruments": {"jitter": "20 us"},
     }  # fmt: skip
     if "position" in control:
-        given["command"] = {"jerk": None, "acceleration": None, "rate": "1 urad/s"}
+        given["command"] = {"jerk": None, "acceleration": None, "rate": "1 urad/s",
+                            "filter_time": draw(_filter_times)}  # fmt: skip
         given["command"] = given["command"] if axis == "rotary" else {**given["command"], "rate": "1 um/s"}
     if not source:
         given["temperature"] = {

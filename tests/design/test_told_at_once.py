@@ -34,6 +34,8 @@ RELATIONS: list[tuple[dict[str, Any], str, set[str]]] = [
      {"load.gear_error", "load.gear_error_periods", "control.period", *TOP_SPEED, *RATIO}),
     ({"command.rate": "900 deg/s"}, "command.rate", {"command.rate", "limits.speed", *RATIO}),
     ({"command.jerk": "1 rad/s^3"}, "command.jerk", {"command.jerk"}),
+    ({"command.filter_time": "31 us"}, "command.filter_time",
+     {"command.filter_time", "control.position.every", "control.period"}),
     ({"supply.brake_voltage": "5 V"}, "supply.brake_voltage", {"supply.brake_voltage", "limits.voltage"}),
     ({"supply.regenerative": False}, "supply.regenerative", {"supply.regenerative"}),
     ({"encoder.speed": "tracking", "encoder.bandwidth": "9 kHz"}, "encoder.bandwidth",

@@ -122,6 +122,7 @@ def test_a_speed_drive_has_no_position_loop() -> None:
         ({"supply.brake_voltage": "10 V"}, r"at least limits\.voltage = 12 V"),
         ({"command.rate": "90 deg/s"}, r"faster than limits\.speed"),
         ({"command.jerk": "1 rad/s^3"}, r"needs command\.acceleration"),
+        ({"command.filter_time": "31 us"}, r"filter_time = 31 us.*above T/pi.*3.1831e-05 s"),
         ({"friction.point": [{"speed": "1 rad/s", "torque": "1 mN*m"}]}, "friction.dry_torque"),
         ({"instruments.jitter": "50 us"}, "a tenth of a tick"),
         ({"temperature.winding": "20 K"}, "degC"),

@@ -96,6 +96,44 @@ def closed_exactly(block: Block, x: complex) -> complex:
         return complex((C * lu_solve(mp.mpmathify(x) * mp.eye(A.rows) - A + B * C, B))[0])
 
 
+def test_a_soft_spring_is_no_mode_at_rest() -> None:
+    """Time constants of 1e9 ticks and more, in closed form from the equations of motor and PI at 60 digits.
+
+    The integral moves by 6e-12 a period where it holds the spring: a rest once, and margins 1.7 deg apart.
+    """
+    design = full_drive(2_100_068)
+    loops = assemble_loops(on_its_stand(on_the_bench(design)))
+    period_s = 10.0 * design.controller.period_s
+    with mp.workdps(60):
+        for loop in (loops.position.open_loop, loops.break_points["u"].open_loop):
+            for omega in (1.17e-6, 5e-6, 1.0):
+                exact = complex(slow_loop(design, mp.expj(omega * mp.mpf(period_s))))
+                assert loop(np.exp(1j * omega * period_s)) == pytest.approx(exact, rel=1e-6)
+        slowest = mp.findroot(lambda change: 1 / slow_loop(design, 1 + change) + 1, -2.6e-12)
+    found = exact_margins(loops, "u")
+    assert found.delay_s == np.inf
+    assert found.spectral_radius - 1.0 == pytest.approx(float(slowest), rel=1e-3)
+
+
+def slow_loop(design: Any, z: Any) -> Any:
+    """L of a PI on the voltage every 10 ticks, one tick late; a spring's torque is held over a tick."""
+    motor, place, N = design.effective_motor, design.controller.position, mp.mpf(design.total_ratio)
+    R, L, k = (mp.mpf(x) for x in (motor.resistance_ohm, motor.inductance_H, motor.torque_constant_Nm_A))
+    J, T = mp.mpf(motor.rotor_inertia_kgm2) + design.load.inertia_kgm2 / N**2, design.controller.period_s
+    rates = mp.matrix(5, 5)  # of current, speed, angle under voltage and torque
+    rates[0, :4] = mp.matrix([[-R / L, -k / L, 0, 1 / L]])
+    rates[1, :] = mp.matrix([[k / J, -mp.mpf(design.friction.viscous_Nms_rad) / J, 0, 0, 1 / J]])
+    rates[2, 1] = 1
+    held = mp.expm(rates * T)
+    tick, voltage = held[:3, :3], held[:3, 3]
+    tick[:, 2] += held[:3, 4] * design.load.moment_slope_Nm_rad / N**2
+    later = mp.matrix(3, 1)
+    for _ in range(9):
+        later = tick * later + voltage
+    moved = mp.lu_solve(z * mp.eye(3) - tick**10, later + tick**9 * voltage / z)
+    return moved[2] * place.gain * (1 + 10 * T / mp.mpf(place.integral_time_s) * z / (z - 1))
+
+
 @pytest.mark.parametrize("slope", [-6000.0, -100.0])
 def test_a_users_own_loop_of_that_kind_has_its_bandwidth(slope: float) -> None:
     """Closed by hand from the matrices with the hidden mode in them: no resonance of 6000 dB at 0 Hz."""

@@ -19,7 +19,7 @@ from nonlinear.bench.derivative import Tangent
 from nonlinear.bench.lifted import GRID, relative
 from nonlinear.bench.loop_setup import points_of, stages_of
 from nonlinear.bench.on_the_bench import on_the_bench
-from nonlinear.bench.operating_motion import on_its_stand, operating_motion
+from nonlinear.bench.operating_motion import on_its_stand, operating_motion, operating_motion_at
 from tests.validation.random_drives import full_drive, is_stable
 
 Z = np.exp(1j * GRID)
@@ -118,7 +118,7 @@ def test_python_control_draws_it() -> None:
 
 FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035, 740_026,
                741_646, 90_006, 770_155, 910_883, 1_010_043,
-               1_010_057, 1_101_223, 1_101_436, 1_102_029, 1_102_211, 1_301_202]  # fmt: skip
+               1_010_057, 1_101_223, 1_101_436, 1_102_029, 1_102_211, 1_301_202, 2_100_068]  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", FAILED_ONCE)
@@ -127,7 +127,7 @@ def test_drives_that_failed_once(seed: int) -> None:
 
     A slow pair was taken for the rest that an integral holds; a response of 1e-10 was left to rounding.
     A slow pole was taken for the one that passes 1 beside it; a quotient of roundings led away from a margin.
-    A mode at rest was taken out over an integrator that hardly takes part in it.
+    A mode at rest was taken out over an integrator that hardly takes part in it, or a soft spring was one.
     """
     result = validate(full_drive(seed), CHECKS)
     assert result.passed, [str(row) for row in result.not_met]
@@ -167,6 +167,14 @@ def test_a_gain_margin_beyond_200_db_is_no_check(seed: int) -> None:
         (1_010_199, ("position", "i_ref")),
         (1_010_254, ("w_ref", "i_ref")),
         (1_010_187, ("velocity", "u", "output", "command")),
+        (1_500_430, ("velocity", "load")),
+        (1_400_122, ("command",)),
+        (1_400_214, ("velocity",)),
+        (1_400_330, ("position", "output")),
+        (1_400_195, ("command",)),
+        (1_500_506, ("velocity",)),
+        (1_500_082, ("velocity",)),
+        (1_700_648, ("position", "command")),
     ],
 )
 def test_drives_that_were_not_proven_once(seed: int, places: tuple[str, ...]) -> None:
@@ -175,12 +183,29 @@ def test_drives_that_were_not_proven_once(seed: int, places: tuple[str, ...]) ->
     A drive that stands with its coupling pressed was fed forward to the angle of its output (240).  The pole
     that crosses at 0 Hz was taken for half a pair with the mode at rest (800 742).  Within a long period the
     speed left the flat part of tanh unseen (1 010 199, 1 010 254); a pressed coupling parted at steps of
-    which tenths were lost in rounding (1 010 187).
+    which tenths were lost in rounding (1 010 187).  What pressed a coupling was 5e-10 to 9e-5 of its play
+    (1 500 430, 1 400 122, 1 700 648).  An output moved by 1e-15 was lost beside the speed (1 400 214,
+    1 400 330); the motion began with a jump of its feed-forward (1 400 195).  A rest that an integral and a
+    hanging load hold was sought evenly in all rows; some are known to rounding (1 500 506, 1 500 082).
     """
     design = full_drive(seed)
     bench = Bench(design, design)
     for name in places:
         assert {row.verdict for row in small_signal(bench.place(name))} == {Verdict.MET}, name
+
+
+def test_a_moving_drive_is_pressed_at_no_cost_to_its_motor() -> None:
+    """The coupling of a seed of which its rating presses 9e-5 of the play; a torque at the shaft holds it."""
+    drive = on_its_stand(on_the_bench(full_drive(1_700_648)))
+    coupling, motion = drive.coupling, operating_motion(drive)
+    plain = operating_motion_at(drive, motion.speed_rad_s, motion.load_Nm)
+    assert motion.speed_rad_s > 0.0
+    past_rad = abs(motion.twist_rad) - 0.5 * coupling.play_rad
+    assert past_rad == pytest.approx(0.01 * coupling.play_rad, rel=1e-9)
+    assert motion.coupling_Nm == pytest.approx(coupling.stiffness_Nm_rad * past_rad, rel=1e-9)
+    torque_Nm = drive.effective_motor.torque_constant_Nm_A * (plain.current_A - motion.current_A)
+    assert motion.extra_Nm == pytest.approx(torque_Nm, rel=1e-9)
+    assert abs(motion.current_A) < 0.4 * drive.limits.peak_current_A < abs(plain.current_A)
 
 
 def test_a_rest_that_an_integral_holds_is_no_border_under_any_delay() -> None:
@@ -204,26 +229,39 @@ def test_a_load_that_hangs_is_a_spring() -> None:
         assert np.max(off) <= max(1e-9, hangs.stated_error), place
 
 
-def test_a_margin_at_rest_that_is_not_resolved_is_not_proven() -> None:
+def test_a_margin_at_rest_is_proven_as_far_as_it_is_resolved() -> None:
     """A P current loop feeds 0.8 of the back-EMF forward: at 1/0.8 the speed is an integrator, exactly.
 
-    Its pole is at 1 - 2.7e-9 a tick; a response beside 0 Hz was taken for that at 0 Hz once.
+    Its pole is at 1 - 2.7e-9 a tick; a response beside 0 Hz was taken for that at 0 Hz once.  With errors of
+    the entries 100 times as large it is not proven.
     """
     design = full_drive(910_869)
     assert design.controller.current.back_emf_feedforward == 0.8
     assert design.controller.current.integral_time_s is None
-    rows = small_signal(Bench(design, design).place("u"))
+    place = Bench(design, design).place("u")
+    rows = small_signal(place)
+    assert all(row.verdict is Verdict.MET for row in rows)
+    (row,) = (row for row in rows if row.name == "gain_margin" and row.because.startswith("0 Hz"))
+    assert row.predicted == pytest.approx(1.0 / 0.8, rel=1e-9)
+    assert row.found == pytest.approx(1.0 / 0.8, rel=1e-5)
+    coarse = replace(place.tangent, entry_errors=100.0 * place.tangent.entry_errors)
+    rows = small_signal(replace(place, tangent=coarse))
     (row,) = (row for row in rows if row.verdict is not Verdict.MET)
     assert (row.name, row.verdict) == ("gain_margin", Verdict.NOT_PROVEN)
     assert "stated error of the tangent there" in row.because
-    assert row.predicted == pytest.approx(1.0 / 0.8, rel=1e-9)
     assert row.found == pytest.approx(1.0 / 0.8, rel=0.05)
 
 
 def test_a_resonance_that_is_not_resolved_is_not_proven() -> None:
-    """A load of damping 5e-9: each figure is allowed what the errors make of it where it is."""
+    """A load of damping 5e-9: each figure is allowed what the errors make of it where it is.
+
+    Its coupling, pressed past the play, is resolved; with errors of the entries 1e4 times as large it is not.
+    """
     design = full_drive(760_008)
-    rows = small_signal(Bench(design, design).place("u"))
+    place = Bench(design, design).place("u")
+    assert all(row.verdict is Verdict.MET for row in small_signal(place))
+    coarse = replace(place.tangent, entry_errors=1e4 * place.tangent.entry_errors)
+    rows = small_signal(replace(place, tangent=coarse))
     unproven = [row for row in rows if row.verdict is not Verdict.MET]
     assert {"response", "sensitivity_peak"} <= {row.name for row in unproven}
     for row in unproven:
