@@ -9,19 +9,19 @@ from typing import Any, overload
 import flint
 
 from actuator_lti.bandwidth.exact_gain import exact_gain
+from actuator_lti.bandwidth.late_response import first_turn, nearest_behind_delay
 from actuator_lti.bandwidth.measured import measured_bandwidth
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
 from actuator_lti.errors import InputError
 from actuator_lti.margins.delays.form import delay_form, in_series
-from actuator_lti.margins.delays.response import DelayResponse
 from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS
 from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.loop import exact_loop, exact_polynomials
 from actuator_lti.margins.given import Given, given_of, whole_samples
-from actuator_lti.margins.late_response import first_turn, nearest_behind_delay
 from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
-from actuator_lti.margins.measured.data import is_measured
+from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.exact_fraction import Fraction, dc_noise, double, exact_fraction, shown
+from actuator_lti.systems.measured_response import is_measured
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.rest_mode import without_rest_mode
 

@@ -12,7 +12,6 @@ from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Range
 from actuator_lti.errors import InputError
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds
-from actuator_lti.margins.measured.data import MeasuredResponse, at_once, measured_response
 from actuator_lti.margins.measured.margins import (
     Group,
     between,
@@ -21,6 +20,7 @@ from actuator_lti.margins.measured.margins import (
     refuse_coarse,
     single_passages,
 )
+from actuator_lti.systems.measured_response import MeasuredResponse, at_once, measured_response
 
 
 @dataclass(frozen=True)

@@ -105,8 +105,8 @@ def response(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:
 
 def _curve(system: Any, margins: StabilityMargins | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies that show a system and its response there; of measured data their own points."""
-    from actuator_lti.margins.measured.data import is_measured, measured_response
     from actuator_lti.margins.measured.margins import measured_points
+    from actuator_lti.systems.measured_response import is_measured, measured_response
 
     if is_measured(system):
         omega, L, _ = measured_points(measured_response(system), None)
@@ -117,7 +117,7 @@ def _curve(system: Any, margins: StabilityMargins | None = None) -> tuple[np.nda
 
 def _phase_deg(system: Any, omega_rad_s: np.ndarray, L: np.ndarray) -> np.ndarray:
     """Unwrapped; of measured data along the shorter turn from point to point."""
-    from actuator_lti.margins.measured.data import is_measured
+    from actuator_lti.systems.measured_response import is_measured
     from actuator_lti.systems.phase import unwrapped_phase_deg
 
     return (
@@ -222,7 +222,7 @@ def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", 
     import control
 
     from actuator_lti.bandwidth import closed_loop_bandwidth
-    from actuator_lti.margins.measured.data import refuse_measured
+    from actuator_lti.systems.measured_response import refuse_measured
 
     refuse_measured(system)
     if duration_s is None:

@@ -19,13 +19,13 @@ from actuator_lti.bandwidth import Bandwidth, closed_loop_bandwidth
 from actuator_lti.drive.profile import CommandMean
 from actuator_lti.margins.axis_search import gain_bounds
 from actuator_lti.margins.delays.form import delay_form
-from actuator_lti.margins.delays.response import DelayResponse
 from actuator_lti.margins.distances import INVERSE
 from actuator_lti.margins.factored import Response, factored
 from actuator_lti.margins.given import given_of
 from actuator_lti.margins.loop import Real, loop_of, rational_loop
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step import StepFigures
+from actuator_lti.systems.delay_response import DelayResponse
 
 _NARROW = 1e-6  # of the frequency: what is decided by a sign at both ends of so small an interval
 _OVER = 1e-9  # of the final value: less is no overshoot

@@ -6,9 +6,9 @@ rational loops, `delays` for exact delays; data of a measurement: `measured`.
 """
 
 from actuator_lti.margins.engine import stability_margins
-from actuator_lti.margins.measured.data import MeasuredResponse
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement, DelayMargin, DiskMargin, GainMargin, PhaseMargin
+from actuator_lti.systems.measured_response import MeasuredResponse
 
 __all__ = [
     "Agreement",

@@ -13,11 +13,11 @@ from actuator_lti.margins.checked import checked_margins
 from actuator_lti.margins.delays.form import DelayForm, delay_form, without_series_delays
 from actuator_lti.margins.given import Given, given_of, whole_samples
 from actuator_lti.margins.loop import loop_of
-from actuator_lti.margins.measured.data import is_measured
 from actuator_lti.margins.measured.margins import measured_margins
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful
+from actuator_lti.systems.measured_response import is_measured
 
 
 def stability_margins(

@@ -12,12 +12,12 @@ from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.delays.form import DelayForm, delay_form
-from actuator_lti.margins.delays.response import DelayResponse
 from actuator_lti.margins.exact.roots import at_enough_bits
 from actuator_lti.margins.loop import Complex, Real, balanced
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import BAND, Motion
 from actuator_lti.step.rational import NO_FINAL, UNSTABLE, free_motion
+from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.delay_stepper import step_of
 from actuator_lti.systems.exact_fraction import product
 from actuator_lti.systems.plain_delays import response

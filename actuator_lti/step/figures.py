@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.margins.loop import Real, rational_loop
-from actuator_lti.margins.measured.data import refuse_measured
 from actuator_lti.step.delayed import Stepped, delayed_response
 from actuator_lti.step.motion import OVER, Motion
 from actuator_lti.step.rational import notes, rational_motion
+from actuator_lti.systems.measured_response import refuse_measured
 
 _SHOWN = 2000
 

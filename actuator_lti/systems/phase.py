@@ -11,17 +11,17 @@ from numpy.typing import ArrayLike
 from actuator_lti.errors import InputError
 from actuator_lti.margins.axis_search import Factored, half_turn
 from actuator_lti.margins.delays.form import delay_form
-from actuator_lti.margins.delays.response import DelayResponse
 from actuator_lti.margins.exact.loop import exact_loop
 from actuator_lti.margins.exact.roots import half_planes
 from actuator_lti.margins.factored import Response, factored
 from actuator_lti.margins.given import Given, given_of
 from actuator_lti.margins.loop import Real, loop_of
 from actuator_lti.margins.measured.bounds import bounds
-from actuator_lti.margins.measured.data import is_measured, measured_response
 from actuator_lti.margins.measured.margins import measured_points
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.margins.trust import Doubtful
+from actuator_lti.systems.delay_response import DelayResponse
+from actuator_lti.systems.measured_response import is_measured, measured_response
 
 _ON_AXIS = 1e-30  # relative: what certified roots leave of an undamped one
 

@@ -12,7 +12,7 @@ from actuator_lti.files.response import FloatArray, read_response
 from actuator_lti.files.response import Loop as Kind
 from actuator_lti.loops import Loops
 from actuator_lti.margins import StabilityMargins, stability_margins
-from actuator_lti.margins.measured.data import MeasuredResponse, measured_response
+from actuator_lti.systems.measured_response import MeasuredResponse, measured_response
 
 
 @dataclass(frozen=True, kw_only=True)
