@@ -12,6 +12,7 @@ from actuator_lti.design import design_hash, warnings_of
 from actuator_lti.design.loader import as_design, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.files.reading import as_path
 from actuator_lti.files.tree import Tree
 from analyses.corners import corners
 from analyses.isolation import attempt, isolated
@@ -89,7 +90,7 @@ def report(
     """
     from reports.html import write_report
 
-    drive = as_design(design)
+    drive, folder = as_design(design), None if out is None else as_path(out)
     if source is None and not isinstance(design, Design):
         source = design_text(design)
     with step(f"further sections of {drive.name}"):
@@ -99,9 +100,9 @@ def report(
             parts = [*validation_sections(drive, validating), *parts]
     with step(f"computing {drive.name}") as computing:
         made = design_report(drive, parts, progress=computing, source=source)
-    if out is not None:
+    if folder is not None:
         with step("drawing figures") as drawing:
-            write_report(made, out, progress=drawing)
+            write_report(made, folder, progress=drawing)
     return made
 
 

@@ -112,7 +112,8 @@ class Reader:
                 hint = said if word else nearest(key, known)
                 where = f"{path}.{key}" if path else key
                 self.refuse(where, table[key], f"unknown key{hint or '; allowed: ' + ', '.join(known)}")
-                for one in (one for one in known if re.search(rf"(?<![\[.])\b{one}\b(?! of)", hint)):
+                named = [] if word.startswith("not needed") else known  # what is not needed stands for no key
+                for one in (one for one in named if re.search(rf"(?<![\[.])\b{one}\b(?! of)", hint)):
                     renamed = key if word.partition(", which takes")[0] == one else ""
                     meant[one] = meant.get(one) or renamed
         return meant

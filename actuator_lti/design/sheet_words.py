@@ -46,6 +46,7 @@ _WORDS: dict[str, dict[str, str]] = {
         f"continuous_current {_CONTINUOUS}": "continuous_current of [limits]",
         "peak_current max_current": "peak_current of [limits]",
         "torque": "peak_current of [limits], the torque over torque_constant",
+        "type motor_type": "constants, of an AC motor rms-line or peak-phase, else dc",
         "weight power": "not needed; it may stand as a [[fact]]",
         "stall_current stall_torque": f"not asked for, but what follows: {_STALL}",
         f"speed {_SPEED}": "speed of [limits]",
@@ -59,6 +60,7 @@ _WORDS: dict[str, dict[str, str]] = {
     "gear": {
         "teeth i": 'ratio, which takes "60/20" too',
         "inertia": "input_inertia",
+        "type model part_number": "name",
         "backlash lost_motion play": "play of [coupling], beside its stiffness; without one left out",
         "stiffness rigidity": "stiffness of [coupling]",
         "self_locking": 'path = "self-locking" of [load]',
@@ -81,7 +83,7 @@ _WORDS: dict[str, dict[str, str]] = {
         "j jl": "inertia",
         "mass": "inertia, in kg on a linear axis",
         "inertia_ratio": "inertia, the ratio times rotor_inertia and the gears' ratio squared",
-        "force torque max_torque": "moment_max",
+        "force torque moment max_torque force_max torque_max": "moment_max",
         _FRICTION: "dry_torque of [load.friction] behind a coupling, else of [friction]",
         "damping": "moment_damping, per output speed",
         "imbalance unbalance": "the table [load.gravity]",
@@ -96,7 +98,8 @@ _WORDS: dict[str, dict[str, str]] = {
     "encoder": {
         "counts": "counts_per_rev",
         _LINES: 'counts_per_rev, which takes "1024 lines"',
-        "resolution cpr bits": 'counts_per_rev, 4096 or "17 bit"; without a screw per metre of a linear axis',
+        "resolution cpr bits": 'counts_per_rev, 4096 or "17 bit"; one revolution over a step in angle '
+        "(linear axis without a screw: one metre over a step)",
         "hall_sensors": "counts_per_rev, 6 for each pole pair",
     },
     "limits": {
@@ -108,6 +111,7 @@ _WORDS: dict[str, dict[str, str]] = {
         "rated_torque continuous_torque": "continuous_current, the torque over torque_constant and ratio",
         "torque max_torque peak_torque": "peak_current, the torque over torque_constant and ratio",
         _SPEED: "speed",
+        "rate max_rate slew_rate": "speed, at the motor: that of the output times ratio",
     },
     "control": {
         "speed speed_loop": "velocity",

@@ -55,6 +55,7 @@ _SECOND = re.compile(r"(?<![\w^.-])(?!1(?:000)?(?![0-9.]))[0-9]")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _OVER = re.compile(r"\s*([0-9]+\.?[0-9]*)\s*([/:])\s*([0-9]+\.?[0-9]*)\s*\Z")
 _BITS = re.compile(r"\s*(?:([0-9]{1,2})[ -]?bits?|2\^([0-9]{1,2}))\s*\Z")  # of an encoder
+_SYMBOL = re.compile(r"\A\s*[A-Za-z]\w{0,3}\s*=\s*(?=[+-]?[0-9.])")  # i = 8, R = 0.36 ohm
 LONGEST = 120  # characters of a quantity
 
 
@@ -79,7 +80,8 @@ def _alone(text: str) -> str:
 
 
 def split_quantity(text: str) -> tuple[float, str]:
-    """Number and unit of a written quantity; ``43:1``, ``343/8`` and ``17 bit`` are numbers without one."""
+    """Number and unit of a written quantity; ``43:1``, ``i = 8`` and ``17 bit`` are numbers without one."""
+    text = _SYMBOL.sub("", text) if len(text) <= LONGEST else text
     if bits := _BITS.match(text) if len(text) <= LONGEST else None:
         return 2.0 ** int(bits[1] or bits[2]), ""
     if over := _OVER.match(text) if len(text) <= LONGEST else None:

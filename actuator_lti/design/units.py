@@ -72,13 +72,13 @@ _DERIVED = {
     "rpm RPM": ("0.10471975511965977", "rad/s"),
     "KV Kv": ("0.10471975511965977", "rad/(V*s)"),
     "Hz hertz": ("6.283185307179586", "rad/s"),
-    "count cpr inc increment": ("1", "1"),
+    "count cpr CPR inc increment": ("1", "1"),
     "line": ("4", "1"),  # of an encoder: two edges of two tracks
 }
 # What makers write into a unit that is none, and what is to be written instead.
 _PULSES = 'is not the same of all makers; write "lines" (4 counts each) or "counts"'
 _ASIDE = {
-    **dict.fromkeys(("ppr", "cpt", "ppt", "pulse", "pulses"), _PULSES),
+    **dict.fromkeys(("ppr", "PPR", "cpt", "ppt", "pulse", "pulses"), _PULSES),
     "phase": "is no unit; leave it out: motor.constants says of which winding R and L are",
     "tpi": "is no lead; write one over it, in inches",
     "ipm": 'is written "in/min"',

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, partial
 from math import isfinite, nan
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.batch import Population, variable_paths
 from actuator_lti.design import design_tree, parameter_value
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.files.reading import as_path
 from actuator_lti.loops import assemble_loops
 from analyses.comparison.variant_figures import (
     FigureName,
@@ -27,7 +29,7 @@ from analyses.comparison.variant_store import Store, address
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
 from analyses.studies.engine import Engine
-from analyses.studies.study import Study, Variant
+from analyses.studies.study import Study, Variant, load_study
 from analyses.validation import CHECKS, validate
 from analyses.validation.row import Row
 
@@ -142,7 +144,7 @@ class Comparison:
 
 
 def compare(
-    study: Study,
+    study: Study | str | PathLike[str],
     *,
     validation: bool | None = None,
     progress: Progress | None = None,
@@ -153,7 +155,7 @@ def compare(
 
     Parameters
     ----------
-    study : Study
+    study : Study, or path of its file
     validation : bool, optional
         Whether every design is validated (quick settings); by default as the study says.
     progress : callable, optional
@@ -171,6 +173,7 @@ def compare(
     """
     from analyses.specification.sensitivity import sensitivities
 
+    study = study if isinstance(study, Study) else load_study(as_path(study))
     assert study.base.design is not None
     plan = LargeSignal.plan(study.base.design)
     tested = study.validation if validation is None else validation

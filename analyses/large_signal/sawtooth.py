@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from os import PathLike
 
 import numpy as np
 
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from analyses.large_signal.formulas import FULL_TRIANGLE, RateLimited, rate_limited
 from analyses.large_signal.grid import tone
@@ -105,7 +107,10 @@ class Sawtooth:
 
 
 def sawtooth(
-    design: Design, *, amplitude_rad: float | None = None, frequency_hz: float | None = None
+    design: Design | str | PathLike[str],
+    *,
+    amplitude_rad: float | None = None,
+    frequency_hz: float | None = None,
 ) -> Sawtooth:
     """Simulate a sine of which the output can only follow the flanks, at each load torque of the design.
 
@@ -116,6 +121,7 @@ def sawtooth(
     frequency_hz : float, optional
         Default: where x = w A/R is three, well inside the range of whole triangles (x >= 1.862).
     """
+    design = as_design(design)
     amplitude = design.validation.full_deflection_rad if amplitude_rad is None else amplitude_rad
     limit = design.limits.speed_rad_s
     if design.controller.velocity is None or not math.isfinite(limit):

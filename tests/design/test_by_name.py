@@ -9,8 +9,9 @@ from scipy import signal
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins, sweep, write_design
 from actuator_lti.design import design_hash, parameter_value, read_design_text
-from analyses import load_campaign, open_record, tune
+from analyses import compare, load_campaign, open_record, sawtooth, tune
 from nonlinear import Drive, State, commands, simulate
+from reports import report
 
 DESIGN = load_design("ilr33-amber")
 
@@ -77,6 +78,9 @@ BAD = {
     "limiter": lambda: simulate(DESIGN, commands.step(0.01), 0.001).limit_active("brake"),
     "drive": lambda: Drive(3),
     "tune": lambda: tune(3),
+    "sawtooth": lambda: sawtooth(3),
+    "study": lambda: compare(3),
+    "a report's folder": lambda: report(DESIGN, out=3),
     "a record's path": lambda: open_record(3),
     "a campaign's path": lambda: load_campaign(3),
     "filter": lambda: DESIGN.add_filter("velocity", kind="lowpass", frequency=[1.0]),
