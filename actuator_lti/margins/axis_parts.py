@@ -11,7 +11,7 @@ import numpy as np
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.axis_search import Factored, Found, nearest, passages, search
 from actuator_lti.margins.distances import Distance
-from actuator_lti.margins.factored import Response
+from actuator_lti.margins.factored import SAME, Response
 from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.trust import Doubtful
 
@@ -180,6 +180,9 @@ def _from_zero(factors: Factored, response: Response, found: Found, dc: complex)
         return 0.0, _leaving(1.0 + dc.real, found)
     low = float(found.known[0, 0])
     on_real, on_axis = response.real_point(low), complex(response.at(np.array([low]))[0])
+    gain, phase = factors.log_at(low)
+    if not abs(on_axis * cmath.exp(complex(-gain, -phase)) - 1.0) <= SAME:  # integrators that cancel
+        raise Doubtful("poles and zeros in double precision do not make up the loop next to zero frequency")
     turn, about = _angle_between(1.0 + on_real, 1.0 + on_axis), 0.5 * math.pi * factors.at_zero
     turn += 2.0 * math.pi * round((about - turn) / (2.0 * math.pi))
     return turn, cmath.phase(1.0 + on_axis)

@@ -14,7 +14,7 @@ from actuator_lti.margins.poles import SortedPoles, eigenvalues, polynomial_root
 from actuator_lti.margins.trust import Doubtful
 
 LEAST_SLACK = 1e-8
-_SAME = 1e-4  # relative: the loop and the product of its factors
+SAME = 1e-4  # relative: the loop and the product of its factors
 _NEARLY_REAL = 1e-12
 _SEEN = math.log(1e10)  # of L, to either side of one
 _NEWTON_STEPS = 6
@@ -170,7 +170,7 @@ def _fitted(factors: Factored, response: Response, poles: Complex) -> Factored:
     turn = half_turn(turned)
     apart = max(float(np.abs(off - 1.0).max(initial=0.0)), abs(turn - turned))
     log_gain = float(np.log(np.abs(L[k]))) - float(gain[k])
-    if not off.size or not apart <= _SAME or not math.isfinite(log_gain):
+    if not off.size or not apart <= SAME or not math.isfinite(log_gain):
         raise Doubtful("poles and zeros in double precision do not make up the loop")
     return Factored(
         factors.roots, factors.weights, factors.delay, log_gain, turn, max(LEAST_SLACK, 10.0 * apart)

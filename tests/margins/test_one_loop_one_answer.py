@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import control
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from actuator_lti.margins import StabilityMargins, stability_margins
 from actuator_lti.systems.delay_system import DelaySystem
@@ -167,3 +168,23 @@ def test_small_coefficients_of_a_numerator_stay_where_a_delay_is_joined() -> Non
     w = 1j * np.geomspace(1e-9, 1e3, 25)
     exact = (1e-17 * w + 1e-17) / (w * w + 1e-9 * w + 1e-16)
     assert np.array([joined(s) for s in w]) == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.parametrize(("gain", "poles", "delay_s"), [
+    (3.0, (1.0, 3.0), 0.3212380417677561), (5.0, (1.0, 5.0), 0.02), (8.0, (2.0, 4.0), 0.9),
+    (60.0, (2.0, 5.0), 0.05), (60.0, (2.0, 5.0), 0.01),
+])  # fmt: skip
+def test_two_integrators_that_cancel_behind_a_series_delay(
+    gain: float, poles: tuple[float, float], delay_s: float
+) -> None:
+    """K s^2/(s^3 (s + a)(s + b)) exp(-s T): seen is K/(s (s + a)(s + b)), whose phase only falls."""
+    a, b = poles
+    loop = control.tf([gain, 0.0, 0.0], np.polymul([1.0, a + b, a * b], [1.0, 0.0, 0.0, 0.0]))
+    w = brentq(lambda w: np.arctan(w / a) + np.arctan(w / b) + w * delay_s - 0.5 * np.pi, 1e-6, 100.0)
+    ratio = w * np.hypot(w, a) * np.hypot(w, b) / gain
+    for m in (
+        stability_margins(loop, delay_s=delay_s),
+        stability_margins(DelaySystem.from_system(loop) * DelaySystem.delay(delay_s)),
+    ):
+        assert m.stable is bool(ratio > 1.0)
+        assert m.gain_margins[0].ratio == pytest.approx(ratio, rel=1e-9)
