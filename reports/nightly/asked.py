@@ -38,10 +38,7 @@ class Settings(OnMachines):
     wait_s: Annotated[
         float, Option(words="Wait for another nightly on the same site; 0.", metavar="SECONDS")
     ] = 0.0
-    keep: Annotated[
-        int,
-        Option(words="Nights whose reports stay on the site; 60.", metavar="NIGHTS"),
-    ] = 60
+    keep: Annotated[int, Option(words="Nights whose reports stay on the site; 60.", metavar="NIGHTS")] = 60
     state: Annotated[
         Path | None, Option(words="History and cache; DIR.state beside the site otherwise.", metavar="DIR")
     ] = None

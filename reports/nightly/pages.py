@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 from actuator_lti.files.tree import Tree
@@ -109,24 +109,20 @@ def _nights(
             break
         if run.id in gaps and run.id != night.run.id:
             rows.append({"gap": gaps[run.id]})
-        rows.append(_night(run, known.get(run.id), outcomes, design, course, available))
+        status = outcomes.get(run.id, "absent")
+        rows.append(_night(run, known.get(run.id), status, design, course, available))
     return rows
 
 
 def _night(
-    run: Run,
-    result: Result | None,
-    outcomes: Mapping[int, str],
-    design: DesignView,
-    course: Course,
-    available: set[str],
+    run: Run, result: Result | None, status: str, design: DesignView, course: Course, available: set[str]
 ) -> Tree:
     folder = report_folder(design.name, result.key) if result is not None and result.key else ""
     return {
         "gap": 0,  # of nights that are missing a row has nothing else
         "run": run,
         "result": result,
-        "status": outcomes.get(run.id, "absent"),
+        "status": status,
         "report": folder if folder in available else "",
         "moved": course.moved.get(run.id, 0),
         "marks": course.marks.get(run.id, []),

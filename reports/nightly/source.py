@@ -68,10 +68,6 @@ def canonical(value: Any) -> str:
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
 
 
-def _is_unicode(text: str) -> bool:
-    return not any("\ud800" <= sign <= "\udfff" for sign in text)
-
-
 def check_jobs(jobs: tuple[Job, ...], where: str) -> tuple[Job, ...]:
     """Refuse a study that is too large or names two designs alike."""
     if not jobs:
@@ -84,7 +80,7 @@ def check_jobs(jobs: tuple[Job, ...], where: str) -> tuple[Job, ...]:
                 f"name {one_line(job.name, 40)!r} has {len(job.name)} characters: at most {MAX_NAME} allowed",
                 where=where,
             )
-        if not one_line(job.name) or not _is_unicode(job.name):
+        if not one_line(job.name) or any("\ud800" <= sign <= "\udfff" for sign in job.name):
             raise InputError(
                 f"name {job.name[:40]!a}: a name needs at least one sign, all in valid Unicode",
                 where=where,

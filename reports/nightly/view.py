@@ -147,13 +147,13 @@ def overview(
     history: History,
     cache: Cache,
     study: Study,
-    metas: Mapping[str, Mapping[str, Any]] | None = None,
-    site: Path = Path(),
+    metas: Mapping[str, Mapping[str, Any]],
+    site: Path,
 ) -> Overview:
     """Put together what the site says about the last finished night."""
     runs = history.runs
     run = runs[-1]
-    reader = _Reader(history, cache, study, metas or {})
+    reader = _Reader(history, cache, study, metas)
     tonight = history.night(run.id).by_name
     designs = sorted((reader.design(r) for r in tonight.values()), key=lambda d: d.rank)
     before = history.night(runs[-2].id).by_name if len(runs) > 1 else {}

@@ -34,7 +34,6 @@ _MARKS = (
     "In brackets the difference from the base. ▲ best and ▽ worst of all designs. Margins by their size: one "
     "downwards counts as one upwards."
 )
-_SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
 
 
 def section(comparison: Comparison) -> list[doc.Section]:
