@@ -11,9 +11,10 @@ _STALL = (
 _MULTIPLE = "every, so many ticks of control.period"
 _PERIOD = 'period, which takes "16 kHz" too'
 _VOLTAGE = "nominal_voltage rated_voltage supply_voltage bus_voltage vbus un"
-_CONTINUOUS = "nominal_current rated_current"
+_CONTINUOUS = "nominal_current rated_current continuous_current_at_standstill"
 _FRICTION = "friction friction_force friction_torque frictional_torque"
-_LINES = "lines lines_per_revolution ppr pulses_per_revolution cpt counts_per_turn"
+_LINES = "lines lines_per_revolution ppr pulses_per_revolution pulses_per_rev cpt counts_per_turn"
+_INTEGRAL = "integral_time = gain/integral gain; of one in Hz 1/(2 pi f)"
 _SPEED = "nominal_speed rated_speed max_speed"
 _WORDS: dict[str, dict[str, str]] = {
     "": {
@@ -27,9 +28,9 @@ _WORDS: dict[str, dict[str, str]] = {
         "filter notch lowpass": "a [[control.velocity.filter]]",
     },
     "motor": {
-        "km kt": "torque_constant",
+        "km kt torque_sensitivity": "torque_constant",
         "ki current_constant": "torque_constant, one over it",
-        "ke voltage_constant ac_voltage_constant emf_constant": "back_emf_constant",
+        "ke back_emf voltage_constant ac_voltage_constant emf_constant": "back_emf_constant",
         "kn speed_constant": 'back_emf_constant, which takes "317 rpm/V" too',
         "kv": 'back_emf_constant, which takes "480 KV"',
         "r rm ra phase_resistance terminal_resistance": "resistance",
@@ -53,12 +54,12 @@ _WORDS: dict[str, dict[str, str]] = {
         "cogging_torque torque_ripple detent_torque": "cogging",
         "thermal_resistance": "thermal_resistance of [temperature], the sum of a sheet's two",
         "thermal_time_constant": "thermal_time of [temperature]",
-        "speed_torque_gradient": "not needed: it follows from R and kM",
+        "motor_constant speed_torque_gradient": "not needed: it follows from R and kM",
         "mechanical_time_constant electrical_time_constant": "not needed: it follows from R, L, J and kM",
         "pole_pairs poles pole_number": "not needed: constants are per mechanical radian",
     },
     "gear": {
-        "teeth i": 'ratio, which takes "60/20" too',
+        "teeth i reduction": 'ratio, which takes "60/20" too',
         "inertia": "input_inertia",
         "type model part_number": "name",
         "backlash lost_motion play": "play of [coupling], beside its stiffness; without one left out",
@@ -97,7 +98,7 @@ _WORDS: dict[str, dict[str, str]] = {
     "temperature": {"winding_max max_winding_temperature maximum_winding_temperature": "winding_limit"},
     "encoder": {
         "counts": "counts_per_rev",
-        _LINES: 'counts_per_rev, which takes "1024 lines"',
+        f"{_LINES} sin_cos_periods": 'counts_per_rev, which takes "1024 lines"',
         "resolution cpr bits": 'counts_per_rev, 4096 or "17 bit"; one revolution over a step in angle '
         "(linear axis without a screw: one metre over a step)",
         "hall_sensors": "counts_per_rev, 6 for each pole pair",
@@ -116,17 +117,18 @@ _WORDS: dict[str, dict[str, str]] = {
     "control": {
         "speed speed_loop": "velocity",
         "current_loop velocity_loop position_loop": "that name without _loop",
-        "cycle sample_rate frequency sampling_frequency cycle_time sample_time sampling_time ts": _PERIOD,
+        "cycle cycle_time sample_rate sample_time sampling_rate sampling_time ts": _PERIOD,
+        "frequency sampling_frequency": _PERIOD,
         "pwm pwm_frequency pwm_period switching_frequency": "not needed, part of computing_delay",
         "delay deadtime dead_time": "computing_delay",
     },
     "control.": {  # a loop of it
-        "kp kv kvp kpp p proportional proportional_gain": "gain",
-        "ki kvi integral_gain integrator_gain": "integral_time = gain/integral gain; of one in Hz 1/(2 pi f)",
-        "kd derivative_gain": "derivative_time = derivative gain/gain",
-        "tn ti reset_time integral_time_constant": "integral_time",
+        "kp kv kvp kpp vp p p_gain kv_factor proportional proportional_gain": "gain",
+        "ki kvi i_gain integral_gain integrator_gain": _INTEGRAL,
+        "kd d_gain derivative_gain": "derivative_time = derivative gain/gain",
+        "tn ti reset_time integral_time_constant integral_action_time": "integral_time",
         "time_constant": "frequency, 1/(2 pi time constant), where it is that of a low-pass",
-        "pff kff velocity_feedforward": "feedforward",
+        "pff kff pfg velocity_feedforward": "feedforward",
         "notch lowpass low_pass": "a [[control.velocity.filter]] with its kind",
         "q": "width, the frequency over Q",
         "frequency cycle_time sample_time": _MULTIPLE,
@@ -157,9 +159,11 @@ def key_for(table: str, word: str, known: Iterable[str] = ()) -> str:
     ('torque_constant', 'gain', 'ratio, which takes "60/20" too')
     >>> key_for("motor", "rotor_moment_of_inertia"), key_for("gear.worm", "reduction ratio", ["ratio"])
     ('rotor_inertia', 'ratio')
+    >>> key_for("motor", "Resistance (L-L)", ["resistance"])
+    'resistance'
     """
     first, *rest = re.split(r"[.\[]", table)
-    plain = _AFTER.sub("", re.sub(r"[- ]", "_", word.lower()))
+    plain = _AFTER.sub("", re.sub(r"[- ()]+", "_", word.lower()).strip("_"))
     tables = (f"{first}.",) if first == "control" and rest else (first, f"{first}.")
     tables = (".law",) if "law" in rest else tables
     own = {key: key for key in known}

@@ -457,6 +457,21 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
             ("control.computing_delay: missing", "not needed, part of computing_delay"),
         ),
         ('name = "first"', 'model = "GPLE 60"', ("gear[1].name: missing", "(it is name)")),
+        ("[motor]", '[motor]\nmotor_constant = "1 V"', ("(not needed: it follows from R and kM)",)),
+        ("[motor]", '[motor]\n"Resistance (L-L)" = "1 V"', ("(it is resistance)",)),
+        ('ratio = "43:1"', 'reduction = "43:1"', ("(it is ratio, which takes",)),
+        (
+            "[control]",
+            CURRENT.replace("gain", "Vp").replace("[control.v", 'I_gain = "9 V/(A s)"\n[control.v')
+            + 'P_gain = "2 A"\nintegral_action_time = "9 ms"\n[control]',
+            (
+                'Vp = "1 V/A": unknown key (it is gain)',
+                "it is integral_time = gain/integral gain",
+                "velocity.P_gain",
+                'velocity.gain = "2 A": wrong',
+                "(it is integral_time)",
+            ),
+        ),
         ("[motor]", '[motor]\ntype = "stepper"', ("(it is constants, of an AC motor rms-line",)),
         ("[load]", '[load]\nhinge_moment = "2 Nms"', ("(it is moment_max)", "load.moment_max = ")),
         ("[load]", '[load]\nforce_max = "2 N"', ("(it is moment_max)", "load.moment_max = ")),
