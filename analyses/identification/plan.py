@@ -14,8 +14,8 @@ from analyses.correlation.closed_loop import model_signals
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import COVERAGE, Fit
 from analyses.estimation.least_squares import Information, information_of, joint_covariance, told_apart
-from analyses.identification.joint_model import JointModel, default_value
-from analyses.identification.rows import Rows, record_rows
+from analyses.identification.joint_model import JointModel, Rows, default_value
+from analyses.identification.rows import record_rows
 from analyses.records.record import Record, RowCounts
 
 SEGMENT_S = 4.0

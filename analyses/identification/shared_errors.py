@@ -23,9 +23,9 @@ def shared_errors(
 ) -> dict[str, FloatArray]:
     """What the bound of each shared error adds to each run's torque, N m.
 
-    An error is uniform within its bounds; those whose bound is zero are left out. The torque sensor's error is
-    a straight line over the load between independent errors at zero and at full scale, each within the stated accuracy, so that the whole stays
-    within it. Runs with a disconnected clutch do not use it.
+    An error is uniform within its bounds; those whose bound is zero are left out. The torque sensor's error
+    is a straight line over the load between independent errors at zero and at full scale, each within the
+    stated accuracy, so that the whole stays within it. Runs with a disconnected clutch do not use it.
     """
     torque = np.array([p.torque_Nm for p in points])
     direction = np.array([float(p.direction) for p in points])
