@@ -151,9 +151,8 @@ def check_runs(
 
 def _share_a_file(run: ImportedRun, other: ImportedRun) -> bool:
     """Whether the file of the load sensor of one run is that of another as well."""
-    if run is other or run.load_is_zero or other.load_is_zero or run.sensor is None or other.sensor is None:
-        return False
-    return run.sensor.sha256 == other.sensor.sha256
+    files = [None if one.load_is_zero or one.sensor is None else one.sensor.sha256 for one in (run, other)]
+    return run is not other and bool(files[0]) and files[0] == files[1]
 
 
 def _same_file(other: ImportedRun) -> Finding:
