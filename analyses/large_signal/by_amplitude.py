@@ -148,7 +148,7 @@ class _Release:
         None where it does not last from the last window but one to the last.
         """
         gain, delay = (value, 0.0) if self.kind == "gain" else (1.0, value)
-        rows = self.setup.rows(np.array([gain]), np.array([delay]))
+        rows = self.setup.rows(gain, delay)
         start = {"position": "angle_start", "velocity": "speed_start", "current": "current_start"}
         outer = self.setup.outer
         scale = -self.setup.design.total_ratio if outer == "position" else 1.0
@@ -157,7 +157,7 @@ class _Release:
         rows["tanh_tolerance"] = TANH_TOLERANCE
         rows.window(self.window, self.cycles, 0)
         result = rows.run()
-        last, before = (float(np.ptp(result.span(self.setup.before, k))) for k in (0, 1))
+        last, before = (float(np.ptp(result.span(f"probe_{self.setup.point}_before", k))) for k in (0, 1))
         full = {
             "u": self.setup.design.limits.voltage_V,
             "i_ref": self.sizes["current"],
