@@ -11,7 +11,7 @@ from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
-from analyses.large_signal.grid import LEAST_UPDATES
+from analyses.large_signal.tones import LEAST_UPDATES
 from analyses.monte_carlo.judging import in_populations
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported
@@ -33,7 +33,7 @@ POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": li
 def live_model(design: Design, held: Collection[str] = (), source: str | None = None) -> Tree:
     """Give the page's data, or why there is none under ``refused``.
 
-    Requirements on the loops of ``held``, which the report judges held (`analyses.linear.held_loops`), are
+    Requirements on the loops of ``held``, which the report judges held (`analyses.linear.loop_figures`), are
     named apart: the page has the loops as they are by themselves.
     """
     if not design.controller.stages:
