@@ -17,8 +17,7 @@ from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
-from analyses.large_signal.grid import tone
-from analyses.large_signal.tones_run import TANH_TOLERANCE
+from analyses.large_signal.tones import TANH_TOLERANCE, tone
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS, Rows
 from nonlinear.runs.reduced import BatchResult

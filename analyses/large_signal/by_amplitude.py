@@ -16,8 +16,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import rubs
-from analyses.large_signal.settling_ticks import full_range, settling_ticks_of
-from analyses.large_signal.tones_run import TANH_TOLERANCE
+from analyses.large_signal.tones import TANH_TOLERANCE, full_range, settling_ticks_of
 from analyses.validation.places import Bench
 from nonlinear import LIMITERS
 from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm

@@ -25,7 +25,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.steady_gains import stage_gain
 from actuator_lti.errors import TooManyTicks
 from actuator_lti.loops import exact_margins, periodic_loop
-from analyses.large_signal.settling_ticks import full_range
+from analyses.large_signal.tones import full_range
 from analyses.motion.settling import accepted_rad
 from nonlinear import LIMITERS, Rows
 from nonlinear.bench.loop_setup import points_of

@@ -10,9 +10,9 @@ import numpy as np
 
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
-from analyses.large_signal.formulas import FULL_TRIANGLE, RateLimited, rate_limited
-from analyses.large_signal.grid import tone
-from analyses.specification.drive_figures import drive_figures
+from analyses.large_signal.classify import FULL_TRIANGLE, RateLimited, rate_limited
+from analyses.large_signal.tones import tone
+from analyses.specification.capability import drive_figures
 from nonlinear import State, commands, simulate
 
 OVERRUN = 3.0  # x = w A/R that is shown

@@ -22,8 +22,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design, Sensor
 from analyses.large_signal.conditional import step_rows
-from analyses.large_signal.grid import tone
-from analyses.large_signal.settling_ticks import LONGEST_TICKS, full_range
+from analyses.large_signal.tones import LONGEST_TICKS, full_range, tone
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
 from nonlinear import Rows

@@ -17,8 +17,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import breakaway_torque_Nm
 from actuator_lti.drive.steady import standing_gain, steady_input
 from actuator_lti.loops import assemble_loops
-from analyses.large_signal.steady_start import linear_steady_state
-from analyses.linear.linear_states import AT_REST, without_value
+from analyses.large_signal.steady_start import AT_REST, linear_steady_state, without_value
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops

@@ -1,4 +1,11 @@
-"""Everything that is said of a loop in one place: margins, bandwidth, peaks, step."""
+"""Everything that is said of a loop in one place: margins, bandwidth, peaks, step.
+
+A load whose moment grows with its own deflection (a pendulum upright, a fin ahead of its centre of pressure)
+moves away by itself, and so does a rotor whose friction falls with the speed. A current loop alone, or a P
+velocity loop alone, does not stop that; the loops around them do. Such a loop is unstable in itself and no
+fault of the drive: it is judged with the rotor locked (current loop), or with the load's moment held
+(velocity loop).
+"""
 
 from __future__ import annotations
 
@@ -8,8 +15,12 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB
+from actuator_lti.design.model import Design
+from actuator_lti.drive.angle import pushes_away
+from actuator_lti.drive.operating import RotorState
 from actuator_lti.drive.profile import command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.loops.assemble import loops_at
 from actuator_lti.systems.as_control import as_control
 from analyses.isolation import attempt
 
@@ -20,6 +31,41 @@ if TYPE_CHECKING:
     from actuator_lti.loops import Loop, Loops
     from actuator_lti.margins import StabilityMargins
     from actuator_lti.step import StepFigures
+
+HELD = {"current": "rotor locked", "velocity": "load moment held"}
+"""How an inner loop is judged that is unstable by itself, by its name."""
+OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}
+"""How it stands then."""
+AWAY = "the load or falling friction drives it away"
+
+
+def held_loop(loops: Loops, name: str) -> Loop | None:
+    """The inner loop with the rotor locked, or with the load's moment held; ``None`` where there is none."""
+    at = loops.operating
+    if name not in HELD or name == loops.design.controller.outermost:
+        return None
+    if not pushes_away(loops.design, at):  # the loop's own fault
+        return None
+    held = replace(at, rotor="locked") if name == "current" else replace(at, torques_held=True)
+    return loops_at(loops.design, held, loops.form, loops.inner_loops).present[name]
+
+
+def other_loops(loops: Loops, design: Design, *, rotor: RotorState = "free") -> Loops:
+    """The loops of another design, or with another rotor, in the same form at the same operating point."""
+    at = replace(loops.operating, rotor=rotor, torques_held=False)
+    return loops_at(design, at, loops.form, loops.inner_loops)
+
+
+def by_itself(name: str) -> str:
+    """What is said of such a loop.
+
+    Examples
+    --------
+    >>> by_itself("velocity")
+    'with the load moment held; by itself, outer loops open, the load or falling friction drives it away'
+    """
+    return f"with the {HELD[name]}; by itself, {OPEN[name]}, {AWAY}"
+
 
 Figure = TypeVar("Figure")
 
@@ -43,7 +89,7 @@ class LoopFigures:
         Why a figure of a stable loop is missing.
     held : LoopFigures or None
         Of an inner loop that is unstable only by itself, in a drive that is stable as a whole: the same loop
-        as `analyses.linear.held_loops` holds it, which is stable.
+        as `analyses.linear.loop_figures` holds it, which is stable.
     locked : LoopFigures or None
         Of a current loop with a free rotor: the same with the rotor locked, where it was asked for.
     mean : CommandMean or None
@@ -223,7 +269,6 @@ def all_loop_figures(
 
 def _locked(loops: Loops, *, step: bool, certify: bool) -> LoopFigures | None:
     """The current loop with the rotor locked; ``None`` where it is the one that stands there already."""
-    from analyses.linear.held_loops import other_loops
 
     if loops.operating.rotor == "locked":
         return None
@@ -234,7 +279,6 @@ def _locked(loops: Loops, *, step: bool, certify: bool) -> LoopFigures | None:
 
 def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFigures:
     """The position loop, its response to the command, and to the reference where that is another."""
-    from analyses.linear.held_loops import other_loops
 
     design, mean = loops.design, command_mean(loops.design)
     figures = loop_figures(loop, loops.plain_response, step=step, certify=certify, mean=mean)
@@ -252,7 +296,6 @@ def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFig
 
 def _with_held(figures: LoopFigures, loops: Loops, name: str, step: bool, certify: bool) -> LoopFigures:
     """The same, with the figures of the loop held where it is unstable only by itself."""
-    from analyses.linear.held_loops import held_loop
 
     if figures.margins.stable is not False or (loop := held_loop(loops, name)) is None:
         return figures

@@ -248,7 +248,7 @@ def operating_points(
 
 def _described_speeds(design: Design) -> tuple[float, ...]:
     """Give the speed amplitudes for the describing function: small fractions of the top speed."""
-    from analyses.specification.drive_figures import drive_figures
+    from analyses.specification.capability import drive_figures
 
     top = drive_figures(design).output_rate_rad_s * design.total_ratio
     if not np.isfinite(top) or top <= 0.0:

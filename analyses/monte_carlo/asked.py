@@ -47,7 +47,7 @@ class Asked(OnMachines):
         """What the study is to do."""
         from actuator_lti.batch import variable_paths
         from analyses.monte_carlo.run import MonteCarloSettings
-        from analyses.monte_carlo.stepping import StepCheck
+        from analyses.monte_carlo.task import StepCheck
         from analyses.studies.sampling import read_table
 
         table = None if self.from_samples is None else read_table(self.from_samples, variable_paths(design))

@@ -25,9 +25,8 @@ from analyses.monte_carlo.judging import by_loop, in_populations, judge, label, 
 from analyses.monte_carlo.reduction import BLOCK, Reducing, Reduction, Tally, judged, reduced, unpacked
 from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
 from analyses.monte_carlo.statistics import MOST, clopper_pearson, column_statistics
-from analyses.monte_carlo.stepping import StepCheck
 from analyses.monte_carlo.store import CHUNK, Store
-from analyses.monte_carlo.task import SampleTask
+from analyses.monte_carlo.task import SampleTask, StepCheck
 from analyses.monte_carlo.worst import worst_case
 from analyses.specification.requirements import RequirementVerdict
 from analyses.studies.engine import Chunk, Engine

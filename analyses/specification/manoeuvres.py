@@ -15,7 +15,7 @@ from actuator_lti.drive.steady import (
     steady_torque_Nm,
     voltage_limit_torque_Nm,
 )
-from analyses.large_signal.grid import tone
+from analyses.large_signal.tones import tone
 from nonlinear import commands, simulate
 from nonlinear.commands import Command
 

@@ -15,7 +15,7 @@ from actuator_lti.design import parameter_value
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.judging import by_loop, in_populations, judge, loop_columns
 from analyses.specification.weakest import View, limit_of, views
-from analyses.tuning.objects import allowed_range
+from analyses.tuning.placing import allowed_range
 from analyses.tuning.problem import GAINS
 
 if TYPE_CHECKING:

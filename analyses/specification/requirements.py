@@ -17,8 +17,7 @@ from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from analyses.linear.held_loops import by_itself
-from analyses.linear.loop_figures import LoopFigures, all_loop_figures
+from analyses.linear.loop_figures import LoopFigures, all_loop_figures, by_itself
 
 if TYPE_CHECKING:
     from analyses.specification.asked_figures import AskedFigures
@@ -61,7 +60,7 @@ def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerd
     of, limits = verdict.requirement, (design.command.rate_rad_s, design.command.acceleration_rad_s2)
     if (of.quantity, verdict.loop) != ("bandwidth", "position") or of.to == "reference" or min(limits) == inf:
         return verdict
-    from analyses.specification.command_limits import said_of
+    from analyses.specification.asked_figures import said_of
 
     return replace(verdict, reason="; ".join(filter(None, (verdict.reason, said_of(design, verdict.value)))))
 

@@ -70,7 +70,7 @@ class Asked:
         InputError
             For a requirement that cannot be read.
         """
-        from analyses.tuning.asked_requirement import read_requirement
+        from analyses.tuning.problem import read_requirement
 
         asked = cls(**chosen)
         wanted = tuple(read_requirement(words, design) for words in asked.require or ())

@@ -15,15 +15,12 @@ from actuator_lti.design.fields import Structure, field_of
 from actuator_lti.design.loader import as_design
 from analyses.monte_carlo.judging import in_populations, label
 from analyses.tuning.asked import Aim, TuningSettings
-from analyses.tuning.checking import confirm, nonlinear_checks
 from analyses.tuning.least import least_change
-from analyses.tuning.objects import neighbours, object_of, step_of_gain
-from analyses.tuning.placing import Placed, checked, place, subsets
+from analyses.tuning.placing import Placed, checked, neighbours, object_of, place, step_of_gain, subsets
 from analyses.tuning.problem import MOST_DESIGNS, Problem, limit_of, loop_requirements, problem_of, size_of
-from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult
+from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult, confirm, nonlinear_checks
 from analyses.tuning.rules import RuleGains, rule_gains
-from analyses.tuning.solve import RESERVE, Solution, solve
-from analyses.tuning.trade_off import trade_off
+from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Requirement

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, cast
 
 from actuator_lti.asked.quantities import AT_A_GLANCE, QUANTITIES, reserve
-from analyses.linear.held_loops import HELD
-from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_figures import HELD, LoopFigures
 from analyses.linear.responses import frequency_grid
 from analyses.specification.mending import Move
 from analyses.specification.weakest import Spread, View, WeakPoint
