@@ -45,14 +45,12 @@ class Corner:
 
 @dataclass(frozen=True)
 class Corners:
-    """All corners of a design, the nominal drive first.
-
-    ``left_out``: requirements on what only an analysis of one design finds; they are not proven at corners.
-    """
+    """All corners of a design, the nominal drive first."""
 
     design: Design
     asked: Asked
     corners: tuple[Corner, ...]
+    # Requirements on what only an analysis of one design finds; they are not proven at corners
     left_out: tuple[RequirementVerdict, ...] = ()
 
     @property

@@ -115,22 +115,16 @@ Course = Callable[[float], float]
 
 @dataclass(frozen=True)
 class Case:
-    """One failure.
-
-    ``start_rad``: where the drive holds before.
-    ``command``: command over the time from the failure on (from the step on, where ``at_rad`` is given).
-    ``broken``: what is done to the rig at the failure.
-    ``at_rad``: the failure happens on the way, when the output is this far from the start; ``None``: at once.
-    ``stops``: whether the run ends at the stop.
-    """
+    """One failure."""
 
     name: str
     words: str
-    start_rad: float
-    command: Course
-    broken: Callable[[Rig], None]
+    start_rad: float  # where the drive holds before
+    command: Course  # command over the time from the failure on (from the step on, where ``at_rad`` is given)
+    broken: Callable[[Rig], None]  # what is done to the rig at the failure
+    # The failure happens on the way, when the output is this far from the start; ``None``: at once
     at_rad: float | None = None
-    stops: bool = True
+    stops: bool = True  # whether the run ends at the stop
 
 
 def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, str]]:

@@ -22,45 +22,34 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FailureCase:
-    """One failure; time runs from the failure, deflection from where the output then was.
+    """One failure; time runs from the failure, deflection from where the output then was."""
 
-    ``name``, ``words``: such as ``"hard-over"``, and what happens.
-    ``time_s``, ``deflection_rad``, ``current_A``, ``moment_Nm``: output side; the moment is that in the
-    coupling (rigid: the motor's torque times the reduction).
-    ``to_deflection_s``, ``to_stop_s``: time to the deflection asked for and to the stop, either side;
-    ``None``: not reached while watched.
-    ``at_detection_rad``: largest deflection until the failure is detected.
-    ``peak_current_A``, ``peak_moment_Nm``: largest magnitudes.
-    ``protected_s``: when the overload protection (I2t) acts first.
-    """
-
-    name: str
-    words: str
+    name: str  # such as ``"hard-over"``
+    words: str  # what happens
+    # Output side; the moment is that in the coupling (rigid: the motor's torque times the reduction)
     time_s: Floats
     deflection_rad: Floats
     current_A: Floats
     moment_Nm: Floats
+    # To the deflection asked for and to the stop, either side; ``None``: not reached while watched
     to_deflection_s: float | None
     to_stop_s: float | None
-    at_detection_rad: float
+    at_detection_rad: float  # largest deflection until the failure is detected
+    # Largest magnitudes
     peak_current_A: float
     peak_moment_Nm: float
-    protected_s: float | None
+    protected_s: float | None  # when the overload protection (I2t) acts first
 
 
 @dataclass(frozen=True)
 class Failures:
-    """All cases of a design.
-
-    ``left_out``: by name: why a case does not exist for the drive.
-    ``before``: what holding each start ends in, the drive whole.
-    """
+    """All cases of a design."""
 
     design: Design
     asked: Asked
     cases: tuple[FailureCase, ...]
-    left_out: dict[str, str]
-    before: tuple[Settling, ...]
+    left_out: dict[str, str]  # by name: why a case does not exist for the drive
+    before: tuple[Settling, ...]  # what holding each start ends in, the drive whole
 
     def case(self, name: str) -> FailureCase:
         """A case by its name.

@@ -32,24 +32,13 @@ class Waiting:
 
 @dataclass(frozen=True)
 class Threshold:
-    """Threshold of motion at one load torque.
+    """Threshold of motion at one load torque."""
 
-    Attributes
-    ----------
-    static : StaticThreshold
-        What the gains predict.
-    waiting : tuple of Waiting
-        Steps below the threshold, where a controller integrates and no kick of a step moves it at once.
-    simulated_rad : float or None
-        Smallest forward step that ever moves the output, where nothing integrates.
-    resolution : float
-        Of ``simulated_rad``, relative.
-    """
-
-    static: StaticThreshold
+    static: StaticThreshold  # What the gains predict
+    # Steps below the threshold, where a controller integrates and no kick of a step moves it at once
     waiting: tuple[Waiting, ...]
-    simulated_rad: float | None
-    resolution: float
+    simulated_rad: float | None  # Smallest forward step that ever moves the output, where nothing integrates
+    resolution: float  # Of ``simulated_rad``, relative
 
 
 def threshold(design: Design, load_Nm: float) -> Threshold | None:
@@ -123,26 +112,20 @@ SLOW_RAD_S = 1e-100  # motor speed at which nothing viscous counts
 
 @dataclass(frozen=True)
 class Hysteresis:
-    """One settled period of a slow triangle at the command.
+    """One settled period of a slow triangle at the command."""
 
-    ``amplitude_rad``, ``frequency_hz``: of the triangle; the width depends on its rate where a controller
-    integrates.
-    ``command_rad``, ``output_rad``: one period at updates of the position loop, thinned.
-    ``width_rad``: output falling less output rising, both where the command passes zero.
-    ``linear_width_rad``: the same without dry friction and play: what the loop lags by at this rate.
-    ``largest_rad``: largest distance of the output from what it would be without dry friction and play, at
-    any update of the position loop in the period.
-    ``predicted_rad``: what a reversal loses of a slow command: `lost_predicted_rad`.
-    """
-
+    # Of the triangle; the width depends on its rate where a controller integrates
     amplitude_rad: float
     frequency_hz: float
+    # One period at updates of the position loop, thinned
     command_rad: np.ndarray
     output_rad: np.ndarray
-    width_rad: float
-    linear_width_rad: float
+    width_rad: float  # output falling less output rising, both where the command passes zero
+    linear_width_rad: float  # the same without dry friction and play: what the loop lags by at this rate
+    # Largest distance of the output from what it would be without dry friction and play, at any update of the
+    # position loop in the period
     largest_rad: float
-    predicted_rad: float
+    predicted_rad: float  # what a reversal loses of a slow command: `lost_predicted_rad`
 
     @property
     def lost_motion_rad(self) -> float:

@@ -29,18 +29,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LimitCycles:
-    """Everything about limit cycles at one load torque.
+    """Everything about limit cycles at one load torque."""
 
-    ``design``: without counts and noise.
-    ``confirmations``: empty: the describing function predicts none.
-    ``stick_slip``: what the analysis of rest, breakaway and slip predicts beside it.
-    ``settlings``: steps of several sizes: the drive rests, breaks away, and may hunt.
-    """
-
-    design: Design
-    confirmations: tuple[Confirmation, ...]
-    stick_slip: StickSlipCycle | None
-    settlings: tuple[Settling, ...]
+    design: Design  # without counts and noise
+    confirmations: tuple[Confirmation, ...]  # empty: the describing function predicts none
+    stick_slip: StickSlipCycle | None  # what the analysis of rest, breakaway and slip predicts beside it
+    settlings: tuple[Settling, ...]  # steps of several sizes: the drive rests, breaks away, and may hunt
 
     @property
     def hunting(self) -> Settling | None:
@@ -104,32 +98,26 @@ def described_cycles(design: Design, load_Nm: float) -> tuple[Cycle, ...]:
 
 @dataclass(frozen=True)
 class FrictionPoint:
-    """What dry friction does at one load torque.
+    """What dry friction does at one load torque."""
 
-    ``load_Nm``, ``dry_torque_Nm``: dry friction at the motor, forward.
-    ``threshold``: ``None`` where a forward step has none.
-    """
-
+    # Dry friction at the motor, forward
     load_Nm: float
     dry_torque_Nm: float
-    threshold: Threshold | None
+    threshold: Threshold | None  # ``None`` where a forward step has none
     hysteresis: Hysteresis | None
     cycles: LimitCycles
 
 
 @dataclass(frozen=True)
 class FrictionEffects:
-    """Friction at small signals, one point a load torque.
-
-    ``integrator``: the controller that integrates, ``"speed"`` or ``"position"``: then friction leaves no
-    lasting error by itself; empty where none does.
-    ``reason``: why there is nothing to show; then ``points`` is empty.
-    """
+    """Friction at small signals, one point a load torque."""
 
     design: Design
     points: tuple[FrictionPoint, ...]
+    # The controller that integrates, ``"speed"`` or ``"position"``: then friction leaves no lasting error by
+    # itself; empty where none does
     integrator: str
-    reason: str = ""
+    reason: str = ""  # why there is nothing to show; then ``points`` is empty
 
 
 def friction_effects(

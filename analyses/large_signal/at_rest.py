@@ -33,27 +33,22 @@ UPDATES = 400  # of the position loop in a window
 
 @dataclass(frozen=True)
 class RestSweep:
-    """Response from rest, one entry a frequency.
+    """Response from rest, one entry a frequency."""
 
-    ``frequency_hz``, ``amplitude_rad``, shape (K,): command at the output shaft, peak.
-    ``measured``, ``sliding``, ``described``, shape (K,): output over command: simulated; sliding loop;
-    describing function at ``speed_rad_s`` (NaN where nothing moves).
-    ``speed_rad_s``, shape (K,): amplitude of the motor speed that was seen.
-    ``stick_fraction``, ``distortion``, ``unsteadiness``, shape (K,): of the last window; distortion of the
-    motor speed.
-    ``limiter``: limit that acted in the last window, or empty.
-    """
-
+    # Shape (K,): command at the output shaft, peak
     frequency_hz: Floats
     amplitude_rad: Floats
+    # Shape (K,): output over command: simulated; sliding loop; describing function at ``speed_rad_s`` (NaN
+    # where nothing moves)
     measured: Complexes
     sliding: Complexes
     described: Complexes
-    speed_rad_s: Floats
+    speed_rad_s: Floats  # shape (K,): amplitude of the motor speed that was seen
+    # Shape (K,): of the last window; distortion of the motor speed
     stick_fraction: Floats
     distortion: Floats
     unsteadiness: Floats
-    limiter: tuple[str, ...]
+    limiter: tuple[str, ...]  # limit that acted in the last window, or empty
 
 
 def sweep_from_rest(

@@ -32,35 +32,27 @@ TOO_MANY = 40_000_000  # ticks of the values asked about one margin, as where th
 
 @dataclass(frozen=True)
 class AmplitudeMargin:
-    """Where an oscillation lasts after a release from one deviation.
-
-    ``kind``, ``size``: ``"gain"`` or ``"delay"``; ``"small"``, ``"medium"`` or ``"large"``.
-    ``part``: of the full deflection, speed or current.
-    ``linear``: the linear margin (factor, or samples).
-    ``value``: factor or samples; 1 (0) where the nominal drive oscillates already; ``None``: not up to
-    ``furthest``.
-    ``limiter``: limit that acts longest while the oscillation lasts, just past the value; empty where none
-    does.
-    ``output``: amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value.
-    ``coarser``: whether fewer than `VALUES` were asked, nearer to the linear margin: those take over
-    `MOST_TICKS`.
-    ``too_long``: whether none was asked, as they take over `TOO_MANY` ticks.
-    """
+    """Where an oscillation lasts after a release from one deviation."""
 
     loop: str
+    # ``"gain"`` or ``"delay"``; ``"small"``, ``"medium"`` or ``"large"``
     kind: str
     size: str
-    part: float
+    part: float  # of the full deflection, speed or current
     friction_on: bool
-    linear: float
+    linear: float  # the linear margin (factor, or samples)
+    # Factor or samples; 1 (0) where the nominal drive oscillates already; ``None``: not up to ``furthest``
     value: float | None
     furthest: float
     period_s: float
+    # Limit that acts longest while the oscillation lasts, just past the value; empty where none does
     limiter: str = ""
+    # Amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value
     output: float = nan
     axis: str = "rotary"
+    # Whether fewer than `VALUES` were asked, nearer to the linear margin: those take over `MOST_TICKS`
     coarser: bool = False
-    too_long: bool = False
+    too_long: bool = False  # whether none was asked, as they take over `TOO_MANY` ticks
 
 
 def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:

@@ -58,55 +58,38 @@ LOW_GAIN = 0.02  # lower gain margins below this are out of reach of any limit
 
 @dataclass(frozen=True)
 class Prediction:
-    """What the describing function of a limit says of a loop with a lower gain margin.
+    """What the describing function of a limit says of a loop with a lower gain margin."""
 
-    ``point``: break point in front of the limit (all other loops closed).
-    ``limit``: in the unit of the point.
-    ``limiter``: what limits there: ``"current limit"``, ``"voltage limit"``, ``"voltage limit as a current,
-    U/R"``.
-    ``gain_lower``: lower gain margin, factor (below 1).
-    ``amplitude``: in front of the limit, peak, in the unit of the point: the border between dying out and
-    growing.
-    ``output_rad``: amplitude of the output angle that goes with it.
-    ``antiwindup``: whether the controller in front stops its integral while the limit acts.
-    """
-
-    point: str
-    limit: float
+    point: str  # break point in front of the limit (all other loops closed)
+    limit: float  # in the unit of the point
+    # What limits there: ``"current limit"``, ``"voltage limit"``, ``"voltage limit as a current, U/R"``
     limiter: str
-    gain_lower: float
+    gain_lower: float  # lower gain margin, factor (below 1)
+    # In front of the limit, peak, in the unit of the point: the border between dying out and growing
     amplitude: float
     frequency_hz: float
-    output_rad: float
-    antiwindup: bool
+    output_rad: float  # amplitude of the output angle that goes with it
+    antiwindup: bool  # whether the controller in front stops its integral while the limit acts
 
 
 @dataclass(frozen=True)
 class Conditional:
-    """Whether a large command makes the drive diverge.
+    """Whether a large command makes the drive diverge."""
 
-    ``margins``: at every break point.
-    ``threshold_rad``: largest step of the output that still settles; ``None`` where all steps up to full
-    deflection do, 0 where not even the smallest tried does.
-    ``next_rad``: smallest step tried that does not; it has been watched for four times as long.
-    ``oscillation_hz``, ``oscillation_rad``: frequency, and amplitude of the output error, while the step at
-    the threshold hovers there.
-    ``limiter``: the limit that acts longest at the end of the smallest step that does not settle.
-    ``limiter_share``: of the ticks at that end.
-    ``end_rad``: half of the output's span at that end.
-    """
-
-    margins: dict[str, ExactMargins]
+    margins: dict[str, ExactMargins]  # at every break point
     predictions: tuple[Prediction, ...]
+    # Largest step of the output that still settles; ``None`` where all steps up to full deflection do, 0
+    # where not even the smallest tried does
     threshold_rad: float | None
-    next_rad: float | None
+    next_rad: float | None  # smallest step tried that does not; it has been watched for four times as long
     full_deflection_rad: float
+    # Frequency, and amplitude of the output error, while the step at the threshold hovers there
     oscillation_hz: float | None
     oscillation_rad: float | None
-    limiter: str
-    limiter_share: float = 0.0
+    limiter: str  # the limit that acts longest at the end of the smallest step that does not settle
+    limiter_share: float = 0.0  # of the ticks at that end
     ending: Ending | Literal[""] = ""
-    end_rad: float | None = None
+    end_rad: float | None = None  # half of the output's span at that end
 
     @property
     def diverges(self) -> bool:

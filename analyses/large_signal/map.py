@@ -44,36 +44,28 @@ LONG = 0.1  # periods of the highest tone
 
 @dataclass(frozen=True)
 class AmplitudeMap:
-    """Sines of many amplitudes and frequencies, each settled; arrays of points are (amplitude, frequency).
-
-    ``amplitude_rad``, shape (a,): peak command at the output shaft (linear axis: m).
-    ``frequency_hz``, shape (f,).
-    ``cause``, ``waveform``, shape (a, f): index into `CAUSES` and `WAVEFORMS`; criteria in
-    `analyses.large_signal.classify`.
-    ``limiter_fraction``, shape (a, f, limiters): fraction of the last window in which speed, acceleration,
-    current and voltage limits act.
-    ``stick_fraction``, ``distortion``, ``unsteadiness``, shape (a, f): of the output in the last window.
-    ``response``, shape (a, f): fundamental of the output over the command.
-    ``linear``, shape (f,): the same from the linear sampled loop, sliding.
-    ``onset_rad``, shape (f,): A_k(w) of each limiter from the linear loop, no load; without protection that
-    is slow against the tones, which acts later than they are simulated (`slow_protection`).
-    ``ticks``: simulated in all.
-    ``coarser``: whether the grid is coarser than asked for, as that would take more than `MOST_TICKS`.
-    """
+    """Sines of many amplitudes and frequencies, each settled; arrays of points are (amplitude, frequency)."""
 
     load_Nm: float
-    amplitude_rad: np.ndarray
-    frequency_hz: np.ndarray
+    amplitude_rad: np.ndarray  # shape (a,): peak command at the output shaft (linear axis: m)
+    frequency_hz: np.ndarray  # shape (f,)
+    # Shape (a, f): index into `CAUSES` and `WAVEFORMS`; criteria in `analyses.large_signal.classify`
     cause: np.ndarray
     waveform: np.ndarray
+    # Shape (a, f, limiters): fraction of the last window in which speed, acceleration, current and voltage
+    # limits act
     limiter_fraction: np.ndarray
+    # Shape (a, f): of the output in the last window
     stick_fraction: np.ndarray
     distortion: np.ndarray
     unsteadiness: np.ndarray
-    response: np.ndarray
-    linear: np.ndarray
+    response: np.ndarray  # shape (a, f): fundamental of the output over the command
+    linear: np.ndarray  # shape (f,): the same from the linear sampled loop, sliding
+    # Shape (f,): A_k(w) of each limiter from the linear loop, no load; without protection that is slow
+    # against the tones, which acts later than they are simulated (`slow_protection`)
     onset_rad: Mapping[str, np.ndarray]
-    ticks: int
+    ticks: int  # simulated in all
+    # Whether the grid is coarser than asked for, as that would take more than `MOST_TICKS`
     coarser: bool = False
 
     @property
@@ -196,45 +188,29 @@ MINUS_3DB = 20.0 * math.log10(math.sqrt(0.5))
 
 @dataclass(frozen=True)
 class AmplitudeBode:
-    """Responses at the amplitudes that a design asks for, and how the bandwidth falls with amplitude.
-
-    Attributes
-    ----------
-    load_Nm : float
-    frequency_hz : ndarray, shape (f,)
-    fractions : tuple of float
-        Of full deflection; those of the design that the map has.
-    amplitude_rad : ndarray, shape (k,)
-    gain_db, phase_deg : ndarray, shape (k, f)
-        Of the fundamental; -inf and NaN where nothing moves, NaN where it did not settle.
-    linear_db, linear_deg : ndarray, shape (f,)
-    all_amplitude_rad : ndarray, shape (a,)
-        Every amplitude of the map.
-    minus3db_hz, minus90deg_hz : ndarray, shape (a,)
-        First crossing; between two frequencies of the map the linear response, and what the simulated one is
-        off by, interpolated on the logarithm of frequency; NaN where there is none in the range
-        (`below_from_start`: already below at the lowest frequency), and where it lies beside points that are
-        not steady: a missing point is no value. -3 dB is 1/sqrt(2) of the linear gain at zero frequency.
-    minus3db_range_hz : ndarray, shape (a, 2)
-        Between which frequencies of the map the gain first falls through -3 dB, as far as steady points tell:
-        from 0 where the first of them is below already, to inf where none is.
-    below_from_start : ndarray of bool, shape (a,)
-        Whether the gain is below -3 dB at the lowest frequency already.
-    linear_minus3db_hz, linear_minus90deg_hz : float or None
-    """
+    """Responses at the amplitudes that a design asks for, and how the bandwidth falls with amplitude."""
 
     load_Nm: float
-    frequency_hz: np.ndarray
-    fractions: tuple[float, ...]
-    amplitude_rad: np.ndarray
+    frequency_hz: np.ndarray  # shape (f,)
+    fractions: tuple[float, ...]  # Of full deflection; those of the design that the map has
+    amplitude_rad: np.ndarray  # shape (k,)
+    # Shape (k, f): Of the fundamental; -inf and NaN where nothing moves, NaN where it did not settle
     gain_db: np.ndarray
     phase_deg: np.ndarray
+    # Shape (f,)
     linear_db: np.ndarray
     linear_deg: np.ndarray
-    all_amplitude_rad: np.ndarray
+    all_amplitude_rad: np.ndarray  # shape (a,): Every amplitude of the map
+    # Shape (a,): First crossing; between two frequencies of the map the linear response, and what the
+    # simulated one is off by, interpolated on the logarithm of frequency; NaN where there is none in the
+    # range (`below_from_start`: already below at the lowest frequency), and where it lies beside points that
+    # are not steady: a missing point is no value. -3 dB is 1/sqrt(2) of the linear gain at zero frequency
     minus3db_hz: np.ndarray
     minus90deg_hz: np.ndarray
+    # Shape (a, 2): Between which frequencies of the map the gain first falls through -3 dB, as far as steady
+    # points tell: from 0 where the first of them is below already, to inf where none is
     minus3db_range_hz: np.ndarray
+    # Shape (a,): Whether the gain is below -3 dB at the lowest frequency already
     below_from_start: np.ndarray
     linear_minus3db_hz: float | None
     linear_minus90deg_hz: float | None

@@ -24,29 +24,24 @@ GAIN_TOLERANCE, LAG_TOLERANCE_DEG = 0.01, 1.0
 
 @dataclass(frozen=True)
 class SawtoothRun:
-    """The last periods at one load torque; output side, motor speed and current at the motor.
-
-    ``time_s``, ``reference_rad``, ``output_rad``, ``output_rate_rad_s``, ``speed_command_rad_s``,
-    ``current_A``: thinned for drawing; the rates are those of the output (motor over N).
-    ``gain``, ``lag_deg``, ``peak_rad``, ``distortion``, ``crest``: of the output over the last whole period:
-    fundamental over the command, its lag, largest deflection from the mean, everything but mean and
-    fundamental over the fundamental, peak over rms.
-    ``formula``: what a pure rate limit would do.
-    """
+    """The last periods at one load torque; output side, motor speed and current at the motor."""
 
     load_Nm: float
+    # Thinned for drawing; the rates are those of the output (motor over N)
     time_s: np.ndarray
     reference_rad: np.ndarray
     output_rad: np.ndarray
     output_rate_rad_s: np.ndarray
     speed_command_rad_s: np.ndarray
     current_A: np.ndarray
+    # Of the output over the last whole period: fundamental over the command, its lag, largest deflection from
+    # the mean, everything but mean and fundamental over the fundamental, peak over rms
     gain: float
     lag_deg: float
     peak_rad: float
     distortion: float
     crest: float
-    formula: RateLimited
+    formula: RateLimited  # what a pure rate limit would do
 
     @property
     def gain_error(self) -> float:
@@ -61,27 +56,21 @@ class SawtoothRun:
 
 @dataclass(frozen=True)
 class Sawtooth:
-    """A sine command that the output can follow only at its top speed.
+    """A sine command that the output can follow only at its top speed."""
 
-    ``amplitude_rad``, ``frequency_hz``: of the command.
-    ``rate_limit_rad_s``: R at the output.
-    ``gain_over_frequency``: Kv/w: the formulas hold where this is large.
-    ``reversal_deg``: part of a period that the reversal 2 R/a takes at the drive's largest acceleration, in
-    degrees: the formulas reverse at once, so this much lag may come on top.
-    ``runs``: one a load torque.
-    ``reason``: why there is none; then ``runs`` is empty.
-    ``slowest_rad_s``: steady rate of the output at the slowest load: below R by the droop of a P velocity
-    loop, which the formulas do not know.
-    """
-
+    # Of the command
     amplitude_rad: float
     frequency_hz: float
-    rate_limit_rad_s: float
-    gain_over_frequency: float
+    rate_limit_rad_s: float  # R at the output
+    gain_over_frequency: float  # Kv/w: the formulas hold where this is large
+    # Part of a period that the reversal 2 R/a takes at the drive's largest acceleration, in degrees: the
+    # formulas reverse at once, so this much lag may come on top
     reversal_deg: float
     has_current: bool
-    runs: tuple[SawtoothRun, ...]
-    reason: str = ""
+    runs: tuple[SawtoothRun, ...]  # one a load torque
+    reason: str = ""  # why there is none; then ``runs`` is empty
+    # Steady rate of the output at the slowest load: below R by the droop of a P velocity loop, which the
+    # formulas do not know
     slowest_rad_s: float = math.inf
 
     @property

@@ -44,35 +44,27 @@ TRIED = np.array([0.1, 0.3, 1.0, 2.0, 4.0, 16.0, 64.0, 256.0])  # of the amplitu
 
 @dataclass(frozen=True)
 class Counts:
-    """What the counts of one encoder do.
-
-    ``quantum_rad``: one count, at the sensor's shaft.
-    ``standing_rad``: error of the output that a count may leave: the output's own count; the motor's leaves
-    none.
-    ``standing_seen_rad``: what a step of the drive as it is ends with, less what it ends with without counts.
-    ``speed_step_rad_s``: by which a speed made of counts jumps (motor side); ``None`` where the speed is not
-    made of them.
-    ``ripple_rad_s``, ``ripple_at_rad_s``: largest ripple of the motor's speed (peak) that counts add at
-    constant speed, and that speed.
-    ``cycles``: foreseen limit cycles, each with what the simulator says of it.
-    ``linear_rad``: amplitude at the sensor from which the gain of the counts is 1 within 5 %, about any bias.
-    ``linear_seen_rad``: smallest amplitude tried from which the response to the command, at the bandwidth, is
-    off by less than 5 % in the simulator: more, where counts shake the drive. ``None``: none up to 256 times
-    as much, or the drive is unstable without friction.
-    ``off``: what that response is off by (relative) at `TRIED` times ``linear_rad``.
-    """
+    """What the counts of one encoder do."""
 
     sensor: Sensor
-    quantum_rad: float
+    quantum_rad: float  # one count, at the sensor's shaft
+    # Error of the output that a count may leave: the output's own count; the motor's leaves none
     standing_rad: float
+    # What a step of the drive as it is ends with, less what it ends with without counts
     standing_seen_rad: float
+    # By which a speed made of counts jumps (motor side); ``None`` where the speed is not made of them
     speed_step_rad_s: float | None
+    # Largest ripple of the motor's speed (peak) that counts add at constant speed, and that speed
     ripple_rad_s: float
     ripple_at_rad_s: float
-    cycles: tuple[Confirmation, ...]
+    cycles: tuple[Confirmation, ...]  # foreseen limit cycles, each with what the simulator says of it
+    # Amplitude at the sensor from which the gain of the counts is 1 within 5 %, about any bias
     linear_rad: float
+    # Smallest amplitude tried from which the response to the command, at the bandwidth, is off by less than 5
+    # % in the simulator: more, where counts shake the drive. ``None``: none up to 256 times as much, or the
+    # drive is unstable without friction
     linear_seen_rad: float | None
-    off: Floats
+    off: Floats  # what that response is off by (relative) at `TRIED` times ``linear_rad``
 
 
 def counted_gain(ratio: float, offset: float = 0.0) -> float:

@@ -15,40 +15,29 @@ Seen = Literal["confirmed", "refuted"]
 
 @dataclass(frozen=True)
 class Cycle:
-    """A limit cycle by describing function.
+    """A limit cycle by describing function."""
 
-    ``cause``: quantisation: of the output's sensor, or of the motor's.
-    ``with_friction``: whether the drive's dry friction, by its own describing function, is in it.
-    ``output_rad``: amplitude of the output, peak.
-    ``inner_rad``: amplitude of what the nonlinearity sees: the twist at the coupling, the sensor's angle, or
-    the motor's speed (rad/s).
-    ``stable``: whether motion near it comes nearer; ``False``: the border between dying out and growing.
-    ``state``: its shape by state of the loop, at this amplitude.
-    ``load_Nm``: load torque that it is at.
-    """
-
-    cause: Cause
-    with_friction: bool
-    output_rad: float
+    cause: Cause  # quantisation: of the output's sensor, or of the motor's
+    with_friction: bool  # whether the drive's dry friction, by its own describing function, is in it
+    output_rad: float  # amplitude of the output, peak
+    # Amplitude of what the nonlinearity sees: the twist at the coupling, the sensor's angle, or the motor's
+    # speed (rad/s)
     inner_rad: float
     frequency_hz: float
-    stable: bool
-    state: dict[str, complex]
-    load_Nm: float = 0.0
+    stable: bool  # whether motion near it comes nearer; ``False``: the border between dying out and growing
+    state: dict[str, complex]  # its shape by state of the loop, at this amplitude
+    load_Nm: float = 0.0  # load torque that it is at
 
 
 @dataclass(frozen=True)
 class Confirmation:
-    """A predicted cycle against the simulator, started in its shape at several sizes.
-
-    ``ratio``: amplitude of the output over the predicted one: of a stable cycle where the motion ends, of an
-    unstable one the size from which it grows; ``None``: refuted.
-    ``frequency_hz``: where the motion ends, of a stable one.
-    """
+    """A predicted cycle against the simulator, started in its shape at several sizes."""
 
     cycle: Cycle
+    # Amplitude of the output over the predicted one: of a stable cycle where the motion ends, of an unstable
+    # one the size from which it grows; ``None``: refuted
     ratio: float | None
-    frequency_hz: float | None
+    frequency_hz: float | None  # where the motion ends, of a stable one
 
     @property
     def verdict(self) -> Seen:
@@ -58,17 +47,13 @@ class Confirmation:
 
 @dataclass(frozen=True)
 class LimitCycles:
-    """Cycles of one design.
-
-    ``confirmations``: every predicted cycle.
-    ``rests``: steps of several sizes, without load and at every load of the design, waited for.
-    ``looked_for``: the causes that the design has.
-    """
+    """Cycles of one design."""
 
     design: Design
-    confirmations: tuple[Confirmation, ...]
+    confirmations: tuple[Confirmation, ...]  # every predicted cycle
+    # Steps of several sizes, without load and at every load of the design, waited for
     rests: tuple[Settling, ...]
-    looked_for: tuple[str, ...]
+    looked_for: tuple[str, ...]  # the causes that the design has
 
     @property
     def hunting(self) -> Settling | None:

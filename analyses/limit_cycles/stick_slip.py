@@ -28,17 +28,12 @@ SLOPE_STEP = 1e-3
 
 @dataclass(frozen=True)
 class StickSlipCycle:
-    """A symmetric stick-slip cycle.
+    """A symmetric stick-slip cycle."""
 
-    ``output_amplitude_rad``: error at rest on either side, output side.
-    ``rest_s``: of half a period.
-    ``slope``: change of the size of the next error with that of this one; below 1 in magnitude the cycle
-    attracts.
-    """
-
-    output_amplitude_rad: float
+    output_amplitude_rad: float  # error at rest on either side, output side
     frequency_hz: float
-    rest_s: float
+    rest_s: float  # of half a period
+    # Change of the size of the next error with that of this one; below 1 in magnitude the cycle attracts
     slope: float
 
     @property

@@ -29,15 +29,12 @@ NOTICED = 1e-6  # of full deflection: a smaller swing is listed, and is rest
 
 @dataclass(frozen=True)
 class Settling:
-    """A step from rest at zero, waited for.
+    """A step from rest at zero, waited for."""
 
-    ``amplitude_rad``, ``load_Nm``: the step and the load torque, both there from the start.
-    ``rest``: what it ends in.
-    """
-
+    # The step and the load torque, both there from the start
     amplitude_rad: float
     load_Nm: float
-    rest: Rest
+    rest: Rest  # what it ends in
 
     @property
     def hunting(self) -> bool:
@@ -240,16 +237,13 @@ def _size(rest: Rest, factor: float, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Conduct:
-    """What a run ends in, the command and the load staying as they are at its end.
+    """What a run ends in, the command and the load staying as they are at its end."""
 
-    ``status``: ``"comes to rest"`` (of a speed or less: ``"becomes steady"``), ``"sits on a limit"`` (it does
-    while this acts), ``"limit cycle"``, ``"still moving"``, ``"diverging"``; ``"following"`` where command or
-    load go on changing; or why the run stopped.
-    ``detail``: with figures; empty where there is nothing to say.
-    """
-
+    # ``"comes to rest"`` (of a speed or less: ``"becomes steady"``), ``"sits on a limit"`` (it does while
+    # this acts), ``"limit cycle"``, ``"still moving"``, ``"diverging"``; ``"following"`` where command or
+    # load go on changing; or why the run stopped
     status: str
-    detail: str = ""
+    detail: str = ""  # with figures; empty where there is nothing to say
 
     @property
     def wanted(self) -> bool:

@@ -35,18 +35,15 @@ State = Literal["powered", "shorted", "open"]
 
 @dataclass(frozen=True)
 class StiffnessCurve:
-    """Dynamic stiffness K = M_ext / output angle over frequency, in one state of the drive.
+    """Dynamic stiffness K = M_ext / output angle over frequency, in one state of the drive."""
 
-    ``state``: all loops closed and the command held; unpowered with the winding shorted (a bridge at zero
-    voltage); unpowered without a current.
-    ``stiffness_Nm_rad``: N m/rad (linear axis: N/m); inf where the output does not move.
-    ``static_Nm_rad``: limit at zero frequency: 0 of an output that runs away, inf of one that comes back.
-    """
-
+    # All loops closed and the command held; unpowered with the winding shorted (a bridge at zero voltage);
+    # unpowered without a current
     state: State
     frequency_hz: npt.NDArray[np.float64]
+    # N m/rad (linear axis: N/m); inf where the output does not move
     stiffness_Nm_rad: npt.NDArray[np.complex128]
-    static_Nm_rad: float
+    static_Nm_rad: float  # limit at zero frequency: 0 of an output that runs away, inf of one that comes back
 
     @property
     def least(self) -> tuple[float, float]:
@@ -60,17 +57,12 @@ class StiffnessCurve:
 
 @dataclass(frozen=True)
 class LostMotion:
-    """How far the output stays apart after a moment to either side has gone, the motor held.
+    """How far the output stays apart after a moment to either side has gone, the motor held."""
 
-    ``play_rad``: the play of the coupling at the output.
-    ``foreseen_rad``: read at +-3 % of the largest load moment
-    (`actuator_lti.loops.stiffness.lost_motion_rad`).
-    ``seen_rad``: the same in the simulator; None where it was not asked.
-    """
-
-    play_rad: float
+    play_rad: float  # the play of the coupling at the output
+    # Read at +-3 % of the largest load moment (`actuator_lti.loops.stiffness.lost_motion_rad`)
     foreseen_rad: float
-    seen_rad: float | None = None
+    seen_rad: float | None = None  # the same in the simulator; None where it was not asked
 
 
 @dataclass(frozen=True)

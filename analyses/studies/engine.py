@@ -37,13 +37,12 @@ class Engine:
     """Where parts are computed.
 
     A local Dask cluster of ``workers`` processes; a running ``scheduler``, such as ``tls://host:8786``, with
-    ``tls``, a folder with ca.pem, cert.pem and key.pem; else ``threads`` of this process (default: all
-    processors).
     """
 
     workers: int | None = None
     scheduler: str | None = None
     threads: int | None = None
+    # A folder with ca.pem, cert.pem and key.pem; else ``threads`` of this process (default: all processors)
     tls: Path | None = None
 
     @property
