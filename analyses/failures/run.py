@@ -54,10 +54,7 @@ class Failures:
     def case(self, name: str) -> FailureCase:
         """A case by its name.
 
-        Raises
-        ------
-        InputError
-            Where there is none of that name.
+        Raises `InputError`: where there is none of that name.
         """
         for one in self.cases:
             if one.name == name:

@@ -12,6 +12,7 @@ from scipy.optimize import root_scalar
 from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.angle import holding_torque_Nm
 from actuator_lti.drive.steady import motor_torque_Nm, standing_gain
+from analyses.finite import finite
 from analyses.linear.static_threshold import StaticThreshold, static_threshold
 from nonlinear import Rows, commands, simulate
 from nonlinear.bench.operating_motion import operating_motion_at
@@ -80,7 +81,7 @@ def _waiting(design: Design, load_Nm: float, static: StaticThreshold) -> tuple[W
     predicted = [static.waiting_time_s(float(size)) for size in sizes]
     seen = _first_motion_s(design, load_Nm, sizes)
     return tuple(
-        Waiting(float(size), foreseen, float(time) if math.isfinite(time) else None)
+        Waiting(float(size), foreseen, finite(time))
         for size, foreseen, time in zip(sizes, predicted, seen, strict=True)
     )
 

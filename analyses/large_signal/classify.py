@@ -29,13 +29,8 @@ class RateLimited:
 def rate_limited(amplitude: float, omega_rad_s: float, rate_limit: float) -> RateLimited:
     """Describing function of a pure rate limit (model.md section 5; between the regimes an accepted fit).
 
-    Parameters
-    ----------
-    amplitude : float
-        Peak of the command.
-    omega_rad_s : float
-    rate_limit : float
-        R, in the unit of the amplitude per second.
+    ``amplitude``: peak of the command.
+    ``rate_limit``: R, in the unit of the amplitude per second.
 
     Examples
     --------

@@ -268,10 +268,7 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
     constant amount
     a period, not by a share of itself: only windows of many periods (``longer``) tell it from one that stays.
 
-    Raises
-    ------
-    TooManyTicks
-        Where one run would take more than `LONGEST_TICKS`.
+    Raises `TooManyTicks`: where one run would take more than `LONGEST_TICKS`.
     """
     rows = step_rows(design, sizes_rad, settle_ticks, longer)
     if rows["ticks"].max() > LONGEST_TICKS:

@@ -13,6 +13,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
+from analyses.finite import finite
 from analyses.large_signal.classify import (
     CAUSES,
     WAVEFORMS,
@@ -253,8 +254,8 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
         minus90deg_hz=first_90,
         minus3db_range_hz=np.array([crossing_range(hz, row, level) for row in gain]),
         below_from_start=gain[:, 0] < level,
-        linear_minus3db_hz=_number(_crossing(fine, fine_db, level)),
-        linear_minus90deg_hz=_number(_crossing(fine, fine_deg, -90.0)),
+        linear_minus3db_hz=finite(_crossing(fine, fine_db, level)),
+        linear_minus90deg_hz=finite(_crossing(fine, fine_deg, -90.0)),
         level_db=level,
     )
 
@@ -299,7 +300,3 @@ def crossing_range(hz: np.ndarray, values: np.ndarray, level: float) -> tuple[fl
     first = int(np.argmin(above)) if known.size and not above.all() else known.size
     low = float(hz[known[first - 1]]) if first > 0 else 0.0
     return low, float(hz[known[first]]) if first < known.size else math.inf
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None

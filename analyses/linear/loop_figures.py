@@ -164,10 +164,8 @@ def loop_figures(
     Bandwidth and step (that of a continuous loop with delays takes its time) are those of ``response``, else
     of the closed loop, behind the ``mean`` of the command.
 
-    Raises
-    ------
-    InputError, NumericalError
-        If the margins cannot be found; another figure that cannot becomes a note.
+    Raises `InputError`, `NumericalError`: if the margins cannot be found; another figure that cannot becomes
+    a note.
     """
     from actuator_lti.bandwidth import peaks
     from actuator_lti.margins import stability_margins
@@ -241,10 +239,8 @@ def all_loop_figures(
     ``locked``: the current loop with the rotor locked as well; where left out, if a requirement is on it.
     Without such a requirement it may fail alone, inside `analyses.isolation.isolated`.
 
-    Raises
-    ------
-    InputError, NumericalError
-        If the margins of a loop cannot be found, and ``refused`` is not given.
+    Raises `InputError`, `NumericalError`: if the margins of a loop cannot be found, and ``refused`` is not
+    given.
     """
     result = {}
     needed = any(r.rotor == "locked" for r in loops.design.requirements)

@@ -50,11 +50,8 @@ class OuterLoop:
 def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
     """The loop of an outer system around a drive, broken at the drive's command.
 
-    Raises
-    ------
-    InputError
-        For a sampled system around continuous loops, one without a sampling period around sampled ones, or a
-        period that is no whole multiple of that of the drive's outermost loop.
+    Raises `InputError`: for a sampled system around continuous loops, one without a sampling period around
+    sampled ones, or a period that is no whole multiple of that of the drive's outermost loop.
 
     Examples
     --------
@@ -144,10 +141,7 @@ def read_outer_loop(path: str | PathLike[str]) -> OuterLoop:
     ``dt`` in s, 0 for a continuous system; ``sampling_period`` in s of a continuous one that a sampled drive
     is closed around; ``sign`` -1 (usual) or 1; ``name``, ``input``, ``output``.
 
-    Raises
-    ------
-    InputError
-        For anything else, naming file, key and what is allowed.
+    Raises `InputError`: for anything else, naming file, key and what is allowed.
     """
     return outer_loop(read_json(path, "JSON file of an outer loop"), shown_path(path))
 

@@ -67,10 +67,7 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     loop), ``"position:T"`` (closed), ``"i_ref:S"`` (sensitivity); empty: the open outermost loop.
     ``averages``: those behind the coherence.
 
-    Raises
-    ------
-    InputError
-        For a file that is no response, or a loop that is not there.
+    Raises `InputError`: for a file that is no response, or a loop that is not there.
     """
     every = {**loops.break_points, **loops.present}
     name, _, of = place.partition(":")

@@ -21,6 +21,7 @@ from actuator_lti.design import with_values, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
+from analyses.finite import finite
 from analyses.monte_carlo.judging import by_loop, in_populations, judge, label, source_columns
 from analyses.monte_carlo.reduction import BLOCK, Reducing, Reduction, Tally, judged, reduced, unpacked
 from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
@@ -140,16 +141,12 @@ def _drivers(task: SampleTask, odds: Sequence[Odds]) -> tuple[Driver, ...]:
         rows[2 * k : 2 * k + 2, k] = factor.box
     figures = task.figures(rows)
     made = [
-        Driver(name, factor.path, *factor.box, *(_known(x) for x in figures[name][2 * k : 2 * k + 2]))
+        Driver(name, factor.path, *factor.box, *(finite(x) for x in figures[name][2 * k : 2 * k + 2]))
         for name in names
         for k, factor in enumerate(factors)
     ]
     order = {name: place for place, name in enumerate(names)}
     return tuple(sorted(made, key=lambda one: (order[one.column], -one.swing)))
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
 
 
 def _odds(id: str, words: str, unit: str, passed: int, count: int) -> Odds:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri, ndtr, ndtri
 
+from analyses.finite import finite
 from analyses.monte_carlo.judging import judge
 from analyses.monte_carlo.result import WorstCase
 from analyses.monte_carlo.task import SampleTask
@@ -232,10 +233,10 @@ def _described(
     return WorstCase(
         requirement.id,
         requirement.unit,
-        sampled if np.isfinite(sampled) else None,
+        finite(sampled),
         sample,
         value if np.isfinite(distance) else None,
-        distance if np.isfinite(distance) else None,
+        finite(distance),
         bool(judged.passed[1]),
         dict(zip(task.sampler.paths, (float(v) for v in point), strict=True)),
         evaluations,

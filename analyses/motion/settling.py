@@ -98,14 +98,9 @@ def settlings_of(
     The largest is asked first. One that does not come to rest fails the drive, whatever smaller steps do, and
     they are not asked at this load; where a requirement accepts a swing all are, as the largest counts.
 
-    Parameters
-    ----------
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
-    loads_Nm : iterable of float, optional
-        Other loads.
-    known : iterable of Settling, optional
-        Steps of which those at rest are not asked again.
+    ``loops``: sampled and sliding, of this design, if they are there already.
+    ``loads_Nm``: other loads.
+    ``known``: steps of which those at rest are not asked again.
     """
     settings, resting = design.validation, [one for one in known if not one.hunting]
     sizes = {settings.full_deflection_rad * share for share in (SMALL, *settings.amplitude_fractions)}

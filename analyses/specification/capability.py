@@ -32,10 +32,7 @@ class DriveFigures:
 def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
     """Rate, current and acceleration of a drive at a load at the output, N m (linear axis: N), either sign.
 
-    Raises
-    ------
-    InputError
-        If the load is not finite.
+    Raises `InputError`: if the load is not finite.
 
     Examples
     --------

@@ -138,10 +138,7 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
     At rest, without dry friction, play, counts and friction of two slopes.  An output that no moment moves is
     pushed with the largest load moment.
 
-    Raises
-    ------
-    UnstableError
-        For a loop that is not stable.
+    Raises `UnstableError`: for a loop that is not stable.
     """
     coupling, bench = design.coupling, on_the_bench(design)
     friction = replace(design.friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
@@ -197,10 +194,7 @@ def lost_motion_seen(design: Design) -> float:
     The peak is the largest load moment, or thrice what the load's friction breaks away at.  It is slow enough
     for `PERIODS_WITHIN` oscillations of the load within the part that is read.
 
-    Raises
-    ------
-    InputError
-        Without a coupling, a position loop or a largest load moment.
+    Raises `InputError`: without a coupling, a position loop or a largest load moment.
     """
     coupling, friction, rated = design.coupling, design.load.friction, design.load.moment_max_Nm
     if coupling is None or design.controller.position is None or rated <= 0.0:

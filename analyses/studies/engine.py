@@ -80,12 +80,8 @@ class Engine:
 
         Results go to the sink in any order; progress counts the sizes of the items.
 
-        Raises
-        ------
-        NumericalError
-            If workers keep dying, or the scheduler cannot be reached or is lost.
-        InputError
-            If a worker computes otherwise than this process (`analyses.studies.proof`).
+        Raises `NumericalError`: if workers keep dying, or the scheduler cannot be reached or is lost.
+        Raises `InputError`: if a worker computes otherwise than this process (`analyses.studies.proof`).
         """
         todo = list(items)
         if not todo:

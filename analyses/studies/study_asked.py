@@ -32,10 +32,7 @@ def compared(
 ) -> Comparison | str:
     """Compare the variants of a study; what is found of each design is kept under ``out``.
 
-    Raises
-    ------
-    InputError
-        Without a study, unless the example of one is asked for.
+    Raises `InputError`: without a study, unless the example of one is asked for.
     """
     if asked.example:
         import textwrap
