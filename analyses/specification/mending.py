@@ -21,7 +21,7 @@ from analyses.tuning.problem import GAINS
 if TYPE_CHECKING:
     from actuator_lti.batch.figures import LinearFigures
     from actuator_lti.design.model import Design
-    from analyses.corners import Corners
+    from analyses.corners.run import Corners
     from analyses.linear.loop_survey import LoopSurvey
     from analyses.specification.weakest import WeakPoint
 
