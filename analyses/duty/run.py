@@ -101,8 +101,10 @@ def duty(design: Design, asked: Asked | None = None) -> Duty:
     asked = Asked.of(design) if asked is None else asked
     free = replace(design, limits=replace(design.limits, peak_time_s=None))
     run, ticks = _moving(free, asked)
-    current = run.current_A[-ticks:]
-    held = _holding_A(free, asked) if asked.share < 1.0 else 0.0
+    current, held = run.current_A[-ticks:], 0.0
+    if asked.share < 1.0:
+        still = simulate(free, commands.hold(), HOLD_S, asked.load_Nm).current_A
+        held = float(np.sqrt(np.mean(still[still.size // 2 :] ** 2)))
     moving = float(np.sqrt(np.mean(current**2)))
     rms = float(np.sqrt(asked.share * moving**2 + (1.0 - asked.share) * held**2))
     acts = [name for name in run.limits if name != "profile" and run.limit_active(name)[-ticks:].any()]
@@ -124,12 +126,6 @@ def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
     ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
     sine = commands.sine(asked.amplitude_rad, 1.0 / (ticks * Ts))
     return simulate(design, sine, (PERIODS + 1) * ticks * Ts, asked.load_Nm), ticks
-
-
-def _holding_A(design: Design, asked: Asked) -> float:
-    """Mean square root of the current while the drive holds still under the load."""
-    run = simulate(design, commands.hold(), HOLD_S, asked.load_Nm)
-    return float(np.sqrt(np.mean(run.current_A[run.current_A.size // 2 :] ** 2)))
 
 
 def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Overload | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, log
 
@@ -96,12 +95,15 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
         raise InputError(f"watched {asked.watched_s:g} s: at most {longest:g} s with this period")
     wait = _settling_s(design, asked)
     cases, left_out = cases_of(design, asked)
-    settled = {start: _settled(design, asked, start, wait) for start in {case.start_rad for case in cases}}
+    settled = {case.start_rad: Rig(design, asked.load_Nm) for case in cases}
+    for start, rig in settled.items():
+        for _ in range(ceil(wait / design.controller.period_s)):
+            rig.step(start)
     made = list[FailureCase]()
     for case in cases:
         rig = settled[case.start_rad].copy()
         if _reaches(rig, case):
-            made.append(_run(rig, asked, case))
+            made.append(_followed(rig, asked, case))
         else:
             left_out |= {case.name: f"its output does not get half-way to the stop in {LONGEST_S:g} s"}
     before = tuple(outcome(design, asked.load_Nm, start) for start in sorted(settled))
@@ -119,16 +121,8 @@ def _settling_s(design: Design, asked: Asked) -> float:
     return min(0.1 + travel + ticks * design.controller.period_s, LONGEST_S)
 
 
-def _settled(design: Design, asked: Asked, start_rad: float, wait_s: float) -> Rig:
-    """The drive as it holds a command."""
-    rig = Rig(design, asked.load_Nm)
-    for _ in range(ceil(wait_s / design.controller.period_s)):
-        rig.step(start_rad)
-    return rig
-
-
-def _run(rig: Rig, asked: Asked, case: Case) -> FailureCase:
-    """Fail and follow."""
+def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
+    """What comes of a failure."""
     Ts = rig.design.controller.period_s
     start = rig.measured().output_angle_rad
     case.broken(rig)
@@ -139,7 +133,22 @@ def _run(rig: Rig, asked: Asked, case: Case) -> FailureCase:
         rows.append((k * Ts, moved, true.current_A, rig.moment_Nm, rig.controller.value("overloaded")))
         if case.stops and abs(moved) >= asked.stop_rad:
             break
-    return _judged(case, asked, *np.array(rows).T)
+    t, moved, current, moment, overloaded = np.array(rows).T
+    protected = np.flatnonzero(overloaded > 0.0)
+    return FailureCase(
+        name=case.name,
+        words=case.words,
+        time_s=t,
+        deflection_rad=moved,
+        current_A=current,
+        moment_Nm=moment,
+        to_deflection_s=_first(t, np.abs(moved), asked.deflection_rad),
+        to_stop_s=_first(t, np.abs(moved), asked.stop_rad),
+        at_detection_rad=float(np.abs(moved)[t <= asked.detection_s * (1.0 + 1e-12)].max()),
+        peak_current_A=float(np.abs(current).max()),
+        peak_moment_Nm=float(np.abs(moment).max()),
+        protected_s=float(t[protected[0]]) if protected.size else None,
+    )
 
 
 def _reaches(rig: Rig, case: Case) -> bool:
@@ -152,34 +161,11 @@ def _reaches(rig: Rig, case: Case) -> bool:
     return case.at_rad is None
 
 
-def _judged(
-    case: Case, asked: Asked, t: Floats, moved: Floats, current: Floats, moment: Floats, overloaded: Floats
-) -> FailureCase:
-    size = np.abs(moved)
-    return FailureCase(
-        name=case.name,
-        words=case.words,
-        time_s=t,
-        deflection_rad=moved,
-        current_A=current,
-        moment_Nm=moment,
-        to_deflection_s=_first(
-            size >= asked.deflection_rad, lambda k: _between(t, size, k, asked.deflection_rad)
-        ),
-        to_stop_s=_first(size >= asked.stop_rad, lambda k: _between(t, size, k, asked.stop_rad)),
-        at_detection_rad=float(size[t <= asked.detection_s * (1.0 + 1e-12)].max()),
-        peak_current_A=float(np.abs(current).max()),
-        peak_moment_Nm=float(np.abs(moment).max()),
-        protected_s=_first(overloaded > 0.0, lambda k: float(t[k])),
-    )
-
-
-def _first(true: np.ndarray, when: Callable[[int], float]) -> float | None:
-    return when(int(np.argmax(true))) if true.any() else None
-
-
-def _between(t: Floats, size: Floats, k: int, level: float) -> float:
-    """Time at which the level is crossed, on a line between two ticks."""
-    if k == 0:
+def _first(t: Floats, size: Floats, level: float) -> float | None:
+    """Time at which a level is first crossed, on a line between two ticks."""
+    there = np.flatnonzero(size >= level)
+    if not there.size:
+        return None
+    if (k := int(there[0])) == 0:
         return float(t[0])
     return float(t[k] - (t[k] - t[k - 1]) * (size[k] - level) / (size[k] - size[k - 1]))

@@ -50,40 +50,29 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
     """
     design = replace(design, command=Command())
     moment = load_Nm + float(design.load.moment_Nm(0.0))
-    static = static_threshold(_motor_alone(design), moment)
+    friction = design.friction
+    at_zero = replace(  # its own torque there an offset, no friction behind the spring
+        design,
+        motor=design.motor.level(),
+        load=replace(design.load.level(), friction=None),
+        friction=replace(friction, offset_torque_Nm=friction.offset_torque_Nm + holding_torque_Nm(design)),
+    )
+    static = static_threshold(at_zero, moment)
     if not 0.0 < static.forward_rad < math.inf:
         return None
     if design.controller.position_loop.kicks:
         return Threshold(static, (), None, 0.0)  # a step's own kick moves it at once
     if static.integral_time_s is not None:
-        return Threshold(static, _waiting(design, load_Nm, static), None, 0.0)
+        sizes = static.forward_rad * np.array(FRACTIONS)
+        waiting = tuple(
+            Waiting(float(size), static.waiting_time_s(float(size)), finite(time))
+            for size, time in zip(sizes, _first_motion_s(design, load_Nm, sizes), strict=True)
+        )
+        return Threshold(static, waiting, None, 0.0)
     sizes = static.forward_rad * np.linspace(1.0 - WITHIN, 1.0 + WITHIN, COUNT)
     moved = _first_motion_s(design, load_Nm, sizes) < math.inf
     first = float(sizes[np.argmax(moved)]) if moved.any() else None
     return Threshold(static, (), first, 2.0 * WITHIN / (COUNT - 1))
-
-
-def _motor_alone(design: Design) -> Design:
-    """The drive at angle zero: its own torque there an offset, no friction behind the spring."""
-    friction = design.friction
-    offset = friction.offset_torque_Nm + holding_torque_Nm(design)
-    return replace(
-        design,
-        motor=design.motor.level(),
-        load=replace(design.load.level(), friction=None),
-        friction=replace(friction, offset_torque_Nm=offset),
-    )
-
-
-def _waiting(design: Design, load_Nm: float, static: StaticThreshold) -> tuple[Waiting, ...]:
-    """Steps below the threshold and when each moves the output."""
-    sizes = static.forward_rad * np.array(FRACTIONS)
-    predicted = [static.waiting_time_s(float(size)) for size in sizes]
-    seen = _first_motion_s(design, load_Nm, sizes)
-    return tuple(
-        Waiting(float(size), foreseen, finite(time))
-        for size, foreseen, time in zip(sizes, predicted, seen, strict=True)
-    )
 
 
 def _first_motion_s(design: Design, load_Nm: float, sizes: np.ndarray) -> np.ndarray:

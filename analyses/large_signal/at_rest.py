@@ -17,10 +17,10 @@ from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
+from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.tones import TANH_TOLERANCE, tone
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS, Rows
-from nonlinear.runs.reduced import BatchResult
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
@@ -94,15 +94,10 @@ def sweep_from_rest(
         stick_fraction=result.window_stick_fraction,
         distortion=result.distortion("motor_speed_rad_s"),
         unsteadiness=result.unsteadiness("output_angle_rad"),
-        limiter=tuple(_acting(result, k) for k in range(asked.size)),
+        limiter=tuple(
+            LIMITERS[int(np.argmax(row))] if row.any() else "" for row in limiter_fractions(result)
+        ),
     )
-
-
-def _acting(result: BatchResult, k: int) -> str:
-    """Name of the limit that acted longest in the last window of a run."""
-    used = {name: float(result.window_limit_fraction(name)[k]) for name in LIMITERS}
-    name = max(used, key=lambda item: used[item])
-    return name if used[name] > 0.0 else ""
 
 
 def _linear(design: Design, frequency_hz: Floats, speed_rad_s: float | None) -> Complexes:

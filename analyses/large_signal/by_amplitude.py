@@ -8,7 +8,7 @@ not be the linear one.  A finding with figures, no check.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil, nan
 
@@ -71,28 +71,18 @@ def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
         for kind, linear, hertz in asked:
             for size in SIZES:
                 for friction_on in (False, True) if rough else (False,):
-                    yield _released(bench, name, kind, linear, hertz, size, friction_on)
+                    release = _Release(bench, name, kind, hertz, SIZES[size], friction_on)
+                    value, seen = _first(release, linear)
+                    found = (linear, value, FURTHEST * linear, bench.setup(name).period_s, *seen)
+                    about = (bench.design.axis, release.coarser, release.too_long)
+                    yield AmplitudeMargin(name, kind, size, SIZES[size], friction_on, *found, *about)
 
 
-def _released(
-    bench: Bench, name: str, kind: str, linear: float, hertz: float, size: str, friction_on: bool
-) -> AmplitudeMargin:
-    """Where an oscillation lasts, and what limits it there."""
-    release = _Release(bench, name, kind, hertz, SIZES[size], friction_on)
-    asked = [] if release.too_long else _asked(kind, linear, coarser=release.coarser)
-    value, seen = _first(release, asked)
-    found = (linear, value, FURTHEST * linear, bench.setup(name).period_s, *seen, bench.design.axis)
-    return AmplitudeMargin(
-        name, kind, size, SIZES[size], friction_on, *found, coarser=release.coarser,
-        too_long=release.too_long,
-    )  # fmt: skip
-
-
-def _first(release: _Release, asked: Sequence[float]) -> tuple[float | None, tuple[str, float]]:
+def _first(release: _Release, linear: float) -> tuple[float | None, tuple[str, float]]:
     """The first value at which an oscillation lasts, closed in from the one before; none beyond is asked."""
     low, seen = -1.0, ("", nan)
     value: float | None = None
-    for one in asked:
+    for one in _asked(release.kind, linear, coarser=release.coarser) if not release.too_long else ():
         if (lasting := release.lasting(one)) is not None:
             value, seen = one, lasting
             break
@@ -149,11 +139,10 @@ class _Release:
         rows.window(self.window, self.cycles, 0)
         result = rows.run()
         last, before = (float(np.ptp(result.span(self.setup.before, k))) for k in (0, 1))
-        full = {
-            "u": self.setup.design.limits.voltage_V,
-            "i_ref": self.sizes["current"],
-            "w_ref": self.sizes["velocity"],
-        }[self.setup.point]
+        voltage = self.setup.design.limits.voltage_V
+        full = {"u": voltage, "i_ref": self.sizes["current"], "w_ref": self.sizes["velocity"]}[
+            self.setup.point
+        ]
         if result.ok[0] and not (last > ALIVE * full and last >= self.lasts * before):
             return None
         shares = [float(result.window_limit_fraction(name)[0]) for name in LIMITERS]

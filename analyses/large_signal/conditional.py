@@ -13,7 +13,7 @@ it and goes on integrating.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import asin, inf, isfinite, pi, sqrt
 from typing import TYPE_CHECKING, Literal
@@ -35,7 +35,6 @@ from nonlinear.bench.operating_motion import lasting_torque_Nm
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins, Loops
     from actuator_lti.loops.periodic import PeriodicLoop
-    from nonlinear.runs.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]
@@ -86,7 +85,7 @@ class Conditional:
     # Frequency, and amplitude of the output error, while the step at the threshold hovers there
     oscillation_hz: float | None
     oscillation_rad: float | None
-    limiter: str  # the limit that acts longest at the end of the smallest step that does not settle
+    limiter: str = ""  # the limit that acts longest at the end of the smallest step that does not settle
     limiter_share: float = 0.0  # of the ticks at that end
     ending: Ending | Literal[""] = ""
     end_rad: float | None = None  # half of the output's span at that end
@@ -133,27 +132,19 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
         for point, limit, limiter in _limits(design)
         if margins[point].stable and margins[point].gain_lower > LOW_GAIN
     ]
-    predictions = tuple(one for one in result if one is not None)
     design = quiet(design)
     threshold, following = step_threshold(design, settle_ticks)
-    hertz, amplitude, end = None, None, None
-    if following is not None:
-        end = _end(design, following, settle_ticks)
-    if threshold is not None and threshold > 0.0:
-        hertz, amplitude = _hovering(design, threshold, settle_ticks)
-    return Conditional(
+    hertz, amplitude = _hovering(design, threshold, settle_ticks) if threshold else (None, None)
+    found = Conditional(
         margins=margins,
-        predictions=predictions,
+        predictions=tuple(one for one in result if one is not None),
         threshold_rad=threshold,
         next_rad=following,
         full_deflection_rad=design.validation.full_deflection_rad,
         oscillation_hz=hertz,
         oscillation_rad=amplitude,
-        limiter="" if end is None else end.limiter,
-        limiter_share=0.0 if end is None else end.share,
-        ending="" if end is None else end.words,
-        end_rad=None if end is None else end.output_rad,
     )
+    return found if following is None else _ended(found, design, following, settle_ticks)
 
 
 def _limits(design: Design) -> list[tuple[str, float, str]]:
@@ -172,7 +163,6 @@ def _limits(design: Design) -> list[tuple[str, float, str]]:
 def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: str) -> Prediction | None:
     """The limit cycle at the lower gain margin; none where the drive drifts away there."""
     ratio = saturation_ratio(gain)
-
     hertz = _oscillation_hz(periodic_loop(loops, point), gain)
     if hertz == 0.0:
         return None
@@ -281,16 +271,11 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
     near = errors[0] <= np.maximum(CONVERGED * sizes_rad, _standing(design) + accepted_rad(design))
     low, high = result.span("output_angle_rad")
     rests = high - low <= RESTING * sizes_rad
-    limited = _limited(result)
+    limited = np.max([result.window_limit_fraction(name) for name in OWN], axis=0)
     held = rests & (limited > HELD)
     alone = (limited == 0.0) & (errors[0] < GROWS * errors[1])
     falls = (errors[0] < LASTING * errors[1]) & (errors[0] < sizes_rad)
-    return result.ok & ~held & (near | rests | alone | falls)
-
-
-def _limited(result: BatchResult) -> Floats:
-    """Part of the last window in which a limit of the drive acts: the one that acts longest."""
-    return np.asarray(np.max([result.window_limit_fraction(name) for name in OWN], axis=0))
+    return np.asarray(result.ok & ~held & (near | rests | alone | falls))
 
 
 def _standing(design: Design) -> float:
@@ -330,17 +315,7 @@ def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int 
     return rows
 
 
-@dataclass(frozen=True)
-class _End:
-    """What a step that does not settle ends in."""
-
-    words: Ending
-    output_rad: float
-    limiter: str
-    share: float
-
-
-def _end(design: Design, size_rad: float, settle_ticks: int) -> _End:
+def _ended(found: Conditional, design: Design, size_rad: float, settle_ticks: int) -> Conditional:
     """Watch the smallest step that does not settle for longer: what it ends in, and which limit acts then."""
     result = step_rows(design, np.array([size_rad]), settle_ticks, AGAIN[1]).run()
     spans = [float(np.subtract(*result.span("output_angle_rad", last)[::-1])[0]) for last in (0, 1)]
@@ -352,7 +327,13 @@ def _end(design: Design, size_rad: float, settle_ticks: int) -> _End:
         ending = "diverges"
     elif spans[0] <= RESTING * size_rad:
         ending = "is held by a limit"
-    return _End(ending, 0.5 * spans[0], limiter if shares[limiter] > 0.0 else "", shares[limiter])
+    return replace(
+        found,
+        limiter=limiter if shares[limiter] > 0.0 else "",
+        limiter_share=shares[limiter],
+        ending=ending,
+        end_rad=0.5 * spans[0],
+    )
 
 
 def _hovering(design: Design, size_rad: float, settle_ticks: int) -> tuple[float | None, float | None]:

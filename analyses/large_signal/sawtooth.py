@@ -62,12 +62,12 @@ class Sawtooth:
     amplitude_rad: float
     frequency_hz: float
     rate_limit_rad_s: float  # R at the output
-    gain_over_frequency: float  # Kv/w: the formulas hold where this is large
+    gain_over_frequency: float = 0.0  # Kv/w: the formulas hold where this is large
     # Part of a period that the reversal 2 R/a takes at the drive's largest acceleration, in degrees: the
     # formulas reverse at once, so this much lag may come on top
-    reversal_deg: float
-    has_current: bool
-    runs: tuple[SawtoothRun, ...]  # one a load torque
+    reversal_deg: float = 0.0
+    has_current: bool = False
+    runs: tuple[SawtoothRun, ...] = ()  # one a load torque
     reason: str = ""  # why there is none; then ``runs`` is empty
     # Steady rate of the output at the slowest load: below R by the droop of a P velocity loop, which the
     # formulas do not know
@@ -115,16 +115,15 @@ def sawtooth(
     limit = design.limits.speed_rad_s
     if design.controller.velocity is None or not math.isfinite(limit):
         reason = "the drive has no speed limit of its own, so its output is no sawtooth"
-        return Sawtooth(amplitude, 0.0, math.inf, 0.0, 0.0, False, (), reason)
+        return Sawtooth(amplitude, 0.0, math.inf, reason=reason)
     figures = [drive_figures(design, load) for load in design.validation.loads_Nm]
     slowest = min(result.output_rate_rad_s for result in figures)
     rate = limit / design.total_ratio
     weak = any(result.rate_limit in ("voltage", "force") for result in figures)
     if weak and slowest < rate * (1.0 - 1e-9):
-        reason = (
-            f"not every load lets the drive reach its speed limit: it stays at {100 * slowest / rate:.0f} %"
-        )
-        return Sawtooth(amplitude, 0.0, rate, 0.0, 0.0, False, (), reason)
+        share = f"{100 * slowest / rate:.0f} %"
+        reason = f"not every load lets the drive reach its speed limit: it stays at {share}"
+        return Sawtooth(amplitude, 0.0, rate, reason=reason)
     wanted = OVERRUN * rate / (2.0 * math.pi * amplitude) if frequency_hz is None else frequency_hz
     chosen = tone(wanted, design, least_updates=400)
     runs = []
@@ -132,7 +131,7 @@ def sawtooth(
         result = _run(design, amplitude, chosen.frequency_hz, chosen.ticks // chosen.cycles, load, rate)
         if result is None:
             reason = f"at a load of {load:g} N m the output stands still"
-            return Sawtooth(amplitude, chosen.frequency_hz, rate, 0.0, 0.0, False, (), reason)
+            return Sawtooth(amplitude, chosen.frequency_hz, rate, reason=reason)
         runs.append(result)
     swift = design.controller.position_loop.gain / chosen.omega_rad_s
     push = min(result.acceleration_rad_s2 for result in figures)
@@ -148,20 +147,13 @@ def _run(
 ) -> SawtoothRun | None:
     """Simulate from the flank of the triangle on, and keep the last periods; none of a drive that stands."""
     formula = rate_limited(amplitude, 2.0 * math.pi * frequency_hz, rate)
-    periods = 2 + PERIODS_SHOWN
-    ticks = periods * period_ticks
     N = design.total_ratio
     begin = State()
     if formula.x >= FULL_TRIANGLE:
         lag_s = math.radians(formula.lag_deg) / (2.0 * math.pi * frequency_hz)
         begin = State(motor_angle_rad=-N * rate * lag_s)
-    run = simulate(
-        design,
-        commands.sine(amplitude, frequency_hz),
-        ticks * design.controller.period_s,
-        load_Nm,
-        initial=begin,
-    )
+    seconds = (2 + PERIODS_SHOWN) * period_ticks * design.controller.period_s
+    run = simulate(design, commands.sine(amplitude, frequency_hz), seconds, load_Nm, initial=begin)
     last = slice(-period_ticks, None)
     y = run.output_angle_rad[last] - run.output_angle_rad[last].mean()
     turn = np.exp(-2j * np.pi * frequency_hz * run.time_s[last])

@@ -18,8 +18,7 @@ from analyses.duty.run import Duty, duty
 from analyses.failures.run import Failures, failures
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones import run_tones, tone
-from analyses.limit_cycles.result import LimitCycles
-from analyses.limit_cycles.run import limit_cycles
+from analyses.limit_cycles.run import LimitCycles, limit_cycles
 from analyses.motion.settling import ending_of
 
 

@@ -159,24 +159,18 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
 
 def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> tuple[AtRest, ...]:
     """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, moment in N m)."""
-    made = []
-    for frequency, moment in asked:
+    made, period = [], design.controller.period_s
+    for frequency, amplitude in asked:
         every = design.controller.position_loop.every  # a period is a whole number of them
-        ticks = max(4, round(1.0 / (frequency * design.controller.period_s * every))) * every
-        K = _injected(design, moment, ticks)
-        made.append(AtRest(moment, 1.0 / (ticks * design.controller.period_s), K))
+        ticks = max(4, round(1.0 / (frequency * period * every))) * every
+        count, turn = (SKIPPED + 2) * ticks, np.exp(-2j * np.pi * np.arange(ticks) / ticks)
+        moment = np.tile(-amplitude * turn.imag, SKIPPED + 2)
+        run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
+        seen = (run.output_angle_rad[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum()
+        given = (moment[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum()
+        K = complex(given / seen) if seen != 0.0 else complex(np.inf)
+        made.append(AtRest(amplitude, 1.0 / (ticks * period), K))
     return tuple(made)
-
-
-def _injected(design: Design, amplitude: float, ticks: int) -> complex:
-    """Stiffness seen at a moment of a period of so many ticks, after some periods."""
-    period, count = design.controller.period_s, (SKIPPED + 2) * ticks
-    turn = np.exp(-2j * np.pi * np.arange(ticks) / ticks)
-    moment = np.tile(-amplitude * turn.imag, SKIPPED + 2)
-    run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
-    seen = run.output_angle_rad[SKIPPED * ticks :].reshape(2, ticks) @ turn
-    given = moment[SKIPPED * ticks :].reshape(2, ticks) @ turn
-    return complex(given.sum() / seen.sum()) if seen.sum() != 0.0 else complex(np.inf)
 
 
 def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
