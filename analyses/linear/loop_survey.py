@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 FORMS: tuple[Form, ...] = ("sampled", "continuous", "ideal")
-DESCRIBED_FRACTIONS = (0.01, 0.1)
+DESCRIBED_FRACTIONS = (0.01, 0.1)  # of the top speed, at which friction is described
 MOST_STATES = 160  # of a periodic loop's fundamental: its certificate takes the fifth power of their number
 
 
@@ -163,11 +163,19 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     forms: dict[str, Mapping[str, LoopFigures]] = {
         "sampled": all_loop_figures(loops, certify=True, locked=True)
     }
+
+    def measured(form: Form) -> Mapping[str, LoopFigures]:
+        return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
+
     for form in () if design.controller.sampled_only else FORMS[1:]:
-        other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
+        other = attempt(f"{form} form", partial(measured, form), None)
         forms |= {} if other is None else {form: other}
     step(2)
-    break_points = attempt("loops at the break points", lambda: _break_points(loops), {})
+    break_points = attempt(
+        "loops at the break points",
+        lambda: {name: _break_point(loops, name) for name in loops.break_points},
+        {},
+    )
     step(3)
     points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
     step(4)
@@ -178,18 +186,6 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     return LoopSurvey(
         design, loops, forms, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
     )
-
-
-def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
-    """Measure the loops in a form other than the sampled one."""
-    from actuator_lti.loops import assemble_loops
-
-    return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
-
-
-def _break_points(loops: Loops) -> dict[str, BreakPoint]:
-    """Measure the loop at every break point."""
-    return {name: _break_point(loops, name) for name in loops.break_points}
 
 
 def _break_point(loops: Loops, name: str) -> BreakPoint:
@@ -218,6 +214,7 @@ def operating_points(
     """
     from actuator_lti.drive.operating import friction_slope
     from actuator_lti.loops import assemble_loops
+    from analyses.specification.capability import drive_figures
 
     def point(
         label: str, load: float | None, kind: OperatingPoint, speed: float | None = None
@@ -237,23 +234,15 @@ def operating_points(
         ]
     if design.coupling is not None and design.coupling.play_rad:
         points.append(point("in the gap of the play", None, "gap"))
+    top = drive_figures(design).output_rate_rad_s * design.total_ratio
+    shares = DESCRIBED_FRACTIONS if described and 0.0 < top < np.inf else ()
     for load in dict.fromkeys(design.validation.loads_Nm):
         points.append(point("at rest", load, "rest"))
-        for speed in _described_speeds(design) if described else ():
+        for speed in (share * top for share in shares):
             unit = "rad/s" if design.axis == "rotary" else "m/s"
             label = f"speed amplitude {speed:.3g} {unit}"
             points.append(point(label, load, "describing-function", speed))
     return tuple(points)
-
-
-def _described_speeds(design: Design) -> tuple[float, ...]:
-    """Give the speed amplitudes for the describing function: small fractions of the top speed."""
-    from analyses.specification.capability import drive_figures
-
-    top = drive_figures(design).output_rate_rad_s * design.total_ratio
-    if not np.isfinite(top) or top <= 0.0:
-        return ()
-    return tuple(fraction * top for fraction in DESCRIBED_FRACTIONS)
 
 
 def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, DelayBudget]:

@@ -73,29 +73,23 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
             raise InputError(message, where=outer.name)
         system, period = outer.system, None
     around = drive * (-outer.sign * system)
-    unit = _unit(loops)
+    if isinstance(around, control.StateSpace):
+        one = control.ss([], [], [], [[1.0]], around.dt)
+    else:
+        one = type(around).from_system(control.ss([], [], [], [[1.0]]))
+    angle = "m" if loops.design.axis == "linear" else "rad"
+    units = {"position": angle, "velocity": f"{angle}/s", "current": "A"}
+    unit = units.get(loops.design.controller.outermost, "V")
     return Loop(
         name=outer.name,
         break_point="command",
         plain_open=around,
         plain_closed=around.feedback(1),
-        plain_sensitivity=_sensitivity(around),
+        plain_sensitivity=one.feedback(around),
         period_s=period,
         unit_in=unit,
         unit_out=unit,
     )
-
-
-def _sensitivity(open_loop: Any) -> Any:
-    if isinstance(open_loop, control.StateSpace):
-        return control.ss([], [], [], [[1.0]], open_loop.dt).feedback(open_loop)
-    return type(open_loop).from_system(control.ss([], [], [], [[1.0]])).feedback(open_loop)
-
-
-def _unit(loops: Loops) -> str:
-    linear = loops.design.axis == "linear"
-    units = {"position": "m" if linear else "rad", "velocity": "m/s" if linear else "rad/s", "current": "A"}
-    return units.get(loops.design.controller.outermost, "V")
 
 
 def _sampled(outer: OuterLoop, drive_s: float) -> tuple[control.StateSpace, float]:
@@ -176,12 +170,7 @@ def _is_list(value: Any) -> bool:
 
 
 def _is_matrix(value: Any) -> bool:
-    return (
-        isinstance(value, list)
-        and bool(value)
-        and all(map(_is_list, value))
-        and len(set(map(len, value))) == 1
-    )
+    return isinstance(value, list) and all(map(_is_list, value)) and len({len(row) for row in value}) == 1
 
 
 def _is_time(value: Any) -> bool:

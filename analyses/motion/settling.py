@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import degrees, inf, radians
 from typing import TYPE_CHECKING
@@ -102,27 +102,20 @@ def settlings_of(
     ``loads_Nm``: other loads.
     ``known``: steps of which those at rest are not asked again.
     """
-    settings, resting = design.validation, [one for one in known if not one.hunting]
+    settings = design.validation
+    resting = {(one.load_Nm, one.amplitude_rad): one for one in known if not one.hunting}
     sizes = {settings.full_deflection_rad * share for share in (SMALL, *settings.amplitude_fractions)}
     found: list[Settling] = []
     for load in dict.fromkeys((0.0, *settings.loads_Nm) if loads_Nm is None else loads_Nm):
-        slip = stick_slip_cycle(design, load, loops)
+        slip, there = stick_slip_cycle(design, load, loops), list[Settling]()
         whole = sizes if slip is None else {*sizes, slip.output_amplitude_rad}
-        asked = _until_known(design, load, sorted(whole, reverse=True), resting)
-        found += reversed(list(asked))
+        for size in sorted(whole, reverse=True):
+            there.append(resting.get((load, size)) or outcome(design, load, size))
+            failed = verdict_of(design, noticed(design, there[-1:])) is Verdict.NOT_MET
+            if failed and accepted(design) is None:  # the verdict of the load is known
+                break
+        found += reversed(there)
     return tuple(found)
-
-
-def _until_known(
-    design: Design, load_Nm: float, sizes_rad: Iterable[float], resting: Iterable[Settling]
-) -> Iterator[Settling]:
-    """Steps in this order, up to the one after which the verdict of the load is known."""
-    known = {one.amplitude_rad: one for one in resting if one.load_Nm == load_Nm}
-    for size in sizes_rad:
-        one = known[size] if size in known else outcome(design, load_Nm, size)
-        yield one
-        if accepted(design) is None and verdict_of(design, noticed(design, [one])) is Verdict.NOT_MET:
-            return
 
 
 FROM_THE_LARGEST = (
