@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.asked.verdict import Tally, Verdict
-from actuator_lti.batch import Population, variable_paths
+from actuator_lti.batch import variable_paths
 from actuator_lti.design import design_tree, parameter_value
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.reading import as_path
@@ -239,21 +239,20 @@ def _moved_by(
     base: Design, other: Design, changed: tuple[Changed, ...], differences: Mapping[str, float]
 ) -> dict[str, tuple[Contribution, ...]]:
     """Change one number at a time, starting from the base."""
-    from analyses.specification.sensitivity import population_figures
+    from analyses.specification.sensitivity import moved, population_figures
 
     if len(changed) == 1:
         return {key: (Contribution(changed[0].path, amount),) for key, amount in differences.items()}
     both = set(variable_paths(base)) & set(variable_paths(other))
     paths = [item.path for item in changed if item.path in both]
-    values = {path: np.full(len(paths) + 1, parameter_value(base, path)) for path in paths}
-    for k, path in enumerate(paths):
-        values[path][k + 1] = parameter_value(other, path)
-    columns = population_figures(Population(base, values, len(paths) + 1), base, time_figures=True)
-    moved: dict[str, tuple[Contribution, ...]] = {}
+    origin = {path: parameter_value(base, path) for path in paths}
+    alone = moved(base, origin, [{path: parameter_value(other, path)} for path in paths])
+    columns = population_figures(alone, base, time_figures=True)
+    causes: dict[str, tuple[Contribution, ...]] = {}
     for key, total in differences.items():
         column = columns.get(key, np.full(len(paths) + 1, nan))
         amounts = [float(there) - float(column[0]) for there in column[1:]]
         parts = [Contribution(path, amount) for path, amount in zip(paths, amounts, strict=True)]
         parts = [one for one in parts if isfinite(one.amount) and abs(one.amount) > 1e-6 * abs(total)]
-        moved[key] = tuple(sorted(parts, key=lambda part: -abs(part.amount)))
-    return moved
+        causes[key] = tuple(sorted(parts, key=lambda part: -abs(part.amount)))
+    return causes

@@ -9,7 +9,6 @@ import numpy as np
 
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, CORNERED, QUANTITIES
 from actuator_lti.asked.verdict import Tally, Verdict
-from actuator_lti.batch import Population
 from actuator_lti.design.access import with_values
 from actuator_lti.design.model import Design, Temperature, Tolerance
 from actuator_lti.design.tolerances import tolerances
@@ -18,7 +17,7 @@ from actuator_lti.loops import assemble_loops
 from analyses.corners.asked import Asked
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures
 from analyses.specification.requirements import RequirementVerdict, judged, tally
-from analyses.specification.sensitivity import population_figures
+from analyses.specification.sensitivity import moved, population_figures
 from analyses.studies.sampling import Factor
 
 
@@ -155,11 +154,8 @@ def worst_ends(design: Design, quantity: str) -> dict[str, float]:
     """
     ends = [end for each in tolerances(design) for end in _ends(design, *each)]
     base = {path: float(design.parameters[path].value) for end in ends for path in end}
-    values = {
-        path: np.array([value, *(end.get(path, value) for end in ends)]) for path, value in base.items()
-    }
     try:
-        figures = population_figures(Population(design, values, 1 + len(ends)), design)
+        figures = population_figures(moved(design, base, ends), design)
     except InputError:
         return {}
     better = QUANTITIES[quantity].better

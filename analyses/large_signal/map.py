@@ -127,7 +127,9 @@ def amplitude_map(
     ``loops`` are sampled and sliding, of this design; ``counts`` are fewer where they would take more than
     `MOST_TICKS`.
     """
-    asked, counts = counts, _within(design, loops, counts)
+    asked, work = counts, counts[0] * work_ticks(design, loops, counts[1])
+    part = min(np.sqrt(MOST_TICKS / work), 1.0)  # of the grid on either side, within `MOST_TICKS`
+    counts = max(int(part * asked[0]), 2), max(int(part * asked[1]), 2)
     frequencies = tones(design, loops, counts[1])
     omega = np.array([t.omega_rad_s for t in frequencies])
     threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
@@ -168,12 +170,6 @@ def amplitude_map(
     )
 
 
-def _within(design: Design, loops: Loops, counts: tuple[int, int]) -> tuple[int, int]:
-    """The grid asked for, or one of the same shape whose first run takes at most `MOST_TICKS`."""
-    part = min(np.sqrt(MOST_TICKS / (counts[0] * work_ticks(design, loops, counts[1]))), 1.0)
-    return max(int(part * counts[0]), 2), max(int(part * counts[1]), 2)
-
-
 def slow_protection(design: Design, loops: Loops) -> list[str]:
     """Limiters that average for longer than a tone is simulated: they act much later."""
     limits = design.limits
@@ -204,14 +200,14 @@ class AmplitudeBode:
     all_amplitude_rad: np.ndarray  # shape (a,): Every amplitude of the map
     # Shape (a,): First crossing; between two frequencies of the map the linear response, and what the
     # simulated one is off by, interpolated on the logarithm of frequency; NaN where there is none in the
-    # range (`below_from_start`: already below at the lowest frequency), and where it lies beside points that
+    # range (`below_from_start`: already below at the whole frequency), and where it lies beside points that
     # are not steady: a missing point is no value. -3 dB is 1/sqrt(2) of the linear gain at zero frequency
     minus3db_hz: np.ndarray
     minus90deg_hz: np.ndarray
     # Shape (a, 2): Between which frequencies of the map the gain first falls through -3 dB, as far as steady
     # points tell: from 0 where the first of them is below already, to inf where none is
     minus3db_range_hz: np.ndarray
-    # Shape (a,): Whether the gain is below -3 dB at the lowest frequency already
+    # Shape (a,): Whether the gain is below -3 dB at the whole frequency already
     below_from_start: np.ndarray
     linear_minus3db_hz: float | None
     linear_minus90deg_hz: float | None
@@ -222,16 +218,20 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
     """Read the responses at the design's amplitude fractions, and the bandwidths at all, from a map."""
     full = design.validation.full_deflection_rad
     asked = sorted(design.validation.amplitude_fractions)
-    fractions, places = _on_the_map(asked, amplitude_map.amplitude_rad / full)
+    there = amplitude_map.amplitude_rad / full  # a coarse map has not all
+    nearest = {fraction: int(np.argmin(np.abs(there - fraction))) for fraction in asked}
+    on_it = {one: k for one, k in nearest.items() if math.isclose(there[k], one, rel_tol=1e-9)}
+    places = list(on_it.values())
     hz, unsteady = amplitude_map.frequency_hz, amplitude_map.waveform == WAVEFORMS.index("not steady")
     gain = np.where(unsteady, np.nan, amplitude_map.gain_db)
     phase = np.where(unsteady, np.nan, amplitude_map.phase_deg)
     steps = np.arange(FINE * (hz.size - 1) + 1) / FINE
     fine = np.exp(np.interp(steps, np.arange(hz.size), np.log(hz)))
     with np.errstate(divide="ignore"):  # the mean of a limited jerk has zeros
-        start, *curve = 20.0 * np.log10(np.abs(_linear(loops, np.array([1e-6 * hz[0], *fine]))))
+        whole = linear_steady_state(loops, 2.0 * math.pi * np.array([1e-6 * hz[0], *fine])).output
+        start, *curve = 20.0 * np.log10(np.abs(whole))
     level, fine_db = MINUS_3DB + start, np.array(curve)
-    fine_deg = np.degrees(np.unwrap(np.angle(_linear(loops, fine))))
+    fine_deg = np.degrees(np.unwrap(np.angle(whole[1:])))
     linear_db, linear_deg = fine_db[::FINE], fine_deg[::FINE]
 
     def between(values: np.ndarray, linear: np.ndarray) -> np.ndarray:
@@ -243,7 +243,7 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
     return AmplitudeBode(
         load_Nm=amplitude_map.load_Nm,
         frequency_hz=hz,
-        fractions=fractions,
+        fractions=tuple(on_it),
         amplitude_rad=amplitude_map.amplitude_rad[places],
         gain_db=gain[places],
         phase_deg=phase[places],
@@ -258,21 +258,6 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
         linear_minus90deg_hz=finite(_crossing(fine, fine_deg, -90.0)),
         level_db=level,
     )
-
-
-def _on_the_map(asked: list[float], there: np.ndarray) -> tuple[tuple[float, ...], list[int]]:
-    """Which of the fractions a map has, and where: a coarse one has not all."""
-    nearest = [int(np.argmin(np.abs(there - fraction))) for fraction in asked]
-    kept = [
-        (fraction, k)
-        for fraction, k in zip(asked, nearest, strict=True)
-        if math.isclose(there[k], fraction, rel_tol=1e-9)
-    ]
-    return tuple(fraction for fraction, _ in kept), [k for _, k in kept]
-
-
-def _linear(loops: Loops, hz: np.ndarray) -> np.ndarray:
-    return linear_steady_state(loops, 2.0 * math.pi * hz).output
 
 
 def _crossing(hz: np.ndarray, values: np.ndarray, level: float) -> float:

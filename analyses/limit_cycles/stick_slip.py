@@ -116,9 +116,9 @@ def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
     """
     velocity, friction = design.controller.velocity, design.friction
     plain = design.controller.own_law is None  # what a law of one's own does meanwhile is not known here
-    symmetric = friction.dry_torque_reverse_Nm is None and friction.offset_torque_Nm == 0.0
-    dry = friction.law == "coulomb" and not friction.points and friction.dry_Nm(load_Nm) > 0.0
-    if not (plain and symmetric and dry and design.load.path != "back-drivable"):
+    alike = friction.dry_torque_reverse_Nm is None and friction.offset_torque_Nm == 0.0
+    rubs = friction.law == "coulomb" and not friction.points and friction.dry_Nm(load_Nm) > 0.0
+    if not (plain and alike and rubs and design.load.path != "back-drivable"):
         return None
     if velocity is None or velocity.integral_time_s is None:
         return None
