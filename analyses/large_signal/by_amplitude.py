@@ -82,7 +82,7 @@ def _first(release: _Release, linear: float) -> tuple[float | None, tuple[str, f
     """The first value at which an oscillation lasts, closed in from the one before; none beyond is asked."""
     low, seen = -1.0, ("", nan)
     value: float | None = None
-    for one in _asked(release.kind, linear, coarser=release.coarser) if not release.too_long else ():
+    for one in _asked(release, linear):
         if (lasting := release.lasting(one)) is not None:
             value, seen = one, lasting
             break
@@ -94,9 +94,12 @@ def _first(release: _Release, linear: float) -> tuple[float | None, tuple[str, f
     return value, seen
 
 
-def _asked(kind: str, linear: float, *, coarser: bool) -> list[float]:
+def _asked(release: _Release, linear: float) -> list[float]:
     """The drive as it is, then values from well below the linear margin to well beyond it."""
-    if coarser:
+    kind = release.kind
+    if release.too_long:
+        return []
+    if release.coarser:
         near = [linear * (1.0 + CLOSE) ** power for power in (-1, 0, 1, 3, 7, 15, 31)]
         return [0.0, linear / 4.0, *near, FURTHEST * linear]
     least = max(linear / 3.0, 1.05) if kind == "gain" else linear / 20.0

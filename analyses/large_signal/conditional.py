@@ -130,7 +130,7 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
     result = [
         _prediction(loops, point, margins[point].gain_lower, limit, limiter)
         for point, limit, limiter in _limits(design)
-        if margins[point].stable and margins[point].gain_lower > LOW_GAIN
+        if isfinite(limit) and margins[point].stable and margins[point].gain_lower > LOW_GAIN
     ]
     design = quiet(design)
     threshold, following = step_threshold(design, settle_ticks)
@@ -157,7 +157,7 @@ def _limits(design: Design) -> list[tuple[str, float, str]]:
         result = [("i_ref", min(limits.peak_current_A, short), name)]
     if "w_ref" in points:
         result.append(("w_ref", limits.speed_rad_s, "speed limit"))
-    return [item for item in result if isfinite(item[1])]
+    return result
 
 
 def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: str) -> Prediction | None:

@@ -258,8 +258,8 @@ def all_loop_figures(
     outermost = result.get(loops.design.controller.outermost)
     if outermost is not None and outermost.stable:  # loops that are unstable only by themselves
         for name, one in result.items():
-            if one.margins.stable is False and (loop := held_loop(loops, name)) is not None:
-                found = partial(loop_figures, loop, step=step, certify=certify)
+            if one.margins.stable is False and (kept := held_loop(loops, name)) is not None:
+                found = partial(loop_figures, kept, step=step, certify=certify)
                 held = one.locked or _if_there_is(found, [])
                 result[name] = replace(one, held=held if held is not None and held.stable else None)
     return result

@@ -12,7 +12,6 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.files.tree import Tree
 from analyses.isolation import attempt
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
@@ -111,28 +110,21 @@ class LoopSurvey:
         """A data frame with one row for each form and loop: margins, bandwidth, peaks (pandas needed)."""
         from actuator_lti.start.extras import need
 
+        names = ("stable", "gain_margin_db", "phase_margin_deg", "delay_margin_s", "modulus_margin")
         rows = [
-            {"form": form, "loop": name, **_row(result)}
+            {
+                "form": form,
+                "loop": name,
+                **{key: getattr(one.margins, key) for key in names},
+                "bandwidth_rad_s": None if one.bandwidth is None else one.bandwidth.minus3db_rad_s,
+                "evidence": one.margins.evidence,
+            }
             for form, loops in self.forms.items()
-            for name, result in loops.items()
+            for name, one in loops.items()
         ]
         frame = need("pandas", "tables", "to_pandas").DataFrame(rows).set_index(["form", "loop"])
         frame.attrs = {"design": self.design.name}
         return frame
-
-
-def _row(figures: LoopFigures) -> Tree:
-    """The figures of one loop, by name with unit."""
-    margins, bandwidth = figures.margins, figures.bandwidth
-    return {
-        "stable": margins.stable,
-        "gain_margin_db": margins.gain_margin_db,
-        "phase_margin_deg": margins.phase_margin_deg,
-        "delay_margin_s": margins.delay_margin_s,
-        "modulus_margin": margins.modulus_margin,
-        "bandwidth_rad_s": None if bandwidth is None else bandwidth.minus3db_rad_s,
-        "evidence": margins.evidence,
-    }
 
 
 def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey:
@@ -250,9 +242,7 @@ def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, De
     from actuator_lti.loops.delay_budget import delay_budget
 
     budgets: dict[str, DelayBudget] = {}
-    if design.controller.own_law is not None:  # its parts are not told apart
-        return budgets
-    for name, result in figures.items():
+    for name, result in figures.items() if design.controller.own_law is None else ():  # else of unknown parts
         crossovers = [m.frequency_rad_s for m in result.margins.phase_margins if m.frequency_rad_s > 0.0]
         if crossovers:
             quoted = result.margins.phase_margin

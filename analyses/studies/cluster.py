@@ -12,7 +12,7 @@ import signal
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,24 +95,11 @@ def local_cluster(workers: int) -> LocalCluster:
         signal.pthread_sigmask(signal.SIG_SETMASK, held)
 
 
-@contextmanager
-def quiet() -> Iterator[None]:
+def quiet() -> AbstractContextManager[None]:
     """What Dask would log of a lost connection is said in one line, by what is raised."""
-    import distributed  # noqa: F401 - sets its handlers up
+    from distributed.utils import silence_logging_cmgr
 
-    names = [
-        "distributed",
-        *(name for name in logging.root.manager.loggerDict if name.startswith("distributed.")),
-    ]
-    handlers = {handler for name in names for handler in logging.getLogger(name).handlers}
-    before = {handler: handler.level for handler in handlers}
-    for handler in handlers:
-        handler.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        for handler, level in before.items():
-            handler.setLevel(level)
+    return silence_logging_cmgr(logging.CRITICAL + 1)
 
 
 @contextmanager
