@@ -132,7 +132,7 @@ class _Release:
         None where it does not last from the last window but one to the last.
         """
         gain, delay = (value, 0.0) if self.kind == "gain" else (1.0, value)
-        rows = self.setup.rows(np.array([gain]), np.array([delay]))
+        rows = self.setup.rows(gain, delay)
         start = {"position": "angle_start", "velocity": "speed_start", "current": "current_start"}
         outer = self.setup.outer
         scale = -self.setup.design.total_ratio if outer == "position" else 1.0
@@ -141,11 +141,12 @@ class _Release:
         rows["tanh_tolerance"] = TANH_TOLERANCE
         rows.window(self.window, self.cycles, 0)
         result = rows.run()
-        last, before = (float(np.ptp(result.span(self.setup.before, k))) for k in (0, 1))
-        voltage = self.setup.design.limits.voltage_V
-        full = {"u": voltage, "i_ref": self.sizes["current"], "w_ref": self.sizes["velocity"]}[
-            self.setup.point
-        ]
+        last, before = (float(np.ptp(result.span(f"probe_{self.setup.point}_before", k))) for k in (0, 1))
+        full = {
+            "u": self.setup.design.limits.voltage_V,
+            "i_ref": self.sizes["current"],
+            "w_ref": self.sizes["velocity"],
+        }[self.setup.point]
         if result.ok[0] and not (last > ALIVE * full and last >= self.lasts * before):
             return None
         shares = [float(result.window_limit_fraction(name)[0]) for name in LIMITERS]
