@@ -30,21 +30,11 @@ _BEHIND = (
 
 @dataclass(frozen=True)
 class Piece:
-    """Some ticks of a run, one entry every so many.
+    """Some ticks of a run, one entry every so many."""
 
-    Attributes
-    ----------
-    columns : ndarray, shape (columns, entries)
-        As `nonlinear._kernels.layout` orders them.
-    flags : ndarray of uint16
-    events : int
-        Landings, breakaways, reversals and contacts within it.
-    status : str
-    """
-
-    columns: Floats
+    columns: Floats  # (columns, entries), as `nonlinear._kernels.layout` orders them
     flags: npt.NDArray[np.uint16]
-    events: int
+    events: int  # landings, breakaways, reversals and contacts within it
     status: Status
 
 
