@@ -59,7 +59,7 @@ def _report(design: Design, settings: Mapping[str, Any]) -> Document:
     sections = validation_sections(design) if settings.get("validation") else []
     plan = settings.get("monte_carlo")
     if plan and any(one.tolerance is not None for one in design.parameters.values()):
-        from analyses.monte_carlo import MonteCarloSettings, monte_carlo
+        from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo
         from analyses.studies.engine import Engine
         from reports.sections.monte_carlo import section
 
