@@ -13,18 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from itertools import pairwise
 
 import flint
 import numpy as np
-from scipy.optimize import brentq
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.loop import Complex, Mask, Real
 
-BAND = 0.02
 OVER = 1e-9  # an excess below this part of the final value is no overshoot
-_FLAT = 1e-12
 _TIE = 1e-12  # a sample this near to a level has reached it, and this near to the band is inside
 _FINE = 512.0  # parts of the shortest time constant: a span that its power series covers
 _TERMS = 8
@@ -32,6 +28,8 @@ _LEVELS = 60
 _BITS = 160  # of the transitions
 _VANISHED = 1e-100  # what is smaller would only slow the processor down
 _MOST = 200_000  # spans of one length
+Undecided = Callable[[Real, Real, Real, Real, Real], Mask]
+Spans = list[tuple[float, Real]]
 _LONG = "the step response rings for too long: what it settles to is known, when is not"
 
 
@@ -50,7 +48,7 @@ class Motion:
         self._A, self._c = _doubles(exact), np.array([complex(each) for each in output], dtype=complex)
         rates = [1 - abs(each) if sampled else -each.real for each in poles]
         self._decay = np.array([float(rate.mid()) for rate in rates], dtype=float)
-        self._tie = _TIE if sampled else 0.0
+        self.tie = _TIE if sampled else 0.0
         size = float(np.linalg.norm(self._A, 2)) if poles and not sampled else 0.0
         self.shortest = 2.0 ** -np.ceil(np.log2(_FINE * size)) if size else 1.0
         turned = self._A - np.eye(len(poles)) if sampled else self._A
@@ -93,52 +91,6 @@ class Motion:
         """Smallest decay rate; infinity where there is no motion."""
         return float(self._decay.min(initial=np.inf))
 
-    def first_at_least(self, level: float) -> float:
-        """First time at which 1 + e reaches a level below 1."""
-        target, best = level - 1.0 - self._tie, np.inf
-
-        def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
-            nonlocal best
-            best = min(best, a[left >= target].min(initial=np.inf), b[right >= target].min(initial=np.inf))
-            return (a < best) & (left < target) & (most >= target)
-
-        for a, series in sorted(self._spans(undecided, np.asarray), key=lambda span: span[0]):
-            for root in _within(series - target * _ONE):
-                return self.start + a + root * self.shortest
-        return self.start + best
-
-    def settled(self) -> float | None:
-        """From when on |e| is no more than 2 %; ``None``: all the time."""
-        band, best = BAND + self._tie, -np.inf
-
-        def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
-            nonlocal best
-            best = max(best, a[left > band].max(initial=-np.inf), b[right > band].max(initial=-np.inf))
-            return (b > best) & (most > band)
-
-        for a, series in sorted(self._spans(undecided, np.abs), key=lambda span: -span[0]):
-            if roots := [*_within(series - BAND * _ONE), *_within(series + BAND * _ONE)]:
-                return self.start + a + max(roots) * self.shortest
-        return self.start + best + self.sampled if np.isfinite(best) else None
-
-    def greatest(self, least: float) -> tuple[float, float]:
-        """Largest e above ``least`` and its time; ``(least, inf)`` where there is none."""
-        best, place = least, np.inf
-
-        def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
-            nonlocal best, place
-            for t, e in ((a, left), (b, right)):
-                k = int(e.argmax())
-                if e[k] > best or (e[k] == best and t[k] < place):
-                    best, place = float(e[k]), float(t[k])
-            return most > best * (1.0 + _FLAT)
-
-        for a, series in self._spans(undecided, np.asarray):
-            for top in _within(np.polyder(series)):
-                if (e := float(np.polyval(series, top))) > best:
-                    best, place = e, a + top * self.shortest
-        return best, self.start + place
-
     def curve(self, end: float, count: int) -> tuple[Real, Real]:
         """Times from the start on to ``end``, at most twice ``count`` and evenly apart, and e there."""
         spans = (end - self.start) / self.shortest
@@ -149,9 +101,7 @@ class Motion:
             x, move = np.concatenate((x, x @ move.T)), _flushed(move @ move)
         return self.start + step * np.arange(points), (x[:points] @ self._c).real
 
-    def _spans(
-        self, undecided: Callable[[Real, Real, Real, Real, Real], Mask], of: Callable[[Real], Real]
-    ) -> list[tuple[float, Real]]:
+    def spans(self, undecided: Undecided, of: Callable[[Real], Real]) -> Spans:
         """Halve all of time; a span stays where ``undecided(a, b, of(e(a)), of(e(b)), most of of(e))``.
 
         Returns the shortest spans that stay: when they begin, and e over them as a power series.
@@ -163,13 +113,14 @@ class Motion:
                 a, x = np.concatenate((a, a + span)), np.concatenate((x, x @ move.T))
             left, right = of((x @ self._c).real), of((x @ (self._c @ move)).real)
             size, bend = (np.abs(x) @ row for row in self._bounds[level])
-            keep = undecided(a, a + span, left, right, np.minimum(size, np.maximum(left, right) + bend))
+            most = np.minimum(size, np.maximum(left, right) + bend)
+            keep = undecided(self.start + a, self.start + a + span, left, right, most)
             a, x = a[keep], x[keep]
             if not a.size:
                 return []
             if a.size > _MOST:
                 raise NumericalError(_LONG)
-        return [] if self.sampled else list(zip(a.tolist(), self._series(x), strict=True))
+        return [] if self.sampled else list(zip(self.start + a, self._series(x), strict=True))
 
     def _series(self, x: Complex) -> Real:
         """Coefficients of e over one shortest span, highest power first; shape (m, terms)."""
@@ -178,19 +129,6 @@ class Motion:
             rows.append((x @ factor).real)
             factor = factor @ self._A * (self.shortest / (k + 1.0))
         return np.array(rows[::-1]).T
-
-
-_ONE = np.eye(_TERMS)[-1]
-
-
-def _within(series: Real) -> list[float]:
-    """Roots in [0, 1] of a power series that is a parabola but for small terms, in order."""
-    f, top = np.poly1d(series), -series[-2] / (2.0 * series[-3]) if series[-3] else 0.0
-    return [
-        float(brentq(f, low, high, xtol=1e-15))
-        for low, high in pairwise((0.0, min(max(top, 0.0), 1.0), 1.0))
-        if f(low) * f(high) <= 0.0
-    ]
 
 
 def gain_of(p: flint.acb, sampled: bool) -> flint.arb:
