@@ -18,7 +18,7 @@ from actuator_lti.drive.facts import (
     capability,
     stall_torque_Nm,
 )
-from actuator_lti.drive.steady_gains import torque_gain_Nm_rad
+from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.specification.drive_figures import drive_figures
 
 

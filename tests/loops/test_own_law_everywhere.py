@@ -12,7 +12,7 @@ from actuator_lti import load_design
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.compiled.compiler import system_compiler
 from actuator_lti.design import Design
-from actuator_lti.drive.steady_gains import torque_gain_Nm_rad
+from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.linear.code_check import check_code
 from analyses.linear.loop_survey import survey_loops
 from analyses.tuning.rules import rule_gains
