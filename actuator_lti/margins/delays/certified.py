@@ -6,9 +6,8 @@ from flint import acb, arb, ctx
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
-from actuator_lti.margins.delays.axis import GAIN, IMAGINARY, Axis, turn, zeros
+from actuator_lti.margins.delays.axis import GAIN, IMAGINARY, NOWHERE, Axis, smallest, turn, zeros
 from actuator_lti.margins.delays.exact import ExactDelayLoop
-from actuator_lti.margins.delays.nearest import NOWHERE, smallest
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.exact.certified import difference
 from actuator_lti.margins.exact.crossings import Crossing
