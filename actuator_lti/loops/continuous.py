@@ -9,11 +9,11 @@ import numpy as np
 
 from actuator_lti.drive.wiring import Drive
 from actuator_lti.errors import InputError
-from actuator_lti.loops.blocks import seen
 from actuator_lti.loops.flow import SOURCES, Flow, FlowProgram
 from actuator_lti.loops.limiters import LimiterPath, Response, limiter_paths
 from actuator_lti.loops.result import Loop, loop_of
 from actuator_lti.loops.sampled import whole_path
+from actuator_lti.loops.tick import seen
 from actuator_lti.systems.plain_delays import PlainDelaySystem, static
 from actuator_lti.systems.rest_mode import without_rest_mode
 

@@ -7,12 +7,11 @@ from functools import partial
 import numpy as np
 
 from actuator_lti.drive.wiring import COMMANDS, Drive
-from actuator_lti.loops.blocks import Block, compose
 from actuator_lti.loops.limiters import LimiterPath, Response, limiter_paths
 from actuator_lti.loops.periodic import cyclic, fundamental, phase_blocks, point_blocks
 from actuator_lti.loops.result import Loop, loop_of
 from actuator_lti.loops.simulation import OUTPUTS, TickSystem
-from actuator_lti.loops.tick import TickProgram
+from actuator_lti.loops.tick import Block, TickProgram, compose
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.resolvent import states_at
 

@@ -16,8 +16,7 @@ from actuator_lti.margins.delays.form import DelayForm, delay_form
 from actuator_lti.margins.exact.roots import at_enough_bits
 from actuator_lti.margins.loop import Complex, Real, balanced
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.step.motion import Motion, Spans, Undecided
-from actuator_lti.step.rational import NO_FINAL, UNSTABLE, free_motion
+from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecided, free_motion
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.delay_stepper import step_of
 from actuator_lti.systems.exact_fraction import product

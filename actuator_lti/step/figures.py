@@ -12,8 +12,7 @@ from scipy.optimize import brentq
 
 from actuator_lti.margins.loop import Mask, Real, rational_loop
 from actuator_lti.step.delayed import Stepped, delayed_response
-from actuator_lti.step.motion import OVER, Motion
-from actuator_lti.step.rational import notes, rational_motion
+from actuator_lti.step.motion import OVER, Motion, notes, rational_motion
 from actuator_lti.systems.measured_response import refuse_measured
 
 _SHOWN = 2000

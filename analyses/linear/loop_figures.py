@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB
 from actuator_lti.drive.profile import command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.systems.as_control import as_control
+from actuator_lti.systems.plain_delays import as_control
 from analyses.isolation import attempt
 
 if TYPE_CHECKING:

@@ -14,9 +14,9 @@ from actuator_lti.design import read_design_text
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import exact_margins
-from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import fundamental, point_blocks
 from actuator_lti.loops.sampled import stage_blocks
+from actuator_lti.loops.tick import Block
 from actuator_lti.systems.rest_mode import without_rest_mode
 from nonlinear.bench.on_the_bench import on_the_bench
 from nonlinear.bench.operating_motion import on_its_stand

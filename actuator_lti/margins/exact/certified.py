@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice, takewhile
 from operator import attrgetter
 
@@ -19,7 +20,7 @@ from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.exact.crossings import Crossing, Findings, crossings, smallest
 from actuator_lti.margins.exact.loop import exact_loop, neighbours
 from actuator_lti.margins.exact.roots import half_planes
-from actuator_lti.margins.given import ULP, Given
+from actuator_lti.margins.given import ULP, Given, unwarped
 from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
@@ -53,12 +54,7 @@ def certified_margins(given: Given) -> StabilityMargins:
 
 
 def _margins(given: Given, base: Findings, result: _Settled) -> StabilityMargins:
-    T = given.period_s
-
-    def frequency(w: float) -> float:
-        return w if T is None else 2.0 * math.atan(w) / T
-
-    figures = None
+    frequency, figures = partial(unwarped, period_s=given.period_s), None
     if result.problem is None:
         modulus, disk = (smallest(base.loop, distance) for distance in (MODULUS, DISK))
         figures = Figures(
@@ -68,7 +64,7 @@ def _margins(given: Given, base: Findings, result: _Settled) -> StabilityMargins
             (disk[0], frequency(disk[1])),
         )
     return assembled(
-        T,
+        given.period_s,
         Agreement(result.unstable, None, result.border),
         figures,
         method=_METHOD,
