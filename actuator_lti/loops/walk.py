@@ -24,7 +24,7 @@ from actuator_lti.drive.wiring import ERRORS, Drive, present
 from actuator_lti.loops.rows import Row, total
 
 INPUTS = ("ref", "torque", "moment", "cut")
-"""``ref`` of the outer stage, ``torque`` (N m at the motor, accelerating), ``moment`` (at the output), ``cut``."""
+"""Reference of the outer stage, torque in N m at the motor, moment on the output shaft, a cut signal."""
 OWN_SIGNALS = {"current": "i", "angle": "th", "output_angle": "output_angle"}
 """What a law of one's own takes of the plant as it is."""
 
