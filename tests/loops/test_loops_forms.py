@@ -12,7 +12,7 @@ from loop_designs import amber, controlled, ctms_position, designs, emps, faster
 
 from actuator_lti import DelaySystem, InputError, assemble_loops
 from actuator_lti.design.model import Design, Encoder, Friction, Load
-from actuator_lti.drive.operating import friction_slope
+from actuator_lti.drive.operating import Operating, slope_at
 from actuator_lti.loops import exact_margins
 
 R, L, K, J, Cv = 0.055, 6e-6, 5.9e-3, 1.05e-6, 5.25e-6  # of `amber`
@@ -217,20 +217,22 @@ def test_trap_back_emf_and_the_locked_rotor() -> None:
 
 def test_operating_points_of_the_friction() -> None:
     design = amber()
-    assert friction_slope(design) == 5.25e-6
-    assert friction_slope(design, "rest", load_Nm=-8.0) == pytest.approx(5.25e-6 + 2.25e-3 + 1.34e-3 * 8)
-    slope = friction_slope(design, "describing-function", 8.0, speed_amplitude_rad_s=100.0)
-    assert slope == pytest.approx(5.25e-6 + 4 * (2.25e-3 + 1.34e-3 * 8) / (np.pi * 100))
+    assert slope_at(design, Operating()) == 5.25e-6
+    rest = Operating(point="rest", load_Nm=-8.0)
+    assert slope_at(design, rest) == pytest.approx(5.25e-6 + 2.25e-3 + 1.34e-3 * 8)
+        5.25e-6 + 2.25e-3 + 1.34e-3 * 8
+    )
+    swings = Operating(point="describing-function", load_Nm=8.0, speed_amplitude_rad_s=100.0)
+    assert slope_at(design, swings) == pytest.approx(5.25e-6 + 4 * (2.25e-3 + 1.34e-3 * 8) / (np.pi * 100))
     uneven = replace(
         design,
         friction=Friction(
             dry_torque_Nm=2e-3, dry_torque_reverse_Nm=4e-3, viscous_Nms_rad=1e-6, viscous_reverse_Nms_rad=3e-6
         ),
     )
-    assert friction_slope(uneven, direction=-1) == 3e-6
-    assert friction_slope(uneven, "describing-function", speed_amplitude_rad_s=10.0) == pytest.approx(
-        2e-6 + 4 * 3e-3 / (np.pi * 10)
-    )
+    assert slope_at(uneven, Operating(direction=-1)) == 3e-6
+    slow = replace(swings, load_Nm=0.0, speed_amplitude_rad_s=10.0)
+    assert slope_at(uneven, slow) == pytest.approx(2e-6 + 4 * 3e-3 / (np.pi * 10))
     rest = assemble_loops(design, operating_point="rest", load_Nm=8.0).velocity
     sliding = assemble_loops(design).velocity
     z = np.exp(1j * 50 * 1e-4)

@@ -11,7 +11,7 @@ from two_mass import drive_d, drive_e
 from actuator_lti import InputError, assemble_loops, stability_margins
 from actuator_lti.design import model
 from actuator_lti.drive.blocks import biquad
-from actuator_lti.drive.operating import friction_slope
+from actuator_lti.drive.operating import Operating, slope_at
 
 NOTCH = model.Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
 
@@ -113,7 +113,6 @@ def test_an_ever_stiffer_coupling_tends_to_the_rigid_drive(form: str) -> None:
 
 def test_driving_and_driven_change_the_reaction() -> None:
     """With CM the motor feels T_s (1/N_c + CM' sgn(w T_s)); a gap takes the spring away."""
-    from actuator_lti.drive.operating import Operating
     from actuator_lti.drive.plant import motor_plant
 
     design = replace(drive_d(), friction=model.Friction(load_coefficient=0.02))
@@ -155,8 +154,8 @@ def test_slope_and_describing_function_of_a_friction_map() -> None:
         model.FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in ((0.0, 0.02), (10.0, 0.01), (50.0, 0.03))
     )
     design = replace(drive_d(), friction=model.Friction(points=points))
-    assert friction_slope(design) == pytest.approx(-1e-3)
-    assert friction_slope(design, speed_rad_s=-80.0) == pytest.approx(5e-4)
+    assert slope_at(design, Operating()) == pytest.approx(-1e-3)
+    assert slope_at(design, Operating(speed_rad_s=-80.0)) == pytest.approx(5e-4)
     # fundamental of the torque of a sinusoidal speed, by quadrature over a quarter turn
     W = 40.0
     edges = np.arcsin(np.array([0.0, 10.0, W]) / W)
@@ -168,5 +167,5 @@ def test_slope_and_describing_function_of_a_friction_map() -> None:
         torque = np.where(speed < 10, 0.02 - 1e-3 * speed, 0.01 + 5e-4 * (speed - 10))
         whole += float(np.sum(weights * torque * np.sin(x)) * (high - low) / 2)
     expected = 4 / np.pi * whole / W
-    result = friction_slope(design, "describing-function", speed_amplitude_rad_s=W)
+    result = slope_at(design, Operating(point="describing-function", speed_amplitude_rad_s=W))
     assert result == pytest.approx(expected, rel=1e-12)
