@@ -218,10 +218,8 @@ def test_trap_back_emf_and_the_locked_rotor() -> None:
 def test_operating_points_of_the_friction() -> None:
     design = amber()
     assert slope_at(design, Operating()) == 5.25e-6
-    rest = Operating(point="rest", load_Nm=-8.0)
-    assert slope_at(design, rest) == pytest.approx(5.25e-6 + 2.25e-3 + 1.34e-3 * 8)
-        5.25e-6 + 2.25e-3 + 1.34e-3 * 8
-    )
+    still = Operating(point="rest", load_Nm=-8.0)
+    assert slope_at(design, still) == pytest.approx(5.25e-6 + 2.25e-3 + 1.34e-3 * 8)
     swings = Operating(point="describing-function", load_Nm=8.0, speed_amplitude_rad_s=100.0)
     assert slope_at(design, swings) == pytest.approx(5.25e-6 + 4 * (2.25e-3 + 1.34e-3 * 8) / (np.pi * 100))
     uneven = replace(
