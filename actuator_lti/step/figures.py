@@ -176,7 +176,9 @@ def _within(series: Real, level: float = 0.0) -> list[float]:
     f = np.poly1d(series) - level
     if not f.order:
         return []
-    edges = (0.0, *_within(f.deriv().coeffs), 1.0)
+    slope = f.deriv().coeffs
+    turns = [] if abs(slope[-1]) > np.abs(slope[:-1]).sum() else _within(slope)
+    edges = (0.0, *turns, 1.0)
     return [
         float(brentq(f, low, high, xtol=1e-15))
         for low, high in pairwise(edges)
