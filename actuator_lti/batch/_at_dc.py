@@ -20,13 +20,10 @@ def _pivoted(n, k, system, first, right):
     for i in range(k + 1, n):
         if abs(system[first + i * n + k]) > abs(system[first + best * n + k]):
             best = i
-    kept = right[k]
-    right[k] = right[best]
-    right[best] = kept
+    right[k], right[best] = right[best], right[k]
     for j in range(k, n):
-        kept = system[first + k * n + j]
-        system[first + k * n + j] = system[first + best * n + j]
-        system[first + best * n + j] = kept
+        here, there = first + k * n + j, first + best * n + j
+        system[here], system[there] = system[there], system[here]
     if system[first + k * n + k] == 0.0:
         system[first + k * n + k] = NO_PIVOT
 

@@ -26,13 +26,9 @@ def _largest_first(n, k, work, state):
     if best == k:
         return
     for j in range(2 * n):
-        kept = work[2 * k * n + j]
-        work[2 * k * n + j] = work[2 * best * n + j]
-        work[2 * best * n + j] = kept
+        work[2 * k * n + j], work[2 * best * n + j] = work[2 * best * n + j], work[2 * k * n + j]
     for j in range(2):
-        kept = state[2 * k + j]
-        state[2 * k + j] = state[2 * best + j]
-        state[2 * best + j] = kept
+        state[2 * k + j], state[2 * best + j] = state[2 * best + j], state[2 * k + j]
 
 
 @kernel

@@ -47,7 +47,7 @@ class Asked(OnMachines):
         """What the study is to do."""
         from actuator_lti.batch import variable_paths
         from analyses.monte_carlo.run import MonteCarloSettings
-        from analyses.monte_carlo.stepping import StepCheck
+        from analyses.monte_carlo.task import StepCheck
         from analyses.studies.sampling import read_table
 
         table = None if self.from_samples is None else read_table(self.from_samples, variable_paths(design))
@@ -62,10 +62,7 @@ def study(
 ) -> MonteCarloResult | Design:
     """The study, its samples kept in a folder of its own under ``out``; or the one sample that is asked for.
 
-    Raises
-    ------
-    InputError
-        If nothing has a tolerance, or what is asked is no study.
+    Raises `InputError`: if nothing has a tolerance, or what is asked is no study.
     """
     from analyses.monte_carlo.run import monte_carlo, sample_folder
     from analyses.monte_carlo.task import replay

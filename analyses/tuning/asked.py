@@ -65,12 +65,9 @@ class Asked:
     def of(cls, design: Design, **chosen: Any) -> TuningSettings:
         """The settings of `analyses.tuning.tune`.
 
-        Raises
-        ------
-        InputError
-            For a requirement that cannot be read.
+        Raises `InputError`: for a requirement that cannot be read.
         """
-        from analyses.tuning.asked_requirement import read_requirement
+        from analyses.tuning.problem import read_requirement
 
         asked = cls(**chosen)
         wanted = tuple(read_requirement(words, design) for words in asked.require or ())

@@ -37,13 +37,13 @@ _FLAGS = ("-Os", "-mexec-model=reactor", "-s", "-Wl,--strip-all", "-Wl,--gc-sect
 
 _ROW: Kind = "row"
 _LINEAR: dict[Any, tuple[Kind, ...]] = {
-    linear_loops.assembled: (*(_ROW,) * 4, "int", *(_ROW,) * 8),
+    linear_loops.assembled: (*(_ROW,) * 4, "int", *(_ROW,) * 7),
     linear.interval: (_ROW, "int"),
     linear.repeats: (_ROW, "int"),
     linear_loops.lead_of: (_ROW,),
     linear_loops.figures: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 12),
     linear_loops.responded: ("int", _ROW, _ROW, _ROW, "int", *(_ROW,) * 5),
-    linear_limiters.limiters_assembled: (_ROW,) * 12,
+    linear_limiters.limiters_assembled: (_ROW,) * 11,
     linear_limiters.limiter_sizes: (_ROW, "int", _ROW, _ROW, _ROW, "int", "int", *(_ROW,) * 4),
     linear_loops.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
     _withheld.rounding_decides: ("int", *(_ROW,) * 8),

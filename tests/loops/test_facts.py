@@ -19,7 +19,7 @@ from actuator_lti.drive.facts import (
     stall_torque_Nm,
 )
 from actuator_lti.drive.steady import torque_gain_Nm_rad
-from analyses.specification.drive_figures import drive_figures
+from analyses.specification.capability import drive_figures
 
 
 def force_source(ratio: float = 2.0) -> model.Design:

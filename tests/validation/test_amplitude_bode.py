@@ -7,8 +7,14 @@ import pytest
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.bandwidth import closed_loop_bandwidth
-from analyses.large_signal.bode import MINUS_3DB, AmplitudeBode, _crossing, amplitude_bode, crossing_range
-from analyses.large_signal.map import amplitude_map
+from analyses.large_signal.map import (
+    MINUS_3DB,
+    AmplitudeBode,
+    _crossing,
+    amplitude_bode,
+    amplitude_map,
+    crossing_range,
+)
 from analyses.linear.loop_figures import all_loop_figures
 from reports.sections.large_signal import _result
 

@@ -16,7 +16,7 @@ from analyses.large_signal.conditional import (
     saturation_ratio,
     step_threshold,
 )
-from analyses.large_signal.settling_ticks import settling_ticks_of
+from analyses.large_signal.tones import settling_ticks_of
 from analyses.validation import QUICK, validate
 from nonlinear import commands, simulate
 from reports.sections.beyond import large_commands as section

@@ -10,7 +10,7 @@ from plain_drive import output_of_step
 from actuator_lti import assemble_loops
 from actuator_lti.design import model
 from analyses.large_signal.conditional import Conditional, conditional_stability, step_rows, step_threshold
-from analyses.large_signal.settling_ticks import settling_ticks_of
+from analyses.large_signal.tones import settling_ticks_of
 from analyses.motion.settling import settle
 from tests.validation.random_drives import full_drive
 

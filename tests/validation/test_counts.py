@@ -11,7 +11,7 @@ from scipy.integrate import quad
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.model import Design, Filter
-from analyses.large_signal.settling_ticks import settling_ticks_of
+from analyses.large_signal.tones import settling_ticks_of
 from analyses.limit_cycles.counts import Counts, counted_gain, counts_of, linear_ratio
 from analyses.limit_cycles.describing import cycles_of_quantisation, without_nonlinearities
 from nonlinear import commands, simulate

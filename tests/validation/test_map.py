@@ -9,12 +9,11 @@ import pytest
 from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
-from analyses.large_signal.border import ROUNDS, limit_shift
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
-from analyses.large_signal.grid import LEAST_UPDATES, amplitudes, tone, work_ticks
 from analyses.large_signal.map import AmplitudeMap, amplitude_map
+from analyses.large_signal.result import ROUNDS, limit_shift
 from analyses.large_signal.steady_start import PLACES, linear_steady_state
-from analyses.large_signal.tones_run import run_tones
+from analyses.large_signal.tones import LEAST_UPDATES, amplitudes, run_tones, tone, work_ticks
 from analyses.linear.static_threshold import static_threshold
 
 
@@ -173,7 +172,7 @@ def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(
     assert not whole.coarser
     monkeypatch.setattr("analyses.large_signal.map.MOST_TICKS", amber_map.ticks // 9)
     two_thirds = (ROUNDS + 2) * work_ticks(amber, loops, 6) * 2 // 3 + 1
-    monkeypatch.setattr("analyses.large_signal.border.MOST_TICKS", two_thirds)
+    monkeypatch.setattr("analyses.large_signal.result.MOST_TICKS", two_thirds)
     shift = limit_shift(amber, loops, count=6)
     assert shift.coarser
     assert shift.frequency_hz.size == 4

@@ -8,9 +8,8 @@ import pytest
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.model import Command, Design, Friction
-from analyses.large_signal.bode import amplitude_bode
 from analyses.large_signal.classify import CAUSES
-from analyses.large_signal.map import AmplitudeMap, amplitude_map
+from analyses.large_signal.map import AmplitudeMap, amplitude_bode, amplitude_map
 from tests.nonlinear.elastic_drive import drive_f
 
 

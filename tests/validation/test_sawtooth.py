@@ -6,7 +6,7 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.design import with_values
-from analyses.large_signal.formulas import FULL_TRIANGLE, rate_limited
+from analyses.large_signal.classify import FULL_TRIANGLE, rate_limited
 from analyses.large_signal.sawtooth import sawtooth
 
 TRIANGLE_CREST, TRIANGLE_DISTORTION = math.sqrt(3.0), 0.1212  # model.md section 5
