@@ -121,13 +121,11 @@ class _Members(Expressions):
         return super()._compared(left, sign, right)
 
     def _Call(self, node: ast.Call) -> Text:
-        if isinstance(node.func, ast.Name) and node.func.id == "int" and self.emit(node.args[0])[1] == "int":
-            return self.emit(node.args[0])
-        if isinstance(node.func, ast.Name) and node.func.id == "float":
-            text, kind = self.emit(node.args[0])
-            if kind == "count":
-                return f"((double){text})", "float"
-        return super()._Call(node)
+        name = node.func.id if isinstance(node.func, ast.Name) else ""
+        text, kind = self.emit(node.args[0]) if name in ("int", "float") else ("", "")
+        if (name, kind) == ("int", "int"):
+            return text, "int"
+        return (f"((double){text})", "float") if (name, kind) == ("float", "count") else super()._Call(node)
 
 
 def _as_whole(node: ast.expr) -> ast.expr:
