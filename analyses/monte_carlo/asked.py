@@ -62,10 +62,7 @@ def study(
 ) -> MonteCarloResult | Design:
     """The study, its samples kept in a folder of its own under ``out``; or the one sample that is asked for.
 
-    Raises
-    ------
-    InputError
-        If nothing has a tolerance, or what is asked is no study.
+    Raises `InputError`: if nothing has a tolerance, or what is asked is no study.
     """
     from analyses.monte_carlo.run import monte_carlo, sample_folder
     from analyses.monte_carlo.task import replay

@@ -32,17 +32,14 @@ def compared(
 ) -> Comparison | str:
     """Compare the variants of a study; what is found of each design is kept under ``out``.
 
-    Raises
-    ------
-    InputError
-        Without a study, unless the example of one is asked for.
+    Raises `InputError`: without a study, unless the example of one is asked for.
     """
     if asked.example:
         import textwrap
 
-        import analyses.studies.study
+        from analyses.studies import study as written
 
-        return textwrap.dedent((analyses.studies.study.__doc__ or "").split("::", 1)[1]).strip()
+        return textwrap.dedent((written.__doc__ or "").split("::", 1)[1]).strip()
     if study is None:
         raise InputError("compare: give a study file or a design; --example prints a study file")
     from analyses.comparison.variants import compare

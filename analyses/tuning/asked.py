@@ -65,10 +65,7 @@ class Asked:
     def of(cls, design: Design, **chosen: Any) -> TuningSettings:
         """The settings of `analyses.tuning.tune`.
 
-        Raises
-        ------
-        InputError
-            For a requirement that cannot be read.
+        Raises `InputError`: for a requirement that cannot be read.
         """
         from analyses.tuning.problem import read_requirement
 

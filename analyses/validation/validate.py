@@ -18,10 +18,10 @@ from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
 from analyses.isolation import attempt
-from analyses.large_signal import large_signals
 from analyses.large_signal.at_rest import RestSweep, free_amplitude, sweep_from_rest
 from analyses.large_signal.by_amplitude import margins_by_amplitude
 from analyses.large_signal.conditional import Conditional, conditional_stability
+from analyses.large_signal.result import large_signals
 from analyses.large_signal.tones import settling_ticks_of
 from analyses.limit_cycles.counts import Counts, counts_of
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures

@@ -8,15 +8,11 @@ from __future__ import annotations
 
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
+from nonlinear._kernels.blocks import TRACKING, clamp, counted, fill_ring, settle
 from nonlinear._kernels.control import control
 from nonlinear._kernels.elastic_modes import coupling_torque, elastic_start, find_mode
-from nonlinear._kernels.estimate import TRACKING, counted
-from nonlinear._kernels.filters import settle
 from nonlinear._kernels.motion import motion, put_load
-from nonlinear._kernels.probes import fill_ring
-from nonlinear._kernels.random import seed_streams
-from nonlinear._kernels.regulator import clamp
-from nonlinear._kernels.sense import applied_voltage, sense
+from nonlinear._kernels.sense import applied_voltage, seed_streams, sense
 
 
 @kernel

@@ -12,21 +12,18 @@ from dataclasses import dataclass, replace
 from math import copysign, cosh, inf, isfinite
 
 import numpy as np
-import numpy.typing as npt
 
-from actuator_lti.design.model import Coupling, Design, FilterPlace, Friction, LoadFriction
+from actuator_lti.design.model import Coupling, Design, Friction, LoadFriction
 from actuator_lti.drive.angle import follows_angle, holding_moment_Nm, holding_torque_Nm
 from actuator_lti.drive.operating import Operating, segments
 from actuator_lti.errors import InputError
-from nonlinear.row.filters import section
+from nonlinear.bench.steady_control import commands_fit
 from nonlinear.rows import Rows
 
-Value = float | npt.NDArray[np.float64]
 SHARE = 0.4  # of each limit that the operating motion may take
 MOST = 0.8  # where friction leaves no less
 FASTEST_RAD_S = 1e6
 SLOWEST = 1e-9  # of that
-COMMANDED = 0.7  # of a limit that a command may take
 ROOM = 0.7  # of the way to standstill, or to the next bend of a friction map, that a test may use
 PRESSED = (0.15, 0.05, 0.015, 0.005)  # of the full torque: what presses the coupling
 CLOSED = 0.01  # of the play: a coupling is pressed past it by as much, or rounding shows
@@ -231,79 +228,10 @@ def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | 
     while speed > SLOWEST * FASTEST_RAD_S:
         motion = operating_motion_at(design, speed, load_Nm)
         fits = motion.voltage_V <= share * limits.voltage_V and abs(motion.current_A) <= current
-        if fits and _commands_fit(design, motion) and motion.room_rad_s > 0.0:
+        if fits and commands_fit(design, motion) and motion.room_rad_s > 0.0:
             return motion
         speed *= 0.8
     return None
-
-
-def _commands_fit(design: Design, motion: OperatingMotion) -> bool:
-    """Whether commands leave room to the limits: a controller without an integral needs an error.
-
-    What a law of one's own needs is its own affair: it is tested with the limits lifted.
-    """
-    control, limits = design.controller, design.limits
-    wanted = motion.voltage_V
-    if control.current is not None and control.current.law is not None:
-        wanted = motion.current_A
-    elif control.current is not None:
-        loop = control.current
-        state = current_state(
-            motion,
-            loop.gain_V_A,
-            loop.integral_time_s is not None,
-            loop.back_emf_feedforward * (design.effective_motor.back_emf_constant_Vs_rad or 0.0),
-            loop.resistance_feedforward * (design.effective_motor.resistance_ohm or 0.0),
-        )
-        wanted = float(state.command)
-        if abs(wanted) > COMMANDED * limits.peak_current_A:
-            return False
-    if control.velocity is not None and control.velocity.law is None:
-        velocity = control.velocity
-        integral = velocity.integral_time_s is not None
-        wanted = float(velocity_state(design, motion, wanted, velocity.gain, integral).command)
-        return abs(wanted) <= COMMANDED * limits.speed_rad_s
-    return True
-
-
-@dataclass(frozen=True)
-class Steady:
-    """A controller in its steady state: its command, its integrator, and its output before filters."""
-
-    command: Value
-    integrator: Value
-    output: Value
-
-
-def current_state(
-    bias: OperatingMotion, gain: Value, integral: bool, back_emf: Value, resistance: Value
-) -> Steady:
-    """The current controller on an operating motion; the last two are feed-forward in V s/rad and ohm."""
-    i, left = bias.current_A, bias.voltage_V - back_emf * bias.speed_rad_s
-    if integral:
-        return Steady(i, left - resistance * i, bias.voltage_V)
-    return Steady((left + gain * i) / (gain + resistance), 0.0, bias.voltage_V)
-
-
-def velocity_state(
-    design: Design, bias: OperatingMotion, wanted: Value, gain: Value, integral: bool
-) -> Steady:
-    """The velocity controller on an operating motion whose output behind the filters is ``wanted``."""
-    before = wanted / steady_gain(design, "torque")
-    seen = bias.speed_rad_s * steady_gain(design, "speed")
-    return Steady(seen, before, before) if integral else Steady(seen + before / gain, 0.0, before)
-
-
-def steady_gain(design: Design, place: FilterPlace) -> float:
-    """Gain at zero frequency of the filters of the velocity loop on the torque or the speed."""
-    velocity = design.controller.velocity
-    if velocity is None:
-        return 1.0
-    result, period_s = 1.0, velocity.every * design.controller.period_s
-    for item in velocity.filters_on(place):
-        b0, b1, b2, a1, a2 = section(item, period_s)
-        result *= (b0 + b1 + b2) / (1.0 + a1 + a2)
-    return result
 
 
 def operating_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> OperatingMotion:

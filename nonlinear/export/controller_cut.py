@@ -19,8 +19,8 @@ from actuator_lti.compiled.unread import without_unread
 from actuator_lti.design.law import LAW_INPUTS
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout
+from nonlinear._kernels.blocks import counted, measured_speed
 from nonlinear._kernels.control import control
-from nonlinear._kernels.estimate import counted, measured_speed
 from nonlinear._kernels.state_kinds import COUNTER, state_kinds
 from nonlinear._kernels.tick import init_command, init_controller, init_estimate
 from nonlinear.export.c_files import exported

@@ -16,7 +16,7 @@ import numpy as np
 
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
-from nonlinear._kernels.regulator import CLAMPED
+from nonlinear._kernels.blocks import CLAMPED
 from nonlinear._kernels.start import derive, prepare_sizes
 from nonlinear._kernels.tick import tick
 from nonlinear.export.linear_row import at_rest, set_off

@@ -34,15 +34,17 @@ from nonlinear.settling.drift import (
     DRIFT,
     MOST_LEAPS,
     STILL,
+    Scales,
     change,
     even,
     eventless,
     leap,
     matter,
+    overload,
     small,
+    stays_overloaded,
+    ticks_until_it_acts,
 )
-from nonlinear.settling.protection import overload, stays_overloaded, ticks_until_it_acts
-from nonlinear.settling.scales import Scales
 
 Floats = npt.NDArray[np.float64]
 Verdict = Literal["at rest", "limit cycle", "still moving", "diverging"]

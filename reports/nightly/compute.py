@@ -60,7 +60,7 @@ def design_document(payload: Mapping[str, Any]) -> Document:
 
 def _tolerances(design: Design, plan: Mapping[str, int]) -> list[Section]:
     """Sample the tolerances of a design; nothing where none of its values has one."""
-    from analyses.monte_carlo import MonteCarloSettings, monte_carlo
+    from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo
     from analyses.studies.engine import Engine
     from reports.sections.monte_carlo import section
 

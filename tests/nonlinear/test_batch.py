@@ -36,7 +36,7 @@ def test_bits_of_single_runs_for_any_number_of_threads() -> None:
     assert np.array_equal(alone, batches[0].outs)
     for k, run in enumerate(runs):
         single = simulate(run.design, run.command, run.duration_s, run.load_Nm)
-        assert single.final.motor_angle_rad == batches[0].outs[k, layout.OUT_ANGLE]
+        assert single.final.motor_angle_rad == batches[0].outs[k, layout.OUT_STATE + layout.S_ANGLE]
         assert single.current_A.max() == batches[0].extreme("current_A")[1][k]
         assert single.motor_speed_rad_s.min() == batches[0].extreme("motor_speed_rad_s")[0][k]
         assert single.events == batches[0].events[k]

@@ -1,4 +1,4 @@
-"""A law of one's own in the steady state of an operating motion: its states, and the command it needs."""
+"""Controllers in the steady state of an operating motion: integrators, states of a law, commands."""
 
 from __future__ import annotations
 
@@ -8,11 +8,83 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.design.model import Design, FilterPlace
+from nonlinear.row.filters import section
+
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
     from nonlinear.bench.operating_motion import OperatingMotion
 
+COMMANDED = 0.7  # of a limit that a command may take
 CONSISTENT = 1e-9  # of the largest term of an equation: what rounding leaves of it
+
+
+def commands_fit(design: Design, motion: OperatingMotion) -> bool:
+    """Whether commands leave room to the limits: a controller without an integral needs an error.
+
+    What a law of one's own needs is its own affair: it is tested with the limits lifted.
+    """
+    control, limits = design.controller, design.limits
+    wanted = motion.voltage_V
+    if control.current is not None and control.current.law is not None:
+        wanted = motion.current_A
+    elif control.current is not None:
+        loop = control.current
+        state = current_state(
+            motion,
+            loop.gain_V_A,
+            loop.integral_time_s is not None,
+            loop.back_emf_feedforward * (design.effective_motor.back_emf_constant_Vs_rad or 0.0),
+            loop.resistance_feedforward * (design.effective_motor.resistance_ohm or 0.0),
+        )
+        wanted = float(state.command)
+        if abs(wanted) > COMMANDED * limits.peak_current_A:
+            return False
+    if control.velocity is not None and control.velocity.law is None:
+        velocity = control.velocity
+        integral = velocity.integral_time_s is not None
+        wanted = float(velocity_state(design, motion, wanted, velocity.gain, integral).command)
+        return abs(wanted) <= COMMANDED * limits.speed_rad_s
+    return True
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A controller in its steady state: its command, its integrator, and its output before filters."""
+
+    command: float
+    integrator: float
+    output: float
+
+
+def current_state(
+    bias: OperatingMotion, gain: float, integral: bool, back_emf: float, resistance: float
+) -> Steady:
+    """The current controller on an operating motion; the last two are feed-forward in V s/rad and ohm."""
+    i, left = bias.current_A, bias.voltage_V - back_emf * bias.speed_rad_s
+    if integral:
+        return Steady(i, left - resistance * i, bias.voltage_V)
+    return Steady((left + gain * i) / (gain + resistance), 0.0, bias.voltage_V)
+
+
+def velocity_state(
+    design: Design, bias: OperatingMotion, wanted: float, gain: float, integral: bool
+) -> Steady:
+    """The velocity controller on an operating motion whose output behind the filters is ``wanted``."""
+    before = wanted / steady_gain(design, "torque")
+    seen = bias.speed_rad_s * steady_gain(design, "speed")
+    return Steady(seen, before, before) if integral else Steady(seen + before / gain, 0.0, before)
+
+
+def steady_gain(design: Design, place: FilterPlace) -> float:
+    """Gain at zero frequency of the filters of the velocity loop on the torque or the speed."""
+    velocity = design.controller.velocity
+    if velocity is None:
+        return 1.0
+    result, period_s = 1.0, velocity.every * design.controller.period_s
+    for item in velocity.filters_on(place):
+        b0, b1, b2, a1, a2 = section(item, period_s)
+        result *= (b0 + b1 + b2) / (1.0 + a1 + a2)
+    return result
 
 
 @dataclass(frozen=True)
