@@ -42,7 +42,14 @@ CHECKS = Settings(own=False, findings=())
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """How much is looked at beside the checks."""
+    """Check every prediction against the derivative of the nonlinear simulator, and show where it ends.
+
+    Each row is met, not met or not proven. Exit status 1 if one is not met, or not proven and not waived, if
+    the drive does not come to rest, or if a command within full deflection makes it diverge. The page
+    (--out), --json and --large also show what is large, starts from rest, or is shaken by counts.
+
+    Try: actuator-lti validate joint --quick, or actuator-lti validate fin --out out/fin
+    """
 
     quick: Annotated[bool, Option("Checks and verdict only, on the page and in JSON, too.")] = False
     large: Annotated[
