@@ -210,7 +210,7 @@ def two_mass_with_play(best: float, quick: bool) -> Row:
         measured=taken / best,
         unit="x",
         target=4.0,
-        note=f"{1e9 * taken / row[at.TICKS]:.1f} ns a tick, {out[at.OUT_EVENTS]:.0f} events",
+        note=f"{1e9 * taken / row[at.TICKS]:.1f} ns a tick, {out[at.OUT_STATE + at.S_EVENTS]:.0f} events",
     )
 
 

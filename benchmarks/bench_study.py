@@ -146,7 +146,7 @@ def _steps(count: int, share: float) -> Row:
     from actuator_lti import load_design
     from actuator_lti.batch import Population
     from analyses.monte_carlo import StepCheck
-    from analyses.monte_carlo.stepping import step_columns
+    from analyses.monte_carlo.task import step_columns
     from analyses.studies.sampling import as_values, sampler_of
 
     design = load_design("ilr33-amber")

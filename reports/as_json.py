@@ -14,8 +14,7 @@ from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design
 from actuator_lti.files.reading import shown_path
 from actuator_lti.files.tree import Tree
-from analyses.linear.held_loops import HELD
-from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_figures import HELD, LoopFigures
 from reports.document import plain
 
 

@@ -1,4 +1,4 @@
-"""Complex numbers as pairs of floats, so that the same text runs in Python and, emitted, in C."""
+"""Rows, and complex numbers as pairs of floats, so that the same text runs in Python and, emitted, in C."""
 
 # mypy: disallow-untyped-defs=False
 from __future__ import annotations
@@ -36,3 +36,10 @@ def size_at(row, k):
 def distance_at(row, k):
     """|1 + z| of the k-th number of a row of pairs."""
     return math.hypot(1.0 + row[2 * k], row[2 * k + 1])
+
+
+@kernel
+def copied(count, source, first, to, begin):
+    """Copy some numbers of a row from one place to a place of another."""
+    for i in range(count):
+        to[begin + i] = source[first + i]

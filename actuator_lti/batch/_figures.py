@@ -28,22 +28,9 @@ FARTHEST = 1e10  # gain margin of 200 dB: what lies beyond, up or down, is not l
 HIDDEN = 1e-10  # distance from 1 within which an eigenvalue is the angle's, which an inner loop does not see
 # Columns of a row of figures; crossover lists follow at FIRST_GAIN and FIRST_PHASE (pairs x, value).
 (
-    STABLE,
-    GAIN_CROSSOVERS,
-    PHASE_CROSSOVERS,
-    MODULUS,
-    MODULUS_X,
-    PEAK_T,
-    PEAK_T_X,
-    BANDWIDTH_X,
-    QUARTER_X,
-    DC_GAIN,
-    RISE,
-    OVERSHOOT,
-    SETTLING,
-    FINAL,
-    RADIUS,
-) = range(15)
+    STABLE, GAIN_CROSSOVERS, PHASE_CROSSOVERS, MODULUS, MODULUS_X, PEAK_T, PEAK_T_X, BANDWIDTH_X, QUARTER_X,
+    DC_GAIN, RISE, OVERSHOOT, SETTLING, FINAL, RADIUS,
+) = range(15)  # fmt: skip
 FIRST_GAIN = 15  # pairs (angle per sample, phase margin in rad within -pi to pi)
 FIRST_PHASE = FIRST_GAIN + 2 * LISTED  # pairs (angle per sample, gain margin as ratio)
 COLUMNS = FIRST_PHASE + 2 * LISTED
@@ -54,8 +41,7 @@ def _list(row, counter, first, x, value):
     """Add a crossover to its list; the count goes on past what is kept."""
     k = int(row[counter])
     if k < LISTED:
-        row[first + 2 * k] = x
-        row[first + 2 * k + 1] = value
+        row[first + 2 * k], row[first + 2 * k + 1] = x, value
     row[counter] = float(k + 1)
 
 
@@ -110,25 +96,17 @@ def _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged):
     sign = 1.0 if quantity_at(mode, k, xs, rs, ss, 1.0, 0.0) > 0.0 else -1.0
     left = high - shrink * (high - low)
     right = low + shrink * (high - low)
-    f_left = _value(mode, left, n, h, b, c, work, state, exchanged)
-    f_left *= sign
-    f_right = _value(mode, right, n, h, b, c, work, state, exchanged)
-    f_right *= sign
+    f_left = sign * _value(mode, left, n, h, b, c, work, state, exchanged)
+    f_right = sign * _value(mode, right, n, h, b, c, work, state, exchanged)
     for _round in range(40):
         if f_left < f_right:
-            high = right
-            right = left
-            f_right = f_left
+            high, right, f_right = right, left, f_left
             left = high - shrink * (high - low)
-            f_left = _value(mode, left, n, h, b, c, work, state, exchanged)
-            f_left *= sign
+            f_left = sign * _value(mode, left, n, h, b, c, work, state, exchanged)
         else:
-            low = left
-            left = right
-            f_left = f_right
+            low, left, f_left = left, right, f_right
             right = low + shrink * (high - low)
-            f_right = _value(mode, right, n, h, b, c, work, state, exchanged)
-            f_right *= sign
+            f_right = sign * _value(mode, right, n, h, b, c, work, state, exchanged)
         if min(f_left, f_right) < 0.0:
             break
     return left if f_left < f_right else right
@@ -150,11 +128,9 @@ def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged)
     f2 = quantity_at(mode, 0, xs, rs, ss, 1.0, 0.0)
     for k in range(count - 1):
         f1 = f2
-        if ss[2 * k + 2] == 0.0 and ss[2 * k + 3] == 0.0:  # lost in rounding
-            if k + 2 < count:
-                f2 = quantity_at(mode, k + 1, xs, rs, ss, 1.0, 0.0)
-            continue
         f2 = quantity_at(mode, k + 1, xs, rs, ss, 1.0, 0.0)
+        if ss[2 * k + 2] == 0.0 and ss[2 * k + 3] == 0.0:  # lost in rounding
+            continue
         above, after = f1 > 0.0, f2 > 0.0
         if (above and not after) or (after and not above):
             if mode == PHASE and rs[2 * k] > 0.0 and rs[2 * k + 2] > 0.0:
@@ -184,19 +160,19 @@ def ends(response_dc, response_nyquist, count, xs, rs, row):
 
 
 @kernel
+def _keep_modulus(size, x, row):
+    """Put down |1 + L| at an angle where it is the smallest so far."""
+    if size < row[MODULUS]:
+        row[MODULUS], row[MODULUS_X] = size, x
+
+
+@kernel
 def modulus(count, xs, rs, ss, nyquist_r, nyquist_i, row, n, h, b, c, work, state, exchanged):
     """The smallest |1 + L| and where."""
-    row[MODULUS] = distance_at(rs, 0)
-    row[MODULUS_X] = xs[0]
+    row[MODULUS], row[MODULUS_X] = distance_at(rs, 0), xs[0]
     for k in range(1, count):
-        distance = distance_at(rs, k)
-        if distance < row[MODULUS]:
-            row[MODULUS] = distance
-            row[MODULUS_X] = xs[k]
-    at_end = math.hypot(1.0 + nyquist_r, nyquist_i)
-    if at_end < row[MODULUS]:
-        row[MODULUS] = at_end
-        row[MODULUS_X] = math.pi
+        _keep_modulus(distance_at(rs, k), xs[k], row)
+    _keep_modulus(math.hypot(1.0 + nyquist_r, nyquist_i), math.pi, row)
     limit = 1.3 * row[MODULUS]
     after = distance_at(rs, 0)
     for k in range(count - 1):
@@ -207,13 +183,8 @@ def modulus(count, xs, rs, ss, nyquist_r, nyquist_i, row, n, h, b, c, work, stat
         f1 = quantity_at(SENSITIVITY, k, xs, rs, ss, 1.0, 0.0)
         f2 = quantity_at(SENSITIVITY, k + 1, xs, rs, ss, 1.0, 0.0)
         if f1 < 0.0 and f2 >= 0.0:
-            x, rr, ri = root(
-                SENSITIVITY, 1.0, 0.0, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged
-            )
-            size = math.hypot(1.0 + rr, ri)
-            if size < row[MODULUS]:
-                row[MODULUS] = size
-                row[MODULUS_X] = x
+            x, rr, ri = zero_in(k, SENSITIVITY, xs, rs, ss, 1.0, 0.0, n, h, b, c, work, state, exchanged)
+            _keep_modulus(math.hypot(1.0 + rr, ri), x, row)
 
 
 @kernel
@@ -230,6 +201,29 @@ def _closed_at(k, xs, rs, lead):
 
 
 @kernel
+def falls_after(after, mode, count, xs, rs, ss, level, lead):
+    """The next interval of the scan in which a quantity falls through zero; the last point: there is none."""
+    k = after + 1
+    f2 = quantity_at(mode, k, xs, rs, ss, level, lead)
+    while k < count - 1:
+        f1 = f2
+        f2 = quantity_at(mode, k + 1, xs, rs, ss, level, lead)
+        if f1 > 0.0 and f2 <= 0.0:
+            return k
+        k += 1
+    return k
+
+
+@kernel
+def zero_in(k, mode, xs, rs, ss, level, lead, n, h, b, c, work, state, exchanged):
+    """The angle in an interval of the scan where a quantity is zero, and L there."""
+    f1 = quantity_at(mode, k, xs, rs, ss, level, lead)
+    f2 = quantity_at(mode, k + 1, xs, rs, ss, level, lead)
+    x, rr, ri = root(mode, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
+    return x, rr, ri
+
+
+@kernel
 def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
     """The largest |T| and where; at the first point where T only falls."""
     best = 0.0
@@ -239,49 +233,32 @@ def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
             best = size
             row[PEAK_T_X] = xs[k]
     row[PEAK_T] = best
-    f2 = quantity_at(RESONANCE, 0, xs, rs, ss, 1.0, lead)
-    for k in range(count - 1):
-        f1 = f2
-        f2 = quantity_at(RESONANCE, k + 1, xs, rs, ss, 1.0, lead)
-        if not (f1 > 0.0 and f2 <= 0.0):
-            continue
-        if max(_closed_at(k, xs, rs, lead), _closed_at(k + 1, xs, rs, lead)) < 0.7 * best:
-            continue
-        x, rr, ri = root(RESONANCE, 1.0, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
-        size = closed_size(rr, ri, x, lead)
-        if size > row[PEAK_T]:
-            row[PEAK_T] = size
-            row[PEAK_T_X] = x
+    k = falls_after(-1, RESONANCE, count, xs, rs, ss, 1.0, lead)
+    while k < count - 1:
+        if not max(_closed_at(k, xs, rs, lead), _closed_at(k + 1, xs, rs, lead)) < 0.7 * best:
+            x, rr, ri = zero_in(k, RESONANCE, xs, rs, ss, 1.0, lead, n, h, b, c, work, state, exchanged)
+            size = closed_size(rr, ri, x, lead)
+            if size > row[PEAK_T]:
+                row[PEAK_T], row[PEAK_T_X] = size, x
+        k = falls_after(k, RESONANCE, count, xs, rs, ss, 1.0, lead)
 
 
 @kernel
 def bandwidths(count, xs, rs, ss, dc, lead, row, n, h, b, c, work, state, exchanged):
     """First fall of |T| below |T(0)|/sqrt 2, and first passage of its phase through -90 degrees."""
     level = abs(dc)
-    row[BANDWIDTH_X] = math.nan
-    row[QUARTER_X] = math.nan
+    row[BANDWIDTH_X], row[QUARTER_X] = math.nan, math.nan
     if not (level > 0.0):
         return
-    f2 = quantity_at(BANDWIDTH, 0, xs, rs, ss, level, lead)
-    for k in range(count - 1):
-        f1 = f2
-        f2 = quantity_at(BANDWIDTH, k + 1, xs, rs, ss, level, lead)
-        if f1 > 0.0 and f2 <= 0.0:
-            x, _r, _i = root(
-                BANDWIDTH, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged
-            )
-            row[BANDWIDTH_X] = x
-            break
-    f2 = quantity_at(QUARTER, 0, xs, rs, ss, level, lead)
-    for k in range(count - 1):
-        f1 = f2
-        f2 = quantity_at(QUARTER, k + 1, xs, rs, ss, level, lead)
-        if not (f1 > 0.0 and f2 <= 0.0):
-            continue
+    k = falls_after(-1, BANDWIDTH, count, xs, rs, ss, level, lead)
+    if k < count - 1:
+        x, _r, _i = zero_in(k, BANDWIDTH, xs, rs, ss, level, lead, n, h, b, c, work, state, exchanged)
+        row[BANDWIDTH_X] = x
+    k = falls_after(-1, QUARTER, count, xs, rs, ss, level, lead)
+    while k < count - 1:
         _closed, side = closed_loop(rs[2 * k], rs[2 * k + 1], xs[k], lead)
         if side < 0.0:
-            x, _r, _i = root(
-                QUARTER, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged
-            )
+            x, _r, _i = zero_in(k, QUARTER, xs, rs, ss, level, lead, n, h, b, c, work, state, exchanged)
             row[QUARTER_X] = x
             break
+        k = falls_after(k, QUARTER, count, xs, rs, ss, level, lead)

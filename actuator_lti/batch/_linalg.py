@@ -44,8 +44,8 @@ def balance(n, a, b, c):
 
 
 @kernel
-def _reflect(n, a, k, v, beta):
-    """Apply I - beta v v' from both sides, v zero up to its element k."""
+def _reflect(n, a, b, c, k, v, beta):
+    """Apply I - beta v v' to a from both sides, to b from the left, to c from the right; v zero up to k."""
     for j in range(n):
         total = 0.0
         for i in range(k + 1, n):
@@ -58,13 +58,7 @@ def _reflect(n, a, k, v, beta):
             total += a[i * n + j] * v[j]
         for j in range(k + 1, n):
             a[i * n + j] -= beta * total * v[j]
-
-
-@kernel
-def _reflect_vectors(n, b, c, k, v, beta):
-    """The same for b from the left and c from the right."""
-    total_b = 0.0
-    total_c = 0.0
+    total_b, total_c = 0.0, 0.0
     for i in range(k + 1, n):
         total_b += v[i] * b[i]
         total_c += v[i] * c[i]
@@ -93,7 +87,6 @@ def hessenberg(n, a, b, c, v):
         if square == 0.0:
             continue
         beta = 2.0 / square
-        _reflect(n, a, k, v, beta)
-        _reflect_vectors(n, b, c, k, v, beta)
+        _reflect(n, a, b, c, k, v, beta)
         for i in range(k + 2, n):
             a[i * n + k] = 0.0

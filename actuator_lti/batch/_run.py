@@ -7,26 +7,10 @@ import math
 
 from actuator_lti.compiled.kernel import kernel
 
-from ._at_dc import level_at_dc, rounding_at_dc
-from ._figures import (
-    COLUMNS,
-    DC_GAIN,
-    FINAL,
-    GAIN_CROSSOVERS,
-    HIDDEN,
-    MODULUS,
-    MODULUS_X,
-    PEAK_T,
-    PHASE_CROSSOVERS,
-    RADIUS,
-    STABLE,
-    bandwidths,
-    crossovers,
-    ends,
-    modulus,
-    resonance,
-)
+from . import _figures as fig
+from ._complex import copied
 from ._linalg import balance, hessenberg
+from ._resolvent import level_at_dc, rounding_at_dc
 from ._response import CAPACITY, DEEPEST, GAIN, PHASE, response_at, scan
 from ._step import step_figures
 from ._withheld import rounding_decides
@@ -98,12 +82,11 @@ def _grid(n, poles, points):
 @kernel
 def _closed_figures(count, n, a, b, c, lead, dc, row, xs, rs, ss, work, state, exchanged):
     """DC gain, resonance and bandwidths of a closed loop whose response is scanned."""
-    row[DC_GAIN] = dc
-    row[FINAL] = row[DC_GAIN]
-    resonance(count, xs, rs, ss, lead, row, n, a, b, c, work, state, exchanged)
-    if abs(row[DC_GAIN]) < NO_GAIN * row[PEAK_T]:  # speed against a spring: nothing to measure a fall from
-        row[DC_GAIN], row[FINAL] = math.nan, 0.0
-    bandwidths(count, xs, rs, ss, row[DC_GAIN], lead, row, n, a, b, c, work, state, exchanged)
+    row[fig.DC_GAIN], row[fig.FINAL] = dc, dc
+    fig.resonance(count, xs, rs, ss, lead, row, n, a, b, c, work, state, exchanged)
+    if abs(dc) < NO_GAIN * row[fig.PEAK_T]:  # speed against a spring: no gain to measure a fall from
+        row[fig.DC_GAIN], row[fig.FINAL] = math.nan, 0.0
+    fig.bandwidths(count, xs, rs, ss, row[fig.DC_GAIN], lead, row, n, a, b, c, work, state, exchanged)
 
 
 @kernel
@@ -123,15 +106,15 @@ def _open_dc(dc, at_rest):
 @kernel
 def _open_figures(count, n, a, b, c, at_rest, row, xs, rs, ss, work, state, exchanged):
     """Crossovers and modulus margin of an open loop whose response is scanned."""
-    row[GAIN_CROSSOVERS], row[PHASE_CROSSOVERS] = 0.0, 0.0
-    open_dc = _open_dc(row[DC_GAIN], at_rest)
+    row[fig.GAIN_CROSSOVERS], row[fig.PHASE_CROSSOVERS] = 0.0, 0.0
+    open_dc = _open_dc(row[fig.DC_GAIN], at_rest)
     at_r, at_i = response_at(n, a, b, c, math.pi, work, state, exchanged)
-    crossovers(GAIN, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
-    crossovers(PHASE, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
-    ends(open_dc, at_r, count, xs, rs, row)
-    modulus(count, xs, rs, ss, at_r, at_i, row, n, a, b, c, work, state, exchanged)
-    if abs(1.0 + open_dc) < row[MODULUS]:
-        row[MODULUS], row[MODULUS_X] = abs(1.0 + open_dc), 0.0
+    fig.crossovers(GAIN, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
+    fig.crossovers(PHASE, count, xs, rs, ss, row, n, a, b, c, work, state, exchanged)
+    fig.ends(open_dc, at_r, count, xs, rs, row)
+    fig.modulus(count, xs, rs, ss, at_r, at_i, row, n, a, b, c, work, state, exchanged)
+    if abs(1.0 + open_dc) < row[fig.MODULUS]:
+        row[fig.MODULUS], row[fig.MODULUS_X] = abs(1.0 + open_dc), 0.0
 
 
 @kernel
@@ -140,7 +123,7 @@ def _radius(n, poles):
     radius = 0.0
     for i in range(n):
         real, imaginary = poles[2 * n + i], poles[3 * n + i]
-        if math.hypot(real - 1.0, imaginary) > HIDDEN:
+        if math.hypot(real - 1.0, imaginary) > fig.HIDDEN:
             radius = max(radius, math.hypot(real, imaginary))
     return radius
 
@@ -163,8 +146,8 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
         a[i * n + i] -= 1.0
     kept = _grid(n, poles, points)
     count = scan(n, a, b, c, points, kept, SMOOTH, stack, xs, rs, ss, work, state, exchanged)
-    row[RADIUS] = _radius(n, poles)
-    row[STABLE] = 1.0 if row[RADIUS] < 1.0 else 0.0
+    row[fig.RADIUS] = _radius(n, poles)
+    row[fig.STABLE] = 1.0 if row[fig.RADIUS] < 1.0 else 0.0
     _closed_figures(count, n, a, b, c, lead, dc, row, xs, rs, ss, work, state, exchanged)
     if not math.isnan(lead):
         _open_figures(count, n, a, b, c, at_rest, row, xs, rs, ss, work, state, exchanged)
@@ -173,21 +156,6 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
             a[i * n + i] += 1.0
         step_figures(n, a, b, c, lead, poles, row, state, work)
     return count
-
-
-@kernel
-def _copied(count, source, first, to):
-    """Copy some numbers of a row to the beginning of another."""
-    for i in range(count):
-        to[i] = source[first + i]
-
-
-@kernel
-def _taken(n, k, A, B, C, a, b, c):
-    """Take the k-th loop out of many."""
-    _copied(n * n, A, n * n * k, a)
-    _copied(n, B, n * k, b)
-    _copied(n, C, n * k, c)
 
 
 @kernel
@@ -204,23 +172,26 @@ def many_loops(
     for k in range(count):
         if math.isnan(poles[4 * n * k]):
             continue
-        _taken(n, k, A, B, C, a, b, c)
-        _copied(4 * n, poles, 4 * n * k, own)
-        _copied(COLUMNS, out, COLUMNS * k, row)
+        copied(n * n, A, n * n * k, a, 0)
+        copied(n, B, n * k, b, 0)
+        copied(n, C, n * k, c, 0)
+        copied(4 * n, poles, 4 * n * k, own, 0)
+        copied(fig.COLUMNS, out, fig.COLUMNS * k, row, 0)
         one_loop(
             n, a, b, c, own, leads[k], time_figures > 0, row,
             points, stack, xs, rs, ss, work, state, exchanged,
         )  # fmt: skip
-        _taken(n, k, A, B, C, a, b, c)
+        copied(n * n, A, n * n * k, a, 0)
+        copied(n, B, n * k, b, 0)
+        copied(n, C, n * k, c, 0)
         if not math.isnan(leads[k]) and rounding_decides(n, a, b, c, own, row, work, state, exchanged):
-            for j in range(COLUMNS):
+            for j in range(fig.COLUMNS):
                 row[j] = math.nan
-            row[GAIN_CROSSOVERS], row[PHASE_CROSSOVERS] = 0.0, 0.0
-        for j in range(COLUMNS):
-            out[COLUMNS * k + j] = row[j]
+            row[fig.GAIN_CROSSOVERS], row[fig.PHASE_CROSSOVERS] = 0.0, 0.0
+        copied(fig.COLUMNS, row, 0, out, fig.COLUMNS * k)
 
 
 def room(n):
     """Lengths of the rows that `many_loops` works in, from ``a`` on."""
-    loop = (n * n, n, n, 4 * n, COLUMNS)
+    loop = (n * n, n, n, 4 * n, fig.COLUMNS)
     return (*loop, POINTS, DEEPEST, CAPACITY, 2 * CAPACITY, 2 * CAPACITY, 2 * n * n + 2 * n, 2 * n, n)

@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS
+from actuator_lti.batch import _figures as fig
+from actuator_lti.batch.library import many_loops, quoted
 from actuator_lti.batch.parameters import Population
 from actuator_lti.drive.angle import pushes_away
 from actuator_lti.drive.operating import Operating, OperatingPoint
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
-from actuator_lti.loops.tick import TickProgram
+from actuator_lti.loops.tick import Block, TickProgram
 
 _CHUNK = 1024
 _MOST_ORDER = 80
@@ -61,28 +62,24 @@ class LinearFigures:
 
     def stable(self, loop: str) -> np.ndarray:
         """Whether the closed loop is stable, bool, shape (count,)."""
-        return self._column(loop, 0) == 1.0
+        return self._column(loop, fig.STABLE) == 1.0
 
     def withheld(self, loop: str) -> np.ndarray:
         """Whether a design has no figures, as rounding decides them, bool, shape (count,)."""
-        return np.isnan(self._column(loop, 0))
+        return np.isnan(self._column(loop, fig.STABLE))
 
     def pole_radius(self, loop: str) -> np.ndarray:
         """Largest modulus of a closed-loop pole, shape (count,)."""
-        return self._column(loop, 14).copy()
+        return self._column(loop, fig.RADIUS).copy()
 
     def gain_crossovers(self, loop: str) -> Crossovers:
         """Frequencies where |L| = 1, with phase margins in deg."""
-        from ._figures import FIRST_GAIN
-
-        result = self._list(loop, FIRST_GAIN, 1)
-        return Crossovers(result.frequency_rad_s, np.degrees(result.margin), result.crossings)
+        result = self._list(loop, fig.FIRST_GAIN, fig.GAIN_CROSSOVERS)
+        return replace(result, margin=np.degrees(result.margin))
 
     def phase_crossovers(self, loop: str) -> Crossovers:
         """Frequencies where L is negative real, with gain margins as ratio."""
-        from ._figures import FIRST_PHASE
-
-        return self._list(loop, FIRST_PHASE, 2)
+        return self._list(loop, fig.FIRST_PHASE, fig.PHASE_CROSSOVERS)
 
     def quantity(self, name: str, loop: str) -> np.ndarray:
         """One figure of one loop, shape (count,), in its unit (`actuator_lti.asked.quantities`).
@@ -91,10 +88,9 @@ class LinearFigures:
         """
         if name not in LOOP_QUANTITIES:
             raise InputError(f"quantity {name!r}: one of {', '.join(LOOP_QUANTITIES)}")
-        from actuator_lti.batch.library import quoted
-
-        rows = self.raw[:, self._index(loop)]
-        return quoted(rows, self._period(loop))[:, list(LOOP_QUANTITIES).index(name)].copy()
+        place = self._index(loop)
+        figures = quoted(self.raw[:, place], self.period_s[:, place])
+        return figures[:, list(LOOP_QUANTITIES).index(name)].copy()
 
     def _index(self, loop: str) -> int:
         if loop not in self.loops:
@@ -104,17 +100,12 @@ class LinearFigures:
     def _column(self, loop: str, column: int) -> np.ndarray:
         return self.raw[:, self._index(loop), column]
 
-    def _period(self, loop: str) -> np.ndarray:
-        return self.period_s[:, self._index(loop)]
-
     def _list(self, loop: str, first: int, counter: int) -> Crossovers:
-        from ._figures import LISTED
-
-        block = self.raw[:, self._index(loop), first : first + 2 * LISTED]
+        block = self.raw[:, self._index(loop), first : first + 2 * fig.LISTED]
         angles, margins = block[:, 0::2], block[:, 1::2]
         order = np.argsort(angles, axis=1, kind="stable")
         return Crossovers(
-            np.take_along_axis(angles, order, 1) / self._period(loop)[:, None],
+            np.take_along_axis(angles, order, 1) / self.period_s[:, self._index(loop), None],
             np.take_along_axis(margins, order, 1),
             self._column(loop, counter).astype(int),
         )
@@ -159,15 +150,13 @@ def linear_figures(
     InputError
         For a computing delay of so many ticks that the order passes 80.
     """
-    from ._figures import COLUMNS
-
     at = Operating(
         point=operating_point,
         load_Nm=load_Nm,
         speed_amplitude_rad_s=speed_amplitude_rad_s,
         direction=direction,
     )
-    out = np.full((population.count, len(LOOPS), COLUMNS), np.nan)
+    out = np.full((population.count, len(LOOPS), fig.COLUMNS), np.nan)
     chunks = [
         group[first : first + _CHUNK]
         for group in population.alike()
@@ -198,9 +187,9 @@ def linear_figures(
 
 def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, time_figures: bool) -> None:
     """Put the figures of a held loop in the place of one that is unstable only by itself."""
-    whole = out[:, LOOPS.index(population.design.controller.outermost), 0] == 1.0
-    pushed = pushes_away(population.stacked, at)
-    chosen = np.flatnonzero(whole & pushed & (out[:, LOOPS.index(loop), 0] == 0.0))
+    place, stable = LOOPS.index(loop), out[:, :, fig.STABLE]
+    whole = stable[:, LOOPS.index(population.design.controller.outermost)] == 1.0
+    chosen = np.flatnonzero(whole & pushes_away(population.stacked, at) & (stable[:, place] == 0.0))
     if not chosen.size:
         return
     some = population.part(chosen)
@@ -208,9 +197,8 @@ def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, tim
     rows = np.full((some.count, *out.shape[1:]), np.nan)
     for group in some.alike():
         _fill(wire(some.part(group).stacked, operating), group, time_figures, rows, only=loop)
-    place = LOOPS.index(loop)
-    stable = rows[:, place, 0] == 1.0
-    out[chosen[stable], place] = rows[stable, place]
+    held = rows[:, place, fig.STABLE] == 1.0
+    out[chosen[held], place] = rows[held, place]
 
 
 def _fill(
@@ -219,22 +207,20 @@ def _fill(
     """Figures of every loop of stacked designs, or of one."""
     for stage in wired.stages if only is None else (only,):
         rows = np.full((len(chosen), out.shape[2]), np.nan)
-        rows[:, [1, 2]] = 0.0  # crossovers
+        rows[:, [fig.GAIN_CROSSOVERS, fig.PHASE_CROSSOVERS]] = 0.0
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)
         loop = fundamental(stage_blocks(wired, stage))
         _figures_of(loop, lead, time_figures and response is None, rows)
         if response is not None:
-            verdict, withheld = rows[:, [0, 14]].copy(), np.isnan(rows[:, 0])
+            of_loop = rows[:, [fig.STABLE, fig.RADIUS]]
             _figures_of(response, np.nan, time_figures, rows)
-            rows[:, [0, 14]] = verdict
-            rows[withheld, 3:] = np.nan
+            rows[:, [fig.STABLE, fig.RADIUS]] = of_loop
+            rows[np.isnan(of_loop[:, 0]), fig.MODULUS :] = np.nan
         out[chosen, LOOPS.index(stage)] = rows
 
 
 def _figures_of(block: Block, lead: Any, time_figures: bool, rows: np.ndarray) -> None:
     """Write the figures of a stacked open loop (lead NaN: of a closed loop's response)."""
-    from actuator_lti.batch.library import many_loops
-
     A, B, C = _stacked(block, len(rows))
     leads = np.array(np.broadcast_to(np.asarray(lead, dtype=float), len(rows)))
     closed = A - B[:, :, None] * C[:, None, :] * ~np.isnan(leads)[:, None, None]
@@ -251,18 +237,8 @@ def _command_path(wired: Drive) -> tuple[Any, Block | None]:
     With a P controller that feeds back the output itself, T (1 + lead (1 - 1/z)) is that response.
     """
     law, T = wired.design.controller.position_loop, wired.period_s("position")
-    plain = (
-        law.law is None
-        and law.integral_time_s is None
-        and not any(
-            present(each)
-            for each in (
-                law.derivative_time_s,
-                law.acceleration_feedforward,
-                wired.design.command.filter_time_s,
-            )
-        )
-    )
+    more = (law.derivative_time_s, law.acceleration_feedforward, wired.design.command.filter_time_s)
+    plain = law.law is None and law.integral_time_s is None and not any(map(present, more))
     if plain and (wired.design.coupling is None or law.sensor == "output"):
         return law.feedforward / (law.gain * T), None
     program = TickProgram(wired, "position")

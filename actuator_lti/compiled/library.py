@@ -10,7 +10,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -56,14 +56,11 @@ class Entry:
         return function
 
 
-class Compiled:
-    """A function of an opened library; takes arrays of float64 for rows, of uint16 for bytes."""
+class Called:
+    """A kernel of an opened library, or as written; takes arrays of float64 for rows, of uint16 for bytes."""
 
-    def __init__(self, opened: ctypes.CDLL, entry: Entry) -> None:
-        self._function = getattr(opened, f"drive_{entry.name}")
-        self._function.argtypes = [_C_TYPES[kind] for kind in entry.arguments]
-        self._function.restype = _C_TYPES[entry.returns]
-        self._passing = [_PASSED[kind] for kind in entry.arguments]
+    def __init__(self, function: Callable[..., Any], passing: Iterable[Callable[[Any], Any]]) -> None:
+        self._function, self._passing = function, tuple(passing)
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it."""
@@ -75,19 +72,15 @@ class Compiled:
         return lambda: self._function(*passed)
 
 
-class Written:
-    """The same function as it is written, run by Python."""
+def _of_library(library: ctypes.CDLL, entry: Entry) -> Called:
+    function = getattr(library, f"drive_{entry.name}")
+    function.argtypes = [_C_TYPES[kind] for kind in entry.arguments]
+    function.restype = _C_TYPES[entry.returns]
+    return Called(function, map(_PASSED.get, entry.arguments))  # type: ignore[arg-type]
 
-    def __init__(self, entry: Entry) -> None:
-        self._function = entry.function
 
-    def __call__(self, *arguments: Any) -> Any:
-        """Call it."""
-        return self._function(*arguments)
-
-    def bound(self, *arguments: Any) -> Callable[[], Any]:
-        """The call with these arguments."""
-        return lambda: self._function(*arguments)
+def _as_written(entry: Entry) -> Called:
+    return Called(entry.function, [_itself] * len(entry.arguments))
 
 
 def _row(array: Any) -> Any:
@@ -184,28 +177,22 @@ class Library:
     @cached_property
     def _opened(self) -> Any:
         path = self.path()
-        if not path.is_file():
-            self._compile_in_checkout(path)
-        try:
-            return self.loaded(path)
-        except OSError as error:
-            raise InputError(f"{path.name}: does not load ({error}); allowed: {_BUILD}") from None
-
-    def _compile_in_checkout(self, path: Path) -> None:
-        if not os.access(self.folder, os.W_OK):
+        if not path.is_file() and not os.access(self.folder, os.W_OK):
             raise InputError(f"{path.name}: no compiled kernels of these sources; allowed: {_BUILD} first")
         try:
-            self.build()
+            return self.loaded(self.build() if not path.is_file() else path)
         except InputError as error:
             raise InputError(
                 f"{error}; then {_BUILD}: margins and simulations run as compiled kernels, which wheels hold "
                 "and this checkout does not yet"
             ) from None
+        except OSError as error:
+            raise InputError(f"{path.name}: does not load ({error}); allowed: {_BUILD}") from None
 
     def loaded(self, path: Path) -> Any:
         """The entries of a library file of this text."""
         opened = ctypes.CDLL(str(path))
-        return SimpleNamespace(**{entry.name: Compiled(opened, entry) for entry in self.entries})
+        return SimpleNamespace(**{entry.name: _of_library(opened, entry) for entry in self.entries})
 
     @contextmanager
     def borrowed(self, path: Path) -> Iterator[None]:
@@ -216,7 +203,7 @@ class Library:
     @contextmanager
     def written(self) -> Iterator[None]:
         """Let Python run the kernels as they are written, for a debugger or as the reference."""
-        with self._instead(SimpleNamespace(**{entry.name: Written(entry) for entry in self.entries})):
+        with self._instead(SimpleNamespace(**{entry.name: _as_written(entry) for entry in self.entries})):
             yield
 
     @contextmanager

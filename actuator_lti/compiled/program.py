@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from actuator_lti.compiled.expressions import Constant
+from actuator_lti.compiled.expressions import Constant, Expressions
 from actuator_lti.compiled.form import Form
 from actuator_lti.compiled.kernel import is_seldom
 from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name
@@ -27,6 +27,8 @@ _MINMAX = {
     "max_int": "static inline int @max_int(int a, int b) { return (b > a) ? b : a; }",
 }
 
+_INLINED = "static inline __attribute__((always_inline)) "
+_ZERO: dict[Kind, str] = {"float": "0.0", "int": "0", "bool": "false", "count": "0"}
 __all__ = ["EmitError", "Program", "emit_c"]
 
 
@@ -96,7 +98,8 @@ def program_of(collector: Collector, names: Sequence[str], second: Sequence[_For
         if public:
             declarations[function.name] = f"{head};"
         if function.returns is not None and len(function.returns) > 1:
-            types.append(_structure(function))
+            fields = " ".join(f"{C_TYPES[kind]} r{n};" for n, kind in enumerate(function.returns))
+            types.append(f"typedef struct {{ {fields} }} {result_type(function)};")
         inner = function.prefix != prefix and all(function is not formed.root for formed in second)
         linkage = "" if public else _INLINED if inner else "static "
         texts.append(collector.definition(function, linkage + head, lines))
@@ -136,15 +139,30 @@ class Collector:
 
     def parsed(self, python: Any, kinds: list[Kind]) -> Function:
         """A function with its text."""
-        return _parsed(python, kinds, self.prefix)
+        lines, first = inspect.getsourcelines(python)
+        tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
+        assert isinstance(tree, ast.FunctionDef)
+        names = [argument.arg for argument in tree.args.args]
+        file, scope = Path(inspect.getsourcefile(python) or "?").name, python.__globals__
+        given, own = dict(zip(names, kinds, strict=False)), (python.__name__, python.__module__)
+        function = Function(*own, file, first, tree, scope, given, self.prefix)
+        if len(names) != len(kinds) or tree.args.defaults or tree.args.vararg or tree.args.kwonlyargs:
+            taken = ", ".join(names)
+            raise function.error(tree, f"takes ({taken}); defaults and stars are not in the subset")
+        return function
 
     def statements(self, function: Function) -> Statements:
         """What translates its body."""
-        return Statements(function, self.call, self.constants, self.helpers, self.form)
+        return Statements(Expressions(function, self.call, self.constants, self.helpers, self.form))
 
     def definition(self, function: Function, head: str, lines: list[str]) -> str:
         """Its definition in C."""
-        return _definition(function, head, lines)
+        about = _plain(ast.get_docstring(function.tree) or "")
+        described = [f" * {line}".rstrip() for line in about.splitlines()]
+        comment = ["/*", *described, f" * ({function.file}, line {function.first_line})", " */"]
+        names, text = map(c_name, function.arguments), "\n".join(lines)
+        unused = [f"{INDENT}(void){name};" for name in names if not re.search(rf"\b{name}\b", text)]
+        return "\n".join([*comment, head, "{", *declared(function), *unused, *lines, "}", ""])
 
     def head(self, function: Function) -> str:
         """The C prototype without its semicolon."""
@@ -157,16 +175,11 @@ class Collector:
                 parts.append(f"{self.prefix}bytes {c_name(name)}")
             else:
                 parts.append(f"{C_TYPES[kind]} {c_name(name)}")
-        return f"{_returned(function)} {function.c_name}({', '.join(parts) or 'void'})"
-
-
-def _returned(function: Function) -> str:
-    if function.returns is None:
-        return "void"
-    return C_TYPES[function.returns[0]] if len(function.returns) == 1 else result_type(function)
-
-
-_INLINED = "static inline __attribute__((always_inline)) "
+        kinds = function.returns or ()
+        returned = (
+            result_type(function) if len(kinds) > 1 else "".join(C_TYPES[kind] for kind in kinds) or "void"
+        )
+        return f"{returned} {function.c_name}({', '.join(parts) or 'void'})"
 
 
 class _Formed(Collector):
@@ -186,47 +199,12 @@ class _Formed(Collector):
         return (self.program.call if is_seldom(python) else super().call)(python, kinds, node, caller)
 
 
-def _parsed(python: Any, kinds: list[Kind], prefix: str) -> Function:
-    lines, first = inspect.getsourcelines(python)
-    tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
-    assert isinstance(tree, ast.FunctionDef)
-    names = [argument.arg for argument in tree.args.args]
-    file = Path(inspect.getsourcefile(python) or "?").name
-    arguments = dict(zip(names, kinds, strict=False))
-    scope = python.__globals__
-    function = Function(python.__name__, python.__module__, file, first, tree, scope, arguments, prefix)
-    if len(names) != len(kinds) or tree.args.defaults or tree.args.vararg or tree.args.kwonlyargs:
-        raise function.error(tree, f"takes ({', '.join(names)}); defaults and stars are not in the subset")
-    return function
-
-
-def _structure(function: Function) -> str:
-    fields = " ".join(f"{C_TYPES[kind]} r{n};" for n, kind in enumerate(function.returns or ()))
-    return f"typedef struct {{ {fields} }} {result_type(function)};"
-
-
-_ZERO: dict[Kind, str] = {"float": "0.0", "int": "0", "bool": "false", "count": "0"}
-
-
 def declared(function: Function) -> list[str]:
     """The declarations of its variables in C."""
     return [
         f"{INDENT}{C_TYPES[kind]} {c_name(name)} = {_ZERO[kind]};"
         for name, kind in function.variables.items()
     ]
-
-
-def _definition(function: Function, head: str, lines: list[str]) -> str:
-    about = _plain(ast.get_docstring(function.tree) or "")
-    described = [f" * {line}".rstrip() for line in about.splitlines()]
-    comment = ["/*", *described, f" * ({function.file}, line {function.first_line})", " */"]
-    text = "\n".join(lines)
-    unused = [
-        f"{INDENT}(void){c_name(name)};"
-        for name in function.arguments
-        if not re.search(rf"\b{c_name(name)}\b", text)
-    ]
-    return "\n".join([*comment, head, "{", *declared(function), *unused, *lines, "}", ""])
 
 
 def _plain(text: str) -> str:

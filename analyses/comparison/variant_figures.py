@@ -11,7 +11,7 @@ from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES, drive_cases
 from actuator_lti.batch import Population
 from actuator_lti.errors import InputError
-from analyses.specification.drive_figures import drive_figures
+from analyses.specification.capability import drive_figures
 from nonlinear.runs.trajectory import COMMAND_UNITS
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class LargeSignal:
     def figures(self, design: Design, loops: Loops) -> dict[str, float | None]:
         """Largest linear amplitudes, and the nonlinear step of full deflection at every load."""
         from actuator_lti.loops.limiters import onset
-        from analyses.monte_carlo.stepping import StepCheck, step_columns
+        from analyses.monte_carlo.task import StepCheck, step_columns
 
         shown = COMMAND_UNITS[design.axis, design.controller.outermost][1]
         figures: dict[str, float | None] = {}

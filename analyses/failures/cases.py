@@ -1,4 +1,8 @@
-"""The failures: what is commanded, when it happens, and what is then broken."""
+"""The failures, and the rig that they happen on: controller and plant of one drive as two.
+
+The controller is the drive's own on measured values; the plant is the same drive without its loops, a voltage
+in.  Nothing failed, the two together are the drive (`nonlinear.simulate`) bit for bit.
+"""
 
 from __future__ import annotations
 
@@ -9,71 +13,160 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.bandwidth import closed_loop_bandwidth
-from actuator_lti.design.model import Design, LoadFriction
+from actuator_lti.design.model import Command, Design, Instruments, LoadFriction
 from actuator_lti.drive.facts import stall_torque_Nm
+from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from analyses.failures.result import Asked
-from analyses.failures.rig import Measured, Rig
+from analyses.failures.asked import Asked
+from nonlinear import Drive, State
+
+
+@dataclass
+class Measured:
+    """What the controller gets at t_k: motor side, and output shaft."""
+
+    current_A: float
+    speed_rad_s: float
+    angle_rad: float
+    output_angle_rad: float
+    output_speed_rad_s: float
+
+
+Sensing = Callable[[Measured], Measured]
+Driving = Callable[[float, float], float]
+
+
+def plant_of(design: Design) -> Design:
+    """The drive without its loops and command shaping; its instruments stay with the controller."""
+    bare = replace(design.controller, position=None, velocity=None, current=None)
+    limits = replace(design.limits, peak_time_s=None)  # the overload protection is the controller's
+    return replace(design, controller=bare, limits=limits, command=Command(), instruments=Instruments())
+
+
+class Rig:
+    """The two halves; ``sensing`` changes what the controller gets, ``driving`` the voltage by (u, U_bus)."""
+
+    def __init__(self, design: Design, load_Nm: float) -> None:
+        self.design, self.load_Nm = design, load_Nm
+        self.controller, self.plant = Drive(design), Drive(plant_of(design), load_Nm=load_Nm)
+        self.sensing: Sensing | None = None
+        self.driving: Driving | None = None
+        self.moment_Nm = 0.0
+
+    def copy(self) -> Rig:
+        """Another rig in the same state, nothing failed."""
+        twin = Rig(self.design, self.load_Nm)
+        twin.controller.set(self.controller.get())
+        twin.plant.set(self.plant.get())
+        return twin
+
+    def measured(self) -> Measured:
+        """The truth about the plant at t_k."""
+        plant, N = self.plant, self.design.total_ratio
+        w, th = plant.value("speed"), plant.value("angle")
+        elastic = self.design.coupling is not None
+        y = plant.value("output") if elastic else th / N
+        Y = plant.value("output_speed") if elastic else w / N
+        return Measured(plant.value("current"), w, th, y, Y)
+
+    def fail(self, broken: Design) -> None:
+        """Go on with another plant from the same angles, speeds, current and voltage."""
+        true, u = self.measured(), self.plant.value("voltage")
+        elastic = self.design.coupling is not None
+        state = State(
+            motor_angle_rad=true.angle_rad,
+            motor_speed_rad_s=true.speed_rad_s,
+            current_A=true.current_A,
+            voltage_V=u,
+            output_angle_rad=true.output_angle_rad if elastic else None,
+            output_speed_rad_s=true.output_speed_rad_s if elastic else None,
+        )
+        self.plant = Drive(plant_of(broken), state, self.load_Nm)
+
+    def step(self, command: float) -> Measured:
+        """One tick; gives the truth at its start. `moment_Nm` is what the train carried, at the output."""
+        true = self.measured()
+        seen = true if self.sensing is None else self.sensing(true)
+        bus = self.plant.value("voltage_limit")
+        u = self.controller.control(
+            command, seen.current_A, seen.speed_rad_s, seen.angle_rad,
+            seen.output_angle_rad, bus, seen.output_speed_rad_s,
+        )  # fmt: skip
+        if self.driving is not None:
+            u = self.driving(u, bus)
+        self.plant.step(u)
+        design = self.design
+        if design.coupling is not None:
+            self.moment_Nm = self.plant.noted("coupling_torque") * design.ratio_behind_coupling
+        else:
+            self.moment_Nm = float(motor_torque_Nm(design, true.current_A, u)) * design.total_ratio
+        return true
+
 
 HELD = 1e6  # times the stall torque: no torque of the drive moves a jam
 FLAT = 1.01  # a response that rises by less has no resonance
 OPEN = 1e4  # times the resistance: of a winding with an open phase
 
-Command = Callable[[float], float]
+Course = Callable[[float], float]
 
 
 @dataclass(frozen=True)
 class Case:
-    """One failure.
-
-    ``start_rad``: where the drive holds before.
-    ``command``: command over the time from the failure on (from the step on, where ``at_rad`` is given).
-    ``broken``: what is done to the rig at the failure.
-    ``at_rad``: the failure happens on the way, when the output is this far from the start; ``None``: at once.
-    ``stops``: whether the run ends at the stop.
-    """
+    """One failure."""
 
     name: str
     words: str
-    start_rad: float
-    command: Command
-    broken: Callable[[Rig], None]
+    command: Course  # command over the time from the failure on (from the step on, where ``at_rad`` is given)
+    broken: Callable[[Rig], None] = lambda _: (
+        None
+    )  # what is done to the rig; nothing: the command alone fails
+    start_rad: float = 0.0  # where the drive holds before
+    # The failure happens on the way, when the output is this far from the start; ``None``: at once
     at_rad: float | None = None
-    stops: bool = True
+    stops: bool = True  # whether the run ends at the stop
 
 
 def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, str]]:
     """The cases that exist for a design, and why the others do not."""
     far, near = asked.stop_rad, asked.deflection_rad
+    half = _size(design, 0.5 * far)
+
+    def hold(value: float) -> Course:
+        return lambda _: value
+
+    def hard_over(rig: Rig) -> None:
+        rig.driving = lambda _, bus: bus
+
     made = [
-        Case("hard-over", "the power stage puts the whole bus on the motor", 0.0, _constant(0.0), _hard_over),
-        Case("open-phase", _open_words(design), 0.0, _constant(0.0), _open),
+        Case("hard-over", "the power stage puts the whole bus on the motor", hold(0.0), hard_over),
+        Case("open-phase", _open_words(design), hold(0.0), _open),
     ]
     if design.controller.position is None:
-        why = "the drive has no position loop"
-        return tuple(made), dict.fromkeys(_LOOP_CASES, why)
+        return tuple(made), dict.fromkeys(_LOOP_CASES, "the drive has no position loop")
     frequency, where = _followed_most_hz(design)
+    sine = f"a sine of {_size(design, near)} at {frequency:.3g} Hz, {where}"
+    frozen = f"the position sensor freezes, the command steps by {_size(design, near)}"
+    lost = f"the position sensor reads zero while the drive holds {half}"
     made += [
-        Case("hard-over-command", "the command jumps to the stop", 0.0, _constant(far), _nothing),
+        Case("hard-over-command", "the command jumps to the stop", hold(far)),
         Case(
-            "jam", "the output jams half-way through a step to the stop", 0.0, _constant(far),
-            lambda rig: rig.fail(jammed(design)), at_rad=0.5 * far, stops=False,
+            "jam",
+            "the output jams half-way through a step to the stop",
+            hold(far),
+            lambda rig: rig.fail(jammed(design)),
+            at_rad=0.5 * far,
+            stops=False,
         ),
-        Case(
-            "frozen-sensor", f"the position sensor freezes, the command steps by {_size(design, near)}", 0.0,
-            _constant(near), lambda rig: _sense(rig, lose=False),
-        ),
-        Case(
-            "lost-sensor", f"the position sensor reads zero while the drive holds {_size(design, 0.5 * far)}",
-            0.5 * far, _constant(0.5 * far), lambda rig: _sense(rig, lose=True),
-        ),
+        Case("frozen-sensor", frozen, hold(near), lambda rig: _sense(rig, lose=False)),
+        Case("lost-sensor", lost, hold(0.5 * far), lambda rig: _sense(rig, lose=True), start_rad=0.5 * far),
         Case(
             "oscillatory-command",
-            f"a sine of {_size(design, near)} at {frequency:.3g} Hz, {where}", 0.0,
-            lambda t: near * math.sin(2.0 * math.pi * frequency * t), _nothing, stops=False,
+            sine,
+            lambda t: near * math.sin(2.0 * math.pi * frequency * t),
+            stops=False,
         ),
-    ]  # fmt: skip
+    ]
     return tuple(made), {}
 
 
@@ -91,18 +184,6 @@ def jammed(design: Design) -> Design:
     behind = design.load.friction or LoadFriction()
     held = replace(behind, dry_torque_Nm=hold * design.ratio_to_coupling)
     return replace(design, load=replace(design.load, friction=held))
-
-
-def _constant(value: float) -> Command:
-    return lambda _: value
-
-
-def _nothing(rig: Rig) -> None:
-    """The command alone fails."""
-
-
-def _hard_over(rig: Rig) -> None:
-    rig.driving = lambda _, bus: bus
 
 
 def _open(rig: Rig) -> None:

@@ -1,16 +1,21 @@
-"""The smallest command that moves the output, simulated beside what the controllers' gains predict."""
+"""The smallest command that moves the output, and what a slow one loses at a reversal; both simulated too."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from math import copysign
 
 import numpy as np
+from scipy.optimize import root_scalar
 
 from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.angle import holding_torque_Nm
+from actuator_lti.drive.steady import motor_torque_Nm, standing_gain
+from analyses.finite import finite
 from analyses.linear.static_threshold import StaticThreshold, static_threshold
-from nonlinear import Rows
+from nonlinear import Rows, commands, simulate
+from nonlinear.bench.operating_motion import operating_motion_at
 from nonlinear.settling.rest import first_motion_s
 
 FRACTIONS = (0.2, 0.3, 0.5, 0.7, 0.9)
@@ -28,24 +33,13 @@ class Waiting:
 
 @dataclass(frozen=True)
 class Threshold:
-    """Threshold of motion at one load torque.
+    """Threshold of motion at one load torque."""
 
-    Attributes
-    ----------
-    static : StaticThreshold
-        What the gains predict.
-    waiting : tuple of Waiting
-        Steps below the threshold, where a controller integrates and no kick of a step moves it at once.
-    simulated_rad : float or None
-        Smallest forward step that ever moves the output, where nothing integrates.
-    resolution : float
-        Of ``simulated_rad``, relative.
-    """
-
-    static: StaticThreshold
+    static: StaticThreshold  # What the gains predict
+    # Steps below the threshold, where a controller integrates and no kick of a step moves it at once
     waiting: tuple[Waiting, ...]
-    simulated_rad: float | None
-    resolution: float
+    simulated_rad: float | None  # Smallest forward step that ever moves the output, where nothing integrates
+    resolution: float  # Of ``simulated_rad``, relative
 
 
 def threshold(design: Design, load_Nm: float) -> Threshold | None:
@@ -56,40 +50,29 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
     """
     design = replace(design, command=Command())
     moment = load_Nm + float(design.load.moment_Nm(0.0))
-    static = static_threshold(_motor_alone(design), moment)
+    friction = design.friction
+    at_zero = replace(  # its own torque there an offset, no friction behind the spring
+        design,
+        motor=design.motor.level(),
+        load=replace(design.load.level(), friction=None),
+        friction=replace(friction, offset_torque_Nm=friction.offset_torque_Nm + holding_torque_Nm(design)),
+    )
+    static = static_threshold(at_zero, moment)
     if not 0.0 < static.forward_rad < math.inf:
         return None
     if design.controller.position_loop.kicks:
         return Threshold(static, (), None, 0.0)  # a step's own kick moves it at once
     if static.integral_time_s is not None:
-        return Threshold(static, _waiting(design, load_Nm, static), None, 0.0)
+        sizes = static.forward_rad * np.array(FRACTIONS)
+        waiting = tuple(
+            Waiting(float(size), static.waiting_time_s(float(size)), finite(time))
+            for size, time in zip(sizes, _first_motion_s(design, load_Nm, sizes), strict=True)
+        )
+        return Threshold(static, waiting, None, 0.0)
     sizes = static.forward_rad * np.linspace(1.0 - WITHIN, 1.0 + WITHIN, COUNT)
     moved = _first_motion_s(design, load_Nm, sizes) < math.inf
     first = float(sizes[np.argmax(moved)]) if moved.any() else None
     return Threshold(static, (), first, 2.0 * WITHIN / (COUNT - 1))
-
-
-def _motor_alone(design: Design) -> Design:
-    """The drive at angle zero: its own torque there an offset, no friction behind the spring."""
-    friction = design.friction
-    offset = friction.offset_torque_Nm + holding_torque_Nm(design)
-    return replace(
-        design,
-        motor=design.motor.level(),
-        load=replace(design.load.level(), friction=None),
-        friction=replace(friction, offset_torque_Nm=offset),
-    )
-
-
-def _waiting(design: Design, load_Nm: float, static: StaticThreshold) -> tuple[Waiting, ...]:
-    """Steps below the threshold and when each moves the output."""
-    sizes = static.forward_rad * np.array(FRACTIONS)
-    predicted = [static.waiting_time_s(float(size)) for size in sizes]
-    seen = _first_motion_s(design, load_Nm, sizes)
-    return tuple(
-        Waiting(float(size), foreseen, float(time) if math.isfinite(time) else None)
-        for size, foreseen, time in zip(sizes, predicted, seen, strict=True)
-    )
 
 
 def _first_motion_s(design: Design, load_Nm: float, sizes: np.ndarray) -> np.ndarray:
@@ -108,3 +91,92 @@ def _first_motion_s(design: Design, load_Nm: float, sizes: np.ndarray) -> np.nda
         if design.controller.position_loop.sensor == "output":
             rows["angle_start"] = design.ratio_to_coupling * twist
     return np.array([first_motion_s(rows.running(k)) for k in range(len(sizes))])
+
+
+SPAN = 25.0  # amplitude over the threshold
+PERIOD_SETTLINGS = 16  # settling times (to 1e-9) in one period
+LEAST_TICKS = 4000
+POINTS = 500
+SLOW_RAD_S = 1e-100  # motor speed at which nothing viscous counts
+
+
+@dataclass(frozen=True)
+class Hysteresis:
+    """One settled period of a slow triangle at the command."""
+
+    # Of the triangle; the width depends on its rate where a controller integrates
+    amplitude_rad: float
+    frequency_hz: float
+    # One period at updates of the position loop, thinned
+    command_rad: np.ndarray
+    output_rad: np.ndarray
+    width_rad: float  # output falling less output rising, both where the command passes zero
+    linear_width_rad: float  # the same without dry friction and play: what the loop lags by at this rate
+    # Largest distance of the output from what it would be without dry friction and play, at any update of the
+    # position loop in the period
+    largest_rad: float
+    predicted_rad: float  # what a reversal loses of a slow command: `lost_predicted_rad`
+
+    @property
+    def lost_motion_rad(self) -> float:
+        """What friction and play add to the width."""
+        return self.width_rad - self.linear_width_rad
+
+
+def hysteresis(design: Design, load_Nm: float, static: StaticThreshold, settling_ticks: int) -> Hysteresis:
+    """Simulate a slow triangle with and without dry friction and play and compare the two branches."""
+    ticks = max(PERIOD_SETTLINGS * settling_ticks, LEAST_TICKS)
+    every = design.controller.position_loop.every
+    ticks = 4 * every * round(ticks / (4 * every))
+    period = ticks * design.controller.period_s
+    smallest = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
+    tight, play = design, 0.0
+    if design.coupling is not None:
+        play = design.coupling.play_rad / design.ratio_behind_coupling
+        tight = replace(design, coupling=replace(design.coupling, play_rad=0.0))
+    amplitude = min(SPAN * (static.forward_rad + play), max(smallest, 2.0 * play))
+    command = commands.triangle(amplitude, 1.0 / period)
+    widths, outputs, updates = [], [], ticks // every
+    for drive, friction_on in ((tight, False), (design, True)):
+        run = simulate(drive, command, 1.25 * period, load_Nm, friction_on=friction_on, record_every=every)
+        y = run.output_angle_rad[-updates:]  # from the first reversal on, where it slides settled already
+        widths.append(float(y[updates // 4] - y[3 * updates // 4]))
+        outputs.append(y)
+    shown = slice(-updates, None, max(1, updates // POINTS))
+    return Hysteresis(
+        amplitude, 1.0 / period, run.reference_rad[shown], run.output_angle_rad[shown],
+        widths[1], widths[0], float(np.max(np.abs(outputs[1] - outputs[0]))),
+        lost_predicted_rad(design, load_Nm, static, 4.0 * amplitude / period),
+    )  # fmt: skip
+
+
+def lost_predicted_rad(design: Design, load_Nm: float, static: StaticThreshold, rate_rad_s: float) -> float:
+    """What dry friction and play lose at a reversal of a slow command, where the command passes zero.
+
+    On each branch the drive slides.  Where nothing integrates, the torque that sliding takes needs an error,
+    torque over stiffness; one integral of time T needs ``T dT_f/dt`` over the stiffness where friction grows
+    with a load that bends over the angle, two need none.  A spring in front of the output lags by its twist,
+    and by half its play, unless the position loop sees the output itself.
+    """
+    branches = (_lag_rad(design, load_Nm, static, way * rate_rad_s) for way in (1.0, -1.0))
+    return next(branches) - next(branches)
+
+
+def _lag_rad(design: Design, load_Nm: float, static: StaticThreshold, rate_rad_s: float) -> float:
+    """Command less output while the drive slides through zero of the command at a rate."""
+    loop, load, sense = design.controller.position_loop, design.load, copysign(1.0, rate_rad_s)
+    fed = sense * loop.friction_feedforward * standing_gain(design) if loop.friction_feedforward else 0.0
+
+    def missing(lag: float) -> float:
+        moment = load_Nm + float(load.moment_Nm(-lag))
+        motion = operating_motion_at(design, sense * SLOW_RAD_S, moment)
+        torque = motor_torque_Nm(design, motion.current_A, motion.voltage_V) - fed
+        if static.integral_time_s is not None:
+            carried = -moment if design.coupling is None else motion.coupling_Nm
+            slope = -np.sign(carried) * load.over_angle.slope_at(-lag, moving=True)
+            growth = design.friction.load_coefficient * slope * abs(rate_rad_s)
+            torque = static.integral_time_s * growth if static.outer_integral_time_s is None else 0.0
+        twist = motion.twist_rad / design.ratio_behind_coupling if loop.sensor == "motor" else 0.0
+        return lag - torque / static.torque_gain_Nm_rad - twist
+
+    return float(root_scalar(missing, x0=0.0, x1=-missing(0.0) or 1e-12).root)

@@ -1,35 +1,149 @@
-"""Everything that is said of large signals, in one result."""
+"""Everything that is said of large signals, in one result; how far dry friction moves the linear limit."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import ceil, log
 from typing import TYPE_CHECKING, Any
 
-from actuator_lti.design.model import Design
+import numpy as np
+
+from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.operating import rubs
-from actuator_lti.loops import assemble_loops
-from analyses.large_signal.bode import AmplitudeBode, amplitude_bode
-from analyses.large_signal.border import LimitShift, limit_shift
-from analyses.large_signal.map import AMPLITUDES, FREQUENCIES, AmplitudeMap, amplitude_map
+from actuator_lti.drive.profile import command_mean
+from actuator_lti.loops import Loops, assemble_loops
+from actuator_lti.loops.assemble import loops_at
+from actuator_lti.loops.limiters import onset
+from analyses.large_signal.classify import limiter_fractions
+from analyses.large_signal.map import (
+    AMPLITUDES,
+    FREQUENCIES,
+    AmplitudeBode,
+    AmplitudeMap,
+    amplitude_bode,
+    amplitude_map,
+)
 from analyses.large_signal.sawtooth import Sawtooth, sawtooth
+from analyses.large_signal.steady_start import DECAY, linear_steady_state
+from analyses.large_signal.tones import MOST_TICKS, run_tones, tones, work_ticks
+from analyses.linear.responses import response_at
+from nonlinear import LIMITERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from actuator_lti.loops import Loops
+COUNT, LEAST, ROUNDS = 12, 3, 9
+TRIED = (0.3, 3.0)  # times the linear limit
+SETTLED = 1e4  # what begins at rest is that much smaller by the window: a limit is closed in to 0.5 %
+
+
+@dataclass(frozen=True)
+class LimitShift:
+    """Amplitude at which a limit first acts, linear and simulated with friction, at each frequency."""
+
+    frequency_hz: np.ndarray  # shape (f,)
+    # Shape (f,): smallest A_k(w); what the simulation shows. NaN where no limit acts within the range tried,
+    # or where nothing limits
+    linear_rad: np.ndarray
+    simulated_rad: np.ndarray
+    # Empty where there is none
+    linear_limiter: tuple[str, ...]
+    simulated_limiter: tuple[str, ...]
+    resolution: float  # relative width of the last interval of the bisection
+    # Shape (f,): of mean and filter of the command, which the amplitudes are behind
+    command_gain: np.ndarray | float = 1.0
+    # Whether there are fewer frequencies than asked for, as those would take more than `MOST_TICKS`
+    coarser: bool = False
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Simulated over linear."""
+        return np.asarray(self.simulated_rad / self.linear_rad)
+
+
+def limit_shift(design: Design, loops: Loops, count: int = COUNT) -> LimitShift | None:
+    """Bisect the amplitude at which a limit first acts in steady state, at each of several frequencies.
+
+    Every run begins in the linear steady state just below the limit and is judged by its last window, so that
+    no start-up counts.  The command is taken as it comes behind its profile and filter.  ``None`` where the
+    loop is unstable, or nothing limits.  There are fewer than ``count`` frequencies, down to `LEAST`, where
+    those would take more than `MOST_TICKS`.
+    """
+    given, design = loops, replace(design, command=Command())
+    if loops.design.command != design.command:
+        loops = loops_at(replace(loops.design, command=design.command), loops.operating)
+    work = (ROUNDS + 2) * work_ticks(design, loops, count)
+    within = min(count, max(int(count * MOST_TICKS / work), LEAST))
+    chosen = tones(design, loops, within)
+    omega = np.array([t.omega_rad_s for t in chosen])
+    border, start = onset(loops, omega), linear_steady_state(loops, omega)
+    brief = replace(start, settling_ticks=ceil(start.settling_ticks * log(SETTLED) / DECAY))
+    limited = np.flatnonzero(np.isfinite(border.amplitude_rad))
+    if not (start.stable and limited.size):
+        return None
+    simulated, names = np.full(len(omega), np.nan), np.full(len(omega), "", dtype=object)
+    linear = border.amplitude_rad[limited]
+
+    def acting(amplitude: np.ndarray) -> np.ndarray:
+        begin = np.minimum(amplitude, 0.99 * linear)
+        seen = run_tones(design, chosen, limited, amplitude, brief, begin, harmonics=1)
+        return limiter_fractions(seen)
+
+    simulated[limited], names[limited] = _bisect(acting, linear, [border.active[k] for k in limited])
+    return LimitShift(
+        omega / (2.0 * np.pi),
+        np.where(np.isfinite(border.amplitude_rad), border.amplitude_rad, np.nan),
+        simulated,
+        border.active,
+        tuple(names),
+        (TRIED[1] / TRIED[0]) ** (0.5**ROUNDS) - 1.0,
+        _command_gain(given, loops, omega),
+        within < count,
+    )
+
+
+def _command_gain(given: Loops, behind: Loops, omega_rad_s: np.ndarray) -> np.ndarray | float:
+    """What mean and filter of the command make of a sine, from how far in front of each a limit lies."""
+    if given.design.command == behind.design.command:
+        return 1.0
+    mean = command_mean(given.design)
+    gain = 1.0 if mean is None else np.abs(mean.response(omega_rad_s))
+    whole, rest = (np.abs(response_at(one.plain_response, omega_rad_s)) for one in (given, behind))
+    return np.asarray(gain * whole / rest)
+
+
+def _bisect(
+    acting: Callable[[np.ndarray], np.ndarray], linear: np.ndarray, wanted: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Close in on the limit from both sides, all frequencies at once, on a logarithmic scale.
+
+    The limiter that acts is the one predicted, where it does: behind the limit a drive may swing against
+    another one for longer.
+    """
+    low, high = np.log(TRIED[0] * linear), np.log(TRIED[1] * linear)
+    at_low, last = acting(np.exp(low)), acting(np.exp(high))
+    valid = (at_low.max(axis=1) == 0.0) & (last.max(axis=1) > 0.0)
+    for _ in range(ROUNDS):
+        middle = 0.5 * (low + high)
+        seen = acting(np.exp(middle))
+        hit = seen.max(axis=1) > 0.0
+        low, high = np.where(hit, low, middle), np.where(hit, middle, high)
+        last = np.where(hit[:, None], seen, last)
+    names = [
+        "" if not ok else one if one and row[LIMITERS.index(one)] > 0.0 else LIMITERS[int(np.argmax(row))]
+        for row, ok, one in zip(last, valid, wanted, strict=True)
+    ]
+    return np.where(valid, np.exp(0.5 * (low + high)), np.nan), np.array(names, dtype=object)
 
 
 @dataclass(frozen=True)
 class LargeSignals:
-    """Map, shift of the linear limit, amplitude Bode and sawtooth of a design.
-
-    ``map``: with friction, no load.
-    ``shift``: how far dry friction moves the linear limit; ``None`` without it, and where the loop is
-    unstable.
-    """
+    """Map, shift of the linear limit, amplitude Bode and sawtooth of a design."""
 
     design: Design
-    map: AmplitudeMap
+    map: AmplitudeMap  # with friction, no load
+    # How far dry friction moves the linear limit; ``None`` without it, and where the loop is unstable
     shift: LimitShift | None
     bode: AmplitudeBode
     sawtooth: Sawtooth

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +16,28 @@ from actuator_lti.drive.steady import steady_input
 from actuator_lti.errors import NumericalError
 from actuator_lti.loops import Loops
 from actuator_lti.systems.resolvent import states_at
-from analyses.large_signal.formulas import FULL_TRIANGLE
-from analyses.linear.linear_states import without_value
+from analyses.large_signal.classify import FULL_TRIANGLE
 from nonlinear import Rows
+
+AT_REST = (
+    r"w|W|acc",  # speeds, and the angle gained since the last estimate
+    r"speed\d*\..+|estimate\..+|hold_w_meas",  # what is made of the speed
+    r"command\..+|ref_prev|rate_prev|rate\..+",  # the command's filter and feed-forward, the command at zero
+)
+"""Names of states that are zero where the motor rests and the command is zero (`actuator_lti.loops.tick`)."""
+
+
+def without_value(states: Iterable[str], known: Collection[str], patterns: Iterable[str] = ()) -> list[str]:
+    """Give the states that an analysis has no value for, by name or by pattern.
+
+    Examples
+    --------
+    >>> without_value(("w", "th", "torque1.1"), {"th"}, AT_REST)
+    ['torque1.1']
+    """
+    whole = re.compile("|".join(f"(?:{each})" for each in patterns) or r"(?!)")
+    return [name for name in states if name not in known and not whole.fullmatch(name)]
+
 
 PLACES = {
     "i": "current_start",
@@ -40,18 +61,13 @@ LONGEST_PERIODS = 20_000
 
 @dataclass(frozen=True)
 class LinearSteadyState:
-    """The whole sampled loop under ``sin(w t)`` at the command, friction sliding without its dry part.
+    """The whole sampled loop under ``sin(w t)`` at the command, friction sliding without its dry part."""
 
-    ``output``, shape (K,): command to output angle: the fundamental over all ticks, the mean of a limited
-    jerk included.
-    ``states``, shape (K,): by column of the rows: value at t = 0 is the imaginary part.
-    ``settling_ticks``: ticks in which the slowest mode falls to 1e-9.
-    """
-
+    # Shape (K,): command to output angle: the fundamental over all ticks, the mean of a limited jerk included
     output: np.ndarray
-    states: dict[str, np.ndarray]
+    states: dict[str, np.ndarray]  # shape (K,): by column of the rows: value at t = 0 is the imaginary part
     stable: bool
-    settling_ticks: int
+    settling_ticks: int  # ticks in which the slowest mode falls to 1e-9
 
     def put(self, rows: Rows, which: np.ndarray, amplitude_rad: np.ndarray) -> None:
         """Write the initial state of each row: tone ``which[r]`` at an amplitude."""

@@ -10,24 +10,80 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
-from actuator_lti.batch import (
-    Population,
-    drive_figures,
-    linear_figures,
-    variable_paths,
-)
+from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.design import design_hash, with_values
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
 from analyses.monte_carlo.judging import drive_column, loop_columns, loops_of
-from analyses.monte_carlo.stepping import StepCheck, step_columns, step_units
 from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version
 from analyses.studies.sampling import Sampler, as_values
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
+    from nonlinear import Rows
+
+
+@dataclass(frozen=True)
+class StepCheck:
+    """A step command at the output shaft, from rest."""
+
+    amplitude_rad: float  # linear axis: m
+    duration_s: float = 0.5
+    load_Nm: float = 0.0  # load torque, constant
+
+    def __post_init__(self) -> None:
+        if not (0 < self.amplitude_rad < np.inf and 0 < self.duration_s <= 100.0):
+            raise InputError("nonlinear step: an amplitude above 0 and a duration above 0, at most 100 s")
+
+
+def step_units() -> dict[str, str]:
+    """Columns of a nonlinear step with their units.
+
+    Rise, overshoot and settling against the commanded angle (missing where it is not reached);
+    ``final_error`` at the end, in percent of it; shares of the time in which a limiter acted.
+    """
+    return {
+        "nonlinear.rise_time": "s",
+        "nonlinear.overshoot": "%",
+        "nonlinear.settling_time": "s",
+        "nonlinear.final_error": "%",
+        "nonlinear.peak_current": "A",
+        "nonlinear.speed_limited": "%",
+        "nonlinear.current_limited": "%",
+        "nonlinear.voltage_limited": "%",
+    }
+
+
+def step_rows(step: StepCheck, population: Population) -> Rows:
+    """Simulator rows of every design."""
+    from nonlinear import Rows
+
+    rows = Rows.of(population.stacked, population.count)
+    rows["load"] = step.load_Nm
+    rows["ticks"] = np.maximum(np.round(step.duration_s / rows["period"]), 1.0)
+    rows.step_figures(step.amplitude_rad)
+    rows.extremes()
+    rows.step("command", step.amplitude_rad)
+    return rows
+
+
+def step_columns(step: StepCheck, population: Population) -> Arrays:
+    """Figures of the nonlinear step of every design, by the columns of `step_units`."""
+    result = step_rows(step, population).run(threads=1)
+    low, high = result.extreme("current_A")
+    figures = result.step
+    columns = {
+        "nonlinear.rise_time": figures.rise_time_s,
+        "nonlinear.overshoot": figures.overshoot_percent,
+        "nonlinear.settling_time": figures.settling_time_s,
+        "nonlinear.final_error": 100.0 * (1.0 - figures.final_ratio),
+        "nonlinear.peak_current": np.maximum(np.abs(low), np.abs(high)),
+        **{f"nonlinear.{name}_limited": 100.0 * result.limit_fraction(name)
+           for name in ("speed", "current", "voltage")},
+    }  # fmt: skip
+    return {name: np.where(result.ok, values, np.nan) for name, values in columns.items()}
 
 
 @dataclass(frozen=True)
@@ -106,22 +162,19 @@ class SampleTask:
     def identity(self) -> Tree:
         """Everything that decides the numbers, as plain JSON."""
         table = self.sampler.table
+        rows = hashlib.sha256(b"" if table is None else np.ascontiguousarray(table.rows, "<f8").tobytes())
         return {
             "design": design_hash(self.design),
             "code": code_version(),
             "seed": self.sampler.seed,
             "factors": [repr(factor) for factor in self.sampler.factors],
             "correlation": self.sampler.correlation.tolist(),
-            "table": None if table is None else [list(table.paths), _digest(table.rows)],
+            "table": None if table is None else [list(table.paths), rows.hexdigest()],
             "operating_point": self.operating_point,
             "load_Nm": self.load_Nm,
             "time_figures": self.time_figures,
             "step": None if self.step is None else repr(self.step),
         }
-
-
-def _digest(rows: np.ndarray) -> str:
-    return hashlib.sha256(np.ascontiguousarray(rows, dtype="<f8").tobytes()).hexdigest()
 
 
 def replay(design: Design, sampler: Sampler, number: int) -> Design:

@@ -1,19 +1,23 @@
-"""What a step of a drive ends in: one step, one word (`nonlinear.settling.rest`), for all who ask."""
+"""What a motion of a drive ends in, a step above all: one word (`nonlinear.settling.rest`) for all."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import degrees, inf, radians
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design, Requirement, Waiver
-from analyses.large_signal.tones_run import TANH_TOLERANCE
+from actuator_lti.files.tree import Tree
+from analyses.large_signal.tones import TANH_TOLERANCE
 from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
+from nonlinear.runs.trajectory import COMMAND_UNITS, Trajectory
 from nonlinear.settling.rest import Rest, judge
 
 if TYPE_CHECKING:
@@ -25,15 +29,12 @@ NOTICED = 1e-6  # of full deflection: a smaller swing is listed, and is rest
 
 @dataclass(frozen=True)
 class Settling:
-    """A step from rest at zero, waited for.
+    """A step from rest at zero, waited for."""
 
-    ``amplitude_rad``, ``load_Nm``: the step and the load torque, both there from the start.
-    ``rest``: what it ends in.
-    """
-
+    # The step and the load torque, both there from the start
     amplitude_rad: float
     load_Nm: float
-    rest: Rest
+    rest: Rest  # what it ends in
 
     @property
     def hunting(self) -> bool:
@@ -97,36 +98,24 @@ def settlings_of(
     The largest is asked first. One that does not come to rest fails the drive, whatever smaller steps do, and
     they are not asked at this load; where a requirement accepts a swing all are, as the largest counts.
 
-    Parameters
-    ----------
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
-    loads_Nm : iterable of float, optional
-        Other loads.
-    known : iterable of Settling, optional
-        Steps of which those at rest are not asked again.
+    ``loops``: sampled and sliding, of this design, if they are there already.
+    ``loads_Nm``: other loads.
+    ``known``: steps of which those at rest are not asked again.
     """
-    settings, resting = design.validation, [one for one in known if not one.hunting]
+    settings = design.validation
+    resting = {(one.load_Nm, one.amplitude_rad): one for one in known if not one.hunting}
     sizes = {settings.full_deflection_rad * share for share in (SMALL, *settings.amplitude_fractions)}
     found: list[Settling] = []
     for load in dict.fromkeys((0.0, *settings.loads_Nm) if loads_Nm is None else loads_Nm):
-        slip = stick_slip_cycle(design, load, loops)
+        slip, there = stick_slip_cycle(design, load, loops), list[Settling]()
         whole = sizes if slip is None else {*sizes, slip.output_amplitude_rad}
-        asked = _until_known(design, load, sorted(whole, reverse=True), resting)
-        found += reversed(list(asked))
+        for size in sorted(whole, reverse=True):
+            there.append(resting.get((load, size)) or outcome(design, load, size))
+            failed = verdict_of(design, noticed(design, there[-1:])) is Verdict.NOT_MET
+            if failed and accepted(design) is None:  # the verdict of the load is known
+                break
+        found += reversed(there)
     return tuple(found)
-
-
-def _until_known(
-    design: Design, load_Nm: float, sizes_rad: Iterable[float], resting: Iterable[Settling]
-) -> Iterator[Settling]:
-    """Steps in this order, up to the one after which the verdict of the load is known."""
-    known = {one.amplitude_rad: one for one in resting if one.load_Nm == load_Nm}
-    for size in sizes_rad:
-        one = known[size] if size in known else outcome(design, load_Nm, size)
-        yield one
-        if accepted(design) is None and verdict_of(design, noticed(design, [one])) is Verdict.NOT_MET:
-            return
 
 
 FROM_THE_LARGEST = (
@@ -232,3 +221,83 @@ def _size(rest: Rest, factor: float, unit: str) -> str:
     if rest.motor_amplitude > 1.05 * rest.amplitude:
         size += f" (motor ±{factor * rest.motor_amplitude:.3g} {unit})"
     return size
+
+
+@dataclass(frozen=True)
+class Conduct:
+    """What a run ends in, the command and the load staying as they are at its end."""
+
+    # ``"comes to rest"`` (of a speed or less: ``"becomes steady"``), ``"sits on a limit"`` (it does while
+    # this acts), ``"limit cycle"``, ``"still moving"``, ``"diverging"``; ``"following"`` where command or
+    # load go on changing; or why the run stopped
+    status: str
+    detail: str = ""  # with figures; empty where there is nothing to say
+
+    @property
+    def wanted(self) -> bool:
+        """Whether the drive rests, turns steadily or follows, no limit in its way."""
+        return self.status in ("comes to rest", "becomes steady", "following")
+
+
+def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
+    """Judge a run; where its end comes too early, the drive is followed beyond it.
+
+    Swings that are too small beside full deflection (m on a linear axis) are rest.
+
+    Examples
+    --------
+    >>> from nonlinear import commands, simulate
+    >>> conduct(simulate("ilr33-amber", commands.step(0.01), duration_s=0.2)).status
+    'comes to rest'
+    """
+    if run.status != "ok":
+        return Conduct(run.status, run.advice)
+    rest = None if run.running is None else judge(run.running)
+    if rest is None:
+        return Conduct("following")
+    unit, factor = COMMAND_UNITS[run.axis, "velocity" if run.stage == "voltage" else run.stage]
+    if run.stage == "position":
+        rest = counted(rest, full_deflection_rad)
+    if not rest.comes_to_rest:
+        text = words(rest, factor, unit).removeprefix("limit cycle of ").removeprefix("still moving ")
+        return Conduct(rest.verdict, text)
+    limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]
+    if limits:
+        return Conduct("sits on a limit", ", ".join(limits))
+    left = faint_words(rest, factor, unit) if rest.amplitude else ""
+    return Conduct("comes to rest" if run.stage == "position" else "becomes steady", left)
+
+
+def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:
+    """What happened, in numbers, SI; full deflection as in `conduct`."""
+    limits = {
+        name: {"limit": u.limit, "unit": u.unit, "fraction": u.fraction, "first_time_s": u.first_time_s}
+        for name, u in run.limits.items()
+    }
+    angle = "m" if run.axis == "linear" else "rad"
+    si = {"position": angle, "velocity": f"{angle}_s", "current": "A", "voltage": "V"}[run.stage]
+    ended = conduct(run, full_deflection_rad)
+    out = {
+        "design": run.design_name,
+        "status": ended.status,
+        "status_detail": ended.detail,
+        "rows": run.time_s.size,
+        "period_s": run.period_s,
+        f"largest_output_{angle}": np.abs(run.output_angle_rad).max(),
+        "commanded": run.stage,
+        f"largest_command_{si}": np.abs(run.reference_rad).max(),
+        f"largest_error_{si}": np.abs(run.reference_rad - run.followed).max(),
+        f"final_output_{angle}": run.output_angle_rad[-1],
+        f"largest_motor_speed_{angle}_s": np.abs(run.motor_speed_rad_s).max(),
+        "largest_current_A": np.abs(run.current_A).max(),
+        "rms_current_A": np.sqrt(np.mean(run.current_A**2)),
+        "largest_voltage_V": np.abs(run.voltage_V).max(),
+        "limits": limits,
+        "events": run.events,
+        "events_per_tick": run.events_per_tick,
+        "stick_fraction": run.stick_fraction,
+        "parameters_hash": run.parameters_hash,
+    }
+    if run.energy is not None:
+        out["energy"] = {**vars(run.energy), "relative_error": run.energy.relative_error}
+    return out

@@ -1,19 +1,83 @@
-"""Figures that only an analysis of one design can find: failures, duty, limit cycles, corners."""
+"""Figures that only an analysis of one design finds: failures, duty, limit cycles, corners, command."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import inf
+from math import inf, log10, pi
+
+import numpy as np
 
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, QUANTITIES, Quantity
 from actuator_lti.design.model import Design
+from actuator_lti.drive.profile import profile_onset_rad
 from actuator_lti.errors import InputError
-from analyses.corners import Corners, corners
-from analyses.duty import Duty, duty
-from analyses.failures import Failures, failures
-from analyses.limit_cycles import LimitCycles, limit_cycles
+from actuator_lti.loops import assemble_loops
+from analyses.corners.run import corners
+from analyses.duty.run import duty
+from analyses.failures.run import failures
+from analyses.large_signal.steady_start import linear_steady_state
+from analyses.large_signal.tones import run_tones, tone
+from analyses.limit_cycles.run import limit_cycles
 from analyses.motion.settling import ending_of
+
+
+@dataclass(frozen=True)
+class CommandLimits:
+    """A sine of full deflection behind rate and acceleration limit of the command."""
+
+    # Asked for, and simulated: a whole number of ticks is a period
+    frequency_hz: float
+    tone_hz: float
+    onset_rad: float  # peak command from which on one of the two acts, output side
+    amplitude_rad: float  # of the sine: full deflection
+    # Simulated fundamental of the output over the command; ``None`` where neither acts at full deflection
+    gain_db: float | None
+    share: float  # of the time that one of them acts
+
+    def words(self, scale: float, unit: str) -> str:
+        """The same in a sentence, amplitudes times a scale."""
+        said = (
+            "rate and acceleration of the command are not in it: they act above "
+            f"{scale * self.onset_rad:.3g} {unit} at {self.frequency_hz:.3g} Hz"
+        )
+        if self.gain_db is None:
+            return f"{said}, beyond full deflection"
+        return (
+            f"{said}; simulated at {scale * self.amplitude_rad:.3g} {unit} and {self.tone_hz:.3g} Hz: "
+            f"{self.gain_db:.3g} dB, {100.0 * self.share:.0f} % of the time limited"
+        )
+
+
+def command_limits(design: Design, frequency_hz: float) -> CommandLimits | None:
+    """Simulate a sine of full deflection where rate or acceleration of the command limit it.
+
+    ``None`` where the command has neither, or the drive no position loop. The frequency is such as the
+    bandwidth of the response to the command.
+    """
+    full = design.validation.full_deflection_rad
+    onset = float(profile_onset_rad(design, np.array([2.0 * pi * frequency_hz]))[0])
+    if onset == inf:
+        return None
+    if onset >= full:
+        return CommandLimits(frequency_hz, frequency_hz, onset, full, None, 0.0)
+    chosen = tone(frequency_hz, design)
+    start = linear_steady_state(assemble_loops(design), np.array([chosen.omega_rad_s]))
+    amplitude, nothing = np.array([full]), np.zeros(1)
+    run = run_tones(design, (chosen,), np.zeros(1, dtype=int), amplitude, start, nothing, insist=True)
+    gain = float(abs(run.phasor("output_angle_rad")[0])) / full
+    share = float(run.window_limit_fraction("profile")[0])
+    gain_db = 20.0 * log10(gain) if gain else -inf
+    return CommandLimits(frequency_hz, chosen.frequency_hz, onset, full, gain_db, share)
+
+
+def said_of(design: Design, frequency_hz: float | None) -> str:
+    """What `command_limits` finds, in words; empty where there is nothing to say."""
+    if frequency_hz is None or not 0.0 < frequency_hz < inf:
+        return ""
+    found = command_limits(design, frequency_hz)
+    scale, unit = (1e3, "mm") if design.axis == "linear" else (180.0 / pi, "deg")
+    return "" if found is None else found.words(scale, unit)
 
 
 @dataclass(frozen=True)
@@ -25,64 +89,53 @@ class AskedFigures:
 
     design: Design
 
-    @cached_property
-    def _failures(self) -> Failures:
-        return failures(self.design)
-
-    @cached_property
-    def _duty(self) -> Duty:
-        return duty(self.design)
-
-    @cached_property
-    def _cycles(self) -> LimitCycles:
-        return limit_cycles(self.design)
-
-    @cached_property
-    def _corners(self) -> Corners:
-        return corners(self.design)
+    failures = cached_property(lambda self: failures(self.design))
+    duty = cached_property(lambda self: duty(self.design))
+    cycles = cached_property(lambda self: limit_cycles(self.design))
+    corners = cached_property(lambda self: corners(self.design))
 
     @property
     def hard_over_time_s(self) -> float:
         """From the hard-over of the power stage to the stop; inf where it is not reached while watched."""
-        reached = self._failures.case("hard-over").to_stop_s
+        reached = self.failures.case("hard-over").to_stop_s
         return inf if reached is None else reached
 
     @property
     def failure_deflection_rad(self) -> float:
         """Largest deflection until detection over all failures."""
-        return max(case.at_detection_rad for case in self._failures.cases)
+        return max(case.at_detection_rad for case in self.failures.cases)
 
     @property
     def failure_moment_Nm(self) -> float:
         """Largest moment in the train over all failures."""
-        return max(case.peak_moment_Nm for case in self._failures.cases)
+        return max(case.peak_moment_Nm for case in self.failures.cases)
 
     @property
     def duty_current_A(self) -> float:
         """Of the duty, rms."""
-        return self._duty.rms_A
+        return self.duty.rms_A
 
     @property
     def winding_degC(self) -> float | None:
         """Of the winding under the duty, in the long run."""
-        heat = self._duty.heating
+        heat = self.duty.heating
         return None if heat is None else heat.final_degC
 
     @property
     def limit_cycle_rad(self) -> float | None:
         """Largest swing that a step of the drive as it is ends in; 0: it rests; ``None``: not known."""
-        swing = self._cycles.hunting
+        swing = self.cycles.hunting
         return 0.0 if swing is None else swing.limit_cycle_rad
 
     @property
     def limit_cycle_said(self) -> str:
         """After which step that is; empty where every one ends at rest."""
-        swing = self._cycles.hunting
+        swing = self.cycles.hunting
         return "" if swing is None else ending_of(self.design, swing)
 
     def at_corners(self, quantity: Quantity) -> float:
         """The worst of a figure over loops and corners; -inf (or inf) where one is not stable."""
-        loops = [one.judged for corner in self._corners.corners for one in corner.figures.values()]
+        loops = [one.judged for corner in self.corners.corners for one in corner.figures.values()]
         if not all(one.stable for one in loops):
             return -quantity.better * inf
         found = (quantity.read(one) for one in loops)

@@ -1,7 +1,8 @@
-"""Everything that a specification of the actuator asks for, in one result."""
+"""Everything that a specification of the actuator asks for, in one result; step times from small to full."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,13 +10,77 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.loops import assemble_loops
+from analyses.finite import finite
 from analyses.large_signal.steady_start import linear_steady_state
+from analyses.large_signal.tones import TANH_TOLERANCE
 from analyses.specification.capability import Capability, capability
 from analyses.specification.manoeuvres import Manoeuvre, TorqueSpeedPlane, manoeuvres, torque_speed_plane
-from analyses.specification.steps import StepTime, step_times
+from nonlinear import LIMITERS, Rows
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
+
+SMALLEST = 0.01  # of full deflection: the small-signal step, beside the design's own fractions
+BAND = 0.02
+SETTLINGS = 2.0  # after travel and swing; in one the slowest mode falls to 1e-9
+LONGEST_TICKS = 60_000
+
+
+@dataclass(frozen=True)
+class StepTime:
+    """A step of the command, output side; ``None`` where a level was not reached in time."""
+
+    # Fraction of full deflection, and the step itself
+    load_Nm: float
+    fraction: float
+    amplitude_rad: float
+    # 10 to 90 %; beyond the target; into 2 % for good
+    rise_time_s: float | None
+    overshoot_percent: float
+    settling_time_s: float | None
+    peak_rate_rad_s: float  # largest rate of the output
+    peak_current_A: float | None
+    limits: dict[str, float]  # fraction of the time simulated in which each limit acts, where it does
+
+
+def step_times(
+    design: Design, rate_rad_s: float, acceleration_rad_s2: float, settling_s: float
+) -> tuple[StepTime, ...]:
+    """Simulate steps at every fraction of full deflection and every load torque."""
+    fractions = sorted({SMALLEST, *design.validation.amplitude_fractions})
+    loads = design.validation.loads_Nm
+    full, Ts = design.validation.full_deflection_rad, design.controller.period_s
+    sizes = np.tile(np.array(fractions) * full, len(loads))
+    rows = Rows.of(design, len(sizes))
+    rows.step("command", sizes)
+    rows["load"], rows["tanh_tolerance"] = np.repeat(loads, len(fractions)), TANH_TOLERANCE
+    rows.step_figures(sizes, BAND)
+    rows.extremes()
+    travel = sizes / rate_rad_s if 0.0 < rate_rad_s < math.inf else np.zeros(len(sizes))
+    swing = np.sqrt(sizes / acceleration_rad_s2) if 0.0 < acceleration_rad_s2 < math.inf else travel
+    wait = np.minimum(np.ceil((3.0 * travel + 12.0 * swing + SETTLINGS * settling_s) / Ts), LONGEST_TICKS)
+    rows["ticks"] = wait
+    result = rows.run()
+    speeds, currents = result.extreme("motor_speed_rad_s"), result.extreme("current_A")
+    electric = design.motor.has_electrical_dynamics
+    return tuple(
+        StepTime(
+            load_Nm=float(rows["load"][k]),
+            fraction=fractions[k % len(fractions)],
+            amplitude_rad=float(sizes[k]),
+            rise_time_s=finite(result.step.rise_time_s[k]),
+            overshoot_percent=float(result.step.overshoot_percent[k]),
+            settling_time_s=finite(result.step.settling_time_s[k]),
+            peak_rate_rad_s=float(max(-speeds[0][k], speeds[1][k])) / design.total_ratio,
+            peak_current_A=float(max(-currents[0][k], currents[1][k])) if electric else None,
+            limits={
+                name: float(result.limit_fraction(name)[k])
+                for name in LIMITERS
+                if result.limit_fraction(name)[k] > 0.0
+            },
+        )
+        for k in range(len(sizes))
+    )
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,217 @@
-"""The stiffness of a design, dynamic and static: the inverse of the response from M_ext to the output."""
+"""The stiffness of a design, dynamic and static: the inverse of the response from M_ext to the output.
+
+It is put to the simulator: by its own derivative, and by a moment injected at the output.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil, sqrt
+from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design, Motor
-from actuator_lti.loops.stiffness import compliance, frequencies_hz, static_stiffness, stiffness_at
-from analyses.stiffness.injected import check_stiffness, lost_motion, stiffness_at_rest
-from analyses.stiffness.result import State, Stiffness, StiffnessCurve
+from actuator_lti.errors import InputError, UnstableError
+from actuator_lti.loops.stiffness import (
+    LOST_MOTION_SHARE,
+    compliance,
+    frequencies_hz,
+    lost_motion_rad,
+    static_stiffness,
+    stiffness_at,
+)
+from nonlinear import commands, simulate, tangent
+from nonlinear.bench.loop_setup import LoopSetup
+from nonlinear.bench.on_the_bench import on_the_bench
+from nonlinear.bench.operating_motion import standing
+from nonlinear.loads import series
+
+State = Literal["powered", "shorted", "open"]
+
+
+@dataclass(frozen=True)
+class StiffnessCurve:
+    """Dynamic stiffness K = M_ext / output angle over frequency, in one state of the drive."""
+
+    # All loops closed and the command held; unpowered with the winding shorted (a bridge at zero voltage);
+    # unpowered without a current
+    state: State
+    frequency_hz: npt.NDArray[np.float64]
+    # N m/rad (linear axis: N/m); inf where the output does not move
+    stiffness_Nm_rad: npt.NDArray[np.complex128]
+    static_Nm_rad: float  # limit at zero frequency: 0 of an output that runs away, inf of one that comes back
+
+    @property
+    def least(self) -> tuple[float, float]:
+        """Smallest |K| and its frequency in Hz; 0 Hz where the static one is below all others."""
+        size = np.abs(self.stiffness_Nm_rad)
+        k = int(np.argmin(size))
+        if self.static_Nm_rad < size[k]:
+            return self.static_Nm_rad, 0.0
+        return float(size[k]), float(self.frequency_hz[k])
+
+
+@dataclass(frozen=True)
+class LostMotion:
+    """How far the output stays apart after a moment to either side has gone, the motor held."""
+
+    play_rad: float  # the play of the coupling at the output
+    # Read at +-3 % of the largest load moment (`actuator_lti.loops.stiffness.lost_motion_rad`)
+    foreseen_rad: float
+    seen_rad: float | None = None  # the same in the simulator; None where it was not asked
+
+
+@dataclass(frozen=True)
+class Check:
+    """One frequency, by the simulator's own derivative at rest, without dry friction and play.
+
+    Both are inf where the output does not move, as behind a gear that locks.
+    """
+
+    frequency_hz: float
+    foreseen_Nm_rad: complex
+    seen_Nm_rad: complex
+
+    @property
+    def difference(self) -> float:
+        """Relative difference of the two compliances."""
+        if np.isinf(self.foreseen_Nm_rad):
+            return 0.0 if np.isinf(self.seen_Nm_rad) else np.inf
+        return abs(self.foreseen_Nm_rad / self.seen_Nm_rad - 1.0)
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """Fundamental stiffness of the drive as it is, at rest, to a sinusoidal moment; inf: no motion."""
+
+    moment_Nm: float
+    frequency_hz: float
+    seen_Nm_rad: complex
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """All of it for one design; ``unproven`` says why the simulator could not be asked."""
+
+    design: Design
+    curves: tuple[StiffnessCurve, ...]
+    lost_motion: LostMotion | None
+    checks: tuple[Check, ...] = ()
+    at_rest: tuple[AtRest, ...] = ()
+    unproven: str = ""
+
+    @property
+    def lost_motion_difference(self) -> float | None:
+        """Relative difference of lost motion as predicted and as simulated; None where it was not read."""
+        lost = self.lost_motion
+        return None if lost is None or lost.seen_rad is None else abs(lost.seen_rad / lost.foreseen_rad - 1.0)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether every check agrees to `AGREED`, and lost motion to `READ`; not proven without a check."""
+        if not self.checks:
+            return Verdict.NOT_PROVEN
+        read = (self.lost_motion_difference or 0.0) <= READ
+        return Verdict.of(read and all(check.difference <= AGREED for check in self.checks))
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is met."""
+        return self.verdict is Verdict.MET
+
+
+AGREED, READ = 1e-6, 1e-2
+
+
+_MOST_TICKS = 400_000
+SKIPPED = 6  # periods at rest, before one is looked at
+PERIODS_WITHIN = 10
+
+
+def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Check, ...]:
+    """The simulator's own derivative from the load to the output (`nonlinear.tangent`) beside the loops.
+
+    At rest, without dry friction, play, counts and friction of two slopes.  An output that no moment moves is
+    pushed with the largest load moment.
+
+    Raises `UnstableError`: for a loop that is not stable.
+    """
+    coupling, bench = design.coupling, on_the_bench(design)
+    friction = replace(design.friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
+    coupling = None if coupling is None else replace(coupling, play_rad=0.0)
+    bench = replace(bench, coupling=coupling, friction=friction)
+    setup = LoopSetup(bench, "load", standing(bench), limits_on=False)
+    response, hertz = compliance(bench, setup.bias.operating(bench)), np.asarray(frequencies_hz, dtype=float)
+    if float(response.slowest) >= 1.0:
+        raise UnstableError("stiffness: the closed loop is not stable")
+    if not response.moves:
+        pushed = stiffness_at_rest(bench, [(each, design.load.moment_max_Nm or 1.0) for each in hertz])
+        return tuple(Check(one.frequency_hz, complex(np.inf), one.seen_Nm_rad) for one in pushed)
+    found = tangent(bench, "load", setup=setup)
+    seen = 1.0 / found.closed(np.exp(2j * np.pi * hertz * found.hold_s))
+    foreseen = [complex(stiffness_at(response, each)[0]) for each in hertz]
+    return tuple(map(Check, hertz.tolist(), foreseen, seen.tolist()))
+
+
+def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> tuple[AtRest, ...]:
+    """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, moment in N m)."""
+    made, period = [], design.controller.period_s
+    for frequency, amplitude in asked:
+        every = design.controller.position_loop.every  # a period is a whole number of them
+        ticks = max(4, round(1.0 / (frequency * period * every))) * every
+        count, turn = (SKIPPED + 2) * ticks, np.exp(-2j * np.pi * np.arange(ticks) / ticks)
+        moment = np.tile(-amplitude * turn.imag, SKIPPED + 2)
+        run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
+        seen = (run.output_angle_rad[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum()
+        given = (moment[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum()
+        K = complex(given / seen) if seen != 0.0 else complex(np.inf)
+        made.append(AtRest(amplitude, 1.0 / (ticks * period), K))
+    return tuple(made)
+
+
+def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
+    """Lost motion of a coupling (`actuator_lti.loops.stiffness`); None for a rigid drive train."""
+    if design.coupling is None:
+        return None
+    play = design.coupling.play_rad / design.ratio_behind_coupling
+    read = lost_motion_seen(design) if seen and design.load.moment_max_Nm > 0.0 else None
+    return LostMotion(play, lost_motion_rad(design), read)
+
+
+def lost_motion_seen(design: Design) -> float:
+    """Lost motion in the simulator, the motor's sensor holding: 0, + peak, - peak, + peak, slowly.
+
+    The peak is the largest load moment, or thrice what the load's friction breaks away at.  It is slow enough
+    for `PERIODS_WITHIN` oscillations of the load within the part that is read.
+
+    Raises `InputError`: without a coupling, a position loop or a largest load moment.
+    """
+    coupling, friction, rated = design.coupling, design.load.friction, design.load.moment_max_Nm
+    if coupling is None or design.controller.position is None or rated <= 0.0:
+        raise InputError("stiffness: lost motion needs a coupling, a position loop and load.moment_max")
+    dry = friction.dry_torque_Nm * friction.breakaway_ratio if friction else 0.0
+    peak = max(rated, 3.0 * dry * design.ratio_behind_coupling)
+    share = LOST_MOTION_SHARE * rated / peak
+    held = replace(
+        design,
+        controller=replace(design.controller, position=replace(design.controller.position, sensor="motor")),
+        load=design.load.bare(),
+    )
+    turn_s = 2.0 * np.pi * sqrt(design.load_side_inertia_kgm2 / coupling.stiffness_Nm_rad)
+    ticks = min(ceil(PERIODS_WITHIN * turn_s / (share * design.controller.period_s)), _MOST_TICKS)
+    quarter = ticks * design.controller.period_s
+    loading = series(quarter * np.array([0.0, 1.0, 3.0, 5.0]), peak * np.array([0.0, 1.0, -1.0, 1.0]))
+    every = max(ticks // 4000, 1)
+    run = simulate(held, commands.hold(), 5.0 * quarter, loading, record_every=every)
+    twist = run.output_angle_rad - run.motor_angle_rad / design.total_ratio
+    at = quarter * np.array([2.0 - share, 4.0 + share, 2.0 + share, 4.0 - share])
+    read = np.interp(at, run.time_s, twist)
+    return float(0.5 * (read[0] + read[1] - read[2] - read[3]))
+
 
 STATES: tuple[State, ...] = ("powered", "shorted", "open")
 CHECKED_HZ = (2.0, 10.0, 50.0)

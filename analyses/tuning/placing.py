@@ -1,25 +1,68 @@
-"""What tuning may add to a velocity loop: a notch, a low-pass, feed-forward; neutral until it is needed.
+"""What tuning may set: gains as the motion controller's objects hold them, and elements that it may add.
 
-A placed element starts where it does nothing: a notch of depth 1, a low-pass at the end of the band, no
-feed-forward. Its distance from there is what it costs, in the same measure as a gain (`Variable.change`).
+A notch, a low-pass, feed-forward of a velocity loop are neutral until they are needed: a notch of depth 1, a
+low-pass at the end of the band, no feed-forward. The distance from there is what they cost, in the same
+measure as a gain (`change`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
-from math import inf, pi, sqrt
+from itertools import combinations, product
+from math import ceil, floor, inf, pi, sqrt
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from actuator_lti.design.model import Filter
+from actuator_lti.design.object_dictionary import OBJECTS, step_of
 from actuator_lti.drive.facts import resonance_rad_s as free_resonance_rad_s
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
+    from actuator_lti.design.object_dictionary import KnownObject
+
+
+def object_of(design: Design, path: str) -> KnownObject | None:
+    """The object that holds a gain; None where the drive is not that motion controller."""
+    if not design.objects.named:
+        return None
+    return next((known for known in OBJECTS.values() if path in known.paths), None)
+
+
+def step_of_gain(design: Design, path: str) -> float | None:
+    """SI value of one step of the object that holds a gain."""
+    known = object_of(design, path)
+    return None if known is None else step_of(known, design.objects.velocity_gain_factor)
+
+
+def allowed_range(design: Design, path: str) -> tuple[float, float]:
+    """Smallest and largest SI value of a gain that its object can hold."""
+    known, step = object_of(design, path), step_of_gain(design, path)
+    if known is None or step is None:
+        return 0.0, inf
+    return max(known.low, 1) * step, known.high * step
+
+
+def neighbours(design: Design, paths: tuple[str, ...], gains: np.ndarray) -> np.ndarray:
+    """All roundings of gains to the steps of their objects, up and down, shape (roundings, gains).
+
+    A gain without an object stays as it is.
+    """
+    choices = []
+    for path, value in zip(paths, gains, strict=True):
+        step = step_of_gain(design, path)
+        if step is None:
+            choices.append((float(value),))
+            continue
+        low, high = allowed_range(design, path)
+        around = {floor(value / step), ceil(value / step)}
+        inside = sorted(n * step for n in around if low * (1 - 1e-12) <= n * step <= high * (1 + 1e-12))
+        choices.append(tuple(inside) or (float(np.clip(round(value / step) * step, low, high)),))
+    return np.array(list(product(*choices)))
+
 
 Element = Literal["notch", "lowpass", "feedforward"]
 ELEMENTS: tuple[Element, ...] = get_args(Element)
@@ -78,7 +121,7 @@ def place(design: Design, elements: tuple[Element, ...]) -> Placed:
         if element == "feedforward":
             variables += _feedforward(design)
             continue
-        item, rows = (_notch if element == "notch" else _lowpass)(design)
+        item, rows = _filter(design, element)
         velocity = design.controller.velocity
         assert velocity is not None
         filters = (*velocity.filters, item)
@@ -106,8 +149,11 @@ def resonance_rad_s(design: Design) -> float:
     return float(np.clip(free_resonance_rad_s(design), low, high))
 
 
-def _notch(design: Design) -> tuple[Filter, list[Variable]]:
+def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
     low, high = band_rad_s(design)
+    if element == "lowpass":
+        lowpass = Filter(kind="lowpass", frequency_rad_s=high)
+        return lowpass, [Variable("frequency", high, low, high, high)]
     centre = resonance_rad_s(design)
     item = Filter(kind="notch", frequency_rad_s=centre, width_rad_s=0.5 * centre, depth=1.0)
     return item, [
@@ -115,12 +161,6 @@ def _notch(design: Design) -> tuple[Filter, list[Variable]]:
         Variable("width", 0.5 * centre, 0.02 * low, 4.0 * high, None, per="frequency"),
         Variable("depth", 1.0, DEEPEST, 1.0, 1.0),
     ]
-
-
-def _lowpass(design: Design) -> tuple[Filter, list[Variable]]:
-    low, high = band_rad_s(design)
-    item = Filter(kind="lowpass", frequency_rad_s=high)
-    return item, [Variable("frequency", high, low, high, high)]
 
 
 def _feedforward(design: Design) -> list[Variable]:

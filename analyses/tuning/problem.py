@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,14 +14,16 @@ import numpy as np
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, paths_of, tolerances
+from actuator_lti.design.model import Requirement
+from actuator_lti.design.units import parse_limit
 from actuator_lti.errors import InputError
-from analyses.monte_carlo.judging import in_populations, judge, loop_columns
+from analyses.monte_carlo.judging import in_populations, judge, loop_columns, loops_of
 from analyses.studies.sampling import Factor, correlation_of, semidefinite_root
 from analyses.tuning.placing import Variable, change
 
 if TYPE_CHECKING:
     from actuator_lti.batch.figures import LinearFigures
-    from actuator_lti.design.model import Design, Requirement
+    from actuator_lti.design.model import Design
 
 GAINS = (
     "control.current.gain",
@@ -141,6 +144,10 @@ class Problem:
         """`exact_distances` as far as the search looks."""
         return np.minimum(self.exact_distances(gains, corners), PLENTY)
 
+    def rows(self, coordinates: np.ndarray, corners: np.ndarray) -> np.ndarray:
+        """Distances at coordinates, one row for each: shape (candidates, corners * requirements)."""
+        return self.distances(self.values(coordinates), corners).reshape(len(coordinates), -1)
+
     def exact_distances(
         self, gains: np.ndarray, corners: np.ndarray, factors: tuple[Factor, ...] | None = None
     ) -> np.ndarray:
@@ -211,7 +218,7 @@ def problem_of(
     The search starts from ``start`` (by rules, SI); another gain of the design starts where it is. ``placed``
     are the variables of added elements.
     """
-    from analyses.tuning.objects import allowed_range
+    from analyses.tuning.placing import allowed_range
 
     variables = []
     for path in (path for path in GAINS if path in set(paths_of(design))):
@@ -221,3 +228,40 @@ def problem_of(
         low, high = max(min(begin, home) / SPAN, low), min(max(begin, home) * SPAN, high)
         variables.append(Variable(path, begin, min(low, high), max(low, high), home))
     return Problem(design, requirements, (*variables, *placed), most)
+
+
+_FORM = re.compile(r"\s*([a-z]+)\.([a-z_0-9]+)\s*(>=|<=)\s*(.+?)\s*")
+
+
+def read_requirement(words: str, design: Design) -> Requirement:
+    """Read a requirement on a loop; what makes no sense is refused with what is allowed.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> result = read_requirement("position.bandwidth >= 30 Hz", load_design("ilr33-amber"))
+    >>> result.id, result.minimum, result.unit
+    ('position-bandwidth-wanted', 30.0, 'Hz')
+    """
+    match = _FORM.fullmatch(words)
+    if match is None:
+        raise InputError(
+            f'--require {words!r}: allowed: LOOP.QUANTITY>=LIMIT, as "position.bandwidth>=30 Hz"'
+        )
+    loop, quantity, sign, limit = match.groups()
+    loops = (*loops_of(design), "every")
+    if loop not in loops:
+        raise InputError(f"--require {words!r}: loop {loop!r}; allowed: {', '.join(loops)}")
+    known = {name: q for name, q in QUANTITIES.items() if q.scope == "loop"}
+    if quantity not in known:
+        raise InputError(f"--require {words!r}: quantity {quantity!r}; allowed: {', '.join(known)}")
+    unit = known[quantity].unit_for(design.axis)
+    try:
+        value = parse_limit(limit, unit)
+    except InputError as error:
+        raise InputError(f"--require {words!r}: {error.message}") from error
+    return Requirement(
+        id=f"{loop}-{quantity.replace('_', '-')}-wanted", quantity=quantity, unit=unit, loop=loop,
+        minimum=value if sign == ">=" else None, maximum=value if sign == "<=" else None,
+        source="command line",
+    )  # fmt: skip

@@ -1,13 +1,25 @@
-"""What tuning returns."""
+"""What tuning returns; the tuned design once more, by certified margins and by nonlinear steps."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from actuator_lti.asked.quantities import QUANTITIES
+from actuator_lti.batch import Population
+from actuator_lti.design import with_values
+from actuator_lti.loops import assemble_loops
+from analyses.finite import finite
+from analyses.linear.loop_figures import all_loop_figures
+from analyses.monte_carlo.task import StepCheck, step_columns
+from analyses.specification.requirements import judged
+from analyses.tuning.problem import Problem
+
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
+    from actuator_lti.design.model import Design, Requirement
     from analyses.specification.requirements import RequirementVerdict
     from analyses.tuning.asked import Aim
 
@@ -104,3 +116,65 @@ class TuningResult:
             f"binding: {r.id} {r.distance:+.4g} {r.unit}" for r in self.requirements if r.binds and r.distance
         ]
         return "\n".join(lines)
+
+
+_SMALL = 0.05
+
+
+def confirm(
+    tuned: Design, requirements: tuple[Requirement, ...], binding: tuple[BindingRequirement, ...]
+) -> tuple[RequirementVerdict, ...]:
+    """Judge the tuned design, and each requirement's worst corner, by certified margins.
+
+    The search asks the many-designs figures; this asks what ``margins`` asks. ``binding`` holds the same
+    requirements at their worst corners.
+    """
+    timed = any(QUANTITIES[item.quantity].timed for item in requirements)
+    rows: dict[tuple[tuple[str, float], ...], list[Requirement]] = {(): list(requirements)}
+    for item, result in zip(requirements, binding, strict=True):
+        if result.corner:
+            rows.setdefault(tuple(sorted(result.corner.items())), []).append(item)
+    verdicts: list[RequirementVerdict] = []
+    for corner, asked in rows.items():
+        design = with_values(tuned, dict(corner), check=False)
+        figures = all_loop_figures(assemble_loops(design), step=timed, certify=True)
+        for requirement in asked:
+            found = judged(design, requirement, figures, lambda name: (None, f"{name}: no figure of a loop"))
+            verdicts += [replace(each, id=f"{each.id}, worst corner") for each in found] if corner else found
+    return tuple(verdicts)
+
+
+def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tuple[NonlinearCheck, ...]:
+    """Steps of a twentieth of full deflection and of full deflection, with every limit and friction on."""
+    from analyses.comparison.variant_figures import LargeSignal
+
+    worst = int(np.argmin(result.min(axis=1)))
+    plan = LargeSignal.plan(tuned)
+    rows = {"nominal": problem.all_corners[0]}
+    if worst:
+        rows["worst corner"] = problem.all_corners[worst]
+    points = np.array(list(rows.values())).T
+    population = Population(
+        tuned, {f.path: column for f, column in zip(problem.factors, points, strict=True)}, len(rows)
+    )
+    checks = []
+    for share in (_SMALL, 1.0):
+        step = StepCheck(share * plan.deflection_rad, plan.duration_s)
+        columns = step_columns(step, population)
+        for k, corner in enumerate(rows):
+            one = {name.partition(".")[2]: float(values[k]) for name, values in columns.items()}
+            shares = {name: one[f"{name}_limited"] for name in ("speed", "current", "voltage")}
+            checks.append(
+                NonlinearCheck(
+                    corner=corner,
+                    amplitude_rad=step.amplitude_rad,
+                    rise_time_s=finite(one["rise_time"]),
+                    overshoot_percent=one["overshoot"],
+                    settling_time_s=finite(one["settling_time"]),
+                    final_error_percent=one["final_error"],
+                    limited=", ".join(
+                        f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0
+                    ),
+                )
+            )
+    return tuple(checks)

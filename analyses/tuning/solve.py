@@ -11,10 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
+from analyses.monte_carlo.judging import loops_of
 from analyses.tuning.problem import Problem
+from analyses.tuning.result import TradeOffPoint
 
 ROUNDS = 6
 STEP = 1e-4  # of a coordinate (ln of a gain), central differences
@@ -46,7 +49,11 @@ def solve(problem: Problem, *, give_up: bool = False) -> Solution:
     starts = start_points(problem, working)
     best: Solution | None = None
     for _ in range(ROUNDS):
-        gains = _best_of([_climb(problem, start, working) for start in starts], problem, working)
+        rows = partial(problem.rows, corners=working)
+        found = np.array([maximise(problem, start, rows) for start in starts])
+        away = np.sum((problem.coordinates(found) - problem.coordinates(problem.start)) ** 2, axis=1)
+        near = np.minimum(problem.distances(found, working).min(axis=(1, 2)), RESERVE) - TIE * away
+        gains = found[int(np.argmax(near))]
         result = problem.distances(gains[None, :], corners)[0]
         slack = float(result.min())
         if best is None or slack > best.slack:
@@ -73,13 +80,6 @@ def start_points(problem: Problem, working: np.ndarray) -> np.ndarray:
     return np.vstack([cloud[:1], cloud[order[:2]]])
 
 
-def _best_of(candidates: list[np.ndarray], problem: Problem, working: np.ndarray) -> np.ndarray:
-    gains = np.array(candidates)
-    away = np.sum((problem.coordinates(gains) - problem.coordinates(problem.start)) ** 2, axis=1)
-    slack = np.minimum(problem.distances(gains, working).min(axis=(1, 2)), RESERVE) - TIE * away
-    return gains[int(np.argmax(slack))]
-
-
 def violated(
     result: np.ndarray, problem: Problem, gains: np.ndarray, corners: np.ndarray, working: np.ndarray
 ) -> np.ndarray:
@@ -88,22 +88,9 @@ def violated(
     fresh = []
     for k in range(result.shape[1]):
         worst = int(np.argmin(result[:, k]))
-        if result[worst, k] < known - 1e-6 and not _among(corners[worst], working):
+        if result[worst, k] < known - 1e-6 and not (working == corners[worst]).all(axis=1).any():
             fresh.append(corners[worst])
     return np.unique(np.array(fresh), axis=0) if fresh else np.empty((0, corners.shape[1]))
-
-
-def _among(corner: np.ndarray, working: np.ndarray) -> bool:
-    return bool(np.any(np.all(working == corner, axis=1)))
-
-
-def _climb(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.ndarray:
-    """Maximise t subject to distances >= t, from one start."""
-
-    def limits(x: np.ndarray) -> np.ndarray:
-        return problem.distances(problem.values(x), working).reshape(len(x), -1)
-
-    return maximise(problem, start, limits)
 
 
 class Spent(Exception):
@@ -150,7 +137,7 @@ def maximise(
     start: np.ndarray,
     limits: Functions,
     free: Functions | None = None,
-    iterations: int = 80,
+    most_rounds: int = 80,
 ) -> np.ndarray:
     """Maximise the smallest of some functions of the gains, from a start; all gains in SI.
 
@@ -179,8 +166,88 @@ def maximise(
             np.append(x0, first if most is None else min(first, most)),
             jac=lambda y: np.append(2 * TIE * (y[:-1] - rules), -1.0),
             method="SLSQP", bounds=[*zip(low, high, strict=True), (None, most)],
-            constraints=met, options={"maxiter": iterations, "ftol": 1e-9},
+            constraints=met, options={"maxiter": most_rounds, "ftol": 1e-9},
         ).x[:-1]  # fmt: skip
     except Spent:
         result = program.best
     return problem.values(np.clip(result, low, high))
+
+
+POINTS = 6
+_SPAN = (0.6, 1.6)
+_MET = -1e-3
+
+
+def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple[TradeOffPoint, ...]:
+    """Largest smallest phase margin (all loops, worst corner) for position bandwidths around the tuned one.
+
+    From gains in SI; the result holds for the corners that are looked at, ``working``.
+    """
+    others = [
+        k for k, r in enumerate(problem.requirements)
+        if r.quantity != "phase_margin" and not (r.quantity == "bandwidth" and r.loop in ("position", None))
+    ]  # fmt: skip
+    trade = _TradeOff(problem, working, others)
+    centre = float(np.min(trade.width(gains[None, :])))
+    if not np.isfinite(centre):
+        return ()
+    targets = [float(hz) for hz in centre * np.geomspace(*_SPAN, POINTS)]
+    result: list[np.ndarray] = []
+    for wanted in targets:
+        starts = [gains, *result[-1:]]
+        tried = [trade.best(start, wanted) for start in starts]
+        result.append(trade.better([*starts, *tried], wanted))
+    for k in range(len(targets) - 2, -1, -1):  # what a higher bandwidth allows, a lower one does too
+        result[k] = trade.better(result[k : k + 2], targets[k])
+    points = [trade.point(one[None, :]) for one in result]
+    return tuple(point for point in points if np.isfinite(point.bandwidth_hz))
+
+
+@dataclass(frozen=True)
+class _TradeOff:
+    """Bandwidth, phase margins and the ``others`` of the requirements at some corners, of rows of gains."""
+
+    problem: Problem
+    working: np.ndarray
+    others: list[int]
+
+    def width(self, rows: np.ndarray) -> np.ndarray:
+        return self.problem.figure("bandwidth", "position", rows, self.working)
+
+    def margins(self, rows: np.ndarray) -> np.ndarray:
+        """Phase margins, shape (candidates, loops * corners); 180 without crossing."""
+        loops = loops_of(self.problem.design)
+        result = [self.problem.figure("phase_margin", loop, rows, self.working) for loop in loops]
+        return np.clip(np.concatenate(result, axis=1), -180.0, 180.0)
+
+    def kept(self, rows: np.ndarray, wanted_hz: float) -> list[np.ndarray]:
+        """How far bandwidth, and the other figures, are from their limits, each (candidates, distances)."""
+        width = self.width(rows)
+        made = [np.where(np.isnan(width), -3.0, width / wanted_hz - 1.0)]
+        if self.others:
+            distances = self.problem.distances(rows, self.working)
+            made.append(distances[:, :, self.others].reshape(len(rows), -1))
+        return made
+
+    def better(self, candidates: list[np.ndarray], wanted_hz: float) -> np.ndarray:
+        """Of some gains those with the largest phase margin that keep the bandwidth and the other limits."""
+        rows = np.array(candidates)
+        margin = self.margins(rows).min(axis=1)
+        short = sum(np.minimum(part.min(axis=1) - _MET, 0.0) for part in self.kept(rows, wanted_hz))
+        return rows[int(np.lexsort((-margin, -np.asarray(short)))[0])]
+
+    def best(self, start: np.ndarray, wanted_hz: float) -> np.ndarray:
+        """Largest phase margin at a bandwidth or above, other requirements kept."""
+        values = self.problem.values
+        return maximise(
+            self.problem,
+            start,
+            lambda x: np.concatenate(self.kept(values(x), wanted_hz), axis=1),
+            lambda x: self.margins(values(x)) / 45.0,
+            most_rounds=30,
+        )
+
+    def point(self, row: np.ndarray) -> TradeOffPoint:
+        width, margin = float(np.min(self.width(row))), float(self.margins(row).min())
+        kept = self.problem.distances(row, self.working)[0][:, self.others]
+        return TradeOffPoint(width, margin, bool(kept.size == 0 or kept.min() >= _MET))

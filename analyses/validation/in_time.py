@@ -27,7 +27,7 @@ from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, Place, near
 from nonlinear import Rows
 from nonlinear.bench.injection import RETURNED
 from nonlinear.bench.loop_setup import LoopSetup
-from nonlinear.bench.probe import Probe, write_probe
+from nonlinear.bench.probe import Probe
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
@@ -42,10 +42,7 @@ SIZES = 10.0 ** -np.arange(1.0, 14.0)  # of a large signal
 
 @dataclass(frozen=True)
 class StepShown:
-    """A small step at a place, simulated and linear, of height 1.
-
-    ``time_s``, ``simulated``, ``linear``, shape (m,).
-    """
+    """A small step at a place, simulated and linear, of height 1; shape (m,)."""
 
     place: str
     time_s: Floats
@@ -74,10 +71,7 @@ class MarginRun:
 
 @dataclass(frozen=True)
 class MarginShown:
-    """Two runs beside a gain margin.
-
-    ``ratio``, ``frequency_hz``: the margin.
-    """
+    """Two runs beside a gain margin of ``ratio`` at ``frequency_hz``."""
 
     place: str
     ratio: float
@@ -213,7 +207,7 @@ def _at_gain(setup: LoopSetup, gain: float) -> Rows:
     rows = setup.rows()
     calm = rows.running()
     calm.run(1)
-    write_probe(Probe(point=setup.point, gain=gain), rows.values[0])  # type: ignore[arg-type]
+    rows.probe(Probe(point=setup.point, gain=gain))  # type: ignore[arg-type]
     rows.step(setup.point, (1.0 - gain) * calm.s[RETURNED[setup.point]], -1.0)
     return rows
 

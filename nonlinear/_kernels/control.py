@@ -7,9 +7,18 @@ from __future__ import annotations
 
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.estimate import counted, measured_speed
-from nonlinear._kernels.filters import chain
-from nonlinear._kernels.own_law import own_output, own_states
+from nonlinear._kernels.blocks import (
+    PROBE_Y,
+    chain,
+    clamp,
+    counted,
+    measured_speed,
+    own_output,
+    own_states,
+    pi,
+    regulator,
+    velocity_regulator,
+)
 from nonlinear._kernels.position import (
     limited,
     outer_rare,
@@ -19,8 +28,6 @@ from nonlinear._kernels.position import (
     put_voltage,
     sloped,
 )
-from nonlinear._kernels.probes import PROBE_Y
-from nonlinear._kernels.regulator import clamp, pi, regulator, velocity_regulator
 
 
 @kernel

@@ -12,7 +12,7 @@ import numpy as np
 
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear._kernels.modal import slip_at
+from nonlinear._kernels.slipping import slip_at
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 NODES, WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from actuator_lti.compiled.form import Form
 from nonlinear._kernels import layout as at
-from nonlinear._kernels.probes import PROBE_I, PROBE_U, PROBE_W, PROBE_Y
+from nonlinear._kernels.blocks import PROBE_I, PROBE_U, PROBE_W, PROBE_Y
 
 _UNSEEN = (at.PROBING, PROBE_U, PROBE_I, PROBE_W, PROBE_Y, at.WITH_ENERGY, at.OWN_STAGE, at.OWN_MEASURES)
 _ABSENT = (

@@ -442,14 +442,7 @@ SIGNALS = (
     "voltage_V",
     "current_command_A",
     "speed_command_rad_s",
-    "probe_u_before",
-    "probe_u_after",
-    "probe_i_ref_before",
-    "probe_i_ref_after",
-    "probe_w_ref_before",
-    "probe_w_ref_after",
-    "probe_output_before",
-    "probe_output_after",
+    *(f"probe_{point}_{side}" for point in POINTS for side in ("before", "after")),
 )
 BASE_SIGNALS = 7
 ALL_SIGNALS = 15
@@ -462,25 +455,13 @@ ELASTIC_COLUMNS = 3
 # --- results of one run ----------------------------------------------------------------------------
 (
     OUT_TICKS,  # ticks done
-    OUT_EVENTS,
-    OUT_MAX_EVENTS,  # most events in one tick
     OUT_STICK_TICKS,  # ticks that began at rest
-    OUT_CURRENT,  # final values
-    OUT_SPEED,
-    OUT_ANGLE,
-    OUT_CURRENT_INTEGRATOR,
-    OUT_VELOCITY_INTEGRATOR,
-    OUT_SPEED_COMMAND,
-    OUT_CURRENT_COMMAND,
-    OUT_VOLTAGE,
-    OUT_OUTPUT,  # of an elastic drive: angle and speed of the output shaft, twist
-    OUT_OUTPUT_SPEED,
-    OUT_TWIST,
-    OUT_LIMIT_TICKS,  # of each limiter: ticks active
-) = range(16)
+    OUT_TWIST,  # of an elastic drive, at the end
+    OUT_STATE,  # the first numbers of the state at the end, up to the energies
+) = range(4)
+OUT_LIMIT_TICKS = OUT_STATE + S_COMMAND_CHAIN  # of each limiter: ticks active
 OUT_LIMIT_FIRST = OUT_LIMIT_TICKS + LIMITER_COUNT  # first tick, -1 if never
-OUT_ENERGY = OUT_LIMIT_FIRST + LIMITER_COUNT
-OUT_STEP = OUT_ENERGY + ENERGY_SIZE
+OUT_STEP = OUT_LIMIT_FIRST + LIMITER_COUNT
 STEP_T10, STEP_T90, STEP_PEAK, STEP_SETTLED, STEP_LAST = range(5)
 STEP_SIZE = 5
 OUT_EXTREMES = OUT_STEP + STEP_SIZE  # minimum, maximum of each signal over the run

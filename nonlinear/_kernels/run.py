@@ -1,13 +1,155 @@
-"""One whole run: the inputs of a block of ticks worked out ahead, then tick after tick."""
+"""One whole run: inputs ahead, tick after tick; its history, or what is kept where there is none."""
 
 from __future__ import annotations
 
-from actuator_lti.compiled.kernel import kernel
+import math
+
+import numpy as np
+
+from actuator_lti.compiled.kernel import kernel, seldom
 from nonlinear._kernels import elastic_layout, layout
-from nonlinear._kernels.record import record
-from nonlinear._kernels.reduce import clear, note_limits, reduce
 from nonlinear._kernels.signals import feed, fill_block
 from nonlinear._kernels.tick import step
+
+LIMITER_BITS = np.array(layout.LIMITER_BITS)
+
+
+@kernel
+def record(p, io, history, rows, flag_history, row):
+    """Write the columns that every run has, and those of active probes."""
+    for j in range(layout.BASE_SIGNALS):
+        history[j * rows + row] = io[layout.IO_REFERENCE + j]
+    history[layout.HISTORY_ANGLE * rows + row] = io[layout.IO_ANGLE]
+    flag_history[row] = int(io[layout.IO_FLAGS])
+    if p[layout.PROBING] > 0.0 or p[layout.ELASTIC_DRIVE] > 0.0 or p[layout.RARE_LOAD] > 0.0:
+        record_more(p, io, history, rows, row)
+
+
+@kernel
+def record_more(p, io, history, rows, row):
+    """Write both sides of each active probe, by point, then an elastic drive's load side, then the load."""
+    col = layout.HISTORY_PROBES
+    if p[layout.PROBING] > 0.0:
+        for point in range(4):
+            if p[layout.PROBES + point * layout.PROBE_SIZE] > 0.0:
+                history[col * rows + row] = io[layout.IO_PROBES + 2 * point]
+                history[(col + 1) * rows + row] = io[layout.IO_PROBES + 2 * point + 1]
+                col += 2
+    if p[layout.ELASTIC_DRIVE] > 0.0:
+        for j in range(layout.ELASTIC_COLUMNS):
+            history[(col + j) * rows + row] = io[layout.IO_OUTPUT_SPEED + j]
+        col += layout.ELASTIC_COLUMNS
+    if p[layout.RARE_LOAD] > 0.0:
+        history[col * rows + row] = io[layout.IO_MOMENT]
+
+
+@kernel
+def clear(p, out):
+    """Reset a row of results for a run."""
+    for j in range(layout.OUT_SIZE):
+        out[j] = 0.0
+    for j in range(layout.LIMITER_COUNT):
+        out[layout.OUT_LIMIT_FIRST + j] = -1.0
+    for j in range(layout.ALL_SIGNALS):
+        out[layout.OUT_EXTREMES + 2 * j] = math.inf
+        out[layout.OUT_EXTREMES + 2 * j + 1] = -math.inf
+        for w in range(layout.WINDOWS):
+            at = layout.OUT_WINDOWS + (w * layout.ALL_SIGNALS + j) * layout.WINDOW_SIGNAL
+            out[at + 2], out[at + 3] = math.inf, -math.inf
+    out[layout.OUT_STEP + layout.STEP_T10] = out[layout.OUT_STEP + layout.STEP_T90] = -1.0
+    out[layout.OUT_STEP + layout.STEP_SETTLED] = -1.0
+    if p[layout.WINDOW] > 0.0:
+        turn = 2.0 * math.pi * p[layout.CYCLES] / p[layout.WINDOW]
+        out[layout.OUT_PHASOR + 2], out[layout.OUT_PHASOR + 3] = math.cos(turn), math.sin(turn)
+
+
+@kernel
+def extremes(io, count, out):
+    """Update minimum and maximum of each signal."""
+    for j in range(count):
+        at = layout.OUT_EXTREMES + 2 * j
+        out[at] = min(out[at], io[layout.IO_REFERENCE + j])
+        out[at + 1] = max(out[at + 1], io[layout.IO_REFERENCE + j])
+
+
+@kernel
+def window(io, count, which, harmonics, c, s, out):
+    """Add one tick to a window; (c, s) is the unit phasor of the fundamental."""
+    for j in range(count):
+        x = io[layout.IO_REFERENCE + j]
+        at = layout.OUT_WINDOWS + (which * layout.ALL_SIGNALS + j) * layout.WINDOW_SIGNAL
+        out[at] += x
+        out[at + 1] += x * x
+        out[at + 2] = min(out[at + 2], x)
+        out[at + 3] = max(out[at + 3], x)
+        re, im = c, s
+        for h in range(harmonics):
+            out[at + layout.WINDOW_BASE + 2 * h] += x * re
+            out[at + layout.WINDOW_BASE + 2 * h + 1] += x * im
+            re, im = re * c - im * s, re * s + im * c
+
+
+@kernel
+def step_figures(y, y_last, k, band, out):
+    """Update rise, peak and settling of a response normalised to its target; times in ticks."""
+    at = layout.OUT_STEP
+    if out[at + layout.STEP_T10] < 0.0 and y >= 0.1:
+        out[at + layout.STEP_T10] = k - (y - 0.1) / (y - y_last) if k > 0 else 0.0
+    if out[at + layout.STEP_T90] < 0.0 and y >= 0.9:
+        out[at + layout.STEP_T90] = k - (y - 0.9) / (y - y_last) if k > 0 else 0.0
+    out[at + layout.STEP_PEAK] = max(out[at + layout.STEP_PEAK], y)
+    if abs(y - 1.0) > band:
+        out[at + layout.STEP_SETTLED] = -1.0
+    elif out[at + layout.STEP_SETTLED] < 0.0:
+        out[at + layout.STEP_SETTLED] = k
+    out[at + layout.STEP_LAST] = y
+
+
+@seldom
+@kernel
+def note_limits(p, flags, first, until, out):
+    """Count the ticks from ``first`` to ``until`` (exclusive), in which the same limiters acted."""
+    ticks = until - first
+    window = max(until - max(float(first), p[layout.TICKS] - p[layout.WINDOW]), 0.0)
+    bits = int(flags)
+    for j in range(layout.LIMITER_COUNT):
+        if bits & LIMITER_BITS[j]:
+            out[layout.OUT_LIMIT_TICKS + j] += ticks
+            out[layout.OUT_WINDOW_LIMITS + j] += window
+            if out[layout.OUT_LIMIT_FIRST + j] < 0.0:
+                out[layout.OUT_LIMIT_FIRST + j] = first
+    if bits & layout.FLAG_STICK:
+        out[layout.OUT_STICK_TICKS] += ticks
+        out[layout.OUT_WINDOW_STICK] += window
+
+
+@kernel
+def windows(p, io, k, count, out):
+    """Add tick k to the last window or the one before it."""
+    length = int(p[layout.WINDOW])
+    into = k - (int(p[layout.TICKS]) - 2 * length)
+    if into < 0:
+        return
+    at = layout.OUT_PHASOR
+    if into == 0 or into == length:
+        out[at], out[at + 1] = 1.0, 0.0
+    c, s = out[at], out[at + 1]
+    window(io, count, 1 if into < length else 0, int(p[layout.HARMONICS]), c, s, out)
+    out[at], out[at + 1] = c * out[at + 2] - s * out[at + 3], c * out[at + 3] + s * out[at + 2]
+
+
+@kernel
+def reduce(p, io, k, out):
+    """Add tick k to whatever is kept of the run."""
+    if p[layout.STEP_TARGET] != 0.0:
+        y = (io[layout.IO_OUTPUT] - p[layout.ANGLE_START] / p[layout.RATIO]) / p[layout.STEP_TARGET]
+        step_figures(y, out[layout.OUT_STEP_BEFORE], k, p[layout.STEP_BAND], out)
+        out[layout.OUT_STEP_BEFORE] = y
+    count = layout.ALL_SIGNALS if p[layout.PROBING] > 0.0 else layout.BASE_SIGNALS
+    if p[layout.WITH_EXTREMES] > 0.0:
+        extremes(io, count, out)
+    if p[layout.WINDOW] > 0.0:
+        windows(p, io, k, count, out)
 
 
 @kernel
@@ -44,22 +186,12 @@ def run_block(p, s, io, block, first, count, history, flag_history, out):
 
 
 @kernel
-def finish(p, s, k, out):
-    """Write the final state and the counts into the results."""
+def finish(s, k, out):
+    """Write the final state into the results, its energies with it."""
     out[layout.OUT_TICKS] = k
-    out[layout.OUT_EVENTS], out[layout.OUT_MAX_EVENTS] = s[layout.S_EVENTS], s[layout.S_MAX_EVENTS]
-    out[layout.OUT_CURRENT], out[layout.OUT_SPEED] = s[layout.S_CURRENT], s[layout.S_SPEED]
-    out[layout.OUT_ANGLE] = s[layout.S_ANGLE]
-    out[layout.OUT_CURRENT_INTEGRATOR] = s[layout.S_CURRENT_INTEGRATOR]
-    out[layout.OUT_VELOCITY_INTEGRATOR] = s[layout.S_VELOCITY_INTEGRATOR]
-    out[layout.OUT_SPEED_COMMAND] = s[layout.S_SPEED_COMMAND]
-    out[layout.OUT_CURRENT_COMMAND] = s[layout.S_CURRENT_REFERENCE]
-    out[layout.OUT_VOLTAGE] = s[layout.S_VOLTAGE]
-    if p[layout.ELASTIC_DRIVE] > 0.0:
-        out[layout.OUT_OUTPUT], out[layout.OUT_OUTPUT_SPEED] = s[layout.S_OUTPUT], s[layout.S_OUTPUT_SPEED]
-        out[layout.OUT_TWIST] = s[elastic_layout.ES_TWIST]
-    for j in range(layout.ENERGY_SIZE):
-        out[layout.OUT_ENERGY + j] = s[layout.S_ENERGY + j]
+    out[layout.OUT_TWIST] = s[elastic_layout.ES_TWIST]
+    for j in range(layout.S_COMMAND_CHAIN):
+        out[layout.OUT_STATE + j] = s[j]
 
 
 @kernel
@@ -83,5 +215,5 @@ def run(p, s, io, block, tables, history, flag_history, out, shared):
         shared[0] = k
         if shared[1] != 0.0 and s[layout.S_STATUS] == 0.0:
             s[layout.S_STATUS] = float(layout.CANCELLED)
-    finish(p, s, k, out)
+    finish(s, k, out)
     return int(s[layout.S_STATUS])

@@ -19,9 +19,9 @@ import math
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.energy import NODES, WEIGHTS, add_slip, energy_whole, pieces_of
-from nonlinear._kernels.expm import MATRIX, exponential, plant, transition
 from nonlinear._kernels.hyperbolic import tanh
 from nonlinear._kernels.segment import slip_step
+from nonlinear._kernels.slipping import MATRIX, exponential, plant, transition
 
 SATURATED = 19.0
 STEP_FACTOR = 4.0  # leaves about a factor of twenty to the error seen

@@ -13,28 +13,21 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import inf, lcm
 
-import numpy as np
-import numpy.typing as npt
-
 from actuator_lti.design.control import FEED_FORWARD
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear.bench.operating_motion import (
     OperatingMotion,
-    current_state,
     full_torque_Nm,
     may_stand,
     operating_motion,
     standing,
-    velocity_state,
 )
-from nonlinear.bench.own_law_start import own_start
-from nonlinear.bench.probe import Probe, write_probe
+from nonlinear.bench.probe import Probe
+from nonlinear.bench.steady_control import current_state, own_start, velocity_state
 from nonlinear.rows import Rows
 
-Floats = npt.NDArray[np.float64]
-Value = float | npt.NDArray[np.float64]
 STAGES = ("current", "velocity", "position")
 HELD = 1e12  # so many times its inertia holds the rotor at its speed
 
@@ -79,11 +72,6 @@ class LoopSetup:
             return target(self.design, self.outer) if self.stages else "u"
         return target(self.design, self.loop) if self.loop in STAGES else self.loop
 
-    @property
-    def before(self) -> str:
-        """Name of the signal in front of the instrument."""
-        return f"probe_{self.point}_before"
-
     @cached_property
     def hold_ticks(self) -> int:
         """Ticks between two updates at the point."""
@@ -124,132 +112,115 @@ class LoopSetup:
             return f"on a constant speed{pressed}"
         return "standing, without dry friction"
 
-    def rows(self, gain: npt.ArrayLike = 1.0, delay_samples: npt.ArrayLike = 0.0) -> Rows:
-        """Parameters of runs that start in the steady state of the operating motion, one a value.
+    def rows(self, gain: float = 1.0, delay_samples: float = 0.0) -> Rows:
+        """Parameters of a run that starts in the steady state of the operating motion.
 
         ``gain`` is a factor on the whole controller in front of the point; a delay is in the point's samples.
         """
-        gains, delays = np.broadcast_arrays(np.atleast_1d(gain), np.atleast_1d(delay_samples))
-        rows = self._base.repeat(gains.size)
-        for values, delay in zip(rows.values, delays, strict=True):
-            write_probe(Probe(point=self.point, delay_samples=float(delay)), values)  # type: ignore[arg-type]
+        row = self._base.copy()
+        row.probe(Probe(point=self.point, delay_samples=delay_samples))  # type: ignore[arg-type]
         for place in gains_of(self.design, producer(self.design, self.point)):
-            rows[place] *= gains
-        self._start(rows)
-        return rows
+            row[place] *= gain
+        self._start(row)
+        return row
 
     @cached_property
     def _base(self) -> Rows:
         """The row without instrument and state."""
         row = Rows.of(self.design, friction_on=self.bias.friction_on, limits_on=self.limits_on)
-        dropped = ("friction_feedforward",) if self.loop in PATHS else FEED_FORWARD
+        dropped = ["friction_feedforward"] if self.loop in PATHS else [*FEED_FORWARD]
+        if self.outer != "position":
+            dropped += GAINS["position"]
+        if self.outer == "current":
+            dropped += GAINS["velocity"]
+        if self._own is None:
+            dropped.append("own_stage")
         for name in dropped:
             row[name] = 0.0
-        if self.outer != "position":
-            for name in GAINS["position"]:
-                row[name] = 0.0
-        if self.outer == "current":
-            row["velocity_gain"] = row["velocity_integral"] = 0.0
-        if self._own is None:
-            row["own_stage"] = 0.0
         if self.held:
             for name in ("inertia", "motor_inertia"):
                 row[name] *= HELD
         return row
 
     def _start(self, row: Rows) -> None:
-        """Write the steady state, from the motor outwards."""
-        self.bias.load(row)
-        row["speed_start"], row["current_start"] = self.bias.speed_rad_s, self.bias.current_A
-        row["twist_start"] = self.bias.twist_rad
-        row["load_speed_start"] = self.bias.speed_rad_s / self.design.ratio_to_coupling
-        wanted: Value = self.bias.voltage_V
-        point = "u"
-        row["voltage_start"] = wanted
+        """Write the steady state, from the motor outwards; a constant replaces controllers out of action."""
+        bias, point = self.bias, "u"
+        bias.load(row)
+        row["speed_start"], row["current_start"] = bias.speed_rad_s, bias.current_A
+        row["twist_start"] = bias.twist_rad
+        row["load_speed_start"] = bias.speed_rad_s / self.design.ratio_to_coupling
+        row["voltage_start"] = wanted = bias.voltage_V
         for stage in self._running:
             if stage == "position":
                 self._position(row, wanted)
                 if point == "w_ref":
                     row["speed_command_start"] = wanted
                 return
-            wanted = self._current(row) if stage == "current" else self._velocity(row, wanted)
-            point = "i_ref" if stage == "current" else "w_ref"
-            if point == "i_ref":
+            if stage == "current":
+                wanted, point = self._current(row), "i_ref"
                 row["current_command_start"] = wanted
+            else:
+                wanted, point = self._velocity(row, wanted), "w_ref"
         if self.outer == "current":
             row["current_command_start"] = 0.0  # filters of a velocity controller that is out of action
-        self._constant(row, point, wanted)
+        row.step(point, wanted, -1.0)
 
-    def _current(self, row: Rows) -> Value:
+    def _current(self, row: Rows) -> float:
         """The current controller in its steady state; returns the current command."""
+        back_emf, resistance = row.value("back_emf_feedforward"), row.value("resistance_feedforward")
         if self._own == "current":
-            fed = row["back_emf_feedforward"] * self.bias.speed_rad_s
-            return self._own_start(row, self.bias.voltage_V, row["resistance_feedforward"], fed)
-        steady = current_state(
-            self.bias,
-            row["current_gain"],
-            row.value("current_integral") != 0.0,
-            row["back_emf_feedforward"],
-            row["resistance_feedforward"],
-        )
+            return self._own_start(row, self.bias.voltage_V, resistance, back_emf * self.bias.speed_rad_s)
+        gain, integral = row.value("current_gain"), row.value("current_integral") != 0.0
+        steady = current_state(self.bias, gain, integral, back_emf, resistance)
         row["current_integrator_start"] = steady.integrator
         return steady.command
 
-    def _velocity(self, row: Rows, wanted: Value) -> Value:
+    def _velocity(self, row: Rows, wanted: float) -> float:
         """The velocity controller in its steady state; returns the speed command."""
         if self._own == "velocity":
             row["current_command_start"] = wanted
             return self._own_start(row, wanted)
-        integral = row.value("velocity_integral") != 0.0
-        steady = velocity_state(self.design, self.bias, wanted, row["velocity_gain"], integral)
+        gain, integral = row.value("velocity_gain"), row.value("velocity_integral") != 0.0
+        steady = velocity_state(self.design, self.bias, wanted, gain, integral)
         row["velocity_integrator_start"] = steady.integrator
         row["current_command_start"] = steady.output  # what the torque filters begin with
         return steady.command
 
-    def _own_start(self, row: Rows, wanted: Value, direct: Value = 0.0, fed: Value = 0.0) -> Value:
+    def _own_start(self, row: Rows, wanted: float, direct: float = 0.0, fed: float = 0.0) -> float:
         """A law of one's own in its steady state; returns the command of its stage."""
-        commands = np.zeros(len(row))
-        parts = np.broadcast_arrays(wanted, row["own_gain"], direct, fed, commands)
-        for k, values in enumerate(zip(*parts[:4], strict=True)):
-            start = own_start(self.design, self.bias, *map(float, values))
-            row.values[k, at.OWN_START : at.OWN_START + len(start.states)] = start.states
-            commands[k] = start.command
-        return commands
+        start = own_start(self.design, self.bias, wanted, row.value("own_gain"), direct, fed)
+        row.values[0, at.OWN_START : at.OWN_START + len(start.states)] = start.states
+        return start.command
 
-    def _position(self, row: Rows, wanted: Value) -> None:
+    def _position(self, row: Rows, wanted: float) -> None:
         """Let the command run with the drive, ahead of the motor by what the controller needs.
 
         The motor starts at zero: a large angle would round what its derivative is made of.
         """
+        N, speed = self.design.total_ratio, self.bias.speed_rad_s
         if self._own == "position":
-            command = self._own_start(row, wanted) / self.design.total_ratio
-            if self.bias.speed_rad_s == 0.0:
+            command = self._own_start(row, wanted) / N
+            if speed == 0.0:
                 row.step("bias", command, -1.0)
             else:
-                speed = self.bias.speed_rad_s / self.design.total_ratio
-                row.ramp("bias", speed, -command / speed)
+                row.ramp("bias", speed / N, -command / (speed / N))
             return
-        ahead = (wanted - row["feedforward"] * self.bias.speed_rad_s) / row["position_gain"]
+        ahead = (wanted - row.value("feedforward") * speed) / row.value("position_gain")
         at_output = self.design.controller.position_loop.sensor == "output"
-        seen = self.design.total_ratio * self.bias.output_rad(self.design) if at_output else 0.0
-        if self.bias.speed_rad_s == 0.0:
+        seen = N * self.bias.output_rad(self.design) if at_output else 0.0
+        if speed == 0.0:
             row["angle_start"] = -ahead
-            row.step("bias", seen / self.design.total_ratio, -1.0)
-            return
-        speed = self.bias.speed_rad_s
-        row.ramp("bias", speed / self.design.total_ratio, -(ahead + seen) / speed)
+            row.step("bias", seen / N, -1.0)
+        else:
+            row.ramp("bias", speed / N, -(ahead + seen) / speed)
 
     @property
     def steady_start(self) -> bool:
         """Whether the steady state is known that a run begins in; a ramp sets what a PI of position holds."""
-        if self._own is not None and not _steady_law(self.design, self.bias):
+        own = self.design.controller.own_law
+        if self._own is not None and own and not own_start(self.design, self.bias, 0.0, own[1].gain).steady:
             return False
         return not (self.outer == "position" and remembers(self.design) and self.bias.speed_rad_s != 0.0)
-
-    @staticmethod
-    def _constant(row: Rows, point: str, value: Value) -> None:
-        """Replace the outer controllers, which are out of action, by a constant command."""
-        row.step(point, value, -1.0)
 
     @cached_property
     def range(self) -> float:
@@ -307,12 +278,6 @@ def gains_of(design: Design, stage: str) -> tuple[str, ...]:
     """Columns of a row that are the gain of a stage."""
     own = design.controller.own_law
     return (*GAINS[stage], *(("own_gain",) if own is not None and own[0] == stage else ()))
-
-
-def _steady_law(design: Design, bias: OperatingMotion) -> bool:
-    """Whether a law of one's own has a steady state on an operating motion, whatever its stage gives."""
-    own = design.controller.own_law
-    return own is None or own_start(design, bias, 0.0, own[1].gain).steady
 
 
 def stages_of(design: Design) -> tuple[str, ...]:

@@ -12,21 +12,18 @@ from dataclasses import dataclass, replace
 from math import copysign, cosh, inf, isfinite
 
 import numpy as np
-import numpy.typing as npt
 
-from actuator_lti.design.model import Coupling, Design, FilterPlace, Friction, LoadFriction
+from actuator_lti.design.model import Coupling, Design, Friction, LoadFriction
 from actuator_lti.drive.angle import follows_angle, holding_moment_Nm, holding_torque_Nm
 from actuator_lti.drive.operating import Operating, segments
 from actuator_lti.errors import InputError
-from nonlinear.row.filters import section
+from nonlinear.bench.steady_control import commands_fit
 from nonlinear.rows import Rows
 
-Value = float | npt.NDArray[np.float64]
 SHARE = 0.4  # of each limit that the operating motion may take
 MOST = 0.8  # where friction leaves no less
 FASTEST_RAD_S = 1e6
 SLOWEST = 1e-9  # of that
-COMMANDED = 0.7  # of a limit that a command may take
 ROOM = 0.7  # of the way to standstill, or to the next bend of a friction map, that a test may use
 PRESSED = (0.15, 0.05, 0.015, 0.005)  # of the full torque: what presses the coupling
 CLOSED = 0.01  # of the play: a coupling is pressed past it by as much, or rounding shows
@@ -106,7 +103,9 @@ def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
         return standing(design)
     loads = [load_Nm]
     if needs_press(design):
-        whole = full_torque_Nm(design) * design.total_ratio / _felt(design)
+        passed = 1.0 if design.load.path == "back-drivable" else 0.0
+        felt = max(passed + design.friction.load_coefficient * design.total_ratio, 1e-12)
+        whole = full_torque_Nm(design) * design.total_ratio / felt  # by the motor torque that it costs
         loads = [load_Nm - part * whole for part in PRESSED]
     for share in (SHARE, MOST):
         for moment in loads:
@@ -115,11 +114,10 @@ def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
                 return _closed(design, motion)
     least, limits = operating_motion_at(design, SLOWEST * FASTEST_RAD_S, loads[-1]), design.limits
     stuck = least.voltage_V > limits.voltage_V or least.current_A > limits.peak_current_A
-    if stuck or bent_about_rest(design):
-        message = (
-            f"friction takes more than {100 if stuck else 100 * MOST:.0f} % of the current or voltage limit"
-        )
-        raise InputError(f"{message}: no steady motion to test on", where=design.name)
+    if stuck or not may_stand(design):
+        part = f"{100 if stuck else 100 * MOST:.0f} % of the current or voltage limit"
+        message = f"friction takes more than {part}: no steady motion to test on"
+        raise InputError(message, where=design.name)
     return standing(design)
 
 
@@ -129,16 +127,11 @@ def needs_press(design: Design) -> bool:
     return coupling is not None and (coupling.play_rad > 0.0 or design.friction.load_coefficient > 0.0)
 
 
-def bent_about_rest(design: Design) -> bool:
-    """Whether play or friction gives a drive at rest another slope than a moving one has."""
+def may_stand(design: Design) -> bool:
+    """Whether the drive has one slope about rest, of play and friction, once its dry friction is left out."""
     friction = design.friction
     uneven = bool(friction.points) or friction.viscous(1) != friction.viscous(-1)
-    return uneven or needs_press(design)
-
-
-def may_stand(design: Design) -> bool:
-    """Whether the drive has one slope about rest once its dry friction is left out."""
-    return follows_angle(design) or not bent_about_rest(design)
+    return follows_angle(design) or not (uneven or needs_press(design))
 
 
 def on_its_stand(design: Design, like: Design | None = None) -> Design:
@@ -186,15 +179,12 @@ def _closed(design: Design, motion: OperatingMotion) -> OperatingMotion:
         return motion
     more = copysign(_closing_Nm(coupling), pressed) - pressed
     load_Nm = motion.load_Nm - more * design.ratio_behind_coupling
-    held = operating_motion_at(design, motion.speed_rad_s, load_Nm)
-    motor = design.effective_motor
+    held, motor = operating_motion_at(design, motion.speed_rad_s, load_Nm), design.effective_motor
+    extra = (motor.torque_constant_Nm_A or 0.0) * (held.current_A - motion.current_A)
     if motor.source_gain_Nm_V is not None:
         extra = motor.source_gain_Nm_V * (held.voltage_V - motion.voltage_V)
-    else:
-        extra = (motor.torque_constant_Nm_A or 0.0) * (held.current_A - motion.current_A)
-    return replace(
-        motion, load_Nm=load_Nm, twist_rad=held.twist_rad, coupling_Nm=held.coupling_Nm, extra_Nm=extra
-    )
+    twist, torque = held.twist_rad, held.coupling_Nm
+    return replace(motion, load_Nm=load_Nm, twist_rad=twist, coupling_Nm=torque, extra_Nm=extra)
 
 
 def full_torque_Nm(design: Design) -> float:
@@ -217,12 +207,6 @@ def _torque_Nm(design: Design, current_A: float) -> float:
     return (motor.torque_constant_Nm_A or 0.0) * min(current_A, short)
 
 
-def _felt(design: Design) -> float:
-    """Motor torque that a moment at the output costs, times N."""
-    passed = 1.0 if design.load.path == "back-drivable" else 0.0
-    return max(passed + design.friction.load_coefficient * design.total_ratio, 1e-12)
-
-
 def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | None:
     """The fastest motion within the limits; None where there is none."""
     limits = design.limits
@@ -231,79 +215,10 @@ def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | 
     while speed > SLOWEST * FASTEST_RAD_S:
         motion = operating_motion_at(design, speed, load_Nm)
         fits = motion.voltage_V <= share * limits.voltage_V and abs(motion.current_A) <= current
-        if fits and _commands_fit(design, motion) and motion.room_rad_s > 0.0:
+        if fits and commands_fit(design, motion) and motion.room_rad_s > 0.0:
             return motion
         speed *= 0.8
     return None
-
-
-def _commands_fit(design: Design, motion: OperatingMotion) -> bool:
-    """Whether commands leave room to the limits: a controller without an integral needs an error.
-
-    What a law of one's own needs is its own affair: it is tested with the limits lifted.
-    """
-    control, limits = design.controller, design.limits
-    wanted = motion.voltage_V
-    if control.current is not None and control.current.law is not None:
-        wanted = motion.current_A
-    elif control.current is not None:
-        loop = control.current
-        state = current_state(
-            motion,
-            loop.gain_V_A,
-            loop.integral_time_s is not None,
-            loop.back_emf_feedforward * (design.effective_motor.back_emf_constant_Vs_rad or 0.0),
-            loop.resistance_feedforward * (design.effective_motor.resistance_ohm or 0.0),
-        )
-        wanted = float(state.command)
-        if abs(wanted) > COMMANDED * limits.peak_current_A:
-            return False
-    if control.velocity is not None and control.velocity.law is None:
-        velocity = control.velocity
-        integral = velocity.integral_time_s is not None
-        wanted = float(velocity_state(design, motion, wanted, velocity.gain, integral).command)
-        return abs(wanted) <= COMMANDED * limits.speed_rad_s
-    return True
-
-
-@dataclass(frozen=True)
-class Steady:
-    """A controller in its steady state: its command, its integrator, and its output before filters."""
-
-    command: Value
-    integrator: Value
-    output: Value
-
-
-def current_state(
-    bias: OperatingMotion, gain: Value, integral: bool, back_emf: Value, resistance: Value
-) -> Steady:
-    """The current controller on an operating motion; the last two are feed-forward in V s/rad and ohm."""
-    i, left = bias.current_A, bias.voltage_V - back_emf * bias.speed_rad_s
-    if integral:
-        return Steady(i, left - resistance * i, bias.voltage_V)
-    return Steady((left + gain * i) / (gain + resistance), 0.0, bias.voltage_V)
-
-
-def velocity_state(
-    design: Design, bias: OperatingMotion, wanted: Value, gain: Value, integral: bool
-) -> Steady:
-    """The velocity controller on an operating motion whose output behind the filters is ``wanted``."""
-    before = wanted / steady_gain(design, "torque")
-    seen = bias.speed_rad_s * steady_gain(design, "speed")
-    return Steady(seen, before, before) if integral else Steady(seen + before / gain, 0.0, before)
-
-
-def steady_gain(design: Design, place: FilterPlace) -> float:
-    """Gain at zero frequency of the filters of the velocity loop on the torque or the speed."""
-    velocity = design.controller.velocity
-    if velocity is None:
-        return 1.0
-    result, period_s = 1.0, velocity.every * design.controller.period_s
-    for item in velocity.filters_on(place):
-        b0, b1, b2, a1, a2 = section(item, period_s)
-        result *= (b0 + b1 + b2) / (1.0 + a1 + a2)
-    return result
 
 
 def operating_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> OperatingMotion:
@@ -331,11 +246,9 @@ def _driven(design: Design, torque_Nm: float, speed_rad_s: float) -> tuple[float
     motor = design.effective_motor
     if motor.source_gain_Nm_V is not None:
         return 0.0, torque_Nm / motor.source_gain_Nm_V
-    assert motor.torque_constant_Nm_A is not None
-    assert motor.resistance_ohm is not None
-    assert motor.back_emf_constant_Vs_rad is not None
-    current = torque_Nm / motor.torque_constant_Nm_A
-    return current, motor.resistance_ohm * current + motor.back_emf_constant_Vs_rad * speed_rad_s
+    current = torque_Nm / (motor.torque_constant_Nm_A or 0.0)
+    back_emf = (motor.back_emf_constant_Vs_rad or 0.0) * speed_rad_s
+    return current, (motor.resistance_ohm or 0.0) * current + back_emf
 
 
 def _behind(friction: LoadFriction | None, speed_rad_s: float) -> float:
@@ -363,11 +276,8 @@ def _room(friction: Friction, speed_rad_s: float, sense: int) -> float:
     """How far the speed may move: part of the way to rest, to a bend of the map, to the slope of a tanh."""
     if friction.law == "tanh" and friction.dry_Nm(0.0, sense) > 0.0:
         least = friction.smoothing_speed_rad_s * 14.0  # there the slope of tanh is below FLAT
-        return min(ROOM * speed_rad_s, speed_rad_s - least) if _flat(friction, speed_rad_s) else 0.0
+        x = speed_rad_s / friction.smoothing_speed_rad_s
+        flat = x > 300.0 or cosh(x) ** -2 < FLAT
+        return min(ROOM * speed_rad_s, speed_rad_s - least) if flat else 0.0
     bends = [0.0, *(start for start, _ in segments(friction.map(sense)))] if friction.points else [0.0]
     return ROOM * min(abs(speed_rad_s - bend) for bend in bends)
-
-
-def _flat(friction: Friction, speed_rad_s: float) -> bool:
-    x = speed_rad_s / friction.smoothing_speed_rad_s
-    return x > 300.0 or cosh(x) ** -2 < FLAT

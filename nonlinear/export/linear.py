@@ -16,7 +16,7 @@ import numpy as np
 
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
-from nonlinear._kernels.regulator import CLAMPED
+from nonlinear._kernels.blocks import CLAMPED
 from nonlinear._kernels.start import derive, prepare_sizes
 from nonlinear._kernels.tick import tick
 from nonlinear.export.linear_row import at_rest, set_off
@@ -24,6 +24,11 @@ from nonlinear.export.linear_row import at_rest, set_off
 MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
 AT_SPEED, AT_CURRENT, AT_VOLTAGE = range(4, 7)  # break points of the closed drive; POSITION is the output's
+# the probe of each; -1: it is run through its command
+POINT = (
+    layout.POINT_CURRENT, -1, layout.POINT_OUTPUT, -1,
+    layout.POINT_SPEED, layout.POINT_CURRENT, layout.POINT_VOLTAGE,
+)  # fmt: skip
 NO_LOOP, TOO_LONG, LOST = 0, -1, -2  # lost: no double holds what a tick gives
 MOST_TICKS = 16  # of a column that are noted
 # signals in front of limiters, and the integral that the limit of one clamps as well (0: none)
@@ -59,14 +64,12 @@ def without_outer(q, stage):
 def cut_of(q, stage):
     """Where the loop of a stage is cut: with a law of one's own at the break point that it drives."""
     own = q[layout.OWN_STAGE]
+    position = stage == POSITION and own == layout.OWN_POSITION
     if stage == CURRENT and own == layout.OWN_CURRENT:
         return AT_VOLTAGE
-    if stage == POSITION and own == layout.OWN_POSITION and q[layout.HAS_VELOCITY] > 0.0:
+    if position and q[layout.HAS_VELOCITY] > 0.0:
         return AT_SPEED
-    outer = (stage == VELOCITY and own == layout.OWN_VELOCITY) or (
-        stage == POSITION and own == layout.OWN_POSITION
-    )
-    if outer:
+    if position or (stage == VELOCITY and own == layout.OWN_VELOCITY):
         return AT_CURRENT if q[layout.HAS_CURRENT] > 0.0 else AT_VOLTAGE
     return stage
 
@@ -74,15 +77,7 @@ def cut_of(q, stage):
 @kernel
 def cut_point(q, stage):
     """The probe that cuts the loop, or -1."""
-    if stage == CURRENT and q[layout.HAS_VELOCITY] > 0.0:
-        return layout.POINT_CURRENT
-    if stage == POSITION:
-        return layout.POINT_OUTPUT
-    if stage == AT_SPEED:
-        return layout.POINT_SPEED
-    if stage == AT_CURRENT:
-        return layout.POINT_CURRENT
-    return layout.POINT_VOLTAGE if stage == AT_VOLTAGE else -1
+    return -1 if stage == CURRENT and q[layout.HAS_VELOCITY] <= 0.0 else POINT[stage]
 
 
 @kernel
@@ -113,12 +108,9 @@ def interval(q, stage):
         return 1 if current else NO_LOOP
     if stage == VELOCITY:
         return speed_interval(q) if velocity else NO_LOOP
-    if stage == POSITION:
-        return command_interval(q) if position else NO_LOOP
-    if stage == COMMAND:
-        return command_interval(q)
-    if stage == AT_SPEED:
-        return command_interval(q) if velocity and position else NO_LOOP
+    if stage == POSITION or stage == COMMAND or stage == AT_SPEED:
+        there = stage == COMMAND or (position and (stage == POSITION or velocity))
+        return command_interval(q) if there else NO_LOOP
     if stage == AT_VOLTAGE and current:
         return 1
     if (not velocity and not position) or (stage == AT_CURRENT and not current):
@@ -197,14 +189,8 @@ def put_inputs(q, s, io, stage, size):
         io[layout.IN_COMMAND] = size / q[layout.RATIO]
     elif stage == CURRENT or stage == COMMAND:
         io[layout.IN_COMMAND] = size
-    elif stage == POSITION:
-        io[layout.IN_PROBE + layout.POINT_OUTPUT] = -size / q[layout.RATIO]
-    elif stage == AT_SPEED:
-        io[layout.IN_PROBE + layout.POINT_SPEED] = -size
-    elif stage == AT_CURRENT:
-        io[layout.IN_PROBE + layout.POINT_CURRENT] = -size
     else:
-        io[layout.IN_PROBE + layout.POINT_VOLTAGE] = -size
+        io[layout.IN_PROBE + POINT[stage]] = -size / q[layout.RATIO] if stage == POSITION else -size
 
 
 @kernel
@@ -224,10 +210,10 @@ def noted(q, s, k, j, seen):
 
 
 @kernel
-def one_column(q, s, io, stage, every, size, places, count, angles, column, j, seen):
-    """Run the drive as it stands over one period; writes the states after it, returns what the loop gave.
+def one_column(q, s, io, stage, every, size, places, count, angles, j, blocks, begin, apart, seen):
+    """Run the drive as it stands over one period; returns what the loop gave, NaN where a tick failed.
 
-    NaN where a tick failed.
+    The states after it are written into ``blocks`` from ``begin`` on, so many numbers ``apart``.
     """
     put_inputs(q, s, io, stage, size)
     value = 0.0
@@ -241,11 +227,12 @@ def one_column(q, s, io, stage, every, size, places, count, angles, column, j, s
             noted(q, s, k, j, seen)
     base = s[layout.S_ANGLE]
     for i in range(count):
-        column[i] = s[int(places[i])]
+        reached = s[int(places[i])]
         if i > 0 and i < angles:
-            column[i] -= base
-            if abs(column[i]) < 1e-15 * abs(base):
-                column[i] = 0.0
+            reached -= base
+            if abs(reached) < 1e-15 * abs(base):
+                reached = 0.0
+        blocks[begin + i * apart] = reached
     return value
 
 
@@ -276,27 +263,22 @@ def put_phase(q, s, ticks):
 
 
 @kernel
-def block(q, s, io, stage, first, every, places, n, angles, a, b, c, column, seen):
-    """A, b, c of the loop as run over the ``every`` ticks from tick ``first``; 0 where a tick failed."""
-    for j in range(n + 1):
-        if j < n:
-            put_unit(q, s, places, j, angles)
-        else:
-            at_rest(q, s)
+def block(q, s, io, stage, first, every, places, n, angles, blocks, at, seen):
+    """A, b, c, one after the other, of the loop as run over ``every`` ticks from tick ``first``.
+
+    0 where a tick failed.
+    """
+    for j in range(n):
+        put_unit(q, s, places, j, angles)
         put_phase(q, s, first)
-        size = 0.0 if j < n else 1.0
-        to = j if j < n else MOST
-        value = one_column(q, s, io, stage, every, size, places, n, angles, column, to, seen)
+        value = one_column(q, s, io, stage, every, 0.0, places, n, angles, j, blocks, at + j, n, seen)
         if math.isnan(value):
             return 0
-        if j < n:
-            c[j] = value
-        for i in range(n):
-            if j < n:
-                a[i * n + j] = column[i]
-            else:
-                b[i] = column[i]
-    return 1
+        blocks[at + n * n + n + j] = value
+    at_rest(q, s)
+    put_phase(q, s, first)
+    value = one_column(q, s, io, stage, every, 1.0, places, n, angles, MOST, blocks, at + n * n, 1, seen)
+    return 0 if math.isnan(value) else 1
 
 
 @kernel

@@ -8,19 +8,8 @@ import math
 from actuator_lti.batch._resolvent import states_at
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear.export.linear import (
-    BESIDE_CURRENT,
-    BESIDE_VOLTAGE,
-    COMMAND,
-    CURRENT_COMMAND,
-    MOST,
-    MOST_TICKS,
-    SEEN,
-    TOO_LONG,
-    VOLTAGE,
-    interval,
-    speed_interval,
-)
+from nonlinear.export import linear
+from nonlinear.export.linear import MOST, SEEN, interval, speed_interval
 from nonlinear.export.linear_loops import joined, phases_of, spread
 
 SIGNALS = ("w_ref", "i_ref", "u")
@@ -28,17 +17,17 @@ SHOWN = 3
 
 
 @kernel
-def limiters_assembled(p, q, s, io, blocks, places, column, keep, seen, a, b, c):
+def limiters_assembled(p, q, s, io, blocks, places, keep, seen, a, b, c):
     """A and b of the closed drive from its command, and rows of ``seen`` (tick, signal): states, then d.
 
     The number of states, or what stands in the way.
     """
-    n = phases_of(p, q, s, io, COMMAND, blocks, places, column, a, b, c, seen)
+    n = phases_of(p, q, s, io, linear.COMMAND, blocks, places, seen)
     if n <= 0:
         return n
-    every = interval(q, COMMAND)
-    if every > MOST_TICKS:
-        return TOO_LONG
+    every = interval(q, linear.COMMAND)
+    if every > linear.MOST_TICKS:
+        return linear.TOO_LONG
     for i in range(n):
         total = 0.0
         for k in range(every * SEEN):
@@ -56,9 +45,9 @@ def limiters_assembled(p, q, s, io, blocks, places, column, keep, seen, a, b, c)
 @kernel
 def signal_interval(q, signal, every):
     """Ticks between two updates of a signal in front of a limiter."""
-    if signal == VOLTAGE or signal == BESIDE_VOLTAGE:
+    if signal == linear.VOLTAGE or signal == linear.BESIDE_VOLTAGE:
         return 1
-    if (signal == CURRENT_COMMAND or signal == BESIDE_CURRENT) and q[layout.HAS_VELOCITY] > 0.0:
+    if (signal == linear.CURRENT_COMMAND or signal == linear.BESIDE_CURRENT) and q[layout.HAS_VELOCITY] > 0.0:
         return speed_interval(q)
     return every
 
@@ -114,5 +103,5 @@ def limiter_sizes(q, n, a, b, seen, every, count, xs, sizes, work, state):
                 change = largest_change(n, seen, signal, every, step, xs[g], state)
                 sizes[(SHOWN + signal) * count + g] = change / (step * q[layout.PERIOD])
             else:
-                at = (CURRENT_COMMAND + signal - BESIDE_CURRENT) * count + g
+                at = (linear.CURRENT_COMMAND + signal - linear.BESIDE_CURRENT) * count + g
                 sizes[at] = max(sizes[at], largest)

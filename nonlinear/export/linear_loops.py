@@ -17,19 +17,8 @@ from actuator_lti.batch._response import evaluate
 from actuator_lti.batch._run import one_loop
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
-from nonlinear.export.linear import (
-    LOST,
-    MOST,
-    NO_LOOP,
-    TOO_LONG,
-    block,
-    cut_of,
-    interval,
-    listed,
-    prepared,
-    repeats,
-    runs_closed,
-)
+from nonlinear.export import linear
+from nonlinear.export.linear import LOST, MOST, NO_LOOP, TOO_LONG, cut_of, interval, repeats, runs_closed
 from nonlinear.export.linear_row import linear_row
 
 MOST_PHASES = 32  # updates of the signal within one period
@@ -38,7 +27,7 @@ BLOCK = MOST * (MOST + 2)  # numbers of one phase: A, b, c
 
 
 @kernel
-def phases_of(p, q, s, io, stage, blocks, places, column, a, b, c, seen):
+def phases_of(p, q, s, io, stage, blocks, places, seen):
     """A, b, c of each phase into ``blocks``; the states, or what stands in the way.
 
     Closed, but for the only phase of a loop that is cut: that one stays open.
@@ -49,30 +38,23 @@ def phases_of(p, q, s, io, stage, blocks, places, column, a, b, c, seen):
         return NO_LOOP
     if whole > every * MOST_PHASES:
         return TOO_LONG
-    ready = prepared(q, s, stage)
+    ready = linear.prepared(q, s, stage)
     if ready == 0:
         return TOO_LONG
-    n, angles = listed(q, places)
+    n, angles = linear.listed(q, places)
     if n > MOST:
         return TOO_LONG
     cut = cut_of(q, stage)
-    closing = 1.0 if whole > every and not runs_closed(cut) else 0.0
     for m in range(int(whole / every)):
-        done = block(q, s, io, cut, m * every, every, places, n, angles, a, b, c, column, seen)
+        at = m * BLOCK
+        done = linear.block(q, s, io, cut, m * every, every, places, n, angles, blocks, at, seen)
         if done == 0:
             return LOST
-        at = m * BLOCK
-        for i in range(n):
-            for j in range(n):
-                blocks[at + i * n + j] = a[i * n + j] - closing * b[i] * c[j]
-            blocks[at + n * n + i], blocks[at + n * n + n + i] = b[i], c[i]
+        if whole > every and not runs_closed(cut):
+            for i in range(n):
+                for j in range(n):
+                    blocks[at + i * n + j] -= blocks[at + n * n + i] * blocks[at + n * n + n + j]
     return n
-
-
-@kernel
-def next_phase(m, count):
-    """The phase after one."""
-    return m + 1 if m + 1 < count else 0
 
 
 @kernel
@@ -80,15 +62,15 @@ def spread(n, count, blocks, keep):
     """Mark, phase by phase, the states that the output sees and the input reaches."""
     total = n * count
     for m in range(count):
-        at = m * BLOCK + n * n
+        at, after = m * BLOCK + n * n, (m + 1) * n if m + 1 < count else 0
         for i in range(n):
             keep[m * n + i] = 1.0 if blocks[at + n + i] != 0.0 else 0.0
-            keep[total + next_phase(m, count) * n + i] = 1.0 if blocks[at + i] != 0.0 else 0.0
+            keep[total + after + i] = 1.0 if blocks[at + i] != 0.0 else 0.0
     changed = 1
     while changed > 0:
         changed = 0
         for m in range(count):
-            after = next_phase(m, count) * n
+            after = (m + 1) * n if m + 1 < count else 0
             for i in range(n):
                 for j in range(n):
                     if blocks[m * BLOCK + i * n + j] == 0.0:
@@ -115,7 +97,7 @@ def joined(n, count, kept, blocks, keep, a, b, c):
     for k in range(kept):
         b[k], c[k] = 0.0, 0.0
     for m in range(count):
-        at, after = m * BLOCK, next_phase(m, count) * n
+        at, after = m * BLOCK, (m + 1) * n if m + 1 < count else 0
         for i in range(n):
             row = int(keep[after + i])
             if row >= 0:
@@ -128,13 +110,13 @@ def joined(n, count, kept, blocks, keep, a, b, c):
 
 
 @kernel
-def assembled(p, q, s, io, stage, blocks, places, column, keep, seen, a, b, c):
+def assembled(p, q, s, io, stage, blocks, places, keep, seen, a, b, c):
     """A, b, c of a loop of the drive with the parameters p; the number of states, or what stands in the way.
 
     ``q``, ``s`` and ``io`` are rows of a second drive that is run here; ``q[PERIOD]`` and ``interval`` give
     the period.
     """
-    n = phases_of(p, q, s, io, stage, blocks, places, column, a, b, c, seen)
+    n = phases_of(p, q, s, io, stage, blocks, places, seen)
     if n <= 0:
         return n
     count = int(repeats(q, stage) / interval(q, stage))
@@ -187,9 +169,10 @@ def figures(
     real, imaginary,
 ):  # fmt: skip
     """Figures of a loop that was assembled (see ``one_loop``); the points scanned, `LOST` without poles."""
-    fed_back = 0.0 if math.isnan(lead) else 1.0
-    result = poles_of(n, a, b, c, fed_back, poles, work, exchanged, state, real, imaginary)
-    if result == 0:
+    found = poles_of(
+        n, a, b, c, 0.0 if math.isnan(lead) else 1.0, poles, work, exchanged, state, real, imaginary
+    )
+    if found == 0:
         return LOST
     return one_loop(
         n, a, b, c, poles, lead, time_figures > 0, row, points, stack, xs, rs, ss, work, state, exchanged

@@ -92,7 +92,10 @@ class BatchResult:
     @property
     def events(self) -> npt.NDArray[np.int64]:
         """Landings, breakaways and reversals of each run."""
-        return self.outs[:, at.OUT_EVENTS].astype(np.int64)
+        return self._final(at.S_EVENTS).astype(np.int64)
+
+    def _final(self, place: int) -> Floats:
+        return self.outs[:, at.OUT_STATE + place]
 
     @property
     def stick_fraction(self) -> Floats:
@@ -102,8 +105,8 @@ class BatchResult:
     @property
     def final_output_rad(self) -> Floats:
         """Output angle after the last tick."""
-        rigid = self.outs[:, at.OUT_ANGLE] / self.rows[:, at.RATIO]
-        return np.where(self.rows[:, at.ELASTIC_DRIVE] > 0.0, self.outs[:, at.OUT_OUTPUT], rigid)
+        rigid = self._final(at.S_ANGLE) / self.rows[:, at.RATIO]
+        return np.where(self.rows[:, at.ELASTIC_DRIVE] > 0.0, self._final(at.S_OUTPUT), rigid)
 
     def limit_fraction(self, name: str) -> Floats:
         """Fraction of the ticks in which a limiter acted: speed, acceleration, current, voltage."""

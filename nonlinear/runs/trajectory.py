@@ -15,7 +15,9 @@ from actuator_lti.design.control import Stage
 from actuator_lti.design.model import Axis
 from actuator_lti.drawing.faces import draw
 from actuator_lti.errors import InputError
+from actuator_lti.files.atomic import write_stream
 from actuator_lti.files.reading import shown
+from actuator_lti.start.extras import need
 from nonlinear._kernels import layout as at
 
 if TYPE_CHECKING:
@@ -267,56 +269,50 @@ class Trajectory:
 
     def columns(self) -> dict[str, np.ndarray]:
         """Every column by name, with its unit as suffix."""
-        names: tuple[str, ...] = (
-            "time_s",
-            "reference_rad",
-            "output_angle_rad",
-            "motor_angle_rad",
-            "motor_speed_rad_s",
-            "current_A",
-            "voltage_V",
-            "current_command_A",
-            "speed_command_rad_s",
-        )
+        names = ["output_angle_rad", "motor_angle_rad", *at.SIGNALS[2 : at.BASE_SIGNALS]]
         if self.twist_rad is not None:
-            names += ("output_speed_rad_s", "twist_rad", "coupling_torque_Nm")
+            names += ["output_speed_rad_s", "twist_rad", "coupling_torque_Nm"]
         if self.load_Nm is not None:
-            names += ("load_Nm",)
-        linear = self.axis == "linear"
-        out: dict[str, np.ndarray] = {COMMANDED[self.stage]: self.reference_rad}
-        out |= {name: getattr(self, name) for name in names if name != "reference_rad"}
-        out = {"time_s": self.time_s} | out
-        if linear:
+            names.append("load_Nm")
+        out: dict[str, np.ndarray] = {"time_s": self.time_s, COMMANDED[self.stage]: self.reference_rad}
+        out |= {name: getattr(self, name) for name in names}
+        if self.axis == "linear":
             out = {_on(name): values for name, values in out.items()}
         for name in self.limits:
             out[f"{name.replace('-', '_')}_limit_active"] = self.limit_active(name)
         out["at_rest"] = self.at_rest
         for record in self.probes.values():
-            out[f"probe_{record.point}_before"], out[f"probe_{record.point}_after"] = (
-                record.before,
-                record.after,
-            )
+            out[f"probe_{record.point}_before"] = record.before
+            out[f"probe_{record.point}_after"] = record.after
         return out
+
+    @property
+    def _about(self) -> dict[str, str]:
+        return {"design": self.design_name, "parameters": self.parameters_hash, "status": self.status}
 
     def to_pandas(self) -> pandas.DataFrame:
         """A data frame with one row a tick; name, hash and status in ``attrs``."""
-        from actuator_lti.start.extras import need
-
         frame = need("pandas", "tables", "to_pandas").DataFrame(self.columns())
-        frame.attrs = {"design": self.design_name, "parameters": self.parameters_hash, "status": self.status}
+        frame.attrs = self._about
         return frame
 
     def to_csv(self, path: str | PathLike[str]) -> None:
-        """Write a CSV file (comma, point, 17 digits); the header carries the units."""
-        from nonlinear.runs.trajectory_files import write_csv
+        """Write a CSV file (comma, point, 17 digits; flags as 0 and 1); the header carries the units."""
+        pa = need("pyarrow", "tables", "a CSV file of a run")
+        from pyarrow import csv
 
-        write_csv(self, path)
+        table = pa.table(
+            {name: v.astype("u1") if v.dtype == bool else v for name, v in self.columns().items()}
+        )
+        write_stream(path, lambda file: csv.write_csv(table, file, csv.WriteOptions(quoting_style="none")))
 
     def to_parquet(self, path: str | PathLike[str]) -> None:
         """Write a Parquet file, the design's name and the parameters' hash in its metadata."""
-        from nonlinear.runs.trajectory_files import write_parquet
+        pa = need("pyarrow", "tables", "a Parquet file")
+        from pyarrow import parquet
 
-        write_parquet(self, path)
+        table = pa.table(self.columns()).replace_schema_metadata(self._about)
+        write_stream(path, lambda file: parquet.write_table(table, file))
 
     def plot(self, axes: Any = None) -> list[Axes]:
         """Draw angle, speed, current and voltage over time; gives matplotlib's four axes.

@@ -1,12 +1,16 @@
-"""Somebody who looks at every simulation while it runs, and may stop it."""
+"""Who waits for a simulation: somebody who looks at it and may stop it; a line on a terminal."""
 
 from __future__ import annotations
 
+import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
 Watch = Callable[[], None]
+PATIENCE_S = 1.0
+_told: set[str] = set()
 _watching: ContextVar[Watch | None] = ContextVar("watching", default=None)
 
 
@@ -23,3 +27,28 @@ def watched(look: Watch) -> Iterator[None]:
 def watch() -> Watch | None:
     """Who looks now."""
     return _watching.get()
+
+
+@contextmanager
+def told_if_slow(text: str, patience_s: float = PATIENCE_S) -> Iterator[None]:
+    """Write a line to standard error if the block is still at work after a while; once in a process.
+
+    Nothing is written where standard error is no terminal, so that logs stay clean.
+    """
+    if text in _told or not sys.stderr.isatty():
+        yield
+        return
+    timer = threading.Timer(patience_s, _tell, [text])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _tell(text: str) -> None:
+    if text not in _told:
+        _told.add(text)
+        sys.stderr.write(f"{text}\n")
+        sys.stderr.flush()

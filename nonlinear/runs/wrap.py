@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from math import inf
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +16,7 @@ from nonlinear.runs.trajectory import Energy, LimitUse, ProbeRecord, State, Stat
 
 Floats = npt.NDArray[np.float64]
 SWITCHES = {"torque-command": at.TORQUE_FILTERS, "overload": at.OVERLOAD, "profile": at.PROFILED}
+STORED = ("magnetic_J", "kinetic_J", "spring_J")  # the other energies are the kernel's, in its order
 
 
 def wrap(
@@ -21,16 +24,13 @@ def wrap(
     probing: list[str], digest: str,
 ) -> Trajectory:  # fmt: skip
     """Name the columns and the results of one run."""
-    period = float(row[at.PERIOD])
-    probes = {
-        point: ProbeRecord(
-            point=point,
-            before=history[at.HISTORY_PROBES + 2 * k],
-            after=history[at.HISTORY_PROBES + 2 * k + 1],
-        )
-        for k, point in enumerate(probing)
-    }
+    period, s = float(row[at.PERIOD]), out[at.OUT_STATE :]
     behind = at.HISTORY_PROBES + 2 * len(probing)
+    sides = history[at.HISTORY_PROBES : behind]
+    probes = {
+        point: ProbeRecord(point=point, before=before, after=after)
+        for point, before, after in zip(probing, sides[::2], sides[1::2], strict=True)
+    }
     elastic = list(history[behind:]) if row[at.ELASTIC_DRIVE] else [None] * at.ELASTIC_COLUMNS
     return Trajectory(
         design_name=design.name,
@@ -41,20 +41,28 @@ def wrap(
         motor_angle_rad=history[at.HISTORY_ANGLE],
         limit_flags=flags,
         limits=limit_uses(row, out, design.axis),
-        events=int(out[at.OUT_EVENTS]),
-        events_per_tick=int(out[at.OUT_MAX_EVENTS]),
+        events=int(s[at.S_EVENTS]),
+        events_per_tick=int(s[at.S_MAX_EVENTS]),
         stick_fraction=float(out[at.OUT_STICK_TICKS] / row[at.TICKS]),
         status=status,
-        final=final_state(row, out),
-        energy=energy_of(row, out) if row[at.WITH_ENERGY] else None,
+        final=final_state(row, s),
+        energy=energy_of(row, s, out[at.OUT_TWIST]) if row[at.WITH_ENERGY] else None,
         probes=probes,
         output_speed_rad_s=elastic[0],
         twist_rad=elastic[1],
         coupling_torque_Nm=elastic[2],
+        load_Nm=_load(row, history),
         parameters_hash=digest,
         stage=design.controller.outermost,
         ratio=float(row[at.RATIO]),
     )
+
+
+def _load(row: Floats, history: Floats) -> Floats | None:
+    """The moment on the output shaft at the recorded ticks; ``None`` where there is none in the whole run."""
+    if not row[at.LOAD : at.TORQUE_TABLE].any():
+        return None
+    return history[-1] if row[at.VARYING_LOAD].any() else np.broadcast_to(row[at.LOAD], history.shape[1])
 
 
 def limit_uses(row: Floats, out: Floats, axis: Axis = "rotary") -> dict[str, LimitUse]:
@@ -76,55 +84,40 @@ def limit_uses(row: Floats, out: Floats, axis: Axis = "rotary") -> dict[str, Lim
     return uses
 
 
-def final_state(row: Floats, out: Floats) -> State:
-    """State after the last tick."""
-    return State(
-        motor_angle_rad=float(out[at.OUT_ANGLE]),
-        motor_speed_rad_s=float(out[at.OUT_SPEED]),
-        current_A=float(out[at.OUT_CURRENT]),
-        current_integral_V=float(out[at.OUT_CURRENT_INTEGRATOR]),
-        velocity_integral=float(out[at.OUT_VELOCITY_INTEGRATOR]),
-        speed_command_rad_s=float(out[at.OUT_SPEED_COMMAND]),
-        current_command_A=float(out[at.OUT_CURRENT_COMMAND]),
-        voltage_V=float(out[at.OUT_VOLTAGE]),
-        output_angle_rad=float(out[at.OUT_OUTPUT]) if row[at.ELASTIC_DRIVE] else None,
-        output_speed_rad_s=float(out[at.OUT_OUTPUT_SPEED]) if row[at.ELASTIC_DRIVE] else None,
+def final_state(row: Floats, s: Floats) -> State:
+    """State after the last tick, of the numbers that a run leaves of it."""
+    angle, speed = (
+        (float(s[at.S_OUTPUT]), float(s[at.S_OUTPUT_SPEED])) if row[at.ELASTIC_DRIVE] else (None, None)
     )
+    held = {
+        "motor_angle_rad": at.S_ANGLE, "motor_speed_rad_s": at.S_SPEED, "current_A": at.S_CURRENT,
+        "current_integral_V": at.S_CURRENT_INTEGRATOR, "velocity_integral": at.S_VELOCITY_INTEGRATOR,
+        "speed_command_rad_s": at.S_SPEED_COMMAND, "current_command_A": at.S_CURRENT_REFERENCE,
+        "voltage_V": at.S_VOLTAGE,
+    }  # fmt: skip
+    numbers: dict[str, Any] = {name: float(s[place]) for name, place in held.items()}
+    return State(output_angle_rad=angle, output_speed_rad_s=speed, **numbers)
 
 
-def energy_of(row: Floats, out: Floats) -> Energy:
+def energy_of(row: Floats, s: Floats, twist_rad: float) -> Energy:
     """Energies of the run: integrals from the kernel, stored energies from the end states."""
-    e = out[at.OUT_ENERGY : at.OUT_ENERGY + at.ENERGY_SIZE]
     stored = 0.0 if row[at.SOURCE] else 0.5 * row[at.INDUCTANCE]
+    integrals = s[at.S_ENERGY : at.S_ENERGY + at.ENERGY_SIZE].tolist()
+    names = [each.name for each in fields(Energy) if each.name not in STORED]
     return Energy(
-        electrical_input_J=float(e[at.ENERGY_INPUT]),
-        copper_loss_J=float(e[at.ENERGY_COPPER]),
-        magnetic_J=float(stored * (out[at.OUT_CURRENT] ** 2 - row[at.CURRENT_START] ** 2)),
-        kinetic_J=kinetic_energy(row, out),
-        dry_friction_J=float(e[at.ENERGY_DRY]),
-        viscous_friction_J=float(e[at.ENERGY_VISCOUS]),
-        offset_friction_J=float(e[at.ENERGY_OFFSET]),
-        output_work_J=float(e[at.ENERGY_LOAD]),
-        conversion_J=float(e[at.ENERGY_CONVERSION]),
-        supply_J=float(e[at.ENERGY_SUPPLY]),
-        supply_loss_J=float(e[at.ENERGY_SUPPLY_LOSS]),
-        brake_J=float(e[at.ENERGY_BRAKE]),
-        bus_capacitor_J=float(e[at.ENERGY_CAPACITOR]),
-        spring_J=spring_energy(row, out[at.OUT_TWIST]) - spring_energy(row, row[at.TWIST_START]),
-        coupling_damping_J=float(e[at.ENERGY_DAMPING]),
-        parting_J=float(e[at.ENERGY_PARTING]),
-        load_dry_friction_J=float(e[at.ENERGY_LOAD_DRY]),
-        load_viscous_friction_J=float(e[at.ENERGY_LOAD_VISCOUS]),
-        load_offset_friction_J=float(e[at.ENERGY_LOAD_OFFSET]),
+        magnetic_J=float(stored * (s[at.S_CURRENT] ** 2 - row[at.CURRENT_START] ** 2)),
+        kinetic_J=kinetic_energy(row, s),
+        spring_J=spring_energy(row, twist_rad) - spring_energy(row, row[at.TWIST_START]),
+        **dict(zip(names, integrals, strict=True)),
     )
 
 
-def kinetic_energy(row: Floats, out: Floats) -> float:
+def kinetic_energy(row: Floats, s: Floats) -> float:
     """Change of the kinetic energy of the run, of both sides of a coupling."""
     J = row[at.MOTOR_INERTIA] if row[at.ELASTIC_DRIVE] else row[at.INERTIA]
-    total = 0.5 * J * (out[at.OUT_SPEED] ** 2 - row[at.SPEED_START] ** 2)
+    total = 0.5 * J * (s[at.S_SPEED] ** 2 - row[at.SPEED_START] ** 2)
     if row[at.ELASTIC_DRIVE] and not row[at.RIGID]:
-        W = out[at.OUT_OUTPUT_SPEED] * row[at.RATIO] / row[at.RATIO_TO_COUPLING]
+        W = s[at.S_OUTPUT_SPEED] * row[at.RATIO] / row[at.RATIO_TO_COUPLING]
         total += 0.5 * row[at.LOAD_INERTIA] * (W**2 - row[at.LOAD_SPEED_START] ** 2)
     return float(total)
 

@@ -3,10 +3,13 @@
 Under constant inputs every period of the outermost stage applies one map to the state.  The map is affine
 as long as no event happens; where it is so at two states it is so on the line between them, as every guard is
 linear there.  So where two windows of `DRIFT` periods add the same to the state, as an integral that grows
-while friction holds the drive does, the last state before an event is found by bisection.
+while friction holds the drive does, the last state before an event is found by bisection.  The memory of the
+overload protection, ``x += a ((i/i_cont)^2 - x)`` a tick, is followed in closed form.
 """
 
 from __future__ import annotations
+
+from math import log, log1p
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +17,6 @@ import numpy.typing as npt
 from nonlinear._kernels import elastic_layout as ES
 from nonlinear._kernels import layout as at
 from nonlinear.runs.running import Piece, Running
-from nonlinear.settling.protection import overload
 
 Floats = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -23,6 +25,84 @@ STILL = 2.0**-30  # of the largest value: a change in a window that counts
 MOST_LEAPS = int(1.0 / STILL)  # windows until what changes by `STILL` in each has changed by its own size
 _ANGLES = [at.S_ANGLE, at.S_OUTPUT]
 _MODES = (at.S_DIRECTION, ES.ES_SEGMENT, ES.ES_LOAD, ES.ES_CONTACT, ES.ES_BEND)  # they follow from the rest
+_SPEED, _CURRENT, _VOLTAGE, _CURRENT_COMMAND, _SPEED_COMMAND = 2, 3, 4, 5, 6
+_AS_LARGE = (  # states that are as large as a signal, or rounded as coarsely
+    ([at.S_SPEED, at.S_MEASURED_SPEED, at.S_FILTERED_SPEED, at.S_TRACKED_SPEED], _SPEED),
+    ([*range(at.S_SPEED_CHAIN, at.S_TORQUE_CHAIN)], _SPEED),
+    ([at.S_CURRENT], _CURRENT),
+    ([at.S_HELD, at.S_VOLTAGE, at.S_VOLTAGE_BEFORE, at.S_CURRENT_INTEGRATOR], _VOLTAGE),
+    ([at.S_CURRENT_REFERENCE, at.S_CURRENT_BEFORE, at.S_VELOCITY_INTEGRATOR], _CURRENT_COMMAND),
+    ([*range(at.S_TORQUE_CHAIN, at.S_PROBE_PLACES)], _CURRENT_COMMAND),
+    ([at.S_SPEED_COMMAND, at.S_SPEED_REFERENCE, at.S_POSITION_INTEGRATOR], _SPEED_COMMAND),
+)
+
+
+def stays_overloaded(drive: Running) -> bool:
+    """Whether the overload memory, on its way to what the current makes of it, stays where it limits."""
+    p, s = drive.p, drive.s
+    if s[at.S_OVERLOADED] == 0.0:
+        return False
+    reached = (s[at.S_CURRENT] / p[at.CONTINUOUS_CURRENT]) ** 2
+    return bool(min(reached, s[at.S_OVERLOAD]) >= p[at.OVERLOAD_RELEASE])
+
+
+def ticks_until_it_acts(p: Floats, s: Floats) -> int:
+    """Ticks after which the memory under this current trips or lets go; 0 where it does not get there.
+
+    The distance to ``(i/i_cont)^2`` falls by ``1 - a`` a tick.
+    """
+    level = p[at.OVERLOAD_RELEASE] if s[at.S_OVERLOADED] > 0.0 else 1.0
+    reached = (s[at.S_CURRENT] / p[at.CONTINUOUS_CURRENT]) ** 2
+    way, left = reached - s[at.S_OVERLOAD], reached - level
+    if way * left <= 0.0 or abs(left) >= abs(way):
+        return 0
+    return int(log(left / way) / log1p(-p[at.OVERLOAD_RATE]))
+
+
+def overload(p: Floats, s: Floats, current_A: float, ticks: int) -> float:
+    """The memory after ticks in which the current grows evenly from that of ``s``."""
+    if ticks == 0:
+        return float(s[at.S_OVERLOAD])
+    a, size = p[at.OVERLOAD_RATE], p[at.CONTINUOUS_CURRENT]
+    start, slope = s[at.S_CURRENT] / size, (current_A - s[at.S_CURRENT]) / (ticks * size)
+    C, B = slope**2, 2.0 * slope * (start - slope / a)
+    A = start**2 - (B + C) / a
+    return float(A + B * ticks + C * ticks**2 + (1.0 - a) ** ticks * (s[at.S_OVERLOAD] - A))
+
+
+class Scales:
+    """Largest values so far: ``signals`` of each column of a piece, ``states`` of each of the state."""
+
+    def __init__(self, drive: Running, window_s: float) -> None:
+        self.signals, self.states = np.zeros(at.HISTORY_PROBES), np.abs(drive.s)
+        self._p, self._window_s = drive.p, window_s
+
+    def take(self, drive: Running, piece: Piece) -> None:
+        """Take a piece in, and the state after it."""
+        signals, states = self.signals, self.states
+        np.maximum(states, np.abs(drive.s), out=states)
+        np.maximum(signals, np.abs(piece.columns[: at.HISTORY_PROBES]).max(axis=1), out=signals)
+        if self._p[at.HAS_POSITION] > 0.0:
+            self._by_angle()
+        for places, column in _AS_LARGE:
+            states[places] = np.maximum(states[places], signals[column])
+        queue = slice(at.S_QUEUE, at.S_QUEUE + int(self._p[at.DELAY_LINE]))
+        states[queue] = np.maximum(states[queue], signals[_VOLTAGE])
+
+    def _by_angle(self) -> None:
+        """All angles are as large as the largest; a speed counts by how far it goes in the window."""
+        p, signals, states = self._p, self.signals, self.states
+        N, N_c = p[at.RATIO], p[at.RATIO_TO_COUPLING]
+        y = max(signals[0], signals[1], signals[at.HISTORY_ANGLE] / N)
+        signals[[1, at.HISTORY_ANGLE]] = y, y * N
+        both = [_SPEED, _SPEED_COMMAND]
+        signals[both] = np.maximum(signals[both], y * N / self._window_s)
+        w = signals[_SPEED]
+        states[[at.S_OUTPUT, at.S_ANGLE, at.S_ERROR, at.S_OUTPUT_SPEED]] = y, y * N, y * N, w / N
+        states[at.S_ERROR_RATE] = w * self._window_s / p[at.POSITION_PERIOD]
+        states[at.S_TORQUE_FEEDFORWARD] = p[at.ACCELERATION_FEEDFORWARD] * y * N
+        if p[at.ELASTIC_DRIVE] > 0.0:
+            states[[ES.ES_TWIST, ES.ES_LOAD_ANGLE, ES.ES_LOAD_SPEED]] = y * N / N_c, y * N / N_c, w / N_c
 
 
 def matter(drive: Running) -> Places:
@@ -65,18 +145,9 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
     Rounding of the change adds up until numbers no longer fit each other.  So behind each leap a window is
     run, in which they find each other again, and the change is taken anew over the whole way.
 
-    Parameters
-    ----------
-    step, before : ndarray
-        Change of the state at ``places`` in the last window, and in the one before it; next to nothing that
-        differs between them is rounding, which does not add up.
-    scale : ndarray
-        Largest values at ``places``.
-
-    Returns
-    -------
-    int
-        How far, 0 where the drive moves.
+    ``step``, ``before``: change at ``places`` in the last window and in the one before it; next to nothing
+    that differs between them is rounding, which does not add up.  ``scale``: largest values at ``places``.
+    Returns how far, 0 where the drive moves.
     """
     angles = (places == at.S_ANGLE) | (places == at.S_OUTPUT)
     if (angles & ~small(step, scale)).any():

@@ -146,7 +146,7 @@ def _put(folder: Path, texts: Mapping[str, str], check: CodeCheck | None = None)
 
 def _checked(design: Design) -> CodeCheck:
     from analyses.linear.code_check import check_code
-    from nonlinear.runs.waiting import told_if_slow
+    from nonlinear.runs.watch import told_if_slow
 
     with told_if_slow("measuring the margins of the compiled code (--no-check leaves it out)"):
         return check_code(design)

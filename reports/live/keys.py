@@ -8,16 +8,17 @@ of `actuator_lti.asked.drive_figure`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 
 from actuator_lti.design.access import located, parameter_value, paths_of
 from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design, Parameter, Tolerance
+from actuator_lti.files.tree import Tree
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
-from nonlinear.export.statement import Statement, Term
+from nonlinear.export.statement import Term
 from nonlinear.export.trace import Tape, row_statements
-from reports.live_schema import FixedKey, NamedKey, SliderKey
 
 Figure = tuple[str, float]  # of the whole drive: name, load in N m
 
@@ -38,8 +39,8 @@ class Followed:
     Figures of the whole drive that cannot be followed are left out.
     """
 
-    free: list[SliderKey]
-    fixed: list[FixedKey]
+    free: list[Tree]
+    fixed: list[Tree]
     lines: list[list[Term]]
     figures: dict[Figure, list[list[Term]]]
 
@@ -47,8 +48,8 @@ class Followed:
 def followed(design: Design, figures: Iterable[Figure] = ()) -> Followed:
     """Follow every numeric key of a design into its row, and into some figures of the whole drive."""
     asked = tuple(dict.fromkeys(figures))
-    free: list[SliderKey] = []
-    fixed: list[FixedKey] = []
+    free: list[Tree] = []
+    fixed: list[Tree] = []
     for path in paths_of(design):
         if path.startswith("validation."):
             continue
@@ -62,13 +63,9 @@ def followed(design: Design, figures: Iterable[Figure] = ()) -> Followed:
     return Followed(
         free=free,
         fixed=fixed,
-        lines=_data(row_statements(design, values, Tape(interpreted=True))),
-        figures={each: _data(lines) for each, lines in made.items() if lines is not None},
+        lines=[each.data for each in row_statements(design, values, Tape(interpreted=True))],
+        figures={name: [each.data for each in lines] for name, lines in made.items() if lines is not None},
     )
-
-
-def _data(statements: Sequence[Statement]) -> list[list[Term]]:
-    return [statement.data for statement in statements]
 
 
 def _reason(design: Design, path: str, figures: Iterable[Figure]) -> str:
@@ -95,7 +92,7 @@ def _top(design: Design, path: str) -> float:
     return min(1.0 if unit == "1" else LONGEST * design.controller.period_s, field.high)
 
 
-def named(design: Design, path: str) -> NamedKey:
+def named(design: Design, path: str) -> Tree:
     """Give path, value and unit as the design file writes them."""
     field, _ = located(design, path)
     value, known = parameter_value(design, path), design.parameters.get(path)
@@ -113,17 +110,14 @@ def named(design: Design, path: str) -> NamedKey:
 
 def _written(known: Parameter | None, value: float, unit: str) -> tuple[str, float]:
     """Give the unit in which a value is written, and SI over it."""
-    number, _, own = (known.text if known is not None else "").partition(" ")
-    try:
-        said = float(number)
-    except ValueError:
-        return unit, 1.0
-    if known is None or not own or said == 0.0 or value == 0.0 or known.value != value:
-        return unit, 1.0
-    return own, value / said
+    if known is not None and known.value == value != 0.0:
+        number, _, own = known.text.partition(" ")
+        with suppress(ValueError, ZeroDivisionError):
+            return own or unit, value / float(number) if own else 1.0
+    return unit, 1.0
 
 
-def _slider(design: Design, path: str) -> SliderKey:
+def _slider(design: Design, path: str) -> Tree:
     """Give a key with the range of its slider and the band of its tolerance."""
     field, _ = located(design, path)
     made, value = named(design, path), parameter_value(design, path)

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 
-from actuator_lti.asked.quantities import (
-    DRIVE_QUANTITIES,
-    LOOP_QUANTITIES,
-    LOOPS,
-    QUANTITIES,
-    Quantity,
-    judged_loops,
-)
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
+from actuator_lti.files.tree import Tree
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
-from analyses.large_signal.grid import LEAST_UPDATES
+from analyses.large_signal.tones import LEAST_UPDATES
 from analyses.monte_carlo.judging import in_populations
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported
@@ -25,16 +19,6 @@ from nonlinear.export.relations import relation_statements
 from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
-from reports.live_schema import (
-    FollowedFigure,
-    FollowedLimit,
-    LiveData,
-    MapData,
-    NotFollowed,
-    Refused,
-    SliderKey,
-    StepData,
-)
 from reports.sections.limits import COLOURS, WORDS
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
@@ -46,10 +30,10 @@ LONGEST_TICKS = 20_000  # before a cell is looked at
 POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
 
 
-def live_model(design: Design, held: Collection[str] = (), source: str | None = None) -> LiveData | Refused:
+def live_model(design: Design, held: Collection[str] = (), source: str | None = None) -> Tree:
     """Give the page's data, or why there is none under ``refused``.
 
-    Requirements on the loops of ``held``, which the report judges held (`analyses.linear.held_loops`), are
+    Requirements on the loops of ``held``, which the report judges held (`analyses.linear.loop_figures`), are
     named apart: the page has the loops as they are by themselves.
     """
     if not design.controller.stages:
@@ -58,7 +42,9 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
         row = exported(design).row
     except InputError as refused:
         return {"refused": f"{refused}."}
-    result = followed(design, _figures(design))
+    limited = (item for item in design.requirements if item.quantity in DRIVE_QUANTITIES)
+    result = followed(design, [(item.quantity, item.load_Nm or 0.0) for item in limited])
+    relations = relation_statements(design, {key["path"]: key["value"] for key in result.free})
     text, places = patches(design, result.free, source)
     requirements, apart = _judged(design, result.figures, held)
     return {
@@ -76,11 +62,11 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
         "point": _point(design, held),
-        "relations": _relations(design, result.free),
+        "relations": [[statement.data for statement in check] for check in relations],
         "electrical": design.motor.has_electrical_dynamics,
         "limiters": [[name, bit, LIMITERS[name].words, LIMITERS[name].signal] for name, bit in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
-        "figures": [_followed(each) for each in LOOP_QUANTITIES.values() if each.followed],
+        "figures": _columns(),
         "requirements": requirements,
         "apart": apart,
         "step": _step(design),
@@ -92,17 +78,17 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
     }
 
 
-def _followed(quantity: Quantity) -> FollowedFigure:
-    """Give a column of the page's table."""
-    unit, factor = quantity.shown
-    return {
-        "name": quantity.name,
-        "label": quantity.label,
-        "unit": unit,
-        "factor": factor,
-        "timed": quantity.timed,
-        "response": quantity.of_response,
-    }
+def _columns() -> list[Tree]:
+    """Give the columns of the table of loops; ``factor`` is from the figure's own unit to that shown."""
+    return [
+        {
+            **dict(zip(("unit", "factor"), each.shown, strict=True)),
+            **{name: getattr(each, name) for name in ("name", "label", "timed")},
+            "response": each.of_response,
+        }
+        for each in LOOP_QUANTITIES.values()
+        if each.followed
+    ]
 
 
 def _point(design: Design, held: Collection[str]) -> str:
@@ -113,38 +99,27 @@ def _point(design: Design, held: Collection[str]) -> str:
     return " ".join(words)
 
 
-def _relations(design: Design, keys: Sequence[SliderKey]) -> list[list[list[str | float]]]:
-    """Give what refuses keys that contradict each other: the checks of a design file, as statements."""
-    checks = relation_statements(design, {key["path"]: key["value"] for key in keys})
-    return [[statement.data for statement in check] for check in checks]
-
-
-def _limit(item: Requirement) -> FollowedLimit:
-    """Give a requirement as the page judges it."""
+def _limit(item: Requirement) -> Tree:
+    """Give a requirement as the page judges it: of the whole drive where no ``loop`` is put in."""
     quantity = QUANTITIES[item.quantity]
     return {
-        "id": item.id,
+        **{name: getattr(item, name) for name in ("id", "quantity", "minimum", "maximum")},
+        **{name: getattr(quantity, name) for name in ("words", "absolute", "timed")},
         "loop": None,
-        "quantity": item.quantity,
-        "words": quantity.words,
-        "absolute": quantity.absolute,
-        "timed": quantity.timed,
         "unit": "" if item.unit == "1" else item.unit,
-        "minimum": item.minimum,
-        "maximum": item.maximum,
     }
 
 
 def _judged(
     design: Design, figures: Mapping[Figure, list[list[str | float]]], held: Collection[str]
-) -> tuple[list[FollowedLimit], list[NotFollowed]]:
+) -> tuple[list[Tree], list[Tree]]:
     """Give the requirements that the page judges, one for each loop, and what the others limit.
 
     ``figures``: those of the whole drive that follow, each with its statements.
     """
     stages = tuple(name for name in LOOPS if name in design.controller.stages)
-    followed: list[FollowedLimit] = []
-    apart: list[NotFollowed] = []
+    followed: list[Tree] = []
+    apart: list[Tree] = []
     for item in design.requirements:
         words, load = QUANTITIES[item.quantity].words, item.load_Nm or 0.0
         if item.quantity not in LOOP_QUANTITIES:
@@ -165,28 +140,22 @@ def _judged(
     return followed, apart
 
 
-def _figures(design: Design) -> list[Figure]:
-    """Give the figures of the whole drive that requirements limit."""
-    limited = (item for item in design.requirements if item.quantity in DRIVE_QUANTITIES)
-    return [(item.quantity, item.load_Nm or 0.0) for item in limited]
-
-
-def _step(design: Design) -> StepData:
+def _step(design: Design) -> Tree:
     """Give the command of the step (a tenth of the largest), and what it is a step of."""
-    stage, linear_axis, limits = design.controller.outermost, design.axis == "linear", design.limits
-    if stage == "position":
+    linear_axis, limits, factor = design.axis == "linear", design.limits, 1.0
+    if design.controller.outermost == "position":
         unit, factor = ("mm", 1e-3) if linear_axis else ("deg", math.pi / 180.0)
-        size = 0.1 * design.validation.full_deflection_rad
-        return {"size": size, "unit": unit, "factor": factor, "of": "output"}
-    known, most = (limits.speed_rad_s, 100.0) if stage == "velocity" else (limits.peak_current_A, 10.0)
-    size = 0.1 * (known if math.isfinite(known) else most)
-    if stage == "velocity":
-        unit = "m/s" if linear_axis else "rad/s"
-        return {"size": size / design.total_ratio, "unit": unit, "factor": 1.0, "of": "speed"}
-    return {"size": size, "unit": "A", "factor": 1.0, "of": "current"}
+        size, of = 0.1 * design.validation.full_deflection_rad, "output"
+    elif design.controller.outermost == "velocity":
+        unit, of = "m/s" if linear_axis else "rad/s", "speed"
+        size = 0.1 * (limits.speed_rad_s if math.isfinite(limits.speed_rad_s) else 100.0) / design.total_ratio
+    else:
+        unit, of = "A", "current"
+        size = 0.1 * (limits.peak_current_A if math.isfinite(limits.peak_current_A) else 10.0)
+    return {"size": size, "unit": unit, "factor": factor, "of": of}
 
 
-def _map(design: Design) -> MapData | None:
+def _map(design: Design) -> Tree | None:
     """Give the cells of the map of sines, and the rule that names them; none without a position loop."""
     if design.controller.position is None:
         return None

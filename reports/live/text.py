@@ -11,7 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.design.writing import overridden_text, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import parse_toml
-from reports.live_schema import SliderKey
+from actuator_lti.files.tree import Tree
 
 MARK = "@@changed@@"
 Patch = tuple[int, int, str, str]
@@ -25,7 +25,7 @@ _GRADE = re.compile(rf",\s*grade\s*=\s*(?:{_STRING})|^grade\s*=\s*(?:{_STRING})[
 _PLAIN = re.compile(rf"({_STRING}|[^\s#]+)")
 
 
-def patches(design: Design, keys: Sequence[SliderKey], source: str | None = None) -> tuple[str, list[Patch]]:
+def patches(design: Design, keys: Sequence[Tree], source: str | None = None) -> tuple[str, list[Patch]]:
     """Give the text of a design, and for each key what its change replaces.
 
     In ``source``, the text that the design was read from, only the entries of changed keys are written anew.
@@ -40,7 +40,7 @@ def patches(design: Design, keys: Sequence[SliderKey], source: str | None = None
     return text, [_patch(text, overridden_text(design, key["path"], MARK)) for key in keys]
 
 
-def _own(design: Design, key: SliderKey, text: str) -> Patch | None:
+def _own(design: Design, key: Tree, text: str) -> Patch | None:
     """The patch of a key in a text of the user; None where the changed text would not say the same."""
     path, known = key["path"], design.parameters.get(key["path"])
     place = _entry_of(path, text)

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, cast
 
 from actuator_lti.asked.quantities import AT_A_GLANCE, QUANTITIES, reserve
-from analyses.linear.held_loops import HELD
-from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_figures import HELD, LoopFigures
 from analyses.linear.responses import frequency_grid
 from analyses.specification.mending import Move
 from analyses.specification.weakest import Spread, View, WeakPoint
@@ -24,7 +23,7 @@ from reports.verdict_summary import gathered, tally
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
-    from analyses.corners import Corners
+    from analyses.corners.run import Corners
 
 SHOWN = 3
 MOST_BARS = 12

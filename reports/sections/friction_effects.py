@@ -8,8 +8,7 @@ import numpy as np
 
 from actuator_lti.design.model import Command, Design
 from analyses.friction_effects import FrictionEffects
-from analyses.friction_effects.cycles import LimitCycles
-from analyses.friction_effects.result import FrictionPoint
+from analyses.friction_effects.result import FrictionPoint, LimitCycles
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, accepted_rad, noticed, told, verdict_of
 from analyses.motion.settling import words as end_words
 from nonlinear.bench.on_the_bench import quiet

@@ -11,7 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.step import StepFigures
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.responses import frequency_grid, response_at, sampled_step
-from analyses.specification.command_limits import said_of
+from analyses.specification.asked_figures import said_of
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital, fixed, gain_margin, seconds, to_minus

@@ -9,10 +9,9 @@ from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.bandwidth import Bandwidth
 from actuator_lti.files.tree import Tree
-from analyses.linear.held_loops import AWAY, HELD, OPEN
-from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_figures import AWAY, HELD, OPEN, LoopFigures
 from analyses.linear.loop_survey import OperatingPointFigures
-from analyses.margins import Margins
+from analyses.margins.run import Margins
 from analyses.specification.weakest import Spread, figures_of, spread
 from reports import document as doc
 from reports.numbers import fixed, gain_margin, short, to_minus

@@ -11,8 +11,8 @@ from actuator_lti.design.control import Stage
 from actuator_lti.drive.signals import LIMITERS, Limiter
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
-from analyses.motion import Motion
-from analyses.motion.conduct import conduct, summary
+from analyses.motion.run import Motion
+from analyses.motion.settling import conduct, summary
 from nonlinear import Trajectory
 from nonlinear.runs.trajectory import COMMAND_UNITS, LimitUse
 from reports import document as doc

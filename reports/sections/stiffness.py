@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from analyses.stiffness import Stiffness, stiffness
-from analyses.stiffness.result import AGREED, READ
+from analyses.stiffness.run import AGREED, READ
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import short

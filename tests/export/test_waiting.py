@@ -4,7 +4,7 @@ import io
 import sys
 import threading
 
-import nonlinear.runs.waiting as waiting
+from nonlinear.runs import watch as waiting
 
 
 class Terminal(io.StringIO):

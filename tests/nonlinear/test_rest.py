@@ -9,12 +9,11 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.design import with_values
 from analyses.friction_effects import friction_effects
-from analyses.motion.conduct import conduct
-from analyses.motion.settling import settle
+from analyses.motion.settling import conduct, settle
 from nonlinear import Rows, State, commands, simulate
 from nonlinear._kernels import layout as at
 from nonlinear.bench.on_the_bench import quiet
-from nonlinear.settling.protection import overload, ticks_until_it_acts
+from nonlinear.settling.drift import overload, ticks_until_it_acts
 from nonlinear.settling.rest import first_motion_s, judge
 from tests.nonlinear.rest_agreement import answers
 from tests.validation.random_drives import full_drive, is_stable

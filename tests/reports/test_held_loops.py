@@ -13,8 +13,7 @@ from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, FrictionPoint, Requirement
 from actuator_lti.drive.angle import level
-from analyses.linear.held_loops import held_loop
-from analyses.linear.loop_figures import all_loop_figures
+from analyses.linear.loop_figures import all_loop_figures, held_loop
 from analyses.margins import margins
 from analyses.specification.requirements import evaluate_requirements, tally
 from analyses.tuning.problem import problem_of

@@ -10,7 +10,7 @@ from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.errors import InputError
-from analyses.specification.drive_figures import drive_figures
+from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import evaluate_requirements, tally
 
 

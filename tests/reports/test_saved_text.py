@@ -7,9 +7,9 @@ import pytest
 
 from actuator_lti.design import parameter_value, read_design_text
 from actuator_lti.design.loader import design_text, load_design, shipped_designs
+from actuator_lti.files.tree import Tree
 from reports.live.keys import followed
 from reports.live.text import patches
-from reports.live_schema import SliderKey
 
 OTHER = """# a drive of mine
 motor.resistance = "1 ohm"  # measured cold
@@ -37,7 +37,7 @@ voltage = "24 V"
 """
 
 
-def as_page(key: SliderKey, factor: float) -> str:
+def as_page(key: Tree, factor: float) -> str:
     """A changed value as the page writes it."""
     value = key["value"] / key["factor"] * factor
     if key["unit"]:
@@ -45,7 +45,7 @@ def as_page(key: SliderKey, factor: float) -> str:
     return str(int(key["value"])) if key["whole"] else repr(value)
 
 
-def changed(text: str, keys: list[SliderKey], places: list[tuple[int, int, str, str]], factor: float) -> str:
+def changed(text: str, keys: list[Tree], places: list[tuple[int, int, str, str]], factor: float) -> str:
     made, last = "", 0
     for (begin, end, before, after), key in sorted(
         zip(places, keys, strict=True), key=lambda pair: pair[0][:2]

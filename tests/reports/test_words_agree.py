@@ -11,7 +11,7 @@ import pytest
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import with_values
 from actuator_lti.margins import stability_margins
-from analyses.large_signal.border import LimitShift
+from analyses.large_signal.result import LimitShift
 from analyses.limit_cycles import LimitCycles
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import operating_points

@@ -13,7 +13,7 @@ from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.model import Tolerance
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.statistics import MOST, SHARES, Sketch, clopper_pearson, column_statistics, merged
-from analyses.monte_carlo.stepping import StepCheck, step_columns, step_rows, step_units
+from analyses.monte_carlo.task import StepCheck, step_columns, step_rows, step_units
 from analyses.studies.sampling import Factor, Sampler, read_table, sampler_of
 from nonlinear import commands
 from nonlinear.runs.batch import Reducers, Run, simulate_many

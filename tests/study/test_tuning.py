@@ -22,8 +22,7 @@ from actuator_lti.design.model import (
 )
 from actuator_lti.errors import InputError
 from analyses.tuning import TuningSettings, tune
-from analyses.tuning.asked_requirement import read_requirement
-from analyses.tuning.problem import loop_requirements, problem_of
+from analyses.tuning.problem import loop_requirements, problem_of, read_requirement
 from analyses.tuning.rules import (
     integrator_gain,
     magnitude_optimum,

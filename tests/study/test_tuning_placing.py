@@ -24,8 +24,7 @@ from actuator_lti.design.model import (
 )
 from actuator_lti.errors import InputError
 from analyses.tuning import TuningSettings, tune
-from analyses.tuning.objects import allowed_range, step_of_gain
-from analyses.tuning.placing import place
+from analyses.tuning.placing import allowed_range, place, step_of_gain
 from analyses.tuning.problem import loop_requirements, problem_of
 
 QUICK = TuningSettings(curve=False, check=False)

@@ -12,7 +12,7 @@ from actuator_lti.errors import InputError
 from analyses.estimation.fit import Fit
 from analyses.identification.to_design import design_with_fit
 from analyses.monte_carlo import MonteCarloSettings, monte_carlo
-from analyses.monte_carlo.region import Region
+from analyses.monte_carlo.worst import Region
 from analyses.studies.sampling import Factor, Sampler, Table, correlation_of, sampler_of, semidefinite_root
 from analyses.tuning.problem import loop_requirements, problem_of
 

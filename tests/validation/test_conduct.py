@@ -10,8 +10,7 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.design import with_values
 from analyses.motion import Asked, Motion
-from analyses.motion.conduct import conduct
-from analyses.motion.settling import outcome, settle
+from analyses.motion.settling import conduct, outcome, settle
 from nonlinear import commands, simulate
 from nonlinear.settling.rest import PERIODS
 from reports.sections.simulate import section

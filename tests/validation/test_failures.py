@@ -13,8 +13,7 @@ from actuator_lti.design.model import Design, Load
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.failures import Asked, failures
-from analyses.failures.cases import _followed_most_hz, cases_of
-from analyses.failures.rig import Rig
+from analyses.failures.cases import Rig, _followed_most_hz, cases_of
 from nonlinear import commands, simulate
 from reports.cli.main import main
 from reports.drawing import draw_svg

@@ -88,7 +88,6 @@ static double other_s[S_MOST];
 static double other_io[DRIVE_IO_LENGTH];
 static double places[MOST];
 static double seen[MOST_TICKS * SEEN * (MOST + 1)];
-static double column[2 * MOST_STATES];
 static double blocks[MOST_PHASES * BLOCK];
 static double keep[2 * MOST_PHASES * MOST];
 static double poles[4 * MOST_STATES];
@@ -136,7 +135,7 @@ static int one(int stage, double lead, int timed)
         it->row[k] = NAN;
     }
     const int n = drive_assembled(
-        p, q, other_s, other_io, stage, blocks, places, column, keep, seen, it->a, it->b, it->c);
+        p, q, other_s, other_io, stage, blocks, places, keep, seen, it->a, it->b, it->c);
     if (n <= 0) {
         return n;
     }
@@ -230,7 +229,7 @@ EXPORT("limiters") int limiters(int count)
         return 0;
     }
     const int n = drive_limiters_assembled(
-        p, q, other_s, other_io, blocks, places, column, keep, seen, whole_a, whole_b, whole_c);
+        p, q, other_s, other_io, blocks, places, keep, seen, whole_a, whole_b, whole_c);
     if (n <= 0) {
         return n;
     }

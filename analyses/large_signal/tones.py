@@ -1,0 +1,191 @@
+"""Sines at many amplitudes and frequencies: which, simulated until settled, reduced to harmonics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, isfinite, log
+from typing import Any
+
+import numpy as np
+
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from actuator_lti.loops import Loops
+from analyses.large_signal.classify import STEADY
+from analyses.large_signal.steady_start import LinearSteadyState, linear_steady_state, triangle_start
+from analyses.linear.responses import response_at
+from nonlinear import Rows
+from nonlinear.runs.reduced import BatchResult
+from nonlinear.runs.running import Running
+
+LEAST_UPDATES = 96  # updates of the position loop in a window: peaks are seen to 1 - cos(pi/96) = 0.05 %
+DECADES_BELOW, FACTOR_ABOVE = 1.6, 8.0
+HIGHEST = 0.8  # of the Nyquist frequency of the position loop
+MOST_TICKS = 4_000_000  # of a map, its repetitions apart; where more work is needed the grid is coarser
+FRICTION_RANGE, PLAIN_RANGE, LARGEST_RANGE = 2.0, 200.0, 2e4
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A frequency of which whole periods fill a window of ticks, at as many phases as it has updates."""
+
+    frequency_hz: float
+    ticks: int
+    cycles: int
+
+    @property
+    def omega_rad_s(self) -> float:
+        """Angular frequency."""
+        return 2.0 * math.pi * self.frequency_hz
+
+
+def tone(
+    frequency_hz: float, design: Design, least_updates: int = LEAST_UPDATES, least_cycles: int = 1
+) -> Tone:
+    """Choose the tone next to a frequency; off by less than one update over the window.
+
+    Updates and periods of a window have no common factor, so that a sampled sinusoid is seen at as many
+    phases as there are updates: its largest sample is its peak to ``1 - cos(pi/updates)``.
+    """
+    control = design.controller
+    every = control.position_loop.every
+    T = every * control.period_s
+    cycles = max(least_cycles, math.ceil(least_updates * frequency_hz * T))
+    updates = round(cycles / (frequency_hz * T))
+    while math.gcd(cycles, updates) > 1:
+        updates += 1
+    return Tone(cycles / (updates * T), updates * every, cycles)
+
+
+def frequency_range_hz(design: Design, loops: Loops) -> tuple[float, float]:
+    """Give the range around the bandwidth of the position loop in which large signals are looked at."""
+    T = design.controller.position_loop.every * design.controller.period_s
+    nyquist = 0.5 / T
+    grid = np.geomspace(nyquist * 1e-5, nyquist * 0.999, 400)
+    magnitude = np.abs(response_at(loops.plain_response, 2.0 * np.pi * grid))
+    below = np.flatnonzero(magnitude < math.sqrt(0.5))
+    bandwidth = float(grid[below[0]]) if below.size else nyquist
+    high = min(bandwidth * FACTOR_ABOVE, HIGHEST * nyquist)
+    return bandwidth / 10.0**DECADES_BELOW, high
+
+
+def tones(design: Design, loops: Loops, count: int) -> tuple[Tone, ...]:
+    """Give tones, spread evenly on a logarithmic scale around the bandwidth."""
+    low, high = frequency_range_hz(design, loops)
+    return tuple(tone(float(f), design) for f in np.geomspace(low, high, count))
+
+
+def work_ticks(design: Design, loops: Loops, count: int) -> int:
+    """Ticks that one sine at each of so many tones takes, until it has settled and in two windows.
+
+    A tick of smoothed friction, which is integrated in steps, counts as three.
+    """
+    settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
+    each = 3 if design.friction.law == "tanh" else 1
+    return each * sum(settling + 2 * tone.ticks for tone in tones(design, loops, count))
+
+
+def amplitudes(design: Design, count: int, smallest_rad: float | None) -> np.ndarray:
+    """Give command amplitudes up to full deflection, among them those that the design asks for.
+
+    ``smallest_rad``: command that just overcomes dry friction at once (`analyses.linear.static_threshold`);
+    the range begins at twice that, within 1/20000 to 1/200 of full deflection.
+    """
+    full = design.validation.full_deflection_rad
+    wanted = sorted({fraction * full for fraction in design.validation.amplitude_fractions})
+    top = max(full, wanted[-1])
+    low = full / PLAIN_RANGE
+    if smallest_rad is not None and math.isfinite(smallest_rad):
+        low = float(np.clip(FRICTION_RANGE * smallest_rad, full / LARGEST_RANGE, low))
+    values = np.geomspace(min(low, 0.5 * wanted[0]), top, max(count, 2))
+    free = np.ones(len(values), dtype=bool)
+    for amplitude in wanted:
+        distance = np.where(free, np.abs(np.log(values / amplitude)), np.inf)
+        nearest = int(np.argmin(distance))
+        values[nearest], free[nearest] = amplitude, False
+    return np.sort(values)
+
+
+HARMONICS = 3
+BEYOND = 1.1  # of the amplitude of the linear start: only what is limited can end in a triangle
+LONGER, MORE_WINDOWS, MORE_TICKS = 4, 12, 24_000
+TANH_TOLERANCE = 1e-5  # of the smoothing speed, a tick: far below what a fundamental is looked at for
+
+
+def run_tones(
+    design: Design,
+    tones: tuple[Tone, ...],
+    which: np.ndarray,
+    amplitude_rad: np.ndarray,
+    start: LinearSteadyState,
+    start_amplitude_rad: np.ndarray,
+    *,
+    load_Nm: float = 0.0,
+    friction_on: bool = True,
+    harmonics: int = HARMONICS,
+    insist: bool = False,
+) -> BatchResult:
+    """Simulate one sine a run, tone ``which[r]``, from the linear steady state at ``start_amplitude_rad``.
+
+    That is at most the onset of limiting; both amplitudes are the command's, at the output shaft.  ``insist``
+    goes on with what has not settled, for four times the start-up and several periods more.
+    """
+    rows = Rows.of(design, len(which), friction_on=friction_on)
+    windows = np.array([t.ticks for t in tones])[which]
+    cycles = np.array([t.cycles for t in tones])[which]
+    rows.sine("command", amplitude_rad, np.array([t.frequency_hz for t in tones])[which])
+    rows.window(windows, cycles, harmonics)
+    start.put(rows, which, start_amplitude_rad)
+    triangle_start(design, rows, amplitude_rad, amplitude_rad > BEYOND * start_amplitude_rad)
+    rows["load"], rows["tanh_tolerance"] = load_Nm, TANH_TOLERANCE
+    rows["ticks"] = start.settling_ticks + 2 * windows
+    if not insist:
+        return rows.run()
+    drives = [rows.running(k) for k in range(len(rows))]
+    return _gone_on(rows, drives, rows.run(drives=drives), start.settling_ticks)
+
+
+def _gone_on(rows: Rows, drives: Sequence[Running], result: BatchResult, settling_ticks: int) -> BatchResult:
+    """Go on with the runs that are not steady."""
+    moving = result.window_stick_fraction < 1.0
+    late = np.flatnonzero(result.ok & moving & (result.unsteadiness("output_angle_rad") > STEADY))
+    if not len(late):
+        return result
+    longer = rows.take(late)
+    longer["ticks"] += LONGER * settling_ticks + np.ceil(
+        np.minimum(MORE_WINDOWS * longer["window"], MORE_TICKS)
+    )
+    return result.with_part(late, longer.run(drives=[drives[int(k)] for k in late]))
+
+
+TIME_CONSTANTS = 14.0  # of the slowest pole
+LONGEST_TICKS = 400_000
+
+
+def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str, longest: int = LONGEST_TICKS) -> int:
+    """Ticks after which the slowest pole of a sampled closed loop is forgotten."""
+    size = np.abs(closed_loop.poles())
+    if (size > 1.0 + 1e-9).any():
+        raise InputError("the loop is not stable: nothing settles in it", where=where)
+    slowest = size[size < 1.0 - 1e-9].max(initial=0.0)
+    if slowest <= 0.0:
+        return 20 * hold_ticks
+    return int(min(ceil(TIME_CONSTANTS / -log(slowest) + 20.0) * hold_ticks, longest))
+
+
+def full_range(design: Design) -> dict[str, float]:
+    """Full deflection (output), motor speed and motor current that a drive can reach."""
+    limits, motor = design.limits, design.effective_motor
+    speed, current = limits.speed_rad_s, limits.peak_current_A
+    if motor.resistance_ohm is not None and motor.back_emf_constant_Vs_rad is not None:
+        speed = min(speed, limits.voltage_V / motor.back_emf_constant_Vs_rad)
+        current = min(current, limits.voltage_V / motor.resistance_ohm)
+    elif motor.source_gain_Nm_V is not None and design.friction.viscous() > 0.0:
+        speed = min(speed, limits.voltage_V * motor.source_gain_Nm_V / design.friction.viscous())
+    if not isfinite(speed):
+        place = design.controller.position  # a gain of 0: a law of one's own
+        gain = 1.0 if place is None or place.gain == 0.0 else place.gain
+        speed = design.validation.full_deflection_rad * design.total_ratio * gain
+    return {"position": design.validation.full_deflection_rad, "velocity": speed, "current": current}
