@@ -261,7 +261,7 @@ def _correlations(design: Design) -> Iterator[Refusal]:
     seen: set[frozenset[str]] = set()
     for number, item in enumerate(design.correlations, 1):
         yield from readable(_pair(item, f"correlation.{number}", tuple(known), seen, matrix))
-    if design.correlations and np.linalg.eigvalsh(matrix)[0] < -1e-12:
+    if known and np.linalg.eigvalsh(matrix)[0] < -1e-12:
         allowed = "the coefficients contradict each other; allowed: a positive semidefinite matrix"
         yield "correlation", "", allowed
 

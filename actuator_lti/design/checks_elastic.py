@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 from actuator_lti.design.mistakes import Refusal
 from actuator_lti.design.model import Design
+from actuator_lti.design.sections import part_at
+from actuator_lti.design.unread import readable
 from actuator_lti.files.reading import shown
 
 _DRIVABLE = 'load.path = "back-drivable"'  # the default locks itself
@@ -13,12 +15,15 @@ _DRIVABLE = 'load.path = "back-drivable"'  # the default locks itself
 
 def check_place(design: Design) -> Iterator[Refusal]:
     """Refuse names of gears that are none; whatever asks for an inertia needs the coupling's place."""
-    after = None if design.coupling is None else design.coupling.after
-    names = [gear.name for gear in design.gears]
-    for key, name in (("coupling.after", after), ("load.locking_gear", design.load.locking_gear)):
-        if name is not None and name not in names:
-            known = ", ".join(names) or "none, as there are no gears; leave it out"
-            yield key, shown(name), f"is no gear; allowed: {known}"
+    for path, attribute in (("coupling", "after"), ("load", "locking_gear")):
+        yield from readable(_no_gear(design, path, attribute))
+
+
+def _no_gear(design: Design, path: str, attribute: str) -> Iterator[Refusal]:
+    name, names = getattr(part_at(design, path), attribute, None), [gear.name for gear in design.gears]
+    if name is not None and name not in names:
+        known = ", ".join(names) or "none, as there are no gears; leave it out"
+        yield f"{path}.{attribute}", shown(name), f"is no gear; allowed: {known}"
 
 
 def _behind(design: Design) -> Iterator[Refusal]:

@@ -142,3 +142,14 @@ def test_one_mistake_is_told_as_one(name: str, old: str, new: str, only: str) ->
     assert old in text
     lines = _told_lines(text.replace(old, new, 1))
     assert [only in line for line in lines] == [True], lines
+
+
+def test_no_mistake_hides_another_or_ends_in_a_traceback() -> None:
+    """A pair where nothing has a tolerance; a coupling after no gear beside a load that is no table."""
+    pair = {"first": "motor.resistance", "second": "motor.inductance", "coefficient": 0.5}
+    with pytest.raises(Mistakes, match="no value has a tolerance"):
+        load_design("ctms-motor-position").with_values({"correlation": [pair]})
+    tree = {**design_tree(AMBER), "load": "heavy", "coupling": {"stiffness": "4 N*m/rad", "after": "x"}}
+    with pytest.raises(Mistakes) as told:
+        design_from_tree(tree, "f")
+    assert [key in str(told.value) for key in ("load = ", "coupling.after = ")] == [True, True]
