@@ -4,10 +4,9 @@ from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.access import parameter_value, paths_of, with_values
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.fields import FIELDS
-from actuator_lti.design.loader import as_design, load_design, read_design_text
+from actuator_lti.design.loader import as_design, load_design, read_design_text, shipped_designs
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
-from actuator_lti.design.shipped import shipped_designs
 from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.sweep import SweepPoint, sweep
 from actuator_lti.design.tolerances import tolerances

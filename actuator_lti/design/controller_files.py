@@ -23,7 +23,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.design.objects import Imported
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.sections import parts_of
-from actuator_lti.design.settings_xml import objects_of_xml, parsed_xml
+from actuator_lti.design.settings_file import objects_of_xml, parsed_xml
 from actuator_lti.design.units import si_text
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError

@@ -1,4 +1,4 @@
-"""Every key of a design file as a list to read: made from the registry of fields, so it cannot drift."""
+"""Every key of a design file as a list to read, from the registry of fields; how one file's numbers are read."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from dataclasses import MISSING, dataclass, fields
 from math import inf
 from typing import Annotated
 
-from actuator_lti.design.data_sheet import SHEET
+from actuator_lti.design.data_sheet import FROM, SHEET
 from actuator_lti.design.field import BIG, Field, Structure
-from actuator_lti.design.fields import ALL_FIELDS
-from actuator_lti.design.model import Axis
+from actuator_lti.design.fields import ALL_FIELDS, field_of
+from actuator_lti.design.model import Axis, Design
 from actuator_lti.design.sections import SECTIONS
 
 
@@ -81,3 +81,41 @@ def _allowed(field: Field, unit: str) -> str:
     if field.high == BIG:
         return "above 0" if field.low > 0 else "0 or more"
     return field.allowed(unit)
+
+
+@dataclass(frozen=True)
+class Explained:
+    """One number of a file.
+
+    ``path``: its dotted key.
+    ``written``, ``read``: as the file has it, and in SI.
+    ``model``: as the equations have it: symbol and value, of the equivalent DC motor at its temperature.
+    """
+
+    path: Annotated[str, "Key"]
+    written: Annotated[str, "Written"]
+    read: Annotated[str, "Read as"]
+    model: Annotated[str, "In the model as"]
+
+
+def explained(design: Design) -> tuple[Explained, ...]:
+    """Every number that stands in the file of a design, in its order.
+
+    Examples
+    --------
+    >>> from actuator_lti.design import load_design
+    >>> items = {item.path: item for item in explained(load_design("ballscrew"))}
+    >>> one = items["motor.torque_constant"]
+    >>> one.written, one.read, one.model
+    ('0.50 N*m/A', '314.159265 N/A', 'kM = 256.509966 N/A')
+    """
+    result = []
+    for path, item in design.parameters.items():
+        field, value = field_of(path), item.value
+        if path.startswith("motor.") and field is not None:
+            value = getattr(design.effective_motor, field.attribute)
+        unit = "" if item.unit == "1" else f" {item.unit}"
+        symbol = f"{item.symbol} = " if item.symbol else ""
+        written = item.source if item.source.startswith(FROM) else item.text
+        result.append(Explained(path, written, f"{item.value:.9g}{unit}", f"{symbol}{value:.9g}{unit}"))
+    return tuple(result)

@@ -11,10 +11,28 @@ from actuator_lti.design.checks import contradictions
 from actuator_lti.design.mistakes import Findings, lines_of, nearest
 from actuator_lti.design.model import Design
 from actuator_lti.design.reader import read_tree
-from actuator_lti.design.shipped import shipped_designs, shipped_path
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown
 from actuator_lti.files.tree import Tree
+
+_FOLDER = Path(__file__).parent / "shipped"
+
+
+def shipped_designs() -> tuple[str, ...]:
+    """Names of the shipped designs, the baseline first.
+
+    Examples
+    --------
+    >>> shipped_designs()[0]
+    'ilr33-amber'
+    """
+    names = sorted(path.stem for path in _FOLDER.glob("*.toml"))
+    return tuple(sorted(names, key=lambda name: name != "ilr33-amber"))
+
+
+def shipped_path(name: str) -> Path:
+    """Where a shipped design lies."""
+    return _FOLDER / f"{name}.toml"
 
 
 def load_design(name_or_path: Design | str | PathLike[str]) -> Design:

@@ -32,11 +32,5 @@ class FrozenMap(Mapping[str, Any]):
     def __hash__(self) -> int:
         return hash(frozenset(self._items.items()))
 
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Mapping) and self._items == dict(other)
-
     def __repr__(self) -> str:
         return f"FrozenMap({self._items!r})"
-
-    def __reduce__(self) -> tuple[type[FrozenMap], tuple[dict[str, Any]]]:
-        return FrozenMap, (self._items,)

@@ -292,14 +292,8 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
         return f"; a frequency in Hz becomes a gain in 1/s times 2 pi: {number * value.factor:.6g} 1/s"
     if pair == ("speed or angular frequency", "time"):
         return f"; a period of {1.0 / (number * value.factor / (2.0 * pi)):.6g} s" if number > 0 else ""
-    if pair == ("mass", "force"):
-        return "; a weight is written kgf"
-    if pair == ("moment of inertia", "mass"):
-        return "; a screw of lead p carries J as the mass J (2 pi/p)^2"
-    if pair == ("mass", "moment of inertia"):
-        return "; a mass m on a screw of lead p is the inertia m (p/2 pi)^2"
-    if pair == ("torque", "force"):
-        return "; a screw of lead p turns a torque T into the force 2 pi T/p"
+    if pair in _ADVICE:
+        return f"; {_ADVICE[pair]}"
     if pair[0] == "speed or angular frequency" and wanted.dimension in _GAINS_OF_BANDWIDTH:
         of = _GAINS_OF_BANDWIDTH[wanted.dimension]
         return f"; a bandwidth of {number * value.factor:.6g} rad/s becomes a gain times {of}"
@@ -312,6 +306,12 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
     return ""
 
 
+_ADVICE = {
+    ("mass", "force"): "a weight is written kgf",
+    ("moment of inertia", "mass"): "a screw of lead p carries J as the mass J (2 pi/p)^2",
+    ("mass", "moment of inertia"): "a mass m on a screw of lead p is the inertia m (p/2 pi)^2",
+    ("torque", "force"): "a screw of lead p turns a torque T into the force 2 pi T/p",
+}
 _GAINS_OF_TORQUE = {
     ("stiffness", parse_unit("A/rad").dimension),
     ("viscous friction", parse_unit("A*s/rad").dimension),

@@ -55,8 +55,7 @@ def export(
     from dataclasses import replace
 
     from actuator_lti.design.objects import calibration, export_objects
-    from actuator_lti.design.settings_file import write_settings_toml
-    from actuator_lti.design.settings_xml import settings_xml
+    from actuator_lti.design.settings_file import settings_xml, write_settings_toml
     from reports.cli.output import print_json, print_line, print_note
 
     drive = load_drive(design, changes)

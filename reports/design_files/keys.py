@@ -10,8 +10,7 @@ from actuator_lti.errors import InputError
 from analyses.request import Option
 
 if TYPE_CHECKING:
-    from actuator_lti.design.explained import Explained
-    from actuator_lti.design.key_reference import KeyEntry
+    from actuator_lti.design.key_reference import Explained, KeyEntry
     from actuator_lti.design.model import Design
     from actuator_lti.drive.sheet_figures import SheetFigure
 
@@ -60,8 +59,7 @@ def keys(asked: Asked) -> Keys:
         If none does, or the design that is to be explained is refused.
     """
     from actuator_lti.design import load_design
-    from actuator_lti.design.explained import explained
-    from actuator_lti.design.key_reference import key_reference
+    from actuator_lti.design.key_reference import explained, key_reference
     from actuator_lti.drive.sheet_figures import sheet_figures
 
     text = asked.match.lower()

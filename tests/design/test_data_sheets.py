@@ -15,7 +15,7 @@ from actuator_lti.design import (
     with_values,
     write_design,
 )
-from actuator_lti.design.explained import explained
+from actuator_lti.design.key_reference import explained
 from actuator_lti.drive.facts import capability, steady_torque_Nm
 from actuator_lti.errors import InputError, Mistakes
 from analyses.linear.loop_survey import survey_loops

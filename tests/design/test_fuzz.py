@@ -19,8 +19,7 @@ from actuator_lti.design import (
 )
 from actuator_lti.design.loader import design_text
 from actuator_lti.design.objects import import_objects
-from actuator_lti.design.settings_file import read_settings_toml
-from actuator_lti.design.settings_xml import read_settings_xml, write_settings_xml
+from actuator_lti.design.settings_file import read_settings_toml, read_settings_xml, write_settings_xml
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
 

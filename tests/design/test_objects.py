@@ -17,9 +17,11 @@ from actuator_lti.design.settings_file import (
     parse_label,
     read_settings,
     read_settings_toml,
+    read_settings_xml,
+    update_settings_xml,
     write_settings_toml,
+    write_settings_xml,
 )
-from actuator_lti.design.settings_xml import read_settings_xml, update_settings_xml, write_settings_xml
 from actuator_lti.errors import InputError
 
 AMBER = load_design("ilr33-amber")

@@ -13,8 +13,8 @@ from random_drives import law_at, random_drive, random_elastic_drive
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import zig_command
 from actuator_lti.design import design_hash
+from actuator_lti.design.loader import shipped_designs
 from actuator_lti.design.model import Design
-from actuator_lti.design.shipped import shipped_designs
 from nonlinear._kernels import layout as at
 from nonlinear.export import controller_export
 

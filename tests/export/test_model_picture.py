@@ -11,7 +11,7 @@ import pytest
 import reports.model_picture as model_picture
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import system_compiler
-from actuator_lti.design.shipped import shipped_designs
+from actuator_lti.design.loader import shipped_designs
 from nonlinear.export.fmu import fmu_bytes
 from reports.model_picture import HEIGHT, WIDTH, model_png, model_svg, train_boxes
 

@@ -22,8 +22,7 @@ from actuator_lti.design.controller_files import import_controller_file
 from actuator_lti.design.loader import design_from_tree, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.objects import import_objects
-from actuator_lti.design.settings_file import read_settings_toml
-from actuator_lti.design.settings_xml import read_settings_xml, write_settings_xml
+from actuator_lti.design.settings_file import read_settings_toml, read_settings_xml, write_settings_xml
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.design.writing import design_tree
 from actuator_lti.files.reading import decode

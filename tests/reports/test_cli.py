@@ -14,7 +14,7 @@ from reports.cli.app import build
 
 def shipped_text(name: str = "ilr33-amber") -> str:
     """Give the text of a shipped design file."""
-    from actuator_lti.design.shipped import shipped_path
+    from actuator_lti.design.loader import shipped_path
 
     return shipped_path(name).read_text(encoding="utf-8")
 

@@ -11,8 +11,8 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import check_design
+from actuator_lti.design.loader import shipped_designs
 from actuator_lti.design.model import Design, FrictionPoint, Instruments, Supply
-from actuator_lti.design.shipped import shipped_designs
 from actuator_lti.errors import InputError
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.row import Row
