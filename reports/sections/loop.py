@@ -130,7 +130,8 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
         words = f"|{letter}|, no peak"
         if db is not None and at and db >= 0.005:
             words = f"|{letter}|, peak {db:.2f} dB at {style.hertz(at)}"
-        values.append(_db(response_at(system, grid)))
+        with np.errstate(divide="ignore"):
+            values.append(20.0 * np.log10(np.abs(response_at(system, grid))))
         panel.curve(grid_hz, values[k], words, colour=colour, dash=k)
         if db is not None and at and grid_hz[0] <= at <= grid_hz[-1] * 1.001:
             panel.points([at], [db], marker="^", colour=colour, size=7.0, read=False)
@@ -229,8 +230,3 @@ def _response(label: str, loop_figures: LoopFigures, end_s: float | None = None)
     if end_s is not None and time[-1] < end_s:
         time, response = np.append(time, end_s), np.append(response, response[-1])
     return label, time, response
-
-
-def _db(values: np.ndarray) -> np.ndarray:
-    with np.errstate(divide="ignore"):
-        return np.asarray(20.0 * np.log10(np.abs(values)))

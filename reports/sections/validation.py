@@ -175,12 +175,16 @@ def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
 
 def table(rows: Sequence[Check], caption: str) -> doc.Block:
     """Lay checks out as a table."""
+
+    def error(row: Check) -> float:
+        return max(row.error, NOISE * abs(row.predicted or 1.0))  # no digits that are noise of the last bit
+
     columns = [
         doc.of(quantity_name, "quantity", "Prediction"),
         doc.of(lambda row: _rounded(row, row.predicted, 12), "predicted", "Predicted", format="sig:6"),
         doc.of(lambda row: _rounded(row, row.found, 10), "found", "Simulated", format="sig:6"),
         doc.of(lambda row: _scaled(row)[1], "unit", "Unit"),
-        doc.of(lambda row: _rounded(row, _error(row), 2), "error", "Error", format="sig:2"),
+        doc.of(lambda row: _rounded(row, error(row), 2), "error", "Error", format="sig:2"),
         doc.of(lambda row: _rounded(row, row.allowed, 2), "allowed", "Allowed", format="sig:2"),
         doc.of(lambda row: str(row.verdict), "verdict", "Verdict"),
         doc.of(lambda row: prose(row.because), "because", "Where"),
@@ -190,11 +194,6 @@ def table(rows: Sequence[Check], caption: str) -> doc.Block:
         caption, rows, columns, status=lambda row: row.verdict.role(),
         more=lambda row: {"_scale": _scaled(row)[0], "_unit": row.unit},  # back to what a night compares
     )  # fmt: skip
-
-
-def _error(row: Check) -> float:
-    """Without the digits that are noise of the last bit."""
-    return max(row.error, NOISE * abs(row.predicted or 1.0))
 
 
 def _scaled(row: Check) -> tuple[float, str]:
