@@ -89,12 +89,8 @@ def _intro(name: str, figures: LoopFigures) -> str:
 
 
 def _facts(figures: LoopFigures) -> doc.Block:
-    chosen = [
-        doc.fact(
-            each.label, _short(shown(each, figures), each.at_a_glance), each.shown[0], better=each.direction
-        )
-        for each in AT_A_GLANCE
-    ]
+    known = [(each, _short(shown(each, figures), each.at_a_glance)) for each in AT_A_GLANCE]
+    chosen = [doc.fact(of.label, value, of.shown[0], better=of.direction) for of, value in known]
     crossover = _short(margin_row(figures)["crossover_hz"], "sig:3")
     return doc.facts([*chosen, doc.fact("Gain crossover", crossover, "Hz")])
 
@@ -111,12 +107,9 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
     """Draw S and T, their peaks and the limit of a requirement."""
     peaks = figures.peaks
     assert peaks is not None
+    asked = [item for item in design.requirements if item.quantity == "sensitivity_peak"]
     limits = [
-        item.maximum
-        for item in design.requirements
-        if item.quantity == "sensitivity_peak"
-        and item.loop in (name, "every", None)
-        and item.maximum is not None
+        item.maximum for item in asked if item.loop in (name, "every", None) and item.maximum is not None
     ]
     grid_hz, values = grid / (2.0 * np.pi), []
     chart = style.Chart(width=style.HALF, height=225.0, loop=name)
@@ -156,12 +149,11 @@ def step(
     """Draw the step responses, as stairs where sampled, and the figures read from the first."""
     figures = loop_figures.step
     assert figures is not None
-    end = None
+    end, drawn = None, {"rotor free" if locked else "closed loop": loop_figures}
     if locked is not None and locked.step is not None:
         end = 4.0 * float(locked.step.settling_time_s)  # the motor's own motion goes on for much longer
-    responses = [_response("rotor free" if locked else "closed loop", loop_figures, end)]
-    if locked is not None and locked.step is not None:
-        responses.append(_response("rotor locked", locked, end))
+        drawn["rotor locked"] = locked
+    responses = [_response(label, one, end) for label, one in drawn.items()]
     width, height = (style.SMALL, 280.0) if small else (style.HALF, 225.0)
     chart = style.Chart(width=width, height=height, loop=name)
     panel = chart.panel(y="response to a unit step")
