@@ -199,7 +199,6 @@ def with_columns(block: Block, keys: Collection[str]) -> Block:
 
 
 def text(content: str) -> Block:
-    """Make a paragraph."""
     return {"kind": "text", "text": prose(content)}
 
 
@@ -223,7 +222,6 @@ def fact(label: str, value: Any, unit: str = "", *, better: int = 0) -> FactItem
 
 
 def facts(items: Iterable[FactItem]) -> Block:
-    """Make a list of labelled values."""
     return {"kind": "facts", "items": [plain(item) for item in items]}
 
 
@@ -282,12 +280,10 @@ def verdicts(items: Iterable[VerdictItem], what: str = "requirements") -> Block:
 
 
 def judged(blocks: Iterable[Block]) -> list[VerdictItem]:
-    """Every verdict of some blocks."""
     return [item for block in blocks if block["kind"] == "verdicts" for item in block["items"]]
 
 
 def details(title: str, blocks: Sequence[Block]) -> Block:
-    """Make a part that opens on demand."""
     return {"kind": "details", "title": title, "blocks": list(blocks)}
 
 
@@ -365,7 +361,6 @@ def _seen(value: Any) -> Any:
 
 
 def figures(made: Mapping[str, Any]) -> list[Block]:
-    """Give every figure block of a document, in order."""
     return [block for part in made["sections"] for block in walk(part) if block["kind"] == "figure"]
 
 

@@ -35,7 +35,6 @@ def tally(items: Iterable[Mapping[str, Any]]) -> Tally:
 
 
 def role(item: Mapping[str, Any]) -> Role:
-    """The colour of one item."""
     return Verdict(item["verdict"]).role(waived=bool(item["waiver"]))
 
 

@@ -151,7 +151,6 @@ class Panel:
         return made
 
     def points(self, x: Values, y: Values, label: str = "", **options: Any) -> Curve:
-        """Draw points only."""
         return self.curve(x, y, label, **{"marker": "o", "line": False, **options})
 
     def _rule(
@@ -173,7 +172,6 @@ class Panel:
     band_y = partialmethod(_band, "y")
 
     def shape(self, rings: Sequence[tuple[Values, Values]], label: str = "", **look: Any) -> None:
-        """Fill outlines."""
         made = [(numbers(x), numbers(y)) for x, y in rings]
         self.items.append(Shape(rings=made, look=_shade(look), label=label))
 
@@ -236,7 +234,6 @@ class Chart:
         return made
 
     def labels(self) -> list[tuple[str, Item]]:
-        """Give every legend entry once, in the order drawn."""
         result: dict[str, Item] = {}
         for item in (one for column in self.columns for panel in column.panels for one in panel.items):
             if not isinstance(item, Note) and item.label:

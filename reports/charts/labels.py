@@ -30,7 +30,6 @@ def text_width(words: str, size: float) -> float:
 
 
 def text_box(words: str, size: float) -> tuple[float, float]:
-    """Give width and height of one or several lines."""
     lines = words.split("\n")
     return max(text_width(line, size) for line in lines), LINE_EM * size * len(lines)
 

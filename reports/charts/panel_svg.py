@@ -18,7 +18,6 @@ RULE_LENGTH = 3000  # of rules; longer ones cost a browser dear where they are d
 
 
 def panel_svg(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
-    """Write a panel with its axes."""
     room = Room((frame.left + 2, frame.top + 2, frame.right - 2, frame.bottom - 2))
     world, marks = [], []
     for k, item in enumerate(panel.items):

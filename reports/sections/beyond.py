@@ -37,7 +37,6 @@ def large_commands(conditional: Conditional, axis: str = "rotary") -> doc.Sectio
 
 
 def findings_of(conditional: Conditional, axis: str = "rotary") -> list[doc.Finding]:
-    """What a reader must know of large commands."""
     if not conditional.diverges:
         return []
     text = _words(conditional, *output_unit(axis))[0]
@@ -133,7 +132,6 @@ def counts(found: Sequence[Counts], axis: str = "rotary") -> doc.Section:
 
 
 def sentence(one: Counts, axis: str) -> str:
-    """Say in one sentence what the counts do."""
     scale, unit, speed = _units(axis)
     side = "" if axis == "linear" else " (motor side)"
     words = [f"{one.ripple_rad_s:.2g} {speed} of ripple at {one.ripple_at_rad_s:.3g} {speed}{side}"]

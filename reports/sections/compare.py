@@ -46,7 +46,6 @@ def section(comparison: Comparison) -> list[doc.Section]:
 
 
 def text(comparison: Comparison | str) -> str | None:
-    """The example of a study file."""
     return comparison if isinstance(comparison, str) else None
 
 
@@ -61,13 +60,11 @@ def brief(comparison: Comparison) -> Brief:
 
 
 def data(comparison: Comparison) -> Tree:
-    """The result by its names."""
     kept = ("study", "names", "base", "variants", "sensitivities", "refused", "verdict")
     return {name: as_json(getattr(comparison, name)) for name in kept}
 
 
 def write(comparison: Comparison, folder: Path | None) -> list[str]:
-    """Write every figure of every design as a table."""
     if folder is None:
         return []
     write_text(folder / compare_best.TABLE, compare_best.table_text(comparison))
@@ -92,7 +89,6 @@ def _first_of(what: str, names: Sequence[str]) -> str:
 
 
 def verdicts(comparison: Comparison) -> doc.Section:
-    """Verdicts of every design: a row a requirement, a column a design."""
     wanted = comparison.base.verdicts
     blocks: list[doc.Block] = compare_best.worst(comparison)
     if wanted:
@@ -104,7 +100,7 @@ def verdicts(comparison: Comparison) -> doc.Section:
         title = "Requirements of every design"
         blocks += _side_by_side(title, wanted, heads, batches(comparison), _verdict_cell, note)
     for one in comparison.all:
-        named = [{**item(v), "id": f"{one.variant.slug}/{v.id}"} for v in one.verdicts]
+        named: list[doc.VerdictItem] = [{**item(v), "id": f"{one.variant.slug}/{v.id}"} for v in one.verdicts]
         blocks += [doc.details(f"Verdicts of {one.variant.name}", [doc.verdicts(named)])] if named else []
     refused, more = comparison.refused, len(comparison.refused) - compare_best.MANY
     blocks += [doc.text(f"{one.name}: no design. {one.error}") for one in refused[: compare_best.MANY]]
@@ -252,7 +248,6 @@ ROUNDING = 1e-9  # of a value
 
 
 def ledger(comparison: Comparison) -> list[doc.Section]:
-    """Make the section; nothing where no design was validated."""
     tested = [one for one in comparison.all if one.checks or one.untested]
     if not tested:
         return []

@@ -50,7 +50,6 @@ def summary(result: Corners) -> str:
 
 
 def unmet(corner: Corner) -> str:
-    """Name what a corner fails."""
     return ", ".join(_failings(corner))
 
 

@@ -41,7 +41,6 @@ def section(result: LimitCycles) -> doc.Section:
 
 
 def summary(result: LimitCycles) -> str:
-    """Say whether the drive as it is comes to rest."""
     fine, small = fine_unit(result.design.axis)
     swing, count = result.hunting, len(result.confirmations)
     seen = sum(one.verdict == "confirmed" for one in result.confirmations)

@@ -54,7 +54,6 @@ _COLUMNS = [
 
 
 def asked_words(result: Duty) -> str:
-    """Say the duty."""
     scale, unit = output_unit(result.design.axis)
     asked = result.asked
     words = f"±{scale * asked.amplitude_rad:.3g} {unit} at {asked.frequency_hz:.3g} Hz"

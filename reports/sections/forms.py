@@ -68,7 +68,6 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) -> doc.Row:
-    """Give one line, with the phase margin lost against the ideal form."""
     margins, response = margin_row(figures), response_row(figures)
     reference = margin_row(ideal)["phase_margin_deg"] if ideal else None
     own = margins["phase_margin_deg"]

@@ -134,7 +134,6 @@ LOWEST = 0.02  # of the linear margin: what lies below is drawn here
 
 
 def by_amplitude(items: Sequence[AmplitudeMargin]) -> list[doc.Block]:
-    """Make figure, remarks and table, if there are any."""
     if not items:
         return []
     return [_amplitudes(items), *(doc.text(words) for words in remarks(items)), _amplitude_table(items)]

@@ -98,7 +98,6 @@ def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
 
 
 def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[doc.VerdictItem]:
-    """Judge the rate-limit formulas, where they apply."""
     if not (sawtooth.runs and sawtooth.applicable):
         return []
 

@@ -45,7 +45,6 @@ def section(design: Design, border: Onset) -> doc.Section:
 
 
 def _chart(design: Design, border: Onset, scale: float, unit: str) -> style.Chart:
-    """Draw every limiter's line; below the lowest the linear model holds."""
     chart = style.Chart(
         width=style.WIDE, height=370.0, legend=True, legend_title="limit reached at this amplitude"
     )
@@ -160,7 +159,6 @@ EVERY = 2  # a glyph in every second column
 
 
 def map_chart(result: LargeSignals, scale: float, unit: str) -> style.Chart:
-    """Draw regions, glyphs and lines."""
     made = style.Chart(
         width=style.WIDE, height=500.0, legend=True, legend_title="waveform; first reached, linear loop"
     )
@@ -187,14 +185,12 @@ def map_chart(result: LargeSignals, scale: float, unit: str) -> style.Chart:
 
 
 def _edges(centres: np.ndarray) -> np.ndarray:
-    """Give the borders between points on a logarithmic scale."""
     inner = np.sqrt(centres[1:] * centres[:-1])
     first, last = centres[0] ** 2 / inner[0], centres[-1] ** 2 / inner[-1]
     return np.concatenate([[first], inner, [last]])
 
 
 def _regions(panel: style.Panel, cause: np.ndarray, xe: np.ndarray, ye: np.ndarray) -> None:
-    """Fill the points of each cause."""
     boxes: dict[str, list[Any]] = {}
     for k, row in enumerate(cause):
         for a, b in pairwise([0, *(np.flatnonzero(np.diff(row)) + 1).tolist(), len(row)]):
@@ -216,7 +212,6 @@ def _glyphs(panel: style.Panel, waveform: np.ndarray, x: np.ndarray, y: np.ndarr
 
 
 def _onsets(panel: style.Panel, hertz: np.ndarray, each_rad: Mapping[str, np.ndarray], scale: float) -> None:
-    """Draw A_k(w) of every limiter."""
     for name, values in each_rad.items():
         if np.isfinite(values).any():
             limited = np.where(np.isfinite(values), scale * np.asarray(values), np.nan)

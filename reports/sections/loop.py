@@ -33,7 +33,6 @@ Response = tuple[str, np.ndarray, np.ndarray]  # label, time in s, response
 
 
 def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
-    """Make the section of one loop; of a current loop that with the rotor locked is drawn beside it."""
     locked = figures.locked
     grid = frequency_grid(figures)
     title, status = LOOPS[name], worst_status([figures.sound])

@@ -250,7 +250,6 @@ def evidence_notes(named: Mapping[str, LoopFigures]) -> list[str]:
 
 
 def margin_table(named: Mapping[str, LoopFigures]) -> doc.Block:
-    """Make the table of the margins to quote."""
     note = (
         "Of several crossings the table quotes the gain margin nearest to 0 dB and the phase margin nearest "
         "to 0°; all of them are listed below. A dash means that there is no such crossing, or that the loop "
@@ -262,7 +261,6 @@ def margin_table(named: Mapping[str, LoopFigures]) -> doc.Block:
 
 
 def response_table(named: Mapping[str, LoopFigures]) -> doc.Block:
-    """Make the table of bandwidths and step figures."""
     note = (
         "−3 dB: where the closed loop has fallen to 1/√2 of its gain at DC. −90°: where its phase reaches "
         "−90°. Current and velocity: the feedback loop. Position: the response from the user's command to "
@@ -312,7 +310,6 @@ def range_words(range_: Spread, quantity: str) -> str:
 
 
 def crossing_table(named: Mapping[str, LoopFigures]) -> doc.Block:
-    """Make the table of every crossing."""
     rows = [row for name, loop_figures in named.items() for row in _crossings(name, loop_figures)]
     return doc.table("Every gain and phase crossover", CROSSING_COLUMNS, rows)
 
@@ -381,7 +378,7 @@ def _crossings(name: str, figures: LoopFigures) -> list[doc.Row]:
     delays = {margin.frequency_rad_s: margin for margin in m.delay_margins}
     for phase in m.phase_margins:
         delay = delays.get(phase.frequency_rad_s)
-        more = {"delay_ms": delay and delay.seconds * 1e3, "samples": delay and delay.samples}
+        more: doc.Row = {"delay_ms": delay.seconds * 1e3, "samples": delay.samples} if delay else {}
         more["note"] = touches if phase.tangent else ""
         rows.append(_crossing(name, "gain crossover", phase.deg, "deg", phase.frequency_rad_s) | more)
     return rows

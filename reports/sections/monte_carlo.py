@@ -49,14 +49,12 @@ def section(result: MonteCarloResult) -> doc.Section:
 
 
 def brief(result: MonteCarloResult) -> Brief:
-    """The odds in few columns."""
     kept = ("label", "probability", "low", "nominal", "worst", "unit")
     tables = [doc.with_columns(_odds_table(result), kept)] if result.odds else []
     return Brief(_result(result), tables, [*result.notes, f"samples and worst designs: {result.folder}"])
 
 
 def text(result: MonteCarloResult | Design) -> str | None:
-    """One sample as a design file."""
     return write_design(result).rstrip("\n") if isinstance(result, Design) else None
 
 
@@ -77,7 +75,6 @@ def _result(result: MonteCarloResult) -> str:
 
 
 def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
-    """Judge one requirement by its odds."""
     wanted = 1.0 if result.at_least is None else result.at_least
     passed = result.judged(odds) is Verdict.MET
     reason = "" if passed else _why(odds, result.case(odds))
@@ -241,6 +238,10 @@ def _worst_table(result: MonteCarloResult) -> doc.Block:
         doc.of(lambda case: "" if case.file is None else case.file.name, "file", "Design file"),
     ]
     for k, path in enumerate(result.paths):
-        columns.append(doc.of(lambda case, path=path: case.parameters[path], f"p{k}", path, format="sig:5"))
+        columns.append(doc.of(partial(_parameter, path), f"p{k}", path, format="sig:5"))
     note = "Each is saved as a design that `report` opens."
     return doc.listing("Worst designs, SI values", result.worst, columns, note)
+
+
+def _parameter(path: str, case: WorstCase) -> float:
+    return case.parameters[path]

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> doc.Section:
-    """Make the section from the verdicts; ``load_unit`` is N for a linear axis."""
     if not verdicts:
         none = "The design states no requirements."
         return doc.section("verdicts", "Requirements", [], result=none, status="info")
@@ -42,7 +41,6 @@ def result(verdicts: Sequence[RequirementVerdict]) -> str:
 
 
 def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem:
-    """Make one line of the verdicts."""
     requirement = verdict.requirement
     limit, comparison = _limit(verdict)
     unlimited = "unlimited" * (verdict.value is not None and math.isinf(verdict.value))

@@ -35,7 +35,6 @@ def section(result: Motion) -> doc.Section:
 
 
 def data(result: Motion) -> Tree:
-    """What happened in numbers, without the rows."""
     full = result.design.validation.full_deflection_rad
     return {**summary(result.run, full), "files": result.asked.files}
 

@@ -161,7 +161,6 @@ def _planes(result: Specification) -> list[doc.Block]:
 def _bound(
     panel: style.Panel, name: str, speed: np.ndarray, torque: np.ndarray, inside: tuple[float, float]
 ) -> None:
-    """Draw one bound in both halves, named once."""
     look: style.Style = {"colour": BOUND_COLOURS.get(name, style.INK), "width": 1.3, "dash": 1}
     if speed[0] == speed[-1]:
         panel.rule_x(speed[0], name, **look)
@@ -176,7 +175,6 @@ def _bound(
 
 
 def _top(result: Specification, moves: list[Any]) -> float:
-    """Torque that the frame must show."""
     level = [c.torque_Nm[0] for c in result.plane.bounds if c.torque_Nm[0] == c.torque_Nm[-1]]
     return float(max([*level, *(move.peak_torque_Nm for move in moves)], default=1.0))
 

@@ -23,7 +23,6 @@ STATES = {
 
 
 def of_design(design: Design) -> doc.Section:
-    """Make the section of a report from the linear loops alone."""
     return {**section(stiffness(design, simulated=False)), "status": "info"}
 
 

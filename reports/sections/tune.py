@@ -30,7 +30,6 @@ def section(result: TuningResult) -> doc.Section:
 
 
 def write(result: TuningResult, folder: Path | None) -> list[str]:
-    """Write the tuned design into the folder."""
     if folder is None:
         return []
     write_text(folder / "tuned.toml", write_design(result.design))
@@ -145,7 +144,6 @@ def _curve(result: TuningResult) -> doc.Block:
 
 
 def checks(result: TuningResult) -> doc.Block:
-    """The nonlinear check."""
     scale, unit = output_unit(result.design.axis)
     columns = [
         doc.of("corner", "corner", "Design"),
