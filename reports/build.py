@@ -14,14 +14,14 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import as_path
 from actuator_lti.files.tree import Tree
-from analyses.corners import corners
+from analyses.corners.run import corners
 from analyses.isolation import attempt, isolated
 from reports import document as doc
 from reports.analyses import BY_NAME, FURTHER, Analysis
 from reports.document_schema import Document
 
 if TYPE_CHECKING:
-    from analyses.corners import Corners
+    from analyses.corners.run import Corners
     from analyses.isolation import Missing
     from analyses.linear.loop_figures import LoopFigures
     from analyses.linear.loop_survey import LoopSurvey

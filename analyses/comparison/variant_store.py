@@ -1,4 +1,4 @@
-"""What was found of each design of a comparison, on disk as JSON: a study that was stopped goes on.
+"""What is found of each design of a comparison, on disk as JSON: a study that was stopped goes on.
 
 An entry's name is the hash of all that it depends on (texts of both designs, commands, code, libraries). It
 is checked like any other file when it is read; one that is damaged is computed again.
@@ -8,55 +8,97 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.reading import decode, read_bytes
-from actuator_lti.files.tree import Tree
+from analyses.specification.requirements import RequirementVerdict
 from analyses.studies.proof import code_version
+from analyses.validation.row import Row
 
 LIBRARIES = ("numpy", "scipy")
 
 
 @dataclass(frozen=True)
-class Store:
-    """Entries in one folder."""
+class Changed:
+    """One key that differs from the base, as texts."""
 
-    folder: Path
+    path: str
+    base: str
+    text: str
 
-    def read(self, key: str) -> Tree | None:
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one changed key alone does to a figure, starting from the base."""
+
+    path: str
+    amount: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """What is found of one design of a comparison: plain data, kept on disk as they are."""
+
+    # By column, such as ``"position.phase_margin"``; ``None`` where there is none
+    figures: dict[str, float | None]
+    verdicts: tuple[RequirementVerdict, ...]
+    changed: tuple[Changed, ...] = ()
+    differences: dict[str, float] = field(default_factory=dict)  # figure minus the base's, where they differ
+    # For each difference the changed keys one at a time, the strongest first; what is left over is their
+    # interaction (or a key without a number)
+    moved_by: dict[str, tuple[Contribution, ...]] = field(default_factory=dict)
+    # Of the validator: each prediction beside what the simulator shows; empty where not asked for
+    checks: tuple[Row, ...] = ()
+    untested: str = ""  # why the validator could not test this design
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What is found of the designs of a study, in one folder; nothing without one."""
+
+    folder: Path | None
+    base: Design
+    settings: object  # its ``repr`` says all of them
+
+    def read(self, design: Design) -> Found | None:
         """What was found; ``None`` where there is nothing, or nothing whole."""
-        path = self._path(key)
-        if not path.exists():
+        path = self._path(design)
+        if path is None or not path.exists():
             return None
         try:
             head, _, body = decode(read_bytes(path, "entry"), str(path)).partition("\n")
-            result = json.loads(body) if head == _digest(body) else None
-        except (InputError, ValueError, RecursionError):
+            return _adapter().validate_python(json.loads(body)) if head == _digest(body) else None
+        except (InputError, ValueError, RecursionError):  # or not what this version writes
             return None
-        return result if isinstance(result, dict) else None
 
-    def write(self, key: str, result: Mapping[str, Any]) -> None:
-        """Keep what was found."""
-        body = json.dumps(result)
-        write_bytes(self._path(key), f"{_digest(body)}\n{body}".encode())
+    def write(self, design: Design, found: Found) -> Found:
+        """Keep what was found, and give it back."""
+        if (path := self._path(design)) is not None:
+            body = json.dumps(_adapter().dump_python(found))
+            write_bytes(path, f"{_digest(body)}\n{body}".encode())
+        return found
 
-    def _path(self, key: str) -> Path:
+    def _path(self, design: Design) -> Path | None:
+        if self.folder is None:
+            return None
+        texts = [write_design(one) for one in (self.base, design)]
+        key = _digest(json.dumps([texts, repr(self.settings), _code()]))
         return self.folder / key[:2] / f"{key}.json"
 
 
-def address(designs: tuple[Design | None, ...], settings: object) -> str:
-    """Name of what is found of designs with settings (whose ``repr`` says all of them)."""
-    texts = [None if design is None else write_design(design) for design in designs]
-    return _digest(json.dumps([texts, repr(settings), _code()]))
+@cache
+def _adapter() -> TypeAdapter[Found]:
+    """Turns what is found into plain data and back."""
+    return TypeAdapter(Found)
 
 
 @cache

@@ -9,7 +9,6 @@ import numpy as np
 
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, CORNERED, QUANTITIES
 from actuator_lti.asked.verdict import Tally, Verdict
-from actuator_lti.batch import Population
 from actuator_lti.design.access import with_values
 from actuator_lti.design.model import Design, Temperature, Tolerance
 from actuator_lti.design.tolerances import tolerances
@@ -18,7 +17,7 @@ from actuator_lti.loops import assemble_loops
 from analyses.corners.asked import Asked
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures
 from analyses.specification.requirements import RequirementVerdict, judged, tally
-from analyses.specification.sensitivity import population_figures
+from analyses.specification.sensitivity import moved, population_figures
 from analyses.studies.sampling import Factor
 
 
@@ -45,14 +44,12 @@ class Corner:
 
 @dataclass(frozen=True)
 class Corners:
-    """All corners of a design, the nominal drive first.
-
-    ``left_out``: requirements on what only an analysis of one design finds; they are not proven at corners.
-    """
+    """All corners of a design, the nominal drive first."""
 
     design: Design
     asked: Asked
     corners: tuple[Corner, ...]
+    # Requirements on what only an analysis of one design finds; they are not proven at corners
     left_out: tuple[RequirementVerdict, ...] = ()
 
     @property
@@ -83,22 +80,20 @@ def corners(design: Design, asked: Asked | None = None) -> Corners:
     ['nominal', 'hot', 'cold', 'low supply', 'hot, low supply', 'worst gain margin', 'worst phase margin']
     """
     asked = Asked.of(design) if asked is None else asked
-    others = [QUANTITIES[one.quantity] for one in design.requirements]
     left_out = tuple(
         verdict
-        for one, quantity in zip(design.requirements, others, strict=True)
-        if quantity.scope == "analysis" and not quantity.cornered
+        for one in design.requirements
+        if (quantity := QUANTITIES[one.quantity]).scope == "analysis" and not quantity.cornered
         for verdict in judged(design, one, {}, _not_here)
     )
-    return Corners(design, asked, tuple(_judged(*each) for each in _made(design, asked)), left_out)
-
-
-def _judged(name: str, words: str, design: Design) -> Corner:
     kept = tuple(one for one in design.requirements if one.quantity not in ANALYSIS_QUANTITIES)
-    design = replace(design, requirements=kept)
-    figures = all_loop_figures(assemble_loops(design))
-    verdicts = tuple(verdict for one in kept for verdict in judged(design, one, figures, _not_here))
-    return Corner(name, words, design, figures, verdicts)
+    made = []
+    for name, words, there in _made(design, asked):
+        there = replace(there, requirements=kept)
+        figures = all_loop_figures(assemble_loops(there))
+        verdicts = tuple(verdict for one in kept for verdict in judged(there, one, figures, _not_here))
+        made.append(Corner(name, words, there, figures, verdicts))
+    return Corners(design, asked, tuple(made), left_out)
 
 
 def _not_here(name: str) -> tuple[None, str]:
@@ -124,7 +119,11 @@ def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
         name, values = f"worst {QUANTITIES[quantity].words}", worst_ends(design, quantity)
         if values:
             worse = "lowers" if QUANTITIES[quantity].better > 0 else "raises"
-            words = f"each tolerance at the end that {worse} it: " + _ends_in_words(design, values)
+            nominal = {path: float(design.parameters[path].value) for path in values}
+            up = [path for path, value in values.items() if value > nominal[path]]
+            down = [path for path, value in values.items() if value < nominal[path]]
+            ends = [f"{', '.join(paths)} {way}" for paths, way in ((up, "high"), (down, "low")) if paths]
+            words = f"each tolerance at the end that {worse} it: {'; '.join(ends)}"
             yield name, words, with_values(design, values)
 
 
@@ -138,15 +137,13 @@ def _thickened(design: Design, factor: float) -> Design:
     """The design with its viscous friction times a factor."""
     friction, load = design.friction, design.load
     back = friction.viscous_reverse_Nms_rad
-    changed = replace(
-        friction,
-        viscous_Nms_rad=factor * friction.viscous_Nms_rad,
-        viscous_reverse_Nms_rad=None if back is None else factor * back,
-    )
+    back = None if back is None else factor * back
+    viscous = factor * friction.viscous_Nms_rad
     if load.friction is not None:
         behind = replace(load.friction, viscous_Nms_rad=factor * load.friction.viscous_Nms_rad)
         load = replace(load, friction=behind)
-    return replace(design, friction=changed, load=load)
+    thick = replace(friction, viscous_Nms_rad=viscous, viscous_reverse_Nms_rad=back)
+    return replace(design, friction=thick, load=load)
 
 
 def worst_ends(design: Design, quantity: str) -> dict[str, float]:
@@ -157,11 +154,8 @@ def worst_ends(design: Design, quantity: str) -> dict[str, float]:
     """
     ends = [end for each in tolerances(design) for end in _ends(design, *each)]
     base = {path: float(design.parameters[path].value) for end in ends for path in end}
-    values = {
-        path: np.array([value, *(end.get(path, value) for end in ends)]) for path, value in base.items()
-    }
     try:
-        figures = population_figures(Population(design, values, 1 + len(ends)), design)
+        figures = population_figures(moved(design, base, ends), design)
     except InputError:
         return {}
     better = QUANTITIES[quantity].better
@@ -185,10 +179,3 @@ def _ends(design: Design, path: str, nominal: float, tolerance: Tolerance) -> li
         back = float(design.parameters[_BACK_EMF].value)
         return [{**end, _BACK_EMF: back * end[path] / nominal} for end in ends]
     return ends
-
-
-def _ends_in_words(design: Design, values: dict[str, float]) -> str:
-    up = [path for path, value in values.items() if value > float(design.parameters[path].value)]
-    down = [path for path, value in values.items() if value < float(design.parameters[path].value)]
-    parts = [f"{', '.join(paths)} {way}" for paths, way in ((up, "high"), (down, "low")) if paths]
-    return "; ".join(parts)

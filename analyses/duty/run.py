@@ -20,56 +20,42 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Overload:
-    """The overload (I2t) state under this duty, for ever repeated; it acts at 1.
+    """The overload (I2t) state under this duty, for ever repeated; it acts at 1."""
 
-    ``peak``: largest in the periodic state, as if the protection did not act.
-    ``acts_after_s``: from the cold drive, to the end of the cycle in which it does; None: never.
-    """
-
-    peak: float
-    acts_after_s: float | None
+    peak: float  # largest in the periodic state, as if the protection did not act
+    acts_after_s: float | None  # from the cold drive, to the end of the cycle in which it does; None: never
 
 
 @dataclass(frozen=True)
 class Heating:
-    """Temperature of the winding, the copper loss of a cycle taken as its mean.
+    """Temperature of the winding, the copper loss of a cycle taken as its mean."""
 
-    ``loss_W``: mean copper loss at the reference temperature.
-    ``final_degC``: in the long run, the resistance growing with the temperature; inf: it never settles.
-    ``limit_after_s``: when the limit is reached from ambient; None: never.
-    ``time_s``, ``temperature_degC``: the rise from ambient, for drawing.
-    """
-
-    loss_W: float
-    final_degC: float
+    loss_W: float  # mean copper loss at the reference temperature
+    final_degC: float  # in the long run, the resistance growing with the temperature; inf: it never settles
     limit_degC: float
-    limit_after_s: float | None
+    limit_after_s: float | None  # when the limit is reached from ambient; None: never
+    # The rise from ambient, for drawing
     time_s: Floats
     temperature_degC: Floats
 
 
 @dataclass(frozen=True)
 class Duty:
-    """A duty cycle and what it asks of the motor.
-
-    ``rms_A``, ``moving_rms_A``, ``holding_A``, ``peak_A``: current: of the whole cycle, in motion (steady),
-    at rest, largest.
-    ``continuous_A``: what the design allows for ever; inf where it states none.
-    ``limited``: limiters that act in steady motion: the duty is then not followed as asked.
-    ``time_s``, ``current_A``: one period of the steady motion.
-    ``overload``, ``heating``: None without overload protection, without a thermal resistance in the design.
-    """
+    """A duty cycle and what it asks of the motor."""
 
     design: Design
     asked: Asked
+    # Current: of the whole cycle, in motion (steady), at rest, largest
     rms_A: float
     moving_rms_A: float
     holding_A: float
     peak_A: float
-    continuous_A: float
-    limited: tuple[str, ...]
+    continuous_A: float  # what the design allows for ever; inf where it states none
+    limited: tuple[str, ...]  # limiters that act in steady motion: the duty is then not followed as asked
+    # One period of the steady motion
     time_s: Floats
     current_A: Floats
+    # None without overload protection, without a thermal resistance in the design
     overload: Overload | None
     heating: Heating | None
 
@@ -115,8 +101,10 @@ def duty(design: Design, asked: Asked | None = None) -> Duty:
     asked = Asked.of(design) if asked is None else asked
     free = replace(design, limits=replace(design.limits, peak_time_s=None))
     run, ticks = _moving(free, asked)
-    current = run.current_A[-ticks:]
-    held = _holding_A(free, asked) if asked.share < 1.0 else 0.0
+    current, held = run.current_A[-ticks:], 0.0
+    if asked.share < 1.0:
+        still = simulate(free, commands.hold(), HOLD_S, asked.load_Nm).current_A
+        held = float(np.sqrt(np.mean(still[still.size // 2 :] ** 2)))
     moving = float(np.sqrt(np.mean(current**2)))
     rms = float(np.sqrt(asked.share * moving**2 + (1.0 - asked.share) * held**2))
     acts = [name for name in run.limits if name != "profile" and run.limit_active(name)[-ticks:].any()]
@@ -138,12 +126,6 @@ def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
     ticks = max(1, round(1.0 / (asked.frequency_hz * Ts * every))) * every
     sine = commands.sine(asked.amplitude_rad, 1.0 / (ticks * Ts))
     return simulate(design, sine, (PERIODS + 1) * ticks * Ts, asked.load_Nm), ticks
-
-
-def _holding_A(design: Design, asked: Asked) -> float:
-    """Mean square root of the current while the drive holds still under the load."""
-    run = simulate(design, commands.hold(), HOLD_S, asked.load_Nm)
-    return float(np.sqrt(np.mean(run.current_A[run.current_A.size // 2 :] ** 2)))
 
 
 def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Overload | None:

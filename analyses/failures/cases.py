@@ -85,7 +85,7 @@ class Rig:
         self.plant = Drive(plant_of(broken), state, self.load_Nm)
 
     def step(self, command: float) -> Measured:
-        """One tick; returns the truth at its start, `moment_Nm` what the train carried then."""
+        """One tick; gives the truth at its start. `moment_Nm` is what the train carried, at the output."""
         true = self.measured()
         seen = true if self.sensing is None else self.sensing(true)
         bus = self.plant.value("voltage_limit")
@@ -96,14 +96,12 @@ class Rig:
         if self.driving is not None:
             u = self.driving(u, bus)
         self.plant.step(u)
-        self.moment_Nm = self._moment(true.current_A, u)
+        design = self.design
+        if design.coupling is not None:
+            self.moment_Nm = self.plant.noted("coupling_torque") * design.ratio_behind_coupling
+        else:
+            self.moment_Nm = float(motor_torque_Nm(design, true.current_A, u)) * design.total_ratio
         return true
-
-    def _moment(self, current_A: float, voltage_V: float) -> float:
-        """In the coupling, at the output; rigid: the motor's torque times the reduction."""
-        if self.design.coupling is not None:
-            return self.plant.noted("coupling_torque") * self.design.ratio_behind_coupling
-        return float(motor_torque_Nm(self.design, current_A, voltage_V)) * self.design.total_ratio
 
 
 HELD = 1e6  # times the stall torque: no torque of the drive moves a jam
@@ -115,55 +113,60 @@ Course = Callable[[float], float]
 
 @dataclass(frozen=True)
 class Case:
-    """One failure.
-
-    ``start_rad``: where the drive holds before.
-    ``command``: command over the time from the failure on (from the step on, where ``at_rad`` is given).
-    ``broken``: what is done to the rig at the failure.
-    ``at_rad``: the failure happens on the way, when the output is this far from the start; ``None``: at once.
-    ``stops``: whether the run ends at the stop.
-    """
+    """One failure."""
 
     name: str
     words: str
-    start_rad: float
-    command: Course
-    broken: Callable[[Rig], None]
+    command: Course  # command over the time from the failure on (from the step on, where ``at_rad`` is given)
+    broken: Callable[[Rig], None] = lambda _: (
+        None
+    )  # what is done to the rig; nothing: the command alone fails
+    start_rad: float = 0.0  # where the drive holds before
+    # The failure happens on the way, when the output is this far from the start; ``None``: at once
     at_rad: float | None = None
-    stops: bool = True
+    stops: bool = True  # whether the run ends at the stop
 
 
 def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, str]]:
     """The cases that exist for a design, and why the others do not."""
     far, near = asked.stop_rad, asked.deflection_rad
+    half = _size(design, 0.5 * far)
+
+    def hold(value: float) -> Course:
+        return lambda _: value
+
+    def hard_over(rig: Rig) -> None:
+        rig.driving = lambda _, bus: bus
+
     made = [
-        Case("hard-over", "the power stage puts the whole bus on the motor", 0.0, _constant(0.0), _hard_over),
-        Case("open-phase", _open_words(design), 0.0, _constant(0.0), _open),
+        Case("hard-over", "the power stage puts the whole bus on the motor", hold(0.0), hard_over),
+        Case("open-phase", _open_words(design), hold(0.0), _open),
     ]
     if design.controller.position is None:
-        why = "the drive has no position loop"
-        return tuple(made), dict.fromkeys(_LOOP_CASES, why)
+        return tuple(made), dict.fromkeys(_LOOP_CASES, "the drive has no position loop")
     frequency, where = _followed_most_hz(design)
+    sine = f"a sine of {_size(design, near)} at {frequency:.3g} Hz, {where}"
+    frozen = f"the position sensor freezes, the command steps by {_size(design, near)}"
+    lost = f"the position sensor reads zero while the drive holds {half}"
     made += [
-        Case("hard-over-command", "the command jumps to the stop", 0.0, _constant(far), _nothing),
+        Case("hard-over-command", "the command jumps to the stop", hold(far)),
         Case(
-            "jam", "the output jams half-way through a step to the stop", 0.0, _constant(far),
-            lambda rig: rig.fail(jammed(design)), at_rad=0.5 * far, stops=False,
+            "jam",
+            "the output jams half-way through a step to the stop",
+            hold(far),
+            lambda rig: rig.fail(jammed(design)),
+            at_rad=0.5 * far,
+            stops=False,
         ),
-        Case(
-            "frozen-sensor", f"the position sensor freezes, the command steps by {_size(design, near)}", 0.0,
-            _constant(near), lambda rig: _sense(rig, lose=False),
-        ),
-        Case(
-            "lost-sensor", f"the position sensor reads zero while the drive holds {_size(design, 0.5 * far)}",
-            0.5 * far, _constant(0.5 * far), lambda rig: _sense(rig, lose=True),
-        ),
+        Case("frozen-sensor", frozen, hold(near), lambda rig: _sense(rig, lose=False)),
+        Case("lost-sensor", lost, hold(0.5 * far), lambda rig: _sense(rig, lose=True), start_rad=0.5 * far),
         Case(
             "oscillatory-command",
-            f"a sine of {_size(design, near)} at {frequency:.3g} Hz, {where}", 0.0,
-            lambda t: near * math.sin(2.0 * math.pi * frequency * t), _nothing, stops=False,
+            sine,
+            lambda t: near * math.sin(2.0 * math.pi * frequency * t),
+            stops=False,
         ),
-    ]  # fmt: skip
+    ]
     return tuple(made), {}
 
 
@@ -181,18 +184,6 @@ def jammed(design: Design) -> Design:
     behind = design.load.friction or LoadFriction()
     held = replace(behind, dry_torque_Nm=hold * design.ratio_to_coupling)
     return replace(design, load=replace(design.load, friction=held))
-
-
-def _constant(value: float) -> Course:
-    return lambda _: value
-
-
-def _nothing(rig: Rig) -> None:
-    """The command alone fails."""
-
-
-def _hard_over(rig: Rig) -> None:
-    rig.driving = lambda _, bus: bus
 
 
 def _open(rig: Rig) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, log
 
@@ -22,53 +21,39 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FailureCase:
-    """One failure; time runs from the failure, deflection from where the output then was.
+    """One failure; time runs from the failure, deflection from where the output then was."""
 
-    ``name``, ``words``: such as ``"hard-over"``, and what happens.
-    ``time_s``, ``deflection_rad``, ``current_A``, ``moment_Nm``: output side; the moment is that in the
-    coupling (rigid: the motor's torque times the reduction).
-    ``to_deflection_s``, ``to_stop_s``: time to the deflection asked for and to the stop, either side;
-    ``None``: not reached while watched.
-    ``at_detection_rad``: largest deflection until the failure is detected.
-    ``peak_current_A``, ``peak_moment_Nm``: largest magnitudes.
-    ``protected_s``: when the overload protection (I2t) acts first.
-    """
-
-    name: str
-    words: str
+    name: str  # such as ``"hard-over"``
+    words: str  # what happens
+    # Output side; the moment is that in the coupling (rigid: the motor's torque times the reduction)
     time_s: Floats
     deflection_rad: Floats
     current_A: Floats
     moment_Nm: Floats
+    # To the deflection asked for and to the stop, either side; ``None``: not reached while watched
     to_deflection_s: float | None
     to_stop_s: float | None
-    at_detection_rad: float
+    at_detection_rad: float  # largest deflection until the failure is detected
+    # Largest magnitudes
     peak_current_A: float
     peak_moment_Nm: float
-    protected_s: float | None
+    protected_s: float | None  # when the overload protection (I2t) acts first
 
 
 @dataclass(frozen=True)
 class Failures:
-    """All cases of a design.
-
-    ``left_out``: by name: why a case does not exist for the drive.
-    ``before``: what holding each start ends in, the drive whole.
-    """
+    """All cases of a design."""
 
     design: Design
     asked: Asked
     cases: tuple[FailureCase, ...]
-    left_out: dict[str, str]
-    before: tuple[Settling, ...]
+    left_out: dict[str, str]  # by name: why a case does not exist for the drive
+    before: tuple[Settling, ...]  # what holding each start ends in, the drive whole
 
     def case(self, name: str) -> FailureCase:
         """A case by its name.
 
-        Raises
-        ------
-        InputError
-            Where there is none of that name.
+        Raises `InputError`: where there is none of that name.
         """
         for one in self.cases:
             if one.name == name:
@@ -110,12 +95,15 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
         raise InputError(f"watched {asked.watched_s:g} s: at most {longest:g} s with this period")
     wait = _settling_s(design, asked)
     cases, left_out = cases_of(design, asked)
-    settled = {start: _settled(design, asked, start, wait) for start in {case.start_rad for case in cases}}
+    settled = {case.start_rad: Rig(design, asked.load_Nm) for case in cases}
+    for start, rig in settled.items():
+        for _ in range(ceil(wait / design.controller.period_s)):
+            rig.step(start)
     made = list[FailureCase]()
     for case in cases:
         rig = settled[case.start_rad].copy()
         if _reaches(rig, case):
-            made.append(_run(rig, asked, case))
+            made.append(_followed(rig, asked, case))
         else:
             left_out |= {case.name: f"its output does not get half-way to the stop in {LONGEST_S:g} s"}
     before = tuple(outcome(design, asked.load_Nm, start) for start in sorted(settled))
@@ -133,16 +121,8 @@ def _settling_s(design: Design, asked: Asked) -> float:
     return min(0.1 + travel + ticks * design.controller.period_s, LONGEST_S)
 
 
-def _settled(design: Design, asked: Asked, start_rad: float, wait_s: float) -> Rig:
-    """The drive as it holds a command."""
-    rig = Rig(design, asked.load_Nm)
-    for _ in range(ceil(wait_s / design.controller.period_s)):
-        rig.step(start_rad)
-    return rig
-
-
-def _run(rig: Rig, asked: Asked, case: Case) -> FailureCase:
-    """Fail and follow."""
+def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
+    """What comes of a failure."""
     Ts = rig.design.controller.period_s
     start = rig.measured().output_angle_rad
     case.broken(rig)
@@ -153,7 +133,22 @@ def _run(rig: Rig, asked: Asked, case: Case) -> FailureCase:
         rows.append((k * Ts, moved, true.current_A, rig.moment_Nm, rig.controller.value("overloaded")))
         if case.stops and abs(moved) >= asked.stop_rad:
             break
-    return _judged(case, asked, *np.array(rows).T)
+    t, moved, current, moment, overloaded = np.array(rows).T
+    protected = np.flatnonzero(overloaded > 0.0)
+    return FailureCase(
+        name=case.name,
+        words=case.words,
+        time_s=t,
+        deflection_rad=moved,
+        current_A=current,
+        moment_Nm=moment,
+        to_deflection_s=_first(t, np.abs(moved), asked.deflection_rad),
+        to_stop_s=_first(t, np.abs(moved), asked.stop_rad),
+        at_detection_rad=float(np.abs(moved)[t <= asked.detection_s * (1.0 + 1e-12)].max()),
+        peak_current_A=float(np.abs(current).max()),
+        peak_moment_Nm=float(np.abs(moment).max()),
+        protected_s=float(t[protected[0]]) if protected.size else None,
+    )
 
 
 def _reaches(rig: Rig, case: Case) -> bool:
@@ -166,34 +161,11 @@ def _reaches(rig: Rig, case: Case) -> bool:
     return case.at_rad is None
 
 
-def _judged(
-    case: Case, asked: Asked, t: Floats, moved: Floats, current: Floats, moment: Floats, overloaded: Floats
-) -> FailureCase:
-    size = np.abs(moved)
-    return FailureCase(
-        name=case.name,
-        words=case.words,
-        time_s=t,
-        deflection_rad=moved,
-        current_A=current,
-        moment_Nm=moment,
-        to_deflection_s=_first(
-            size >= asked.deflection_rad, lambda k: _between(t, size, k, asked.deflection_rad)
-        ),
-        to_stop_s=_first(size >= asked.stop_rad, lambda k: _between(t, size, k, asked.stop_rad)),
-        at_detection_rad=float(size[t <= asked.detection_s * (1.0 + 1e-12)].max()),
-        peak_current_A=float(np.abs(current).max()),
-        peak_moment_Nm=float(np.abs(moment).max()),
-        protected_s=_first(overloaded > 0.0, lambda k: float(t[k])),
-    )
-
-
-def _first(true: np.ndarray, when: Callable[[int], float]) -> float | None:
-    return when(int(np.argmax(true))) if true.any() else None
-
-
-def _between(t: Floats, size: Floats, k: int, level: float) -> float:
-    """Time at which the level is crossed, on a line between two ticks."""
-    if k == 0:
+def _first(t: Floats, size: Floats, level: float) -> float | None:
+    """Time at which a level is first crossed, on a line between two ticks."""
+    there = np.flatnonzero(size >= level)
+    if not there.size:
+        return None
+    if (k := int(there[0])) == 0:
         return float(t[0])
     return float(t[k] - (t[k] - t[k - 1]) * (size[k] - level) / (size[k] - size[k - 1]))

@@ -12,6 +12,7 @@ from scipy.optimize import root_scalar
 from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.angle import holding_torque_Nm
 from actuator_lti.drive.steady import motor_torque_Nm, standing_gain
+from analyses.finite import finite
 from analyses.linear.static_threshold import StaticThreshold, static_threshold
 from nonlinear import Rows, commands, simulate
 from nonlinear.bench.operating_motion import operating_motion_at
@@ -32,24 +33,13 @@ class Waiting:
 
 @dataclass(frozen=True)
 class Threshold:
-    """Threshold of motion at one load torque.
+    """Threshold of motion at one load torque."""
 
-    Attributes
-    ----------
-    static : StaticThreshold
-        What the gains predict.
-    waiting : tuple of Waiting
-        Steps below the threshold, where a controller integrates and no kick of a step moves it at once.
-    simulated_rad : float or None
-        Smallest forward step that ever moves the output, where nothing integrates.
-    resolution : float
-        Of ``simulated_rad``, relative.
-    """
-
-    static: StaticThreshold
+    static: StaticThreshold  # What the gains predict
+    # Steps below the threshold, where a controller integrates and no kick of a step moves it at once
     waiting: tuple[Waiting, ...]
-    simulated_rad: float | None
-    resolution: float
+    simulated_rad: float | None  # Smallest forward step that ever moves the output, where nothing integrates
+    resolution: float  # Of ``simulated_rad``, relative
 
 
 def threshold(design: Design, load_Nm: float) -> Threshold | None:
@@ -60,40 +50,29 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
     """
     design = replace(design, command=Command())
     moment = load_Nm + float(design.load.moment_Nm(0.0))
-    static = static_threshold(_motor_alone(design), moment)
+    friction = design.friction
+    at_zero = replace(  # its own torque there an offset, no friction behind the spring
+        design,
+        motor=design.motor.level(),
+        load=replace(design.load.level(), friction=None),
+        friction=replace(friction, offset_torque_Nm=friction.offset_torque_Nm + holding_torque_Nm(design)),
+    )
+    static = static_threshold(at_zero, moment)
     if not 0.0 < static.forward_rad < math.inf:
         return None
     if design.controller.position_loop.kicks:
         return Threshold(static, (), None, 0.0)  # a step's own kick moves it at once
     if static.integral_time_s is not None:
-        return Threshold(static, _waiting(design, load_Nm, static), None, 0.0)
+        sizes = static.forward_rad * np.array(FRACTIONS)
+        waiting = tuple(
+            Waiting(float(size), static.waiting_time_s(float(size)), finite(time))
+            for size, time in zip(sizes, _first_motion_s(design, load_Nm, sizes), strict=True)
+        )
+        return Threshold(static, waiting, None, 0.0)
     sizes = static.forward_rad * np.linspace(1.0 - WITHIN, 1.0 + WITHIN, COUNT)
     moved = _first_motion_s(design, load_Nm, sizes) < math.inf
     first = float(sizes[np.argmax(moved)]) if moved.any() else None
     return Threshold(static, (), first, 2.0 * WITHIN / (COUNT - 1))
-
-
-def _motor_alone(design: Design) -> Design:
-    """The drive at angle zero: its own torque there an offset, no friction behind the spring."""
-    friction = design.friction
-    offset = friction.offset_torque_Nm + holding_torque_Nm(design)
-    return replace(
-        design,
-        motor=design.motor.level(),
-        load=replace(design.load.level(), friction=None),
-        friction=replace(friction, offset_torque_Nm=offset),
-    )
-
-
-def _waiting(design: Design, load_Nm: float, static: StaticThreshold) -> tuple[Waiting, ...]:
-    """Steps below the threshold and when each moves the output."""
-    sizes = static.forward_rad * np.array(FRACTIONS)
-    predicted = [static.waiting_time_s(float(size)) for size in sizes]
-    seen = _first_motion_s(design, load_Nm, sizes)
-    return tuple(
-        Waiting(float(size), foreseen, float(time) if math.isfinite(time) else None)
-        for size, foreseen, time in zip(sizes, predicted, seen, strict=True)
-    )
 
 
 def _first_motion_s(design: Design, load_Nm: float, sizes: np.ndarray) -> np.ndarray:
@@ -123,26 +102,20 @@ SLOW_RAD_S = 1e-100  # motor speed at which nothing viscous counts
 
 @dataclass(frozen=True)
 class Hysteresis:
-    """One settled period of a slow triangle at the command.
+    """One settled period of a slow triangle at the command."""
 
-    ``amplitude_rad``, ``frequency_hz``: of the triangle; the width depends on its rate where a controller
-    integrates.
-    ``command_rad``, ``output_rad``: one period at updates of the position loop, thinned.
-    ``width_rad``: output falling less output rising, both where the command passes zero.
-    ``linear_width_rad``: the same without dry friction and play: what the loop lags by at this rate.
-    ``largest_rad``: largest distance of the output from what it would be without dry friction and play, at
-    any update of the position loop in the period.
-    ``predicted_rad``: what a reversal loses of a slow command: `lost_predicted_rad`.
-    """
-
+    # Of the triangle; the width depends on its rate where a controller integrates
     amplitude_rad: float
     frequency_hz: float
+    # One period at updates of the position loop, thinned
     command_rad: np.ndarray
     output_rad: np.ndarray
-    width_rad: float
-    linear_width_rad: float
+    width_rad: float  # output falling less output rising, both where the command passes zero
+    linear_width_rad: float  # the same without dry friction and play: what the loop lags by at this rate
+    # Largest distance of the output from what it would be without dry friction and play, at any update of the
+    # position loop in the period
     largest_rad: float
-    predicted_rad: float
+    predicted_rad: float  # what a reversal loses of a slow command: `lost_predicted_rad`
 
     @property
     def lost_motion_rad(self) -> float:

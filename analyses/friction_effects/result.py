@@ -14,9 +14,8 @@ from actuator_lti.drive.operating import dry_torque
 from actuator_lti.loops import assemble_loops
 from analyses.friction_effects.breakaway import Hysteresis, Threshold, hysteresis, threshold
 from analyses.large_signal.steady_start import linear_steady_state
-from analyses.limit_cycles.friction import at_load, cycles_of_friction, dry_Nm
-from analyses.limit_cycles.result import Confirmation, Cycle
-from analyses.limit_cycles.run import confirm
+from analyses.limit_cycles.describing import at_load, cycles_of_friction, dry_Nm
+from analyses.limit_cycles.run import Confirmation, Cycle, confirm
 from analyses.limit_cycles.stick_slip import StickSlipCycle, stick_slip_cycle
 from analyses.motion.settling import Settling, noticed, settlings_of
 from analyses.specification.capability import drive_figures
@@ -29,18 +28,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LimitCycles:
-    """Everything about limit cycles at one load torque.
+    """Everything about limit cycles at one load torque."""
 
-    ``design``: without counts and noise.
-    ``confirmations``: empty: the describing function predicts none.
-    ``stick_slip``: what the analysis of rest, breakaway and slip predicts beside it.
-    ``settlings``: steps of several sizes: the drive rests, breaks away, and may hunt.
-    """
-
-    design: Design
-    confirmations: tuple[Confirmation, ...]
-    stick_slip: StickSlipCycle | None
-    settlings: tuple[Settling, ...]
+    design: Design  # without counts and noise
+    confirmations: tuple[Confirmation, ...]  # empty: the describing function predicts none
+    stick_slip: StickSlipCycle | None  # what the analysis of rest, breakaway and slip predicts beside it
+    settlings: tuple[Settling, ...]  # steps of several sizes: the drive rests, breaks away, and may hunt
 
     @property
     def hunting(self) -> Settling | None:
@@ -52,21 +45,20 @@ class LimitCycles:
         """Whether a step ended in a cycle in which no limit acts."""
         return self.hunting is not None and not self.hunting.rest.limited
 
+    def right(self, *predicted: bool) -> bool:
+        """Whether a stable cycle is predicted exactly where a step ends in one, and all are confirmed."""
+        stable = any((*predicted, *(item.cycle.stable for item in self.confirmations)))
+        return all(item.verdict == "confirmed" for item in self.confirmations) and stable == self.by_friction
+
     @property
     def described(self) -> bool:
-        """Whether the describing function is right about friction.
-
-        A stable cycle is predicted exactly where a step ends in one, and every predicted one is confirmed.
-        """
-        stable = any(item.cycle.stable for item in self.confirmations)
-        return all(item.verdict == "confirmed" for item in self.confirmations) and stable == self.by_friction
+        """Whether the describing function is right about friction."""
+        return self.right()
 
     @property
     def as_predicted(self) -> bool:
         """Whether describing function and stick-slip analysis together are right about friction."""
-        slips = self.stick_slip is not None and self.stick_slip.stable
-        stable = slips or any(item.cycle.stable for item in self.confirmations)
-        return all(item.verdict == "confirmed" for item in self.confirmations) and stable == self.by_friction
+        return self.right(self.stick_slip is not None and self.stick_slip.stable)
 
 
 def limit_cycles(
@@ -104,32 +96,26 @@ def described_cycles(design: Design, load_Nm: float) -> tuple[Cycle, ...]:
 
 @dataclass(frozen=True)
 class FrictionPoint:
-    """What dry friction does at one load torque.
+    """What dry friction does at one load torque."""
 
-    ``load_Nm``, ``dry_torque_Nm``: dry friction at the motor, forward.
-    ``threshold``: ``None`` where a forward step has none.
-    """
-
+    # Dry friction at the motor, forward
     load_Nm: float
     dry_torque_Nm: float
-    threshold: Threshold | None
+    threshold: Threshold | None  # ``None`` where a forward step has none
     hysteresis: Hysteresis | None
     cycles: LimitCycles
 
 
 @dataclass(frozen=True)
 class FrictionEffects:
-    """Friction at small signals, one point a load torque.
-
-    ``integrator``: the controller that integrates, ``"speed"`` or ``"position"``: then friction leaves no
-    lasting error by itself; empty where none does.
-    ``reason``: why there is nothing to show; then ``points`` is empty.
-    """
+    """Friction at small signals, one point a load torque."""
 
     design: Design
     points: tuple[FrictionPoint, ...]
+    # The controller that integrates, ``"speed"`` or ``"position"``: then friction leaves no lasting error by
+    # itself; empty where none does
     integrator: str
-    reason: str = ""
+    reason: str = ""  # why there is nothing to show; then ``points`` is empty
 
 
 def friction_effects(
@@ -153,44 +139,27 @@ def friction_effects(
     InputError, NumericalError
         As `assemble_loops` and `simulate`.
     """
-    integrator = _integrator(design)
+    control, own, integrator = design.controller, design.controller.own_law, ""
+    if own is not None and own[1].integrates and own[0] != "current":
+        integrator = "speed" if own[0] == "velocity" else own[0]
+    elif control.velocity is not None and control.velocity.integral_time_s is not None:
+        integrator = "speed"
+    elif control.position_loop.integral_time_s is not None:
+        integrator = "position"
     loads = design.validation.loads_Nm
     if not any(dry_Nm(design, load) > 0.0 for load in loads):
         return FrictionEffects(design, (), integrator, "the design has no dry friction")
     loops = assemble_loops(design) if loops is None else loops
     settling = linear_steady_state(loops, np.array([1.0])).settling_ticks
-    points: list[FrictionPoint] = []
+    points, alone = list[FrictionPoint](), quiet(design)
     most = max(loads, key=lambda load: dry_Nm(design, load))
     described = described_cycles(design, most)
     for load in loads:
         scaled = tuple(at_load(cycle, design, load) for cycle in described if dry_Nm(design, load) > 0.0)
         if design.friction.points and load != most:  # a map does not grow in proportion to the load
             scaled = described_cycles(design, load)
-        points.append(_point(design, loops, load, settling, scaled, settlings))
+        result = threshold(alone, load)
+        loop = None if result is None else hysteresis(alone, load, result.static, settling)
+        cycles = limit_cycles(design, load, scaled, loops, settlings)
+        points.append(FrictionPoint(load, float(dry_torque(design, load, 1)), result, loop, cycles))
     return FrictionEffects(design, tuple(points), integrator)
-
-
-def _integrator(design: Design) -> str:
-    """The controller whose integral overcomes dry friction: that of the speed, else of the position."""
-    control, own = design.controller, design.controller.own_law
-    if own is not None and own[1].integrates and own[0] != "current":
-        return {"velocity": "speed"}.get(own[0], own[0])
-    if control.velocity is not None and control.velocity.integral_time_s is not None:
-        return "speed"
-    return "" if control.position_loop.integral_time_s is None else "position"
-
-
-def _point(
-    design: Design,
-    loops: Loops,
-    load_Nm: float,
-    settling_ticks: int,
-    described: tuple[Cycle, ...],
-    settlings: Iterable[Settling] | None,
-) -> FrictionPoint:
-    alone = quiet(design)
-    result = threshold(alone, load_Nm)
-    loop = None if result is None else hysteresis(alone, load_Nm, result.static, settling_ticks)
-    dry = float(dry_torque(design, load_Nm, 1))
-    cycles = limit_cycles(design, load_Nm, described, loops, settlings)
-    return FrictionPoint(load_Nm, dry, result, loop, cycles)

@@ -17,10 +17,10 @@ from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
+from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.tones import TANH_TOLERANCE, tone
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS, Rows
-from nonlinear.runs.reduced import BatchResult
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
@@ -33,27 +33,22 @@ UPDATES = 400  # of the position loop in a window
 
 @dataclass(frozen=True)
 class RestSweep:
-    """Response from rest, one entry a frequency.
+    """Response from rest, one entry a frequency."""
 
-    ``frequency_hz``, ``amplitude_rad``, shape (K,): command at the output shaft, peak.
-    ``measured``, ``sliding``, ``described``, shape (K,): output over command: simulated; sliding loop;
-    describing function at ``speed_rad_s`` (NaN where nothing moves).
-    ``speed_rad_s``, shape (K,): amplitude of the motor speed that was seen.
-    ``stick_fraction``, ``distortion``, ``unsteadiness``, shape (K,): of the last window; distortion of the
-    motor speed.
-    ``limiter``: limit that acted in the last window, or empty.
-    """
-
+    # Shape (K,): command at the output shaft, peak
     frequency_hz: Floats
     amplitude_rad: Floats
+    # Shape (K,): output over command: simulated; sliding loop; describing function at ``speed_rad_s`` (NaN
+    # where nothing moves)
     measured: Complexes
     sliding: Complexes
     described: Complexes
-    speed_rad_s: Floats
+    speed_rad_s: Floats  # shape (K,): amplitude of the motor speed that was seen
+    # Shape (K,): of the last window; distortion of the motor speed
     stick_fraction: Floats
     distortion: Floats
     unsteadiness: Floats
-    limiter: tuple[str, ...]
+    limiter: tuple[str, ...]  # limit that acted in the last window, or empty
 
 
 def sweep_from_rest(
@@ -99,15 +94,10 @@ def sweep_from_rest(
         stick_fraction=result.window_stick_fraction,
         distortion=result.distortion("motor_speed_rad_s"),
         unsteadiness=result.unsteadiness("output_angle_rad"),
-        limiter=tuple(_acting(result, k) for k in range(asked.size)),
+        limiter=tuple(
+            LIMITERS[int(np.argmax(row))] if row.any() else "" for row in limiter_fractions(result)
+        ),
     )
-
-
-def _acting(result: BatchResult, k: int) -> str:
-    """Name of the limit that acted longest in the last window of a run."""
-    used = {name: float(result.window_limit_fraction(name)[k]) for name in LIMITERS}
-    name = max(used, key=lambda item: used[item])
-    return name if used[name] > 0.0 else ""
 
 
 def _linear(design: Design, frequency_hz: Floats, speed_rad_s: float | None) -> Complexes:

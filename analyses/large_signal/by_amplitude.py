@@ -8,7 +8,7 @@ not be the linear one.  A finding with figures, no check.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil, nan
 
@@ -32,35 +32,27 @@ TOO_MANY = 40_000_000  # ticks of the values asked about one margin, as where th
 
 @dataclass(frozen=True)
 class AmplitudeMargin:
-    """Where an oscillation lasts after a release from one deviation.
-
-    ``kind``, ``size``: ``"gain"`` or ``"delay"``; ``"small"``, ``"medium"`` or ``"large"``.
-    ``part``: of the full deflection, speed or current.
-    ``linear``: the linear margin (factor, or samples).
-    ``value``: factor or samples; 1 (0) where the nominal drive oscillates already; ``None``: not up to
-    ``furthest``.
-    ``limiter``: limit that acts longest while the oscillation lasts, just past the value; empty where none
-    does.
-    ``output``: amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value.
-    ``coarser``: whether fewer than `VALUES` were asked, nearer to the linear margin: those take over
-    `MOST_TICKS`.
-    ``too_long``: whether none was asked, as they take over `TOO_MANY` ticks.
-    """
+    """Where an oscillation lasts after a release from one deviation."""
 
     loop: str
+    # ``"gain"`` or ``"delay"``; ``"small"``, ``"medium"`` or ``"large"``
     kind: str
     size: str
-    part: float
+    part: float  # of the full deflection, speed or current
     friction_on: bool
-    linear: float
+    linear: float  # the linear margin (factor, or samples)
+    # Factor or samples; 1 (0) where the nominal drive oscillates already; ``None``: not up to ``furthest``
     value: float | None
     furthest: float
     period_s: float
+    # Limit that acts longest while the oscillation lasts, just past the value; empty where none does
     limiter: str = ""
+    # Amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value
     output: float = nan
     axis: str = "rotary"
+    # Whether fewer than `VALUES` were asked, nearer to the linear margin: those take over `MOST_TICKS`
     coarser: bool = False
-    too_long: bool = False
+    too_long: bool = False  # whether none was asked, as they take over `TOO_MANY` ticks
 
 
 def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
@@ -79,28 +71,18 @@ def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
         for kind, linear, hertz in asked:
             for size in SIZES:
                 for friction_on in (False, True) if rough else (False,):
-                    yield _released(bench, name, kind, linear, hertz, size, friction_on)
+                    release = _Release(bench, name, kind, hertz, SIZES[size], friction_on)
+                    value, seen = _first(release, linear)
+                    found = (linear, value, FURTHEST * linear, bench.setup(name).period_s, *seen)
+                    about = (bench.design.axis, release.coarser, release.too_long)
+                    yield AmplitudeMargin(name, kind, size, SIZES[size], friction_on, *found, *about)
 
 
-def _released(
-    bench: Bench, name: str, kind: str, linear: float, hertz: float, size: str, friction_on: bool
-) -> AmplitudeMargin:
-    """Where an oscillation lasts, and what limits it there."""
-    release = _Release(bench, name, kind, hertz, SIZES[size], friction_on)
-    asked = [] if release.too_long else _asked(kind, linear, coarser=release.coarser)
-    value, seen = _first(release, asked)
-    found = (linear, value, FURTHEST * linear, bench.setup(name).period_s, *seen, bench.design.axis)
-    return AmplitudeMargin(
-        name, kind, size, SIZES[size], friction_on, *found, coarser=release.coarser,
-        too_long=release.too_long,
-    )  # fmt: skip
-
-
-def _first(release: _Release, asked: Sequence[float]) -> tuple[float | None, tuple[str, float]]:
+def _first(release: _Release, linear: float) -> tuple[float | None, tuple[str, float]]:
     """The first value at which an oscillation lasts, closed in from the one before; none beyond is asked."""
     low, seen = -1.0, ("", nan)
     value: float | None = None
-    for one in asked:
+    for one in _asked(release, linear):
         if (lasting := release.lasting(one)) is not None:
             value, seen = one, lasting
             break
@@ -112,9 +94,12 @@ def _first(release: _Release, asked: Sequence[float]) -> tuple[float | None, tup
     return value, seen
 
 
-def _asked(kind: str, linear: float, *, coarser: bool) -> list[float]:
+def _asked(release: _Release, linear: float) -> list[float]:
     """The drive as it is, then values from well below the linear margin to well beyond it."""
-    if coarser:
+    kind = release.kind
+    if release.too_long:
+        return []
+    if release.coarser:
         near = [linear * (1.0 + CLOSE) ** power for power in (-1, 0, 1, 3, 7, 15, 31)]
         return [0.0, linear / 4.0, *near, FURTHEST * linear]
     least = max(linear / 3.0, 1.05) if kind == "gain" else linear / 20.0

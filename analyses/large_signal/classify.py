@@ -17,30 +17,20 @@ TRIANGLE_THIRD, PARABOLA_THIRD = -1.0 / 9.0, 1.0 / 27.0
 
 @dataclass(frozen=True)
 class RateLimited:
-    """A sine through a pure rate limit R, with ``x = w A/R``.
-
-    ``gain``: fundamental of the output over the command.
-    ``lag_deg``: positive: the output comes later.
-    ``peak``: peak of the output, in the unit of R times s; ``None`` between the two regimes.
-    """
+    """A sine through a pure rate limit R, with ``x = w A/R``."""
 
     x: float
     regime: Literal["linear", "between", "triangle"]
-    gain: float
-    lag_deg: float
-    peak: float | None
+    gain: float  # fundamental of the output over the command
+    lag_deg: float  # positive: the output comes later
+    peak: float | None  # peak of the output, in the unit of R times s; ``None`` between the two regimes
 
 
 def rate_limited(amplitude: float, omega_rad_s: float, rate_limit: float) -> RateLimited:
     """Describing function of a pure rate limit (model.md section 5; between the regimes an accepted fit).
 
-    Parameters
-    ----------
-    amplitude : float
-        Peak of the command.
-    omega_rad_s : float
-    rate_limit : float
-        R, in the unit of the amplitude per second.
+    ``amplitude``: peak of the command.
+    ``rate_limit``: R, in the unit of the amplitude per second.
 
     Examples
     --------

@@ -13,7 +13,7 @@ it and goes on integrating.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import asin, inf, isfinite, pi, sqrt
 from typing import TYPE_CHECKING, Literal
@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.steady_gains import stage_gain
+from actuator_lti.drive.steady import stage_gain
 from actuator_lti.errors import TooManyTicks
 from actuator_lti.loops import exact_margins, periodic_loop
 from analyses.large_signal.tones import full_range
@@ -35,7 +35,6 @@ from nonlinear.bench.operating_motion import lasting_torque_Nm
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins, Loops
     from actuator_lti.loops.periodic import PeriodicLoop
-    from nonlinear.runs.reduced import BatchResult
 
 Floats = npt.NDArray[np.float64]
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]
@@ -58,55 +57,38 @@ LOW_GAIN = 0.02  # lower gain margins below this are out of reach of any limit
 
 @dataclass(frozen=True)
 class Prediction:
-    """What the describing function of a limit says of a loop with a lower gain margin.
+    """What the describing function of a limit says of a loop with a lower gain margin."""
 
-    ``point``: break point in front of the limit (all other loops closed).
-    ``limit``: in the unit of the point.
-    ``limiter``: what limits there: ``"current limit"``, ``"voltage limit"``, ``"voltage limit as a current,
-    U/R"``.
-    ``gain_lower``: lower gain margin, factor (below 1).
-    ``amplitude``: in front of the limit, peak, in the unit of the point: the border between dying out and
-    growing.
-    ``output_rad``: amplitude of the output angle that goes with it.
-    ``antiwindup``: whether the controller in front stops its integral while the limit acts.
-    """
-
-    point: str
-    limit: float
+    point: str  # break point in front of the limit (all other loops closed)
+    limit: float  # in the unit of the point
+    # What limits there: ``"current limit"``, ``"voltage limit"``, ``"voltage limit as a current, U/R"``
     limiter: str
-    gain_lower: float
+    gain_lower: float  # lower gain margin, factor (below 1)
+    # In front of the limit, peak, in the unit of the point: the border between dying out and growing
     amplitude: float
     frequency_hz: float
-    output_rad: float
-    antiwindup: bool
+    output_rad: float  # amplitude of the output angle that goes with it
+    antiwindup: bool  # whether the controller in front stops its integral while the limit acts
 
 
 @dataclass(frozen=True)
 class Conditional:
-    """Whether a large command makes the drive diverge.
+    """Whether a large command makes the drive diverge."""
 
-    ``margins``: at every break point.
-    ``threshold_rad``: largest step of the output that still settles; ``None`` where all steps up to full
-    deflection do, 0 where not even the smallest tried does.
-    ``next_rad``: smallest step tried that does not; it has been watched for four times as long.
-    ``oscillation_hz``, ``oscillation_rad``: frequency, and amplitude of the output error, while the step at
-    the threshold hovers there.
-    ``limiter``: the limit that acts longest at the end of the smallest step that does not settle.
-    ``limiter_share``: of the ticks at that end.
-    ``end_rad``: half of the output's span at that end.
-    """
-
-    margins: dict[str, ExactMargins]
+    margins: dict[str, ExactMargins]  # at every break point
     predictions: tuple[Prediction, ...]
+    # Largest step of the output that still settles; ``None`` where all steps up to full deflection do, 0
+    # where not even the smallest tried does
     threshold_rad: float | None
-    next_rad: float | None
+    next_rad: float | None  # smallest step tried that does not; it has been watched for four times as long
     full_deflection_rad: float
+    # Frequency, and amplitude of the output error, while the step at the threshold hovers there
     oscillation_hz: float | None
     oscillation_rad: float | None
-    limiter: str
-    limiter_share: float = 0.0
+    limiter: str = ""  # the limit that acts longest at the end of the smallest step that does not settle
+    limiter_share: float = 0.0  # of the ticks at that end
     ending: Ending | Literal[""] = ""
-    end_rad: float | None = None
+    end_rad: float | None = None  # half of the output's span at that end
 
     @property
     def diverges(self) -> bool:
@@ -148,29 +130,21 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
     result = [
         _prediction(loops, point, margins[point].gain_lower, limit, limiter)
         for point, limit, limiter in _limits(design)
-        if margins[point].stable and margins[point].gain_lower > LOW_GAIN
+        if isfinite(limit) and margins[point].stable and margins[point].gain_lower > LOW_GAIN
     ]
-    predictions = tuple(one for one in result if one is not None)
     design = quiet(design)
     threshold, following = step_threshold(design, settle_ticks)
-    hertz, amplitude, end = None, None, None
-    if following is not None:
-        end = _end(design, following, settle_ticks)
-    if threshold is not None and threshold > 0.0:
-        hertz, amplitude = _hovering(design, threshold, settle_ticks)
-    return Conditional(
+    hertz, amplitude = _hovering(design, threshold, settle_ticks) if threshold else (None, None)
+    found = Conditional(
         margins=margins,
-        predictions=predictions,
+        predictions=tuple(one for one in result if one is not None),
         threshold_rad=threshold,
         next_rad=following,
         full_deflection_rad=design.validation.full_deflection_rad,
         oscillation_hz=hertz,
         oscillation_rad=amplitude,
-        limiter="" if end is None else end.limiter,
-        limiter_share=0.0 if end is None else end.share,
-        ending="" if end is None else end.words,
-        end_rad=None if end is None else end.output_rad,
     )
+    return found if following is None else _ended(found, design, following, settle_ticks)
 
 
 def _limits(design: Design) -> list[tuple[str, float, str]]:
@@ -183,13 +157,12 @@ def _limits(design: Design) -> list[tuple[str, float, str]]:
         result = [("i_ref", min(limits.peak_current_A, short), name)]
     if "w_ref" in points:
         result.append(("w_ref", limits.speed_rad_s, "speed limit"))
-    return [item for item in result if isfinite(item[1])]
+    return result
 
 
 def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: str) -> Prediction | None:
     """The limit cycle at the lower gain margin; none where the drive drifts away there."""
     ratio = saturation_ratio(gain)
-
     hertz = _oscillation_hz(periodic_loop(loops, point), gain)
     if hertz == 0.0:
         return None
@@ -285,10 +258,7 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
     constant amount
     a period, not by a share of itself: only windows of many periods (``longer``) tell it from one that stays.
 
-    Raises
-    ------
-    TooManyTicks
-        Where one run would take more than `LONGEST_TICKS`.
+    Raises `TooManyTicks`: where one run would take more than `LONGEST_TICKS`.
     """
     rows = step_rows(design, sizes_rad, settle_ticks, longer)
     if rows["ticks"].max() > LONGEST_TICKS:
@@ -301,16 +271,11 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
     near = errors[0] <= np.maximum(CONVERGED * sizes_rad, _standing(design) + accepted_rad(design))
     low, high = result.span("output_angle_rad")
     rests = high - low <= RESTING * sizes_rad
-    limited = _limited(result)
+    limited = np.max([result.window_limit_fraction(name) for name in OWN], axis=0)
     held = rests & (limited > HELD)
     alone = (limited == 0.0) & (errors[0] < GROWS * errors[1])
     falls = (errors[0] < LASTING * errors[1]) & (errors[0] < sizes_rad)
-    return result.ok & ~held & (near | rests | alone | falls)
-
-
-def _limited(result: BatchResult) -> Floats:
-    """Part of the last window in which a limit of the drive acts: the one that acts longest."""
-    return np.asarray(np.max([result.window_limit_fraction(name) for name in OWN], axis=0))
+    return np.asarray(result.ok & ~held & (near | rests | alone | falls))
 
 
 def _standing(design: Design) -> float:
@@ -350,17 +315,7 @@ def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int 
     return rows
 
 
-@dataclass(frozen=True)
-class _End:
-    """What a step that does not settle ends in."""
-
-    words: Ending
-    output_rad: float
-    limiter: str
-    share: float
-
-
-def _end(design: Design, size_rad: float, settle_ticks: int) -> _End:
+def _ended(found: Conditional, design: Design, size_rad: float, settle_ticks: int) -> Conditional:
     """Watch the smallest step that does not settle for longer: what it ends in, and which limit acts then."""
     result = step_rows(design, np.array([size_rad]), settle_ticks, AGAIN[1]).run()
     spans = [float(np.subtract(*result.span("output_angle_rad", last)[::-1])[0]) for last in (0, 1)]
@@ -372,7 +327,13 @@ def _end(design: Design, size_rad: float, settle_ticks: int) -> _End:
         ending = "diverges"
     elif spans[0] <= RESTING * size_rad:
         ending = "is held by a limit"
-    return _End(ending, 0.5 * spans[0], limiter if shares[limiter] > 0.0 else "", shares[limiter])
+    return replace(
+        found,
+        limiter=limiter if shares[limiter] > 0.0 else "",
+        limiter_share=shares[limiter],
+        ending=ending,
+        end_rad=0.5 * spans[0],
+    )
 
 
 def _hovering(design: Design, size_rad: float, settle_ticks: int) -> tuple[float | None, float | None]:

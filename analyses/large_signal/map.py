@@ -13,6 +13,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
+from analyses.finite import finite
 from analyses.large_signal.classify import (
     CAUSES,
     WAVEFORMS,
@@ -44,36 +45,28 @@ LONG = 0.1  # periods of the highest tone
 
 @dataclass(frozen=True)
 class AmplitudeMap:
-    """Sines of many amplitudes and frequencies, each settled; arrays of points are (amplitude, frequency).
-
-    ``amplitude_rad``, shape (a,): peak command at the output shaft (linear axis: m).
-    ``frequency_hz``, shape (f,).
-    ``cause``, ``waveform``, shape (a, f): index into `CAUSES` and `WAVEFORMS`; criteria in
-    `analyses.large_signal.classify`.
-    ``limiter_fraction``, shape (a, f, limiters): fraction of the last window in which speed, acceleration,
-    current and voltage limits act.
-    ``stick_fraction``, ``distortion``, ``unsteadiness``, shape (a, f): of the output in the last window.
-    ``response``, shape (a, f): fundamental of the output over the command.
-    ``linear``, shape (f,): the same from the linear sampled loop, sliding.
-    ``onset_rad``, shape (f,): A_k(w) of each limiter from the linear loop, no load; without protection that
-    is slow against the tones, which acts later than they are simulated (`slow_protection`).
-    ``ticks``: simulated in all.
-    ``coarser``: whether the grid is coarser than asked for, as that would take more than `MOST_TICKS`.
-    """
+    """Sines of many amplitudes and frequencies, each settled; arrays of points are (amplitude, frequency)."""
 
     load_Nm: float
-    amplitude_rad: np.ndarray
-    frequency_hz: np.ndarray
+    amplitude_rad: np.ndarray  # shape (a,): peak command at the output shaft (linear axis: m)
+    frequency_hz: np.ndarray  # shape (f,)
+    # Shape (a, f): index into `CAUSES` and `WAVEFORMS`; criteria in `analyses.large_signal.classify`
     cause: np.ndarray
     waveform: np.ndarray
+    # Shape (a, f, limiters): fraction of the last window in which speed, acceleration, current and voltage
+    # limits act
     limiter_fraction: np.ndarray
+    # Shape (a, f): of the output in the last window
     stick_fraction: np.ndarray
     distortion: np.ndarray
     unsteadiness: np.ndarray
-    response: np.ndarray
-    linear: np.ndarray
+    response: np.ndarray  # shape (a, f): fundamental of the output over the command
+    linear: np.ndarray  # shape (f,): the same from the linear sampled loop, sliding
+    # Shape (f,): A_k(w) of each limiter from the linear loop, no load; without protection that is slow
+    # against the tones, which acts later than they are simulated (`slow_protection`)
     onset_rad: Mapping[str, np.ndarray]
-    ticks: int
+    ticks: int  # simulated in all
+    # Whether the grid is coarser than asked for, as that would take more than `MOST_TICKS`
     coarser: bool = False
 
     @property
@@ -134,7 +127,9 @@ def amplitude_map(
     ``loops`` are sampled and sliding, of this design; ``counts`` are fewer where they would take more than
     `MOST_TICKS`.
     """
-    asked, counts = counts, _within(design, loops, counts)
+    asked, work = counts, counts[0] * work_ticks(design, loops, counts[1])
+    part = min(np.sqrt(MOST_TICKS / work), 1.0)  # of the grid on either side, within `MOST_TICKS`
+    counts = max(int(part * asked[0]), 2), max(int(part * asked[1]), 2)
     frequencies = tones(design, loops, counts[1])
     omega = np.array([t.omega_rad_s for t in frequencies])
     threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
@@ -175,12 +170,6 @@ def amplitude_map(
     )
 
 
-def _within(design: Design, loops: Loops, counts: tuple[int, int]) -> tuple[int, int]:
-    """The grid asked for, or one of the same shape whose first run takes at most `MOST_TICKS`."""
-    part = min(np.sqrt(MOST_TICKS / (counts[0] * work_ticks(design, loops, counts[1]))), 1.0)
-    return max(int(part * counts[0]), 2), max(int(part * counts[1]), 2)
-
-
 def slow_protection(design: Design, loops: Loops) -> list[str]:
     """Limiters that average for longer than a tone is simulated: they act much later."""
     limits = design.limits
@@ -196,45 +185,29 @@ MINUS_3DB = 20.0 * math.log10(math.sqrt(0.5))
 
 @dataclass(frozen=True)
 class AmplitudeBode:
-    """Responses at the amplitudes that a design asks for, and how the bandwidth falls with amplitude.
-
-    Attributes
-    ----------
-    load_Nm : float
-    frequency_hz : ndarray, shape (f,)
-    fractions : tuple of float
-        Of full deflection; those of the design that the map has.
-    amplitude_rad : ndarray, shape (k,)
-    gain_db, phase_deg : ndarray, shape (k, f)
-        Of the fundamental; -inf and NaN where nothing moves, NaN where it did not settle.
-    linear_db, linear_deg : ndarray, shape (f,)
-    all_amplitude_rad : ndarray, shape (a,)
-        Every amplitude of the map.
-    minus3db_hz, minus90deg_hz : ndarray, shape (a,)
-        First crossing; between two frequencies of the map the linear response, and what the simulated one is
-        off by, interpolated on the logarithm of frequency; NaN where there is none in the range
-        (`below_from_start`: already below at the lowest frequency), and where it lies beside points that are
-        not steady: a missing point is no value. -3 dB is 1/sqrt(2) of the linear gain at zero frequency.
-    minus3db_range_hz : ndarray, shape (a, 2)
-        Between which frequencies of the map the gain first falls through -3 dB, as far as steady points tell:
-        from 0 where the first of them is below already, to inf where none is.
-    below_from_start : ndarray of bool, shape (a,)
-        Whether the gain is below -3 dB at the lowest frequency already.
-    linear_minus3db_hz, linear_minus90deg_hz : float or None
-    """
+    """Responses at the amplitudes that a design asks for, and how the bandwidth falls with amplitude."""
 
     load_Nm: float
-    frequency_hz: np.ndarray
-    fractions: tuple[float, ...]
-    amplitude_rad: np.ndarray
+    frequency_hz: np.ndarray  # shape (f,)
+    fractions: tuple[float, ...]  # Of full deflection; those of the design that the map has
+    amplitude_rad: np.ndarray  # shape (k,)
+    # Shape (k, f): Of the fundamental; -inf and NaN where nothing moves, NaN where it did not settle
     gain_db: np.ndarray
     phase_deg: np.ndarray
+    # Shape (f,)
     linear_db: np.ndarray
     linear_deg: np.ndarray
-    all_amplitude_rad: np.ndarray
+    all_amplitude_rad: np.ndarray  # shape (a,): Every amplitude of the map
+    # Shape (a,): First crossing; between two frequencies of the map the linear response, and what the
+    # simulated one is off by, interpolated on the logarithm of frequency; NaN where there is none in the
+    # range (`below_from_start`: already below at the whole frequency), and where it lies beside points that
+    # are not steady: a missing point is no value. -3 dB is 1/sqrt(2) of the linear gain at zero frequency
     minus3db_hz: np.ndarray
     minus90deg_hz: np.ndarray
+    # Shape (a, 2): Between which frequencies of the map the gain first falls through -3 dB, as far as steady
+    # points tell: from 0 where the first of them is below already, to inf where none is
     minus3db_range_hz: np.ndarray
+    # Shape (a,): Whether the gain is below -3 dB at the whole frequency already
     below_from_start: np.ndarray
     linear_minus3db_hz: float | None
     linear_minus90deg_hz: float | None
@@ -245,16 +218,20 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
     """Read the responses at the design's amplitude fractions, and the bandwidths at all, from a map."""
     full = design.validation.full_deflection_rad
     asked = sorted(design.validation.amplitude_fractions)
-    fractions, places = _on_the_map(asked, amplitude_map.amplitude_rad / full)
+    there = amplitude_map.amplitude_rad / full  # a coarse map has not all
+    nearest = {fraction: int(np.argmin(np.abs(there - fraction))) for fraction in asked}
+    on_it = {one: k for one, k in nearest.items() if math.isclose(there[k], one, rel_tol=1e-9)}
+    places = list(on_it.values())
     hz, unsteady = amplitude_map.frequency_hz, amplitude_map.waveform == WAVEFORMS.index("not steady")
     gain = np.where(unsteady, np.nan, amplitude_map.gain_db)
     phase = np.where(unsteady, np.nan, amplitude_map.phase_deg)
     steps = np.arange(FINE * (hz.size - 1) + 1) / FINE
     fine = np.exp(np.interp(steps, np.arange(hz.size), np.log(hz)))
     with np.errstate(divide="ignore"):  # the mean of a limited jerk has zeros
-        start, *curve = 20.0 * np.log10(np.abs(_linear(loops, np.array([1e-6 * hz[0], *fine]))))
+        whole = linear_steady_state(loops, 2.0 * math.pi * np.array([1e-6 * hz[0], *fine])).output
+        start, *curve = 20.0 * np.log10(np.abs(whole))
     level, fine_db = MINUS_3DB + start, np.array(curve)
-    fine_deg = np.degrees(np.unwrap(np.angle(_linear(loops, fine))))
+    fine_deg = np.degrees(np.unwrap(np.angle(whole[1:])))
     linear_db, linear_deg = fine_db[::FINE], fine_deg[::FINE]
 
     def between(values: np.ndarray, linear: np.ndarray) -> np.ndarray:
@@ -266,7 +243,7 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
     return AmplitudeBode(
         load_Nm=amplitude_map.load_Nm,
         frequency_hz=hz,
-        fractions=fractions,
+        fractions=tuple(on_it),
         amplitude_rad=amplitude_map.amplitude_rad[places],
         gain_db=gain[places],
         phase_deg=phase[places],
@@ -277,25 +254,10 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
         minus90deg_hz=first_90,
         minus3db_range_hz=np.array([crossing_range(hz, row, level) for row in gain]),
         below_from_start=gain[:, 0] < level,
-        linear_minus3db_hz=_number(_crossing(fine, fine_db, level)),
-        linear_minus90deg_hz=_number(_crossing(fine, fine_deg, -90.0)),
+        linear_minus3db_hz=finite(_crossing(fine, fine_db, level)),
+        linear_minus90deg_hz=finite(_crossing(fine, fine_deg, -90.0)),
         level_db=level,
     )
-
-
-def _on_the_map(asked: list[float], there: np.ndarray) -> tuple[tuple[float, ...], list[int]]:
-    """Which of the fractions a map has, and where: a coarse one has not all."""
-    nearest = [int(np.argmin(np.abs(there - fraction))) for fraction in asked]
-    kept = [
-        (fraction, k)
-        for fraction, k in zip(asked, nearest, strict=True)
-        if math.isclose(there[k], fraction, rel_tol=1e-9)
-    ]
-    return tuple(fraction for fraction, _ in kept), [k for _, k in kept]
-
-
-def _linear(loops: Loops, hz: np.ndarray) -> np.ndarray:
-    return linear_steady_state(loops, 2.0 * math.pi * hz).output
 
 
 def _crossing(hz: np.ndarray, values: np.ndarray, level: float) -> float:
@@ -323,7 +285,3 @@ def crossing_range(hz: np.ndarray, values: np.ndarray, level: float) -> tuple[fl
     first = int(np.argmin(above)) if known.size and not above.all() else known.size
     low = float(hz[known[first - 1]]) if first > 0 else 0.0
     return low, float(hz[known[first]]) if first < known.size else math.inf
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None

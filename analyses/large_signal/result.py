@@ -40,25 +40,20 @@ SETTLED = 1e4  # what begins at rest is that much smaller by the window: a limit
 
 @dataclass(frozen=True)
 class LimitShift:
-    """Amplitude at which a limit first acts, linear and simulated with friction, at each frequency.
+    """Amplitude at which a limit first acts, linear and simulated with friction, at each frequency."""
 
-    ``frequency_hz``, shape (f,).
-    ``linear_rad``, ``simulated_rad``, shape (f,): smallest A_k(w); what the simulation shows. NaN where no
-    limit acts within the range tried, or where nothing limits.
-    ``linear_limiter``, ``simulated_limiter``: empty where there is none.
-    ``resolution``: relative width of the last interval of the bisection.
-    ``command_gain``, shape (f,): of mean and filter of the command, which the amplitudes are behind.
-    ``coarser``: whether there are fewer frequencies than asked for, as those would take more than
-    `MOST_TICKS`.
-    """
-
-    frequency_hz: np.ndarray
+    frequency_hz: np.ndarray  # shape (f,)
+    # Shape (f,): smallest A_k(w); what the simulation shows. NaN where no limit acts within the range tried,
+    # or where nothing limits
     linear_rad: np.ndarray
     simulated_rad: np.ndarray
+    # Empty where there is none
     linear_limiter: tuple[str, ...]
     simulated_limiter: tuple[str, ...]
-    resolution: float
+    resolution: float  # relative width of the last interval of the bisection
+    # Shape (f,): of mean and filter of the command, which the amplitudes are behind
     command_gain: np.ndarray | float = 1.0
+    # Whether there are fewer frequencies than asked for, as those would take more than `MOST_TICKS`
     coarser: bool = False
 
     @property
@@ -144,15 +139,11 @@ def _bisect(
 
 @dataclass(frozen=True)
 class LargeSignals:
-    """Map, shift of the linear limit, amplitude Bode and sawtooth of a design.
-
-    ``map``: with friction, no load.
-    ``shift``: how far dry friction moves the linear limit; ``None`` without it, and where the loop is
-    unstable.
-    """
+    """Map, shift of the linear limit, amplitude Bode and sawtooth of a design."""
 
     design: Design
-    map: AmplitudeMap
+    map: AmplitudeMap  # with friction, no load
+    # How far dry friction moves the linear limit; ``None`` without it, and where the loop is unstable
     shift: LimitShift | None
     bode: AmplitudeBode
     sawtooth: Sawtooth

@@ -24,29 +24,24 @@ GAIN_TOLERANCE, LAG_TOLERANCE_DEG = 0.01, 1.0
 
 @dataclass(frozen=True)
 class SawtoothRun:
-    """The last periods at one load torque; output side, motor speed and current at the motor.
-
-    ``time_s``, ``reference_rad``, ``output_rad``, ``output_rate_rad_s``, ``speed_command_rad_s``,
-    ``current_A``: thinned for drawing; the rates are those of the output (motor over N).
-    ``gain``, ``lag_deg``, ``peak_rad``, ``distortion``, ``crest``: of the output over the last whole period:
-    fundamental over the command, its lag, largest deflection from the mean, everything but mean and
-    fundamental over the fundamental, peak over rms.
-    ``formula``: what a pure rate limit would do.
-    """
+    """The last periods at one load torque; output side, motor speed and current at the motor."""
 
     load_Nm: float
+    # Thinned for drawing; the rates are those of the output (motor over N)
     time_s: np.ndarray
     reference_rad: np.ndarray
     output_rad: np.ndarray
     output_rate_rad_s: np.ndarray
     speed_command_rad_s: np.ndarray
     current_A: np.ndarray
+    # Of the output over the last whole period: fundamental over the command, its lag, largest deflection from
+    # the mean, everything but mean and fundamental over the fundamental, peak over rms
     gain: float
     lag_deg: float
     peak_rad: float
     distortion: float
     crest: float
-    formula: RateLimited
+    formula: RateLimited  # what a pure rate limit would do
 
     @property
     def gain_error(self) -> float:
@@ -61,27 +56,21 @@ class SawtoothRun:
 
 @dataclass(frozen=True)
 class Sawtooth:
-    """A sine command that the output can follow only at its top speed.
+    """A sine command that the output can follow only at its top speed."""
 
-    ``amplitude_rad``, ``frequency_hz``: of the command.
-    ``rate_limit_rad_s``: R at the output.
-    ``gain_over_frequency``: Kv/w: the formulas hold where this is large.
-    ``reversal_deg``: part of a period that the reversal 2 R/a takes at the drive's largest acceleration, in
-    degrees: the formulas reverse at once, so this much lag may come on top.
-    ``runs``: one a load torque.
-    ``reason``: why there is none; then ``runs`` is empty.
-    ``slowest_rad_s``: steady rate of the output at the slowest load: below R by the droop of a P velocity
-    loop, which the formulas do not know.
-    """
-
+    # Of the command
     amplitude_rad: float
     frequency_hz: float
-    rate_limit_rad_s: float
-    gain_over_frequency: float
-    reversal_deg: float
-    has_current: bool
-    runs: tuple[SawtoothRun, ...]
-    reason: str = ""
+    rate_limit_rad_s: float  # R at the output
+    gain_over_frequency: float = 0.0  # Kv/w: the formulas hold where this is large
+    # Part of a period that the reversal 2 R/a takes at the drive's largest acceleration, in degrees: the
+    # formulas reverse at once, so this much lag may come on top
+    reversal_deg: float = 0.0
+    has_current: bool = False
+    runs: tuple[SawtoothRun, ...] = ()  # one a load torque
+    reason: str = ""  # why there is none; then ``runs`` is empty
+    # Steady rate of the output at the slowest load: below R by the droop of a P velocity loop, which the
+    # formulas do not know
     slowest_rad_s: float = math.inf
 
     @property
@@ -126,16 +115,15 @@ def sawtooth(
     limit = design.limits.speed_rad_s
     if design.controller.velocity is None or not math.isfinite(limit):
         reason = "the drive has no speed limit of its own, so its output is no sawtooth"
-        return Sawtooth(amplitude, 0.0, math.inf, 0.0, 0.0, False, (), reason)
+        return Sawtooth(amplitude, 0.0, math.inf, reason=reason)
     figures = [drive_figures(design, load) for load in design.validation.loads_Nm]
     slowest = min(result.output_rate_rad_s for result in figures)
     rate = limit / design.total_ratio
     weak = any(result.rate_limit in ("voltage", "force") for result in figures)
     if weak and slowest < rate * (1.0 - 1e-9):
-        reason = (
-            f"not every load lets the drive reach its speed limit: it stays at {100 * slowest / rate:.0f} %"
-        )
-        return Sawtooth(amplitude, 0.0, rate, 0.0, 0.0, False, (), reason)
+        share = f"{100 * slowest / rate:.0f} %"
+        reason = f"not every load lets the drive reach its speed limit: it stays at {share}"
+        return Sawtooth(amplitude, 0.0, rate, reason=reason)
     wanted = OVERRUN * rate / (2.0 * math.pi * amplitude) if frequency_hz is None else frequency_hz
     chosen = tone(wanted, design, least_updates=400)
     runs = []
@@ -143,7 +131,7 @@ def sawtooth(
         result = _run(design, amplitude, chosen.frequency_hz, chosen.ticks // chosen.cycles, load, rate)
         if result is None:
             reason = f"at a load of {load:g} N m the output stands still"
-            return Sawtooth(amplitude, chosen.frequency_hz, rate, 0.0, 0.0, False, (), reason)
+            return Sawtooth(amplitude, chosen.frequency_hz, rate, reason=reason)
         runs.append(result)
     swift = design.controller.position_loop.gain / chosen.omega_rad_s
     push = min(result.acceleration_rad_s2 for result in figures)
@@ -159,20 +147,13 @@ def _run(
 ) -> SawtoothRun | None:
     """Simulate from the flank of the triangle on, and keep the last periods; none of a drive that stands."""
     formula = rate_limited(amplitude, 2.0 * math.pi * frequency_hz, rate)
-    periods = 2 + PERIODS_SHOWN
-    ticks = periods * period_ticks
     N = design.total_ratio
     begin = State()
     if formula.x >= FULL_TRIANGLE:
         lag_s = math.radians(formula.lag_deg) / (2.0 * math.pi * frequency_hz)
         begin = State(motor_angle_rad=-N * rate * lag_s)
-    run = simulate(
-        design,
-        commands.sine(amplitude, frequency_hz),
-        ticks * design.controller.period_s,
-        load_Nm,
-        initial=begin,
-    )
+    seconds = (2 + PERIODS_SHOWN) * period_ticks * design.controller.period_s
+    run = simulate(design, commands.sine(amplitude, frequency_hz), seconds, load_Nm, initial=begin)
     last = slice(-period_ticks, None)
     y = run.output_angle_rad[last] - run.output_angle_rad[last].mean()
     turn = np.exp(-2j * np.pi * frequency_hz * run.time_s[last])

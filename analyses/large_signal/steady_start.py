@@ -61,18 +61,13 @@ LONGEST_PERIODS = 20_000
 
 @dataclass(frozen=True)
 class LinearSteadyState:
-    """The whole sampled loop under ``sin(w t)`` at the command, friction sliding without its dry part.
+    """The whole sampled loop under ``sin(w t)`` at the command, friction sliding without its dry part."""
 
-    ``output``, shape (K,): command to output angle: the fundamental over all ticks, the mean of a limited
-    jerk included.
-    ``states``, shape (K,): by column of the rows: value at t = 0 is the imaginary part.
-    ``settling_ticks``: ticks in which the slowest mode falls to 1e-9.
-    """
-
+    # Shape (K,): command to output angle: the fundamental over all ticks, the mean of a limited jerk included
     output: np.ndarray
-    states: dict[str, np.ndarray]
+    states: dict[str, np.ndarray]  # shape (K,): by column of the rows: value at t = 0 is the imaginary part
     stable: bool
-    settling_ticks: int
+    settling_ticks: int  # ticks in which the slowest mode falls to 1e-9
 
     def put(self, rows: Rows, which: np.ndarray, amplitude_rad: np.ndarray) -> None:
         """Write the initial state of each row: tone ``which[r]`` at an amplitude."""

@@ -23,6 +23,14 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design, Sensor
 from analyses.large_signal.conditional import step_rows
 from analyses.large_signal.tones import LONGEST_TICKS, full_range, tone
+from analyses.limit_cycles.describing import (
+    SENSORS,
+    Cause,
+    counts_matter,
+    cycle_of_counts,
+    quantum_of,
+    without_nonlinearities,
+)
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
 from nonlinear import Rows
@@ -30,7 +38,7 @@ from nonlinear.bench.on_the_bench import without_counts
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops
-    from analyses.limit_cycles.result import Cause, Confirmation
+    from analyses.limit_cycles.run import Confirmation
 
 Floats = npt.NDArray[np.float64]
 WITHIN = 0.05  # of its value: a gain that is off by less counts as linear
@@ -44,35 +52,27 @@ TRIED = np.array([0.1, 0.3, 1.0, 2.0, 4.0, 16.0, 64.0, 256.0])  # of the amplitu
 
 @dataclass(frozen=True)
 class Counts:
-    """What the counts of one encoder do.
-
-    ``quantum_rad``: one count, at the sensor's shaft.
-    ``standing_rad``: error of the output that a count may leave: the output's own count; the motor's leaves
-    none.
-    ``standing_seen_rad``: what a step of the drive as it is ends with, less what it ends with without counts.
-    ``speed_step_rad_s``: by which a speed made of counts jumps (motor side); ``None`` where the speed is not
-    made of them.
-    ``ripple_rad_s``, ``ripple_at_rad_s``: largest ripple of the motor's speed (peak) that counts add at
-    constant speed, and that speed.
-    ``cycles``: foreseen limit cycles, each with what the simulator says of it.
-    ``linear_rad``: amplitude at the sensor from which the gain of the counts is 1 within 5 %, about any bias.
-    ``linear_seen_rad``: smallest amplitude tried from which the response to the command, at the bandwidth, is
-    off by less than 5 % in the simulator: more, where counts shake the drive. ``None``: none up to 256 times
-    as much, or the drive is unstable without friction.
-    ``off``: what that response is off by (relative) at `TRIED` times ``linear_rad``.
-    """
+    """What the counts of one encoder do."""
 
     sensor: Sensor
-    quantum_rad: float
+    quantum_rad: float  # one count, at the sensor's shaft
+    # Error of the output that a count may leave: the output's own count; the motor's leaves none
     standing_rad: float
+    # What a step of the drive as it is ends with, less what it ends with without counts
     standing_seen_rad: float
+    # By which a speed made of counts jumps (motor side); ``None`` where the speed is not made of them
     speed_step_rad_s: float | None
+    # Largest ripple of the motor's speed (peak) that counts add at constant speed, and that speed
     ripple_rad_s: float
     ripple_at_rad_s: float
-    cycles: tuple[Confirmation, ...]
+    cycles: tuple[Confirmation, ...]  # foreseen limit cycles, each with what the simulator says of it
+    # Amplitude at the sensor from which the gain of the counts is 1 within 5 %, about any bias
     linear_rad: float
+    # Smallest amplitude tried from which the response to the command, at the bandwidth, is off by less than 5
+    # % in the simulator: more, where counts shake the drive. ``None``: none up to 256 times as much, or the
+    # drive is unstable without friction
     linear_seen_rad: float | None
-    off: Floats
+    off: Floats  # what that response is off by (relative) at `TRIED` times ``linear_rad``
 
 
 def counted_gain(ratio: float, offset: float = 0.0) -> float:
@@ -97,33 +97,28 @@ def linear_ratio() -> float:
 
 def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, ...]:
     """Look at every encoder whose counts a loop sees, of a position drive that settles in so many ticks."""
-    from analyses.limit_cycles.describing import counts_matter
-
-    there: list[Sensor] = []
-    if counts_matter(design, "motor-quantisation"):
-        there.append("motor")
-    if counts_matter(design, "quantisation"):
-        there.append("output")
-    return tuple(_one(design, loops, sensor, settle_ticks) for sensor in there)
+    causes: tuple[Cause, ...] = ("motor-quantisation", "quantisation")
+    return tuple(_one(design, loops, cause, settle_ticks) for cause in causes if counts_matter(design, cause))
 
 
-def _one(design: Design, loops: Loops, sensor: Sensor, settle_ticks: int) -> Counts:
-    from analyses.limit_cycles.describing import cycle_of_counts
+def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Counts:
     from analyses.limit_cycles.run import confirm
 
-    cause: Cause = "motor-quantisation" if sensor == "motor" else "quantisation"
-    quantum = (design.angle_quantum_rad if sensor == "motor" else design.output_quantum_rad) or 0.0
-    other: Sensor = "output" if sensor == "motor" else "motor"
+    sensor, other = SENSORS[cause]
+    quantum, velocity = quantum_of(design, cause) or 0.0, design.controller.velocity
+    at_motor = quantum * (design.total_ratio if sensor == "output" else 1.0)
     alone, ideal = without_counts(design, other), without_counts(design)
-    ripple, at = _ripple(alone, ideal, sensor, quantum, settle_ticks)
-    off = _linearity(alone, ideal, loops, sensor, quantum, settle_ticks)
+    ripple, at = _ripple(alone, ideal, at_motor, settle_ticks)
+    wanted = linear_ratio() * quantum / (design.total_ratio if sensor == "motor" else 1.0)
+    off = _linearity(alone, ideal, loops, wanted, settle_ticks)
     good = np.logical_and.accumulate((off <= WITHIN)[::-1])[::-1]  # here and at all that is larger
+    made_of = velocity is not None and velocity.sensor == sensor and design.encoder.speed == "difference"
     return Counts(
         sensor=sensor,
         quantum_rad=quantum,
         standing_rad=quantum if sensor == "output" else 0.0,
         standing_seen_rad=_standing(alone, ideal),
-        speed_step_rad_s=_speed_step(design, sensor, quantum),
+        speed_step_rad_s=at_motor / _span_s(design) if made_of else None,  # q/(m T)
         ripple_rad_s=ripple,
         ripple_at_rad_s=at,
         cycles=tuple(confirm(design, one) for one in cycle_of_counts(design, cause)),
@@ -136,28 +131,16 @@ def _one(design: Design, loops: Loops, sensor: Sensor, settle_ticks: int) -> Cou
 def _span_s(design: Design) -> float:
     """Time over which a speed is made of counts, or between two looks at the position."""
     control, encoder = design.controller, design.encoder
-    velocity = control.velocity
-    if velocity is None:
+    if control.velocity is None:
         return control.position_loop.every * control.period_s
     samples = encoder.difference_samples if encoder.speed == "difference" else 1
-    return samples * velocity.every * control.period_s
+    return samples * control.velocity.every * control.period_s
 
 
-def _speed_step(design: Design, sensor: Sensor, quantum: float) -> float | None:
-    """Jump of a speed that is a difference of counts, motor side: ``q/(m T)``."""
-    velocity = design.controller.velocity
-    if velocity is None or velocity.sensor != sensor or design.encoder.speed != "difference":
-        return None
-    return quantum * (design.total_ratio if sensor == "output" else 1.0) / _span_s(design)
-
-
-def _ripple(
-    design: Design, ideal: Design, sensor: Sensor, quantum: float, settle_ticks: int
-) -> tuple[float, float]:
+def _ripple(design: Design, ideal: Design, count_rad: float, settle_ticks: int) -> tuple[float, float]:
     """Largest ripple that counts add to the motor's speed on a ramp of the command, and its speed."""
-    count = quantum * (design.total_ratio if sensor == "output" else 1.0)
     span = _span_s(design)
-    speeds = np.minimum(np.array(SPEEDS) * count / span, PART * full_range(design)["velocity"])
+    speeds = np.minimum(np.array(SPEEDS) * count_rad / span, PART * full_range(design)["velocity"])
     window = round(SAMPLES * span / design.controller.period_s)
     found = []
     for one in (design, ideal):
@@ -177,29 +160,22 @@ def _standing(design: Design, ideal: Design) -> float:
     size = np.array([min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad])
     ends = []
     for one in (design, ideal):
-        result = step_rows(one, size, LONGEST_TICKS // 4).run()
-        low, high = (float(x[0]) for x in result.span("output_angle_rad"))
-        ends.append(abs(0.5 * (low + high) - float(size[0])))
+        low, high = step_rows(one, size, LONGEST_TICKS // 4).run().span("output_angle_rad")
+        ends.append(abs(0.5 * (float(low[0]) + float(high[0])) - float(size[0])))
     return abs(ends[0] - ends[1])
 
 
-def _linearity(
-    design: Design, ideal: Design, loops: Loops, sensor: Sensor, quantum: float, settle_ticks: int
-) -> Floats:
-    """What the response to the command is off by with counts, at `TRIED` times the linear amplitude."""
-    from analyses.limit_cycles.describing import without_nonlinearities
-
+def _linearity(design: Design, ideal: Design, loops: Loops, output_rad: float, settle_ticks: int) -> Floats:
+    """What the response to the command is off by with counts, at `TRIED` times an amplitude of the output."""
     band = loop_figures(loops.present["position"], loops.plain_response).bandwidth
     if band is None or band.minus3db_hz is None:
         return np.full(TRIED.size, inf)
     sine = tone(band.minus3db_hz, design, UPDATES, least_cycles=8)
     gain = abs(complex(response_at(loops.plain_response, np.array([sine.omega_rad_s]))[0]))
-    wanted = linear_ratio() * quantum / (design.total_ratio if sensor == "motor" else 1.0) / gain
-    amplitude = wanted * TRIED
     seen, there = [], np.ones(TRIED.size, dtype=bool)
     for one in (design, ideal):  # nothing else that is not linear: no play, no friction
         rows = Rows.of(without_nonlinearities(one), TRIED.size, friction_on=False, limits_on=False)
-        rows.sine("command", amplitude, sine.frequency_hz)
+        rows.sine("command", output_rad / gain * TRIED, sine.frequency_hz)
         rows["ticks"] = settle_ticks + 2 * sine.ticks
         rows.window(sine.ticks, sine.cycles)
         run = rows.run()

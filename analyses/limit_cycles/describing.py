@@ -1,10 +1,13 @@
-"""Cycles of play and quantisation by describing function inside the exact sampled loop.
+"""Cycles of play, dry friction and quantisation by describing function inside the exact sampled loop.
+
+A cycle is predicted where an oscillating eigenvalue of the whole closed loop lies on the unit circle.
 
 Play: the coupling's torque is a dead zone of the twist.  For a twist of amplitude A its fundamental is that
 of the coupling with k and c times ``n(x) = 1 - (2/pi)(asin x + x sqrt(1 - x^2))``, x = b/A (the damping acts
-in contact only, and its share is the same n).  A cycle is predicted where an oscillating eigenvalue of the
-closed loop lies on the unit circle.  Dry friction of either side adds ``4 Tc/(pi W)``, W the amplitude of its
-speed in the same cycle; friction by load is left out.
+in contact only, and its share is the same n).
+
+Dry friction adds the slope ``4 Tc/(pi W)``, W the amplitude of its speed in the same cycle. The breakaway
+torque has no part in it: at rest a sinusoid spends no time. In cycles of play friction by load is left out.
 
 Quantisation: an angle that swings about the edge of a count is a relay of one count, ``2 q/(pi A)`` up to
 A = q.  The sensor multiplies the loop that it stands in by it (the output's that of the position, the
@@ -17,24 +20,47 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import exp, log, pi
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 
-from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction
-from actuator_lti.drive.operating import Operating, dead_zone, described_dry, slope_at
+from actuator_lti.design.model import Coupling, Design, Filter, Friction, LoadFriction, Sensor
+from actuator_lti.drive.operating import Operating, dead_zone, described_dry, dry_torque, slope_at
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.periodic import exact_margins, point_blocks
 from actuator_lti.loops.tick import TickProgram
-from analyses.limit_cycles.result import Cause, Cycle
 
+Cause = Literal["play", "quantisation", "motor-quantisation", "friction"]
+# The sensor whose counts they are, and the other one
+SENSORS: dict[Cause, tuple[Sensor, Sensor]] = {
+    "quantisation": ("output", "motor"),
+    "motor-quantisation": ("motor", "output"),
+}
 LEAST, MOST, POINTS = 1.02, 300.0, 48  # of the half play: amplitudes of the twist that are looked at
 MOST_GAIN, GAINS = 1e3, 73  # of a speed made of counts
+SPEEDS, DECADES = 36, 6.0  # of the motor, that friction is looked at with
 RESOLVED = 1e-9  # of the radius
 _TURNS = 1e-6  # least angle of an eigenvalue that oscillates
 _STEPS = 60  # of the fixed point between the amplitudes of both speeds
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A limit cycle by describing function."""
+
+    cause: Cause  # quantisation: of the output's sensor, or of the motor's
+    with_friction: bool  # whether the drive's dry friction, by its own describing function, is in it
+    output_rad: float  # amplitude of the output, peak
+    # Amplitude of what the nonlinearity sees: the twist at the coupling, the sensor's angle, or the motor's
+    # speed (rad/s)
+    inner_rad: float
+    frequency_hz: float
+    stable: bool  # whether motion near it comes nearer; ``False``: the border between dying out and growing
+    state: dict[str, complex]  # its shape by state of the loop, at this amplitude
+    load_Nm: float = 0.0  # load torque that it is at
 
 
 @dataclass(frozen=True)
@@ -58,9 +84,57 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
         return _at_twist(design, exp(log_A), friction, near)
 
     return tuple(
-        _cycle(design, exp(log_A), there, friction, stable=stable)
+        _cycle("play", design, there, exp(log_A), there.shape["twist"], friction=friction, stable=stable)
         for log_A, there, stable in kept_up(mode, np.log(grid))
     )
+
+
+def cycles_of_friction(design: Design, load_Nm: float, top_speed_rad_s: float) -> tuple[Cycle, ...]:
+    """Every cycle with a motor speed up to ``top_speed_rad_s``, over six decades."""
+
+    def mode(log_speed: float, _: Mode | None) -> Mode | None:
+        at = Operating(point="describing-function", load_Nm=load_Nm, speed_amplitude_rad_s=exp(log_speed))
+        return mode_at(design, at)
+
+    grid = log(top_speed_rad_s) - np.linspace(DECADES, 0.0, SPEEDS) * log(10.0)
+    found = (
+        _cycle("friction", design, there, exp(log_speed), there.shape["w"], friction=True, stable=stable)
+        for log_speed, there, stable in kept_up(mode, grid)
+    )
+    return tuple(replace(cycle, load_Nm=load_Nm) for cycle in found)
+
+
+def _cycle(
+    cause: Cause,
+    design: Design,
+    mode: Mode,
+    inner: float,
+    seen: complex,
+    *,
+    friction: bool,
+    stable: bool,
+) -> Cycle:
+    """The cycle whose nonlinearity sees ``inner``, where it sees ``seen`` of the mode."""
+    state = {name: inner / seen * value for name, value in mode.shape.items()}
+    output = abs(output_of(design, state))
+    return Cycle(cause, friction, output, inner, mode.frequency_hz, stable, state)
+
+
+def at_load(cycle: Cycle, design: Design, load_Nm: float) -> Cycle:
+    """The same cycle at another load torque: the slope at the border is the same, so W goes with Tc."""
+    ratio = dry_Nm(design, load_Nm) / dry_Nm(design, cycle.load_Nm)
+    return replace(
+        cycle,
+        inner_rad=ratio * cycle.inner_rad,
+        output_rad=ratio * cycle.output_rad,
+        state={name: ratio * value for name, value in cycle.state.items()},
+        load_Nm=load_Nm,
+    )
+
+
+def dry_Nm(design: Design, load_Nm: float) -> float:
+    """Dry friction at the motor, forward and backward together; of a friction map that at its first point."""
+    return float(dry_torque(design, load_Nm, 1) + dry_torque(design, load_Nm, -1))
 
 
 def kept_up(
@@ -147,24 +221,14 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
 def mode_at(design: Design, at: Operating) -> Mode | None:
     """The least damped oscillation of the linear loop at an operating point; None without any."""
     program = TickProgram(wire(design, at), "position")
-    return _oscillation(_over_a_period(program), program.states, design)
-
-
-def _over_a_period(program: TickProgram) -> np.ndarray:
     A = np.eye(len(program.states))
     for k in range(program.ticks):
         A = program.tick(k).A @ A
-    return A
-
-
-def _cycle(design: Design, A: float, mode: Mode, friction: bool, *, stable: bool) -> Cycle:
-    """The cycle at its amplitude; phi = th/N_c - twist."""
-    state = {name: A / mode.shape["twist"] * value for name, value in mode.shape.items()}
-    output = abs(output_of(design, state))
-    return Cycle("play", friction, output, A, mode.frequency_hz, stable, state)
+    return _oscillation(A, program.states, design)
 
 
 def output_of(design: Design, state: dict[str, complex]) -> complex:
+    """The output in a state of the loop: phi = th/N_c - twist, behind the coupling."""
     if design.coupling is None:
         return state["th"] / design.total_ratio
     phi = state["th"] / design.ratio_to_coupling - state["twist"]
@@ -183,13 +247,12 @@ def quantum_of(design: Design, cause: Cause) -> float | None:
 
 def counts_matter(design: Design, cause: Cause) -> bool:
     """Whether a loop sees the counts of a sensor (the motor's: where a speed is made of them)."""
-    control, estimated = design.controller, design.encoder.speed != "ideal"
-    if control.position is None or quantum_of(design, cause) is None:
+    position, velocity = design.controller.position, design.controller.velocity
+    if position is None or quantum_of(design, cause) is None:
         return False
-    by_speed = control.velocity is not None and estimated
     if cause == "quantisation":
-        return control.position.sensor == "output"
-    return by_speed and control.velocity is not None and control.velocity.sensor == "motor"
+        return position.sensor == "output"
+    return velocity is not None and velocity.sensor == "motor" and design.encoder.speed != "ideal"
 
 
 def cycle_of_counts(design: Design, cause: Cause) -> tuple[Cycle, ...]:
@@ -204,9 +267,7 @@ def cycle_of_counts(design: Design, cause: Cause) -> tuple[Cycle, ...]:
     border, mode = found
     amplitude = 2.0 * q / (pi * border)
     seen = output_of(free, mode.shape) if cause == "quantisation" else mode.shape["th"]
-    state = {name: amplitude / seen * value for name, value in mode.shape.items()}
-    output = abs(output_of(free, state))
-    return (Cycle(cause, False, output, amplitude, mode.frequency_hz, True, state),)
+    return (_cycle(cause, free, mode, amplitude, seen, friction=False, stable=True),)
 
 
 def _border_at_output(free: Design) -> tuple[float, Mode] | None:
@@ -235,7 +296,14 @@ def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
 
     It is met once in a tick, so every entry of a tick's matrix has it to the first power.
     """
-    plain, double = (TickProgram(wire(_louder(free, gain), Operating()), "position") for gain in (1.0, 2.0))
+    velocity = free.controller.velocity
+    assert velocity is not None
+    programs = []
+    for gain in (1.0, 2.0):
+        filters = (*velocity.filters, Filter(kind="biquad", on="speed", b=(gain,), a=(0.0,)))
+        control = replace(free.controller, velocity=replace(velocity, filters=filters))
+        programs.append(TickProgram(wire(replace(free, controller=control), Operating()), "position"))
+    plain, double = programs
     ticks = [(plain.tick(k).A, double.tick(k).A) for k in range(plain.ticks)]
 
     def mode(log_gain: float, _: Mode | None) -> Mode | None:
@@ -248,14 +316,6 @@ def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
     if found is None or found[2]:  # unstable from the first
         return None
     return exp(found[0]), found[1]
-
-
-def _louder(free: Design, gain: float) -> Design:
-    """The drive with a gain on the measured speed."""
-    velocity = free.controller.velocity
-    assert velocity is not None
-    filters = (*velocity.filters, Filter(kind="biquad", on="speed", b=(gain,), a=(0.0,)))
-    return replace(free, controller=replace(free.controller, velocity=replace(velocity, filters=filters)))
 
 
 def _oscillation(

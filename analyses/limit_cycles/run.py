@@ -2,27 +2,71 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from actuator_lti.design.model import Design, Sensor
+from actuator_lti.asked.verdict import Tally, Verdict
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.large_signal.steady_start import PLACES
+from analyses.large_signal.steady_start import ELASTIC, PLACES
 from analyses.limit_cycles.describing import (
+    SENSORS,
+    Cycle,
     counts_matter,
     cycles_of_play,
     cycles_of_quantisation,
     without_nonlinearities,
 )
-from analyses.limit_cycles.result import Cause, Confirmation, Cycle, LimitCycles
-from analyses.motion.settling import settlings_of
+from analyses.motion.settling import Settling, noticed, settlings_of, verdict_of, waiver_of_rest
 from nonlinear import Rows
 from nonlinear.bench.on_the_bench import without_counts
 
 SCALES = np.geomspace(0.4, 2.5, 41)
 CYCLES_WATCHED = 24
-_STARTS = {**PLACES, "W": "load_speed_start", "twist": "twist_start"}
+_STARTS = {**PLACES, **ELASTIC}
+
+
+Seen = Literal["confirmed", "refuted"]
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """A predicted cycle against the simulator, started in its shape at several sizes."""
+
+    cycle: Cycle
+    # Amplitude of the output over the predicted one: of a stable cycle where the motion ends, of an unstable
+    # one the size from which it grows; ``None``: refuted
+    ratio: float | None
+    frequency_hz: float | None  # where the motion ends, of a stable one
+
+    @property
+    def verdict(self) -> Seen:
+        """In one word."""
+        return "refuted" if self.ratio is None else "confirmed"
+
+
+@dataclass(frozen=True)
+class LimitCycles:
+    """Cycles of one design."""
+
+    design: Design
+    confirmations: tuple[Confirmation, ...]  # every predicted cycle
+    # Steps of several sizes, without load and at every load of the design, waited for
+    rests: tuple[Settling, ...]
+    looked_for: tuple[str, ...]  # the causes that the design has
+
+    @property
+    def hunting(self) -> Settling | None:
+        """The largest motion of a step of the drive as it is that does not come to rest; None: all do."""
+        return noticed(self.design, self.rests)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether every step of the drive as it is ends at rest, or in a swing that a requirement accepts."""
+        waived = waiver_of_rest(self.design) is not None
+        return Tally.of([verdict_of(self.design, self.hunting)], [waived]).verdict
 
 
 def limit_cycles(design: Design) -> LimitCycles:
@@ -47,12 +91,9 @@ def limit_cycles(design: Design) -> LimitCycles:
     has_play = design.coupling is not None and design.coupling.play_rad > 0.0
     predicted = [*cycles_of_play(design, friction=False), *cycles_of_play(design, friction=True)]
     predicted += cycles_of_quantisation(design)
-    names: tuple[Cause, ...] = ("play", "quantisation", "motor-quantisation")
-    there = (has_play, *(counts_matter(design, name) for name in names[1:]))
-    looked_for = tuple(name for name, yes in zip(names, there, strict=True) if yes)
-    return LimitCycles(
-        design, tuple(confirm(design, cycle) for cycle in predicted), settlings_of(design), looked_for
-    )
+    looked_for = (*["play"] * has_play, *(cause for cause in SENSORS if counts_matter(design, cause)))
+    confirmed = tuple(confirm(design, cycle) for cycle in predicted)
+    return LimitCycles(design, confirmed, settlings_of(design), looked_for)
 
 
 def confirm(design: Design, cycle: Cycle) -> Confirmation:
@@ -64,9 +105,11 @@ def confirm(design: Design, cycle: Cycle) -> Confirmation:
     window = round(3.0 / (cycle.frequency_hz * design.controller.period_s))
     rows = Rows.of(tried, len(SCALES), friction_on=cycle.with_friction, limits_on=False)
     rows["load"] = cycle.load_Nm
-    rows.step("command", _centre(design, cycle))
+    # Half a count below the edge, as the mean of the sensor is; a speed made of counts has no mean: the motor
+    # swings about the edge itself
+    rows.step("command", -0.5 * (design.output_quantum_rad or 0.0) if cycle.cause == "quantisation" else 0.0)
     for name, value in cycle.state.items():
-        if name in _STARTS and (tried.coupling is not None or name not in ("W", "twist")):
+        if name in _STARTS and (tried.coupling is not None or name not in ELASTIC):
             rows[_STARTS[name]] = SCALES * value.real
     rows["speed_command_start"] = SCALES * _speed_command(tried, cycle)
     rows.window(window, 3, 0)
@@ -95,19 +138,10 @@ def _frequency(time_s: np.ndarray, values: np.ndarray) -> float | None:
     return float((len(up) - 1) / (exact[-1] - exact[0]))
 
 
-def _centre(design: Design, cycle: Cycle) -> float:
-    """The command about which the cycle swings: half a count below the edge, as the mean of the sensor is.
-
-    A speed made of counts has no mean: the motor swings about the edge itself.
-    """
-    return -0.5 * (design.output_quantum_rad or 0.0) if cycle.cause == "quantisation" else 0.0
-
-
 def _tried(design: Design, cycle: Cycle) -> Design:
     """The drive with the one nonlinearity that the cycle is of, and friction where it is in it."""
-    if cycle.cause in ("quantisation", "motor-quantisation"):
-        other: Sensor = "motor" if cycle.cause == "quantisation" else "output"
-        return without_nonlinearities(without_counts(design, other))
+    if cycle.cause in SENSORS:
+        return without_nonlinearities(without_counts(design, SENSORS[cycle.cause][1]))
     ideal = without_counts(design)
     if cycle.cause == "friction":
         return ideal
@@ -120,8 +154,7 @@ def _speed_command(design: Design, cycle: Cycle) -> float:
         return 0.0
     if "hold_w_ref" in cycle.state:
         return cycle.state["hold_w_ref"].real
-    behind = design.controller.position_loop.sensor == "output" and design.coupling is not None
     angle = cycle.state["th"]
-    if behind:
+    if design.controller.position_loop.sensor == "output" and design.coupling is not None:
         angle = angle - design.ratio_to_coupling * cycle.state["twist"]
     return -design.controller.position_loop.gain * angle.real

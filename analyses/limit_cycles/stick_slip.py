@@ -28,17 +28,12 @@ SLOPE_STEP = 1e-3
 
 @dataclass(frozen=True)
 class StickSlipCycle:
-    """A symmetric stick-slip cycle.
+    """A symmetric stick-slip cycle."""
 
-    ``output_amplitude_rad``: error at rest on either side, output side.
-    ``rest_s``: of half a period.
-    ``slope``: change of the size of the next error with that of this one; below 1 in magnitude the cycle
-    attracts.
-    """
-
-    output_amplitude_rad: float
+    output_amplitude_rad: float  # error at rest on either side, output side
     frequency_hz: float
-    rest_s: float
+    rest_s: float  # of half a period
+    # Change of the size of the next error with that of this one; below 1 in magnitude the cycle attracts
     slope: float
 
     @property
@@ -89,8 +84,7 @@ def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None)
     """
     from scipy.optimize import brentq
 
-    slip = _slip(design, load_Nm, loops) if _may_be(design, load_Nm) else None
-    if slip is None:
+    if (slip := _slip(design, load_Nm, loops)) is None:
         return None
     threshold = slip.start / slip.gain
     grid = threshold * np.geomspace(SMALLEST, LARGEST, POINTS)
@@ -115,21 +109,21 @@ def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None)
     return StickSlipCycle(error / design.total_ratio, hz, resting, slope)
 
 
-def _may_be(design: Design, load_Nm: float) -> bool:
-    """Whether the slip is that of the linear loop, with a constant sliding friction alike either way."""
-    velocity, friction = design.controller.velocity, design.friction
-    integrates = velocity is not None and velocity.integral_time_s is not None
-    plain = design.controller.own_law is None  # what a law of one's own does meanwhile is not known here
-    symmetric = friction.dry_torque_reverse_Nm is None and friction.offset_torque_Nm == 0.0
-    dry = friction.law == "coulomb" and not friction.points and friction.dry_Nm(load_Nm) > 0.0
-    return integrates and plain and symmetric and dry and design.load.path != "back-drivable"
-
-
 def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
-    """Follow the slip after breakaway in the linear loop; ``None`` where this cycle cannot be."""
+    """Follow the slip after breakaway in the linear loop; ``None`` where this cycle cannot be.
+
+    The slip has to be that of the linear loop, with a constant sliding friction alike either way.
+    """
+    velocity, friction = design.controller.velocity, design.friction
+    plain = design.controller.own_law is None  # what a law of one's own does meanwhile is not known here
+    alike = friction.dry_torque_reverse_Nm is None and friction.offset_torque_Nm == 0.0
+    rubs = friction.law == "coulomb" and not friction.points and friction.dry_Nm(load_Nm) > 0.0
+    if not (plain and alike and rubs and design.load.path != "back-drivable"):
+        return None
+    if velocity is None or velocity.integral_time_s is None:
+        return None
     loops = assemble_loops(design) if loops is None else loops
-    velocity, friction, system = design.controller.velocity, design.friction, loops.tick_system
-    if velocity is None or velocity.integral_time_s is None or system is None:
+    if (system := loops.tick_system) is None:
         return None
     ticks = linear_steady_state(loops, np.array([1.0])).settling_ticks
     torque = breakaway_torque_Nm(design, load_Nm, 1)

@@ -21,7 +21,7 @@ from actuator_lti.drive.operating import RotorState
 from actuator_lti.drive.profile import command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops.assemble import loops_at
-from actuator_lti.systems.as_control import as_control
+from actuator_lti.systems.plain_delays import as_control
 from analyses.isolation import attempt
 
 if TYPE_CHECKING:
@@ -164,10 +164,8 @@ def loop_figures(
     Bandwidth and step (that of a continuous loop with delays takes its time) are those of ``response``, else
     of the closed loop, behind the ``mean`` of the command.
 
-    Raises
-    ------
-    InputError, NumericalError
-        If the margins cannot be found; another figure that cannot becomes a note.
+    Raises `InputError`, `NumericalError`: if the margins cannot be found; another figure that cannot becomes
+    a note.
     """
     from actuator_lti.bandwidth import peaks
     from actuator_lti.margins import stability_margins
@@ -191,7 +189,12 @@ def _answering(
     notes: list[str] = []
 
     def band() -> Bandwidth:
-        own = _measured(closed_loop_bandwidth(response))
+        own = closed_loop_bandwidth(response)
+        if own.resonance_peak_db > MOST_RESONANCE_DB:  # its gain at zero is what rounding leaves of zero
+            raise InputError(
+                "the response at zero frequency is less than 1e-5 of its largest value: there is nothing to "
+                "measure the fall and the resonance from"
+            )
         return own if mean is None else commanded_bandwidth(response, mean)
 
     def steps() -> StepFigures:
@@ -206,16 +209,6 @@ def _answering(
         notes=tuple(dict.fromkeys(notes)),
         mean=mean,
     )
-
-
-def _measured(band: Bandwidth) -> Bandwidth:
-    """The bandwidths, refused where a drive's gain at zero frequency is what rounding leaves of zero."""
-    if band.resonance_peak_db > MOST_RESONANCE_DB:
-        raise InputError(
-            "the response at zero frequency is less than 1e-5 of its largest value: there is nothing to "
-            "measure the fall and the resonance from"
-        )
-    return band
 
 
 def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:
@@ -241,10 +234,8 @@ def all_loop_figures(
     ``locked``: the current loop with the rotor locked as well; where left out, if a requirement is on it.
     Without such a requirement it may fail alone, inside `analyses.isolation.isolated`.
 
-    Raises
-    ------
-    InputError, NumericalError
-        If the margins of a loop cannot be found, and ``refused`` is not given.
+    Raises `InputError`, `NumericalError`: if the margins of a loop cannot be found, and ``refused`` is not
+    given.
     """
     result = {}
     needed = any(r.rotor == "locked" for r in loops.design.requirements)
@@ -254,32 +245,28 @@ def all_loop_figures(
                 result[name] = _position(loops, loop, step=step, certify=certify)
             else:
                 result[name] = loop_figures(loop, step=step, certify=certify)
-            if name == "current" and (needed if locked is None else locked):
-                own = partial(_locked, loops, step=step, certify=certify)
+            wanted = name == "current" and loops.operating.rotor != "locked"
+            if wanted and (needed if locked is None else locked):
+                fixed = other_loops(loops, loops.design, rotor="locked").present[name]
+                own = partial(loop_figures, fixed, step=step, certify=certify)
                 with_it = own() if needed else attempt("current loop with the rotor locked", own, None)
                 result[name] = replace(result[name], locked=with_it)
         except (InputError, NumericalError) as error:
             if refused is None:
                 raise
             refused.append(f"{name} loop, {loops.form}, {loops.operating_point}: {error}")
-    if result and (whole := result.get(loops.design.controller.outermost)) and whole.stable:
-        return {name: _with_held(one, loops, name, step, certify) for name, one in result.items()}
+    outermost = result.get(loops.design.controller.outermost)
+    if outermost is not None and outermost.stable:  # loops that are unstable only by themselves
+        for name, one in result.items():
+            if one.margins.stable is False and (kept := held_loop(loops, name)) is not None:
+                found = partial(loop_figures, kept, step=step, certify=certify)
+                held = one.locked or _if_there_is(found, [])
+                result[name] = replace(one, held=held if held is not None and held.stable else None)
     return result
-
-
-def _locked(loops: Loops, *, step: bool, certify: bool) -> LoopFigures | None:
-    """The current loop with the rotor locked; ``None`` where it is the one that stands there already."""
-
-    if loops.operating.rotor == "locked":
-        return None
-    fixed = other_loops(loops, loops.design, rotor="locked").current
-    assert fixed is not None
-    return loop_figures(fixed, step=step, certify=certify)
 
 
 def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFigures:
     """The position loop, its response to the command, and to the reference where that is another."""
-
     design, mean = loops.design, command_mean(loops.design)
     figures = loop_figures(loop, loops.plain_response, step=step, certify=certify, mean=mean)
     filtered = design.command.filter_time_s > 0.0
@@ -292,12 +279,3 @@ def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFig
     reference = _answering(figures, response, None, bandwidth=True, step=step)
     said = (profile_note(design),) if mean else ()
     return replace(figures, reference=reference, notes=(*figures.notes, *said))
-
-
-def _with_held(figures: LoopFigures, loops: Loops, name: str, step: bool, certify: bool) -> LoopFigures:
-    """The same, with the figures of the loop held where it is unstable only by itself."""
-
-    if figures.margins.stable is not False or (loop := held_loop(loops, name)) is None:
-        return figures
-    held = figures.locked or _if_there_is(lambda: loop_figures(loop, step=step, certify=certify), [])
-    return replace(figures, held=held) if held is not None and held.stable else figures

@@ -12,7 +12,6 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.files.tree import Tree
 from analyses.isolation import attempt
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 FORMS: tuple[Form, ...] = ("sampled", "continuous", "ideal")
-DESCRIBED_FRACTIONS = (0.01, 0.1)
+DESCRIBED_FRACTIONS = (0.01, 0.1)  # of the top speed, at which friction is described
 MOST_STATES = 160  # of a periodic loop's fundamental: its certificate takes the fifth power of their number
 
 
@@ -111,28 +110,21 @@ class LoopSurvey:
         """A data frame with one row for each form and loop: margins, bandwidth, peaks (pandas needed)."""
         from actuator_lti.start.extras import need
 
+        names = ("stable", "gain_margin_db", "phase_margin_deg", "delay_margin_s", "modulus_margin")
         rows = [
-            {"form": form, "loop": name, **_row(result)}
+            {
+                "form": form,
+                "loop": name,
+                **{key: getattr(one.margins, key) for key in names},
+                "bandwidth_rad_s": None if one.bandwidth is None else one.bandwidth.minus3db_rad_s,
+                "evidence": one.margins.evidence,
+            }
             for form, loops in self.forms.items()
-            for name, result in loops.items()
+            for name, one in loops.items()
         ]
         frame = need("pandas", "tables", "to_pandas").DataFrame(rows).set_index(["form", "loop"])
         frame.attrs = {"design": self.design.name}
         return frame
-
-
-def _row(figures: LoopFigures) -> Tree:
-    """The figures of one loop, by name with unit."""
-    margins, bandwidth = figures.margins, figures.bandwidth
-    return {
-        "stable": margins.stable,
-        "gain_margin_db": margins.gain_margin_db,
-        "phase_margin_deg": margins.phase_margin_deg,
-        "delay_margin_s": margins.delay_margin_s,
-        "modulus_margin": margins.modulus_margin,
-        "bandwidth_rad_s": None if bandwidth is None else bandwidth.minus3db_rad_s,
-        "evidence": margins.evidence,
-    }
 
 
 def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey:
@@ -163,11 +155,19 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     forms: dict[str, Mapping[str, LoopFigures]] = {
         "sampled": all_loop_figures(loops, certify=True, locked=True)
     }
+
+    def measured(form: Form) -> Mapping[str, LoopFigures]:
+        return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
+
     for form in () if design.controller.sampled_only else FORMS[1:]:
-        other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
+        other = attempt(f"{form} form", partial(measured, form), None)
         forms |= {} if other is None else {form: other}
     step(2)
-    break_points = attempt("loops at the break points", lambda: _break_points(loops), {})
+    break_points = attempt(
+        "loops at the break points",
+        lambda: {name: _break_point(loops, name) for name in loops.break_points},
+        {},
+    )
     step(3)
     points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
     step(4)
@@ -178,18 +178,6 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     return LoopSurvey(
         design, loops, forms, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
     )
-
-
-def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
-    """Measure the loops in a form other than the sampled one."""
-    from actuator_lti.loops import assemble_loops
-
-    return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
-
-
-def _break_points(loops: Loops) -> dict[str, BreakPoint]:
-    """Measure the loop at every break point."""
-    return {name: _break_point(loops, name) for name in loops.break_points}
 
 
 def _break_point(loops: Loops, name: str) -> BreakPoint:
@@ -216,15 +204,16 @@ def operating_points(
     ``refused`` gets the loops whose margins are not found, and why; ``described``: friction described at
     small speeds as well; ``certify``: margins by exact arithmetic.
     """
-    from actuator_lti.drive.operating import friction_slope
-    from actuator_lti.loops import assemble_loops
+    from actuator_lti.drive.operating import Operating, slope_at
+    from actuator_lti.loops.assemble import loops_at
+    from analyses.specification.capability import drive_figures
 
     def point(
         label: str, load: float | None, kind: OperatingPoint, speed: float | None = None
     ) -> OperatingPointFigures:
         moment = load or 0.0
-        slope = friction_slope(design, kind, moment, speed, 1)
-        loops = assemble_loops(design, operating_point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
+        at = Operating(point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
+        slope, loops = slope_at(design, at), loops_at(design, at)
         figures = all_loop_figures(loops, step=False, refused=refused, certify=certify, locked=False)
         unit = "N" if design.axis == "linear" else "N m"
         return OperatingPointFigures(kind, label, load, slope, figures, unit)
@@ -237,23 +226,15 @@ def operating_points(
         ]
     if design.coupling is not None and design.coupling.play_rad:
         points.append(point("in the gap of the play", None, "gap"))
+    top = drive_figures(design).output_rate_rad_s * design.total_ratio
+    shares = DESCRIBED_FRACTIONS if described and 0.0 < top < np.inf else ()
     for load in dict.fromkeys(design.validation.loads_Nm):
         points.append(point("at rest", load, "rest"))
-        for speed in _described_speeds(design) if described else ():
+        for speed in (share * top for share in shares):
             unit = "rad/s" if design.axis == "rotary" else "m/s"
             label = f"speed amplitude {speed:.3g} {unit}"
             points.append(point(label, load, "describing-function", speed))
     return tuple(points)
-
-
-def _described_speeds(design: Design) -> tuple[float, ...]:
-    """Give the speed amplitudes for the describing function: small fractions of the top speed."""
-    from analyses.specification.capability import drive_figures
-
-    top = drive_figures(design).output_rate_rad_s * design.total_ratio
-    if not np.isfinite(top) or top <= 0.0:
-        return ()
-    return tuple(fraction * top for fraction in DESCRIBED_FRACTIONS)
 
 
 def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, DelayBudget]:
@@ -261,9 +242,7 @@ def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, De
     from actuator_lti.loops.delay_budget import delay_budget
 
     budgets: dict[str, DelayBudget] = {}
-    if design.controller.own_law is not None:  # its parts are not told apart
-        return budgets
-    for name, result in figures.items():
+    for name, result in figures.items() if design.controller.own_law is None else ():  # else of unknown parts
         crossovers = [m.frequency_rad_s for m in result.margins.phase_margins if m.frequency_rad_s > 0.0]
         if crossovers:
             quoted = result.margins.phase_margin

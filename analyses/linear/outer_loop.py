@@ -50,11 +50,8 @@ class OuterLoop:
 def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
     """The loop of an outer system around a drive, broken at the drive's command.
 
-    Raises
-    ------
-    InputError
-        For a sampled system around continuous loops, one without a sampling period around sampled ones, or a
-        period that is no whole multiple of that of the drive's outermost loop.
+    Raises `InputError`: for a sampled system around continuous loops, one without a sampling period around
+    sampled ones, or a period that is no whole multiple of that of the drive's outermost loop.
 
     Examples
     --------
@@ -76,29 +73,23 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
             raise InputError(message, where=outer.name)
         system, period = outer.system, None
     around = drive * (-outer.sign * system)
-    unit = _unit(loops)
+    if isinstance(around, control.StateSpace):
+        one = control.ss([], [], [], [[1.0]], around.dt)
+    else:
+        one = type(around).from_system(control.ss([], [], [], [[1.0]]))
+    angle = "m" if loops.design.axis == "linear" else "rad"
+    units = {"position": angle, "velocity": f"{angle}/s", "current": "A"}
+    unit = units.get(loops.design.controller.outermost, "V")
     return Loop(
         name=outer.name,
         break_point="command",
         plain_open=around,
         plain_closed=around.feedback(1),
-        plain_sensitivity=_sensitivity(around),
+        plain_sensitivity=one.feedback(around),
         period_s=period,
         unit_in=unit,
         unit_out=unit,
     )
-
-
-def _sensitivity(open_loop: Any) -> Any:
-    if isinstance(open_loop, control.StateSpace):
-        return control.ss([], [], [], [[1.0]], open_loop.dt).feedback(open_loop)
-    return type(open_loop).from_system(control.ss([], [], [], [[1.0]])).feedback(open_loop)
-
-
-def _unit(loops: Loops) -> str:
-    linear = loops.design.axis == "linear"
-    units = {"position": "m" if linear else "rad", "velocity": "m/s" if linear else "rad/s", "current": "A"}
-    return units.get(loops.design.controller.outermost, "V")
 
 
 def _sampled(outer: OuterLoop, drive_s: float) -> tuple[control.StateSpace, float]:
@@ -144,10 +135,7 @@ def read_outer_loop(path: str | PathLike[str]) -> OuterLoop:
     ``dt`` in s, 0 for a continuous system; ``sampling_period`` in s of a continuous one that a sampled drive
     is closed around; ``sign`` -1 (usual) or 1; ``name``, ``input``, ``output``.
 
-    Raises
-    ------
-    InputError
-        For anything else, naming file, key and what is allowed.
+    Raises `InputError`: for anything else, naming file, key and what is allowed.
     """
     return outer_loop(read_json(path, "JSON file of an outer loop"), shown_path(path))
 
@@ -182,12 +170,7 @@ def _is_list(value: Any) -> bool:
 
 
 def _is_matrix(value: Any) -> bool:
-    return (
-        isinstance(value, list)
-        and bool(value)
-        and all(map(_is_list, value))
-        and len(set(map(len, value))) == 1
-    )
+    return isinstance(value, list) and all(map(_is_list, value)) and len({len(row) for row in value}) == 1
 
 
 def _is_time(value: Any) -> bool:

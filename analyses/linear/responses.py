@@ -156,21 +156,16 @@ def nyquist_curve(system: Any, omega_rad_s: np.ndarray, frame: float) -> tuple[n
         order = np.argsort(np.concatenate([omega, middle]))
         values = np.concatenate([values, response_at(system, middle)])[order]
         omega = np.concatenate([omega, middle])[order]
-    kept = _framed(values, frame)
     shown = np.where(np.abs(values + 1.0) < 2.5 * frame, values, np.nan + 0j)
+    kept = _framed(shown, frame)
     return omega[kept], shown[kept]
 
 
-def _framed(values: np.ndarray, frame: float) -> np.ndarray:
+def _framed(shown: np.ndarray, frame: float) -> np.ndarray:
     """Tell which points a figure needs: one outside the frame as a gap, none too near to be told apart."""
-    shown = np.where(np.abs(values + 1.0) < 2.5 * frame, values, np.nan + 0j)
-    kept: list[int] = []
-    for k, value in enumerate(shown):
-        last = shown[kept[-1]] if kept else None
-        if last is None:
-            kept.append(k)
-        elif np.isnan(value) and np.isnan(last):
-            continue
-        elif np.isnan(value) or np.isnan(last) or abs(value - last) > 0.006 * frame:
+    kept = [0]
+    for k, value in enumerate(shown[1:], 1):
+        last = shown[kept[-1]]
+        if np.isnan(value) != np.isnan(last) or abs(value - last) > 0.006 * frame:
             kept.append(k)
     return np.array(kept, dtype=int)

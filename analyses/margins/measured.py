@@ -67,11 +67,10 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     loop), ``"position:T"`` (closed), ``"i_ref:S"`` (sensitivity); empty: the open outermost loop.
     ``averages``: those behind the coherence.
 
-    Raises
-    ------
-    InputError
-        For a file that is no response, or a loop that is not there.
+    Raises `InputError`: for a file that is no response, or a loop that is not there.
     """
+    import control
+
     every = {**loops.break_points, **loops.present}
     name, _, of = place.partition(":")
     name, of = name or list(loops.present)[-1], of or "L"
@@ -90,7 +89,10 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     points = 1j * omega if loop.period_s is None else np.exp(1j * omega * loop.period_s)
     data = MeasuredResponse(omega, L, np.zeros(omega.size), loop.period_s, "")
     sigma, known = np.abs(L) * read.deviation[below], np.isfinite(read.deviation[below]).all()
-    data = MeasuredResponse.with_noise(data, sigma) if known else _scattered(data)
+    if known:
+        data = MeasuredResponse.with_noise(data, sigma)
+    else:  # with the noise that the scatter of the points about their neighbours tells
+        data = measured_response(control.FrequencyResponseData(data.frdata, data.omega, dt=data.dt))
     margins, note = None, ""
     try:
         margins = stability_margins(data)
@@ -102,10 +104,3 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
         radius=np.asarray(data.radius, dtype=np.float64), source=data.source,
         margins=margins, note=note, beyond=int((~below).sum()), left_out=read.left_out,
     )  # fmt: skip
-
-
-def _scattered(data: MeasuredResponse) -> MeasuredResponse:
-    """With the noise that the scatter of the points about their neighbours tells."""
-    import control
-
-    return measured_response(control.FrequencyResponseData(data.frdata, data.omega, dt=data.dt))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.model import Design
-from actuator_lti.loops import Loops, assemble_loops
+from actuator_lti.loops import assemble_loops
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 from analyses.linear.loop_survey import OperatingPointFigures, operating_points
 from analyses.margins.asked import Asked
@@ -62,6 +61,8 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
     InputError, NumericalError
         Where the loops cannot be assembled as asked, or the margins of one not be found.
     """
+    from analyses.linear.outer_loop import loop_around, read_outer_loop
+
     asked = asked or Asked()
     loops = assemble_loops(
         design,
@@ -70,7 +71,10 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
         load_Nm=asked.load_Nm,
     )
     step = asked.form != "continuous"  # with delays it takes its time
-    around = {} if asked.around is None else _around(loops, asked.around, step=step)
+    around = {}
+    if asked.around is not None:
+        outer = read_outer_loop(asked.around)
+        around[outer.name] = loop_figures(loop_around(loops, outer), step=step, certify=True)
     measured = measured_if_asked(loops, asked.response, asked.response_of, asked.averages)
     figures = all_loop_figures(loops, step=step, certify=True, locked=True)
     usual = (asked.form, asked.operating_point) == ("sampled", "sliding")
@@ -83,11 +87,3 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
         operating_points=tuple(operating_points(design, [], described=False, certify=False)),
         measured=measured,
     )
-
-
-def _around(loops: Loops, file: Path, *, step: bool) -> dict[str, LoopFigures]:
-    """The figures of the loop of the file, by its name."""
-    from analyses.linear.outer_loop import loop_around, read_outer_loop
-
-    outer = read_outer_loop(file)
-    return {outer.name: loop_figures(loop_around(loops, outer), step=step, certify=True)}

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
@@ -21,6 +22,7 @@ from actuator_lti.design import with_values, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
+from analyses.finite import finite
 from analyses.monte_carlo.judging import by_loop, in_populations, judge, label, source_columns
 from analyses.monte_carlo.reduction import BLOCK, Reducing, Reduction, Tally, judged, reduced, unpacked
 from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
@@ -112,12 +114,27 @@ def monte_carlo(
     task = _task(design, settings)
     sampler = task.sampler
     store = Store.open(Path(folder), task.identity(), settings.chunk)
-    whole = (_kept if settings.samples <= KEPT else _reduced)(
-        task, store, settings.samples, engine or Engine(), progress
-    )
+    engine = engine or Engine()
+    if settings.samples <= KEPT:
+        engine.map(task, store.missing(settings.samples), store.write, progress, SIZE)
+        blocks = store.blocks(settings.samples)
+        whole = functools.reduce(Reduction.merged, (reduced(task, block) for block in blocks), Reduction())
+    else:
+        whole = _reduced(task, store, settings.samples, engine, progress)
     nominal = task.figures(sampler.nominal[None, :])
     tallies = list(zip(judged(design), whole.tallies, strict=True))
-    odds = [_tallied(design, requirement, tally, whole.count, nominal) for requirement, tally in tallies]
+    odds = [
+        replace(
+            _odds(r.id, label(r), r.unit, tally.passed, whole.count),
+            minimum=r.minimum,
+            maximum=r.maximum,
+            nominal=float(judge(r, design, nominal).value[0]),
+            worst=tally.worst[0][2],
+            worst_sample=tally.worst[0][1],
+            columns=source_columns(r, design),
+        )
+        for r, tally in tallies
+    ]
     if tallies:
         odds.append(_odds("all", "all requirements together", "", whole.together, whole.count))
     worst = _worst_cases(task, tallies, Path(folder)) if settings.worst_cases else ()
@@ -140,7 +157,7 @@ def _drivers(task: SampleTask, odds: Sequence[Odds]) -> tuple[Driver, ...]:
         rows[2 * k : 2 * k + 2, k] = factor.box
     figures = task.figures(rows)
     made = [
-        Driver(name, factor.path, *factor.box, *(_known(x) for x in figures[name][2 * k : 2 * k + 2]))
+        Driver(name, factor.path, *factor.box, *(finite(x) for x in figures[name][2 * k : 2 * k + 2]))
         for name in names
         for k, factor in enumerate(factors)
     ]
@@ -148,36 +165,9 @@ def _drivers(task: SampleTask, odds: Sequence[Odds]) -> tuple[Driver, ...]:
     return tuple(sorted(made, key=lambda one: (order[one.column], -one.swing)))
 
 
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
 def _odds(id: str, words: str, unit: str, passed: int, count: int) -> Odds:
     low, high = clopper_pearson(passed, count)
     return Odds(id, words, unit, passed, count, passed / count, low, high)
-
-
-def _tallied(
-    design: Design, r: Requirement, tally: Tally, count: int, nominal: Mapping[str, np.ndarray]
-) -> Odds:
-    made = _odds(r.id, label(r), r.unit, tally.passed, count)
-    _, sample, value = tally.worst[0]
-    here = float(judge(r, design, nominal).value[0])
-    return replace(
-        made, minimum=r.minimum, maximum=r.maximum, nominal=here, worst=value, worst_sample=sample,
-        columns=source_columns(r, design),
-    )  # fmt: skip
-
-
-def _kept(
-    task: SampleTask, store: Store, samples: int, engine: Engine, progress: Progress | None
-) -> Reduction:
-    """Keep every sample, then reduce them."""
-    engine.map(task, store.missing(samples), store.write, progress, SIZE)
-    whole = Reduction()
-    for block in store.blocks(samples):
-        whole = whole.merged(reduced(task, block))
-    return whole
 
 
 def _reduced(
@@ -188,15 +178,12 @@ def _reduced(
     whole, done = unpacked(path.read_bytes()) if path.is_file() else (Reduction(), [])
     noted = time.monotonic()
 
-    def note() -> None:
-        store.put(path, whole.packed(done))
-
     def take(chunk: Chunk, part: Reduction) -> None:
         nonlocal whole, noted
         whole = whole.merged(part)
         done.append(chunk)
         if time.monotonic() - noted > NOTED_S:
-            note()
+            store.put(path, whole.packed(done))
             noted = time.monotonic()
 
     part = max(BLOCK, BLOCK * -(-samples // (PARTS * BLOCK)))
@@ -206,7 +193,7 @@ def _reduced(
         engine.map(Reducing(task), [one for one in parts if one not in known], take, progress, SIZE)
     finally:
         if done:
-            note()
+            store.put(path, whole.packed(done))
     return whole
 
 
@@ -234,26 +221,18 @@ def _worst_cases(
 
 
 def _notes(task: SampleTask, samples: int) -> tuple[str, ...]:
-    notes = [
+    sampler = task.sampler
+    normal = any(f.tolerance.kind != "uniform" for f in sampler.factors)
+    correlated = not np.array_equal(sampler.correlation, np.eye(len(sampler.correlation)))
+    notes = {
         "Scrambled Sobol points: intervals are those of independent samples (Clopper and Pearson, 95 %), "
-        "which is on the safe side.",
-    ]
-    if any(f.tolerance.kind != "uniform" for f in task.sampler.factors):
-        notes.append(
-            "The tolerance box of a normal distribution ends at 3 standard deviations or its bounds."
-        )
-    if len(task.sampler.correlation) and not np.array_equal(
-        task.sampler.correlation, np.eye(len(task.sampler.correlation))
-    ):
-        notes.append(
-            "Worst cases of correlated parameters are sought in their ellipsoid, tied ones together."
-        )
-    if samples > KEPT:
-        notes.append(
-            f"More than {KEPT} samples: they are not kept. Quantiles are to one of up to {MOST} bins; any"
-            " sample is made again by its number."
-        )
-    return tuple(notes)
+        "which is on the safe side.": True,
+        "The tolerance box of a normal distribution ends at 3 standard deviations or its bounds.": normal,
+        "Worst cases of correlated parameters are sought in their ellipsoid, tied ones together.": correlated,
+        f"More than {KEPT} samples: they are not kept. Quantiles are to one of up to {MOST} bins; any"
+        " sample is made again by its number.": samples > KEPT,
+    }
+    return tuple(words for words, said in notes.items() if said)
 
 
 def _left_out(design: Design) -> tuple[RequirementVerdict, ...]:

@@ -162,22 +162,19 @@ class SampleTask:
     def identity(self) -> Tree:
         """Everything that decides the numbers, as plain JSON."""
         table = self.sampler.table
+        rows = hashlib.sha256(b"" if table is None else np.ascontiguousarray(table.rows, "<f8").tobytes())
         return {
             "design": design_hash(self.design),
             "code": code_version(),
             "seed": self.sampler.seed,
             "factors": [repr(factor) for factor in self.sampler.factors],
             "correlation": self.sampler.correlation.tolist(),
-            "table": None if table is None else [list(table.paths), _digest(table.rows)],
+            "table": None if table is None else [list(table.paths), rows.hexdigest()],
             "operating_point": self.operating_point,
             "load_Nm": self.load_Nm,
             "time_figures": self.time_figures,
             "step": None if self.step is None else repr(self.step),
         }
-
-
-def _digest(rows: np.ndarray) -> str:
-    return hashlib.sha256(np.ascontiguousarray(rows, dtype="<f8").tobytes()).hexdigest()
 
 
 def replay(design: Design, sampler: Sampler, number: int) -> Design:

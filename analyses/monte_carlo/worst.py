@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import chdtri, ndtr, ndtri
 
+from analyses.finite import finite
 from analyses.monte_carlo.judging import judge
 from analyses.monte_carlo.result import WorstCase
 from analyses.monte_carlo.task import SampleTask
@@ -198,7 +199,9 @@ def worst_case(task: SampleTask, requirement: Requirement, worst_samples: np.nda
     pool = np.vstack([edges, region.cube(drawn)])
     distance = cost(pool.T)
     many = max(12, min(40, 4 * size))
-    population = _padded(pool[np.argsort(distance, kind="stable")[:many]], many, task.sampler.seed)
+    rng = np.random.default_rng(task.sampler.seed)
+    chosen = pool[np.argsort(distance, kind="stable")[:many]]
+    population = np.vstack([chosen, rng.uniform(size=(many - len(chosen), size))])
     result = differential_evolution(
         cost, [(0.0, 1.0)] * size, init=population, maxiter=GENERATIONS, tol=1e-10, polish=False,
         vectorized=True, updating="deferred", rng=np.random.default_rng(task.sampler.seed),
@@ -213,15 +216,6 @@ def worst_case(task: SampleTask, requirement: Requirement, worst_samples: np.nda
     return _described(task, requirement, region.values(best[None])[0], int(worst_samples[0]), looked_at)
 
 
-def _padded(points: np.ndarray, size: int, seed: int) -> np.ndarray:
-    """Fill up a population with random points; shake equal ones apart."""
-    rng = np.random.default_rng(seed)
-    missing = size - len(points)
-    if missing > 0:
-        points = np.vstack([points, rng.uniform(size=(missing, points.shape[1]))])
-    return points
-
-
 def _described(
     task: SampleTask, requirement: Requirement, point: np.ndarray, sample: int, evaluations: int
 ) -> WorstCase:
@@ -232,10 +226,10 @@ def _described(
     return WorstCase(
         requirement.id,
         requirement.unit,
-        sampled if np.isfinite(sampled) else None,
+        finite(sampled),
         sample,
         value if np.isfinite(distance) else None,
-        distance if np.isfinite(distance) else None,
+        finite(distance),
         bool(judged.passed[1]),
         dict(zip(task.sampler.paths, (float(v) for v in point), strict=True)),
         evaluations,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -128,15 +127,11 @@ def _load(asked: Asked, duration: float) -> LoadMoment:
     if asked.load_file is None:
         return moment
     times, values = read_columns(asked.load_file, (0, 1))
-    shift = asked.start - _begins_s(asked.record)
+    # The first time of a recorded command is where the run's clock has its zero
+    shift = asked.start - (0.0 if asked.record is None else float(read_columns(asked.record, (0,))[0][0]))
     if not (times[0] + shift < duration and times[-1] + shift >= 0.0):
         span = f"its rows are from {times[0]:g} to {times[-1]:g} s, the run from {0.0 - shift:g}"
         clock = " on the record's clock" if shift else ""
         raise InputError(f"{span} to {duration - shift:g} s{clock}: no load would act", str(asked.load_file))
     series = loads.series(times + shift, values, where=str(asked.load_file)).series
     return replace(moment, series=series)
-
-
-def _begins_s(record: Path | None) -> float:
-    """The first time of a recorded command: where the run's clock has its zero."""
-    return 0.0 if record is None else float(read_columns(record, (0,))[0][0])

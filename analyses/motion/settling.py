@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import degrees, inf, radians
 from typing import TYPE_CHECKING
@@ -29,15 +29,12 @@ NOTICED = 1e-6  # of full deflection: a smaller swing is listed, and is rest
 
 @dataclass(frozen=True)
 class Settling:
-    """A step from rest at zero, waited for.
+    """A step from rest at zero, waited for."""
 
-    ``amplitude_rad``, ``load_Nm``: the step and the load torque, both there from the start.
-    ``rest``: what it ends in.
-    """
-
+    # The step and the load torque, both there from the start
     amplitude_rad: float
     load_Nm: float
-    rest: Rest
+    rest: Rest  # what it ends in
 
     @property
     def hunting(self) -> bool:
@@ -101,36 +98,24 @@ def settlings_of(
     The largest is asked first. One that does not come to rest fails the drive, whatever smaller steps do, and
     they are not asked at this load; where a requirement accepts a swing all are, as the largest counts.
 
-    Parameters
-    ----------
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
-    loads_Nm : iterable of float, optional
-        Other loads.
-    known : iterable of Settling, optional
-        Steps of which those at rest are not asked again.
+    ``loops``: sampled and sliding, of this design, if they are there already.
+    ``loads_Nm``: other loads.
+    ``known``: steps of which those at rest are not asked again.
     """
-    settings, resting = design.validation, [one for one in known if not one.hunting]
+    settings = design.validation
+    resting = {(one.load_Nm, one.amplitude_rad): one for one in known if not one.hunting}
     sizes = {settings.full_deflection_rad * share for share in (SMALL, *settings.amplitude_fractions)}
     found: list[Settling] = []
     for load in dict.fromkeys((0.0, *settings.loads_Nm) if loads_Nm is None else loads_Nm):
-        slip = stick_slip_cycle(design, load, loops)
+        slip, there = stick_slip_cycle(design, load, loops), list[Settling]()
         whole = sizes if slip is None else {*sizes, slip.output_amplitude_rad}
-        asked = _until_known(design, load, sorted(whole, reverse=True), resting)
-        found += reversed(list(asked))
+        for size in sorted(whole, reverse=True):
+            there.append(resting.get((load, size)) or outcome(design, load, size))
+            failed = verdict_of(design, noticed(design, there[-1:])) is Verdict.NOT_MET
+            if failed and accepted(design) is None:  # the verdict of the load is known
+                break
+        found += reversed(there)
     return tuple(found)
-
-
-def _until_known(
-    design: Design, load_Nm: float, sizes_rad: Iterable[float], resting: Iterable[Settling]
-) -> Iterator[Settling]:
-    """Steps in this order, up to the one after which the verdict of the load is known."""
-    known = {one.amplitude_rad: one for one in resting if one.load_Nm == load_Nm}
-    for size in sizes_rad:
-        one = known[size] if size in known else outcome(design, load_Nm, size)
-        yield one
-        if accepted(design) is None and verdict_of(design, noticed(design, [one])) is Verdict.NOT_MET:
-            return
 
 
 FROM_THE_LARGEST = (
@@ -240,16 +225,13 @@ def _size(rest: Rest, factor: float, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Conduct:
-    """What a run ends in, the command and the load staying as they are at its end.
+    """What a run ends in, the command and the load staying as they are at its end."""
 
-    ``status``: ``"comes to rest"`` (of a speed or less: ``"becomes steady"``), ``"sits on a limit"`` (it does
-    while this acts), ``"limit cycle"``, ``"still moving"``, ``"diverging"``; ``"following"`` where command or
-    load go on changing; or why the run stopped.
-    ``detail``: with figures; empty where there is nothing to say.
-    """
-
+    # ``"comes to rest"`` (of a speed or less: ``"becomes steady"``), ``"sits on a limit"`` (it does while
+    # this acts), ``"limit cycle"``, ``"still moving"``, ``"diverging"``; ``"following"`` where command or
+    # load go on changing; or why the run stopped
     status: str
-    detail: str = ""
+    detail: str = ""  # with figures; empty where there is nothing to say
 
     @property
     def wanted(self) -> bool:

@@ -13,12 +13,12 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import profile_onset_rad
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from analyses.corners import Corners, corners
-from analyses.duty import Duty, duty
-from analyses.failures import Failures, failures
+from analyses.corners.run import corners
+from analyses.duty.run import duty
+from analyses.failures.run import failures
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones import run_tones, tone
-from analyses.limit_cycles import LimitCycles, limit_cycles
+from analyses.limit_cycles.run import limit_cycles
 from analyses.motion.settling import ending_of
 
 
@@ -89,64 +89,53 @@ class AskedFigures:
 
     design: Design
 
-    @cached_property
-    def _failures(self) -> Failures:
-        return failures(self.design)
-
-    @cached_property
-    def _duty(self) -> Duty:
-        return duty(self.design)
-
-    @cached_property
-    def _cycles(self) -> LimitCycles:
-        return limit_cycles(self.design)
-
-    @cached_property
-    def _corners(self) -> Corners:
-        return corners(self.design)
+    failures = cached_property(lambda self: failures(self.design))
+    duty = cached_property(lambda self: duty(self.design))
+    cycles = cached_property(lambda self: limit_cycles(self.design))
+    corners = cached_property(lambda self: corners(self.design))
 
     @property
     def hard_over_time_s(self) -> float:
         """From the hard-over of the power stage to the stop; inf where it is not reached while watched."""
-        reached = self._failures.case("hard-over").to_stop_s
+        reached = self.failures.case("hard-over").to_stop_s
         return inf if reached is None else reached
 
     @property
     def failure_deflection_rad(self) -> float:
         """Largest deflection until detection over all failures."""
-        return max(case.at_detection_rad for case in self._failures.cases)
+        return max(case.at_detection_rad for case in self.failures.cases)
 
     @property
     def failure_moment_Nm(self) -> float:
         """Largest moment in the train over all failures."""
-        return max(case.peak_moment_Nm for case in self._failures.cases)
+        return max(case.peak_moment_Nm for case in self.failures.cases)
 
     @property
     def duty_current_A(self) -> float:
         """Of the duty, rms."""
-        return self._duty.rms_A
+        return self.duty.rms_A
 
     @property
     def winding_degC(self) -> float | None:
         """Of the winding under the duty, in the long run."""
-        heat = self._duty.heating
+        heat = self.duty.heating
         return None if heat is None else heat.final_degC
 
     @property
     def limit_cycle_rad(self) -> float | None:
         """Largest swing that a step of the drive as it is ends in; 0: it rests; ``None``: not known."""
-        swing = self._cycles.hunting
+        swing = self.cycles.hunting
         return 0.0 if swing is None else swing.limit_cycle_rad
 
     @property
     def limit_cycle_said(self) -> str:
         """After which step that is; empty where every one ends at rest."""
-        swing = self._cycles.hunting
+        swing = self.cycles.hunting
         return "" if swing is None else ending_of(self.design, swing)
 
     def at_corners(self, quantity: Quantity) -> float:
         """The worst of a figure over loops and corners; -inf (or inf) where one is not stable."""
-        loops = [one.judged for corner in self._corners.corners for one in corner.figures.values()]
+        loops = [one.judged for corner in self.corners.corners for one in corner.figures.values()]
         if not all(one.stable for one in loops):
             return -quantity.better * inf
         found = (quantity.read(one) for one in loops)

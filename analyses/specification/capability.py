@@ -12,6 +12,9 @@ from actuator_lti.drive import facts
 from analyses.specification.manoeuvres import thermal_duty
 from nonlinear import commands, simulate
 
+LONGEST_TICKS = 40_000
+STEADY_SHARE = 0.1
+
 
 @dataclass(frozen=True)
 class DriveFigures:
@@ -32,10 +35,7 @@ class DriveFigures:
 def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
     """Rate, current and acceleration of a drive at a load at the output, N m (linear axis: N), either sign.
 
-    Raises
-    ------
-    InputError
-        If the load is not finite.
+    Raises `InputError`: if the load is not finite.
 
     Examples
     --------
@@ -53,10 +53,6 @@ def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
         motor_current_A=None if math.isnan(current) else current,
         acceleration_rad_s2=float(capacity.acceleration_rad_s2),
     )
-
-
-LONGEST_TICKS = 40_000
-STEADY_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -82,16 +78,17 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
     design = replace(design, command=Command(), load=design.load.level(), motor=design.motor.level())
     figures = drive_figures(design, load_Nm)
     rate, push = figures.output_rate_rad_s, figures.acceleration_rad_s2
-    current = figures.motor_current_A
-    ratio, duty = None, thermal_duty(design, current)
-    if current is not None and math.isfinite(design.limits.continuous_current_A):
-        ratio = current / design.limits.continuous_current_A
+    current, continuous = figures.motor_current_A, design.limits.continuous_current_A
+    ratio = current / continuous if current is not None and math.isfinite(continuous) else None
+    duty = thermal_duty(design, current)
     if not (0.0 < rate < math.inf and 0.0 < push < math.inf):
         return Capability(figures, None, None, None, ratio, duty)
-    direction = 1 if _forward_is_worse(design, load_Nm) else -1
+    friction = design.friction  # the way that meets the greater resistance
+    forward = friction.dry_Nm(load_Nm, 1) + friction.offset_torque_Nm
+    direction = 1 if forward >= friction.dry_Nm(load_Nm, -1) - friction.offset_torque_Nm else -1
     Ts = design.controller.period_s
-    force_bound = figures.rate_limit == "force" and design.friction.viscous(1) > 0.0
-    viscous_s = design.inertia_kgm2 / design.friction.viscous(direction) if force_bound else 0.0
+    force_bound = figures.rate_limit == "force" and friction.viscous(1) > 0.0
+    viscous_s = design.inertia_kgm2 / friction.viscous(direction) if force_bound else 0.0
     time = min(12.0 * rate / push + 8.0 * settling_s + 8.0 * viscous_s, LONGEST_TICKS * Ts)
     load = direction * -abs(load_Nm) if design.load.path == "back-drivable" else load_Nm
     run = simulate(design, commands.ramp(direction * 3.0 * rate), time, load)
@@ -118,10 +115,3 @@ def _acceleration(design: Design, load_Nm: float, direction: int, rate: float, p
     run = simulate(design, command, (14 * stretch + 20) * Ts, load_Nm)
     speed = direction * run.motor_speed_rad_s / design.total_ratio
     return float(np.max(speed[stretch:] - speed[:-stretch])) / (stretch * Ts)
-
-
-def _forward_is_worse(design: Design, load_Nm: float) -> bool:
-    """Whether forward motion meets the greater resistance."""
-    friction = design.friction
-    forward = friction.dry_Nm(load_Nm, 1) + friction.offset_torque_Nm
-    return forward >= friction.dry_Nm(load_Nm, -1) - friction.offset_torque_Nm

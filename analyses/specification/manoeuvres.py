@@ -9,12 +9,8 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
-from actuator_lti.drive.facts import stall_torque_Nm
-from actuator_lti.drive.steady import (
-    motor_torque_Nm,
-    steady_torque_Nm,
-    voltage_limit_torque_Nm,
-)
+from actuator_lti.drive.facts import stall_torque_Nm, steady_torque_Nm
+from actuator_lti.drive.steady import motor_torque_Nm, voltage_limit_torque_Nm
 from analyses.large_signal.tones import tone
 from nonlinear import commands, simulate
 from nonlinear.commands import Command
@@ -58,11 +54,10 @@ def thermal_duty(design: Design, rms_current_A: float | None) -> float | None:
     >>> thermal_duty(load_design("ilr33-amber"), 8.0)
     0.25
     """
-    if rms_current_A is None or not math.isfinite(design.limits.continuous_current_A):
+    continuous = design.limits.continuous_current_A
+    if rms_current_A is None or not math.isfinite(continuous):
         return None
-    if rms_current_A <= design.limits.continuous_current_A:
-        return 1.0
-    return (design.limits.continuous_current_A / rms_current_A) ** 2
+    return 1.0 if rms_current_A <= continuous else (continuous / rms_current_A) ** 2
 
 
 def manoeuvres(
@@ -78,22 +73,17 @@ def manoeuvres(
     swing = 2.0 * math.sqrt(full / acceleration_rad_s2) if 0.0 < acceleration_rad_s2 < math.inf else 0.0
     time = min(travel + 4.0 * swing + 4.0 * settling_s, LONGEST_TICKS * design.controller.period_s)
     result.append(_manoeuvre(design, "step to full deflection", commands.step(full), time, load_Nm, None))
-    slow = _sine_hz(full, rate_rad_s, acceleration_rad_s2)
+    bounds = []  # angular frequencies at which a sine needs all of the rate, or of the acceleration
+    if 0.0 < rate_rad_s < math.inf:
+        bounds.append(rate_rad_s / full)
+    if 0.0 < acceleration_rad_s2 < math.inf:
+        bounds.append(math.sqrt(acceleration_rad_s2 / full))
+    slow = min(bounds) / (2.0 * math.pi) if bounds else None
     names = ("sine at 70 % of what rate and torque allow", "sine three times as fast as allowed")
     for name, share in zip(names, (SINE_SHARE, OVERRUN), strict=True):
         if slow is not None:
             result.append(_sine(design, name, full, share * slow, load_Nm))
     return tuple(result)
-
-
-def _sine_hz(full: float, rate: float, acceleration: float) -> float | None:
-    """Frequency at which a sine of full deflection needs all of the rate, or of the acceleration."""
-    bounds = []
-    if 0.0 < rate < math.inf:
-        bounds.append(rate / full)
-    if 0.0 < acceleration < math.inf:
-        bounds.append(math.sqrt(acceleration / full))
-    return min(bounds) / (2.0 * math.pi) if bounds else None
 
 
 def _sine(design: Design, name: str, full: float, hz: float, load_Nm: float) -> Manoeuvre:
@@ -137,8 +127,7 @@ def _manoeuvre(
 def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
     """Choose points that lie evenly along the path in the plane, so that fast parts keep their shape."""
     spans = (max(float(np.ptp(speed)), 1e-300), max(float(np.ptp(torque)), 1e-300))
-    way = np.cumsum(np.hypot(np.diff(speed) / spans[0], np.diff(torque) / spans[1]))
-    way = np.concatenate([[0.0], way])
+    way = np.append(0.0, np.cumsum(np.hypot(np.diff(speed) / spans[0], np.diff(torque) / spans[1])))
     places = np.searchsorted(way, np.linspace(0.0, way[-1], POINTS))
     return np.unique(np.minimum(places, len(way) - 1))
 
@@ -189,11 +178,9 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
     if design.controller.velocity is not None and math.isfinite(limits.speed_rad_s):
         high = max((float(curve.torque_Nm.max()) for curve in bounds), default=1.0)
         bounds.append(Curve("speed limit", np.full(2, limits.speed_rad_s), np.array([0.0, high])))
-    demands = tuple(_demand(design, load, speed) for load in design.validation.loads_Nm)
-    return TorqueSpeedPlane(tuple(bounds), demands)
-
-
-def _demand(design: Design, load_Nm: float, speed: np.ndarray) -> Curve:
-    """Torque for steady motion forward."""
     unit = "N" if design.axis == "linear" else "N m"
-    return Curve(f"steady motion at {load_Nm:g} {unit}", speed, steady_torque_Nm(design, load_Nm, speed))
+    demands = tuple(
+        Curve(f"steady motion at {load:g} {unit}", speed, steady_torque_Nm(design, load, speed))
+        for load in design.validation.loads_Nm
+    )
+    return TorqueSpeedPlane(tuple(bounds), demands)

@@ -19,9 +19,8 @@ from analyses.tuning.placing import allowed_range
 from analyses.tuning.problem import GAINS
 
 if TYPE_CHECKING:
-    from actuator_lti.batch.figures import LinearFigures
     from actuator_lti.design.model import Design
-    from analyses.corners import Corners
+    from analyses.corners.run import Corners
     from analyses.linear.loop_survey import LoopSurvey
     from analyses.specification.weakest import WeakPoint
 
@@ -91,24 +90,18 @@ def _written(value: float, was: float) -> float:
     return float(f"{unit * (np.ceil if value > was else np.floor)(value / unit * (1.0 - 1e-12)):.3g}")
 
 
-def _figures(view: View, design: Design, path: str, values: np.ndarray) -> LinearFigures:
-    population = Population(view.design or design, {path: values}, len(values))
-    return linear_figures(population, operating_point=view.kind, load_Nm=view.load_Nm, held=True)
-
-
 def _reserves(view: View, design: Design, path: str, values: np.ndarray) -> np.ndarray:
     """The least reserve of a view for each value of a gain; minus infinity where the loop is not stable."""
     try:
-        found = _figures(view, design, path, values)
+        population = Population(view.design or design, {path: values}, len(values))
+        found = linear_figures(population, operating_point=view.kind, load_Nm=view.load_Nm, held=True)
     except InputError:
         return np.full(len(values), -inf)
-    columns = {name: np.abs(found.quantity(name, view.loop)) for name in CUSTOMARY}
     limits = {name: limit_of(design, name, view)[0] for name in CUSTOMARY}
+    rows = zip(*(np.abs(found.quantity(name, view.loop)) for name in CUSTOMARY), strict=True)
     least = [
-        min(
-            reserve(name, columns[name][k], limits[name], columns[name][k] - limits[name]) for name in columns
-        )
-        for k in range(len(values))
+        min(reserve(name, x, limits[name], x - limits[name]) for name, x in zip(CUSTOMARY, row, strict=True))
+        for row in rows
     ]
     return np.where(found.stable(view.loop), np.nan_to_num(least, nan=-inf), -inf)
 
@@ -120,11 +113,7 @@ def _harmless(move: Move, others: Iterable[View], design: Design) -> bool:
         before, after = _reserves(view, design, move.path, both)
         if after < min(before, 0.0):
             return False
-    return _requirements_kept(design, move.path, both)
-
-
-def _requirements_kept(design: Design, path: str, both: np.ndarray) -> bool:
-    found = linear_figures(Population(design, {path: both}, 2), time_figures=True, held=True)
+    found = linear_figures(Population(design, {move.path: both}, 2), time_figures=True, held=True)
     columns = loop_columns(found)
     for item in by_loop(design):
         if item.quantity in LOOP_QUANTITIES and item.loop in found.loops and in_populations(item, design):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import compress
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -104,15 +105,6 @@ def judged(
     design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures], asked: Asked
 ) -> list[RequirementVerdict]:
     """Judge one requirement wherever it holds; ``asked`` finds what only an analysis finds."""
-    verdicts = _judged(design, requirement, figures, asked)
-    waiver = design.waiver_of
-    return [replace(one, waiver=waiver(one.id)) if one.verdict == "not proven" else one for one in verdicts]
-
-
-def _judged(
-    design: Design, requirement: Requirement, figures: Mapping[str, LoopFigures], asked: Asked
-) -> list[RequirementVerdict]:
-    """Judge one requirement wherever it holds, waivers apart."""
     quantity = QUANTITIES.get(requirement.quantity)
     if quantity is None:
         raise InputError(
@@ -120,24 +112,24 @@ def _judged(
             f"{', '.join(QUANTITIES)}",
             where=design.origin or None,
         )
+    verdicts = []
     if quantity.scope == "analysis":
-        value, reason = asked(quantity.name)
-        return [_verdict(requirement, requirement.id, None, value, reason)]
-    if quantity.scope == "drive":
-        result = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
-        value = None if math.isnan(result) else result
-        reason = "" if value is not None else "the design has no such figure"
-        return [_verdict(requirement, requirement.id, None, value, reason)]
-    named = requirement.loop not in (None, "every")
-    verdicts = [
-        _judge_loop(
-            design, requirement, requirement.id if named else f"{requirement.id}/{name}", name, figures
-        )
-        for name in judged_loops(requirement.loop, figures)
-    ]
-    current = figures.get("current")
-    rotor = requirement.rotor or (current.rotor if current else "")
-    return [replace(one, rotor=rotor) if one.loop == "current" else one for one in verdicts]
+        verdicts.append(_verdict(requirement, requirement.id, None, *asked(quantity.name)))
+    elif quantity.scope == "drive":
+        value = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
+        reason = "the design has no such figure" if math.isnan(value) else ""
+        verdicts.append(_verdict(requirement, requirement.id, None, value, reason))
+    else:
+        named = requirement.loop not in (None, "every")
+        for name in judged_loops(requirement.loop, figures):
+            id = requirement.id if named else f"{requirement.id}/{name}"
+            one = _judge_loop(design, requirement, id, name, figures)
+            if name == "current":
+                rotor = requirement.rotor or (figures[name].rotor if name in figures else "")
+                one = replace(one, rotor=rotor)
+            verdicts.append(one)
+    waiver = design.waiver_of
+    return [replace(one, waiver=waiver(one.id)) if one.verdict == "not proven" else one for one in verdicts]
 
 
 def _judge_loop(
@@ -186,23 +178,14 @@ def which_response(quantity: str, loop: str, to: ResponseTo = "command", design:
         return "of the feedback loop"
     if to == "reference":
         return "of the response to the reference, behind profile and filter of the command"
-    parts = _in_front(design)
+    parts = ["mean of its profile", "filter", "feed-forward"]
+    if design is not None:
+        position = design.controller.position
+        fed = position is not None and bool(position.feedforward or position.acceleration_feedforward)
+        there = (command_mean(design) is not None, design.command.filter_time_s > 0.0, fed)
+        parts = [*compress(parts, there)]
     included = f": {', '.join(parts[:-1])}{' and ' * (len(parts) > 1)}{parts[-1]} included" if parts else ""
     return f"of the response to the command{included}"
-
-
-def _in_front(design: Design | None) -> list[str]:
-    """What acts between the command and the feedback loop; of no design all that may."""
-    if design is None:
-        return ["mean of its profile", "filter", "feed-forward"]
-    position = design.controller.position
-    fed = position is not None and bool(position.feedforward or position.acceleration_feedforward)
-    there = {
-        "mean of its profile": command_mean(design) is not None,
-        "filter": design.command.filter_time_s > 0.0,
-        "feed-forward": fed,
-    }
-    return [name for name, has in there.items() if has]
 
 
 def _verdict(

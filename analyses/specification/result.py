@@ -10,6 +10,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.loops import assemble_loops
+from analyses.finite import finite
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones import TANH_TOLERANCE
 from analyses.specification.capability import Capability, capability
@@ -67,9 +68,9 @@ def step_times(
             load_Nm=float(rows["load"][k]),
             fraction=fractions[k % len(fractions)],
             amplitude_rad=float(sizes[k]),
-            rise_time_s=_number(result.step.rise_time_s[k]),
+            rise_time_s=finite(result.step.rise_time_s[k]),
             overshoot_percent=float(result.step.overshoot_percent[k]),
-            settling_time_s=_number(result.step.settling_time_s[k]),
+            settling_time_s=finite(result.step.settling_time_s[k]),
             peak_rate_rad_s=float(max(-speeds[0][k], speeds[1][k])) / design.total_ratio,
             peak_current_A=float(max(-currents[0][k], currents[1][k])) if electric else None,
             limits={
@@ -80,10 +81,6 @@ def step_times(
         )
         for k in range(len(sizes))
     )
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 @dataclass(frozen=True)

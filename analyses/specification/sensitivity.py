@@ -77,22 +77,28 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
     >>> round(result.tornado("position.bandwidth")[0].per_percent, 2)
     0.38
     """
-    chosen = tuple(p for p in (paths or variable_paths(design)) if _moves(design, p))
-    nominal = {path: parameter_value(design, path) for path in chosen}
-    ends = {path: _ends(design, path, nominal[path]) for path in chosen}
-    count = 1 + 4 * len(chosen)
-    values = {path: np.full(count, nominal[path]) for path in chosen}
-    for k, path in enumerate(chosen):
-        low, high = ends[path]
-        row = 1 + 4 * k
-        values[path][row : row + 4] = (nominal[path] * (1 - STEP), nominal[path] * (1 + STEP), low, high)
-    figures = population_figures(Population(design, values, count), design)
+    every = {path: parameter_value(design, path) for path in paths or variable_paths(design)}
+    nominal = {
+        path: value
+        for path, value in every.items()
+        if value != 0.0 and np.isfinite(value) and not path.startswith("friction.breakaway")
+    }
+    ends = {path: (value * (1 - SWING), value * (1 + SWING)) for path, value in nominal.items()}
+    for path, value in nominal.items():
+        if (own := design.parameters.get(path)) is not None and own.tolerance is not None:
+            ends[path] = Factor(path, value, own.tolerance).box
+    moves = [
+        {path: to}
+        for path, value in nominal.items()
+        for to in (value * (1 - STEP), value * (1 + STEP), *ends[path])
+    ]
+    figures = population_figures(moved(design, nominal, moves), design)
     entries = [
         Sensitivity(
             path, name, _rise(column[1 + 4 * k], column[2 + 4 * k]) / (200.0 * STEP), *ends[path],
             float(column[3 + 4 * k]), float(column[4 + 4 * k]),
         )
-        for k, path in enumerate(chosen)
+        for k, path in enumerate(nominal)
         for name, column in figures.items()
     ]  # fmt: skip
     return Sensitivities({name: float(column[0]) for name, column in figures.items()}, tuple(entries))
@@ -103,18 +109,12 @@ def _rise(low: float, high: float) -> float:
     return 0.0 if low == high else float(high - low)
 
 
-def _moves(design: Design, path: str) -> bool:
-    """Whether a parameter is a finite number that is not zero."""
-    value = parameter_value(design, path)
-    return value != 0.0 and bool(np.isfinite(value)) and not path.startswith("friction.breakaway")
-
-
-def _ends(design: Design, path: str, nominal: float) -> tuple[float, float]:
-    parameter = design.parameters.get(path)
-    if parameter is not None and parameter.tolerance is not None:
-        low, high = Factor(path, nominal, parameter.tolerance).box
-        return low, high
-    return nominal * (1 - SWING), nominal * (1 + SWING)
+def moved(design: Design, base: Mapping[str, float], moves: Sequence[Mapping[str, float]]) -> Population:
+    """The design, and once for each move the same with some of its numbers at other values (SI)."""
+    values = {
+        path: np.array([value, *(one.get(path, value) for one in moves)]) for path, value in base.items()
+    }
+    return Population(design, values, 1 + len(moves))
 
 
 def population_figures(

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from actuator_lti.drive.operating import OperatingPoint
     from actuator_lti.margins import StabilityMargins
-    from analyses.corners import Corners
+    from analyses.corners.run import Corners
     from analyses.linear.loop_figures import LoopFigures
     from analyses.linear.loop_survey import BreakPoint, LoopSurvey, OperatingPointFigures
 

@@ -35,18 +35,15 @@ State = Literal["powered", "shorted", "open"]
 
 @dataclass(frozen=True)
 class StiffnessCurve:
-    """Dynamic stiffness K = M_ext / output angle over frequency, in one state of the drive.
+    """Dynamic stiffness K = M_ext / output angle over frequency, in one state of the drive."""
 
-    ``state``: all loops closed and the command held; unpowered with the winding shorted (a bridge at zero
-    voltage); unpowered without a current.
-    ``stiffness_Nm_rad``: N m/rad (linear axis: N/m); inf where the output does not move.
-    ``static_Nm_rad``: limit at zero frequency: 0 of an output that runs away, inf of one that comes back.
-    """
-
+    # All loops closed and the command held; unpowered with the winding shorted (a bridge at zero voltage);
+    # unpowered without a current
     state: State
     frequency_hz: npt.NDArray[np.float64]
+    # N m/rad (linear axis: N/m); inf where the output does not move
     stiffness_Nm_rad: npt.NDArray[np.complex128]
-    static_Nm_rad: float
+    static_Nm_rad: float  # limit at zero frequency: 0 of an output that runs away, inf of one that comes back
 
     @property
     def least(self) -> tuple[float, float]:
@@ -60,17 +57,12 @@ class StiffnessCurve:
 
 @dataclass(frozen=True)
 class LostMotion:
-    """How far the output stays apart after a moment to either side has gone, the motor held.
+    """How far the output stays apart after a moment to either side has gone, the motor held."""
 
-    ``play_rad``: the play of the coupling at the output.
-    ``foreseen_rad``: read at +-3 % of the largest load moment
-    (`actuator_lti.loops.stiffness.lost_motion_rad`).
-    ``seen_rad``: the same in the simulator; None where it was not asked.
-    """
-
-    play_rad: float
+    play_rad: float  # the play of the coupling at the output
+    # Read at +-3 % of the largest load moment (`actuator_lti.loops.stiffness.lost_motion_rad`)
     foreseen_rad: float
-    seen_rad: float | None = None
+    seen_rad: float | None = None  # the same in the simulator; None where it was not asked
 
 
 @dataclass(frozen=True)
@@ -146,10 +138,7 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
     At rest, without dry friction, play, counts and friction of two slopes.  An output that no moment moves is
     pushed with the largest load moment.
 
-    Raises
-    ------
-    UnstableError
-        For a loop that is not stable.
+    Raises `UnstableError`: for a loop that is not stable.
     """
     coupling, bench = design.coupling, on_the_bench(design)
     friction = replace(design.friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
@@ -170,24 +159,18 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
 
 def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> tuple[AtRest, ...]:
     """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, moment in N m)."""
-    made = []
-    for frequency, moment in asked:
+    made, period = [], design.controller.period_s
+    for frequency, amplitude in asked:
         every = design.controller.position_loop.every  # a period is a whole number of them
-        ticks = max(4, round(1.0 / (frequency * design.controller.period_s * every))) * every
-        K = _injected(design, moment, ticks)
-        made.append(AtRest(moment, 1.0 / (ticks * design.controller.period_s), K))
+        ticks = max(4, round(1.0 / (frequency * period * every))) * every
+        count, turn = (SKIPPED + 2) * ticks, np.exp(-2j * np.pi * np.arange(ticks) / ticks)
+        moment = np.tile(-amplitude * turn.imag, SKIPPED + 2)
+        run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
+        seen = (run.output_angle_rad[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum()
+        given = (moment[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum()
+        K = complex(given / seen) if seen != 0.0 else complex(np.inf)
+        made.append(AtRest(amplitude, 1.0 / (ticks * period), K))
     return tuple(made)
-
-
-def _injected(design: Design, amplitude: float, ticks: int) -> complex:
-    """Stiffness seen at a moment of a period of so many ticks, after some periods."""
-    period, count = design.controller.period_s, (SKIPPED + 2) * ticks
-    turn = np.exp(-2j * np.pi * np.arange(ticks) / ticks)
-    moment = np.tile(-amplitude * turn.imag, SKIPPED + 2)
-    run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
-    seen = run.output_angle_rad[SKIPPED * ticks :].reshape(2, ticks) @ turn
-    given = moment[SKIPPED * ticks :].reshape(2, ticks) @ turn
-    return complex(given.sum() / seen.sum()) if seen.sum() != 0.0 else complex(np.inf)
 
 
 def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
@@ -205,10 +188,7 @@ def lost_motion_seen(design: Design) -> float:
     The peak is the largest load moment, or thrice what the load's friction breaks away at.  It is slow enough
     for `PERIODS_WITHIN` oscillations of the load within the part that is read.
 
-    Raises
-    ------
-    InputError
-        Without a coupling, a position loop or a largest load moment.
+    Raises `InputError`: without a coupling, a position loop or a largest load moment.
     """
     coupling, friction, rated = design.coupling, design.load.friction, design.load.moment_max_Nm
     if coupling is None or design.controller.position is None or rated <= 0.0:

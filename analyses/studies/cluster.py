@@ -12,7 +12,7 @@ import signal
 import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,6 @@ from analyses.studies.proof import Proof, hold_against, packages_of, prove, prov
 
 if TYPE_CHECKING:
     from distributed import Client, LocalCluster
-    from distributed.security import Security
 
 IN_FLIGHT = 3  # parts a worker that are under way or waiting to be written
 CONNECT_S = 10.0
@@ -34,14 +33,12 @@ def is_open(address: str) -> bool:
     """Whether others than this machine may reach an address, and nobody is asked who he is."""
     scheme, _, rest = address.rpartition("://")
     host = rest.rpartition(":")[0].strip("[]")
-    return scheme in ("", "tcp") and host not in ("", "localhost") and not _is_loopback(host)
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
+    if scheme not in ("", "tcp") or host in ("", "localhost"):
         return False
+    try:
+        return not ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name
+        return True
 
 
 def connected(address: str, tls: Path | None) -> Client:
@@ -50,7 +47,14 @@ def connected(address: str, tls: Path | None) -> Client:
 
     import distributed
 
-    security = None if tls is None else _security(tls)
+    security = None
+    if tls is not None:
+        files = {key: tls / name for key, name in TLS_FILES.items()}
+        for path in files.values():
+            if not path.is_file():
+                raise InputError("no such file; allowed: a certificate in PEM", where=str(path))
+        keys = {key: str(path) for key, path in files.items()}
+        security = distributed.Security(require_encryption=True, **keys)
     try:
         return distributed.Client(address, timeout=CONNECT_S, security=security)
     except ssl.SSLError as error:
@@ -61,24 +65,12 @@ def connected(address: str, tls: Path | None) -> Client:
         raise InputError(f"--scheduler {address!r}: an address such as tcp://host:8786") from error
 
 
-def _security(folder: Path) -> Security:
-    """The certificates of a folder."""
-    from distributed.security import Security
-
-    files = {key: folder / name for key, name in TLS_FILES.items()}
-    for path in files.values():
-        if not path.is_file():
-            raise InputError("no such file; allowed: a certificate in PEM", where=str(path))
-    return Security(require_encryption=True, **{key: str(path) for key, path in files.items()})
-
-
 def local_cluster(workers: int) -> LocalCluster:
     """Start worker processes that leave Ctrl-C to this one: each would print its own traceback."""
     from multiprocessing import resource_tracker
 
     import dask
     import distributed
-    from distributed.security import Security
 
     resource_tracker.ensure_running()  # its start would take the mask away again
     held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # what is started now inherits it
@@ -94,7 +86,7 @@ def local_cluster(workers: int) -> LocalCluster:
                 processes=True,
                 host="127.0.0.1",
                 protocol="tls://",
-                security=Security.temporary(),
+                security=distributed.Security.temporary(),
                 dashboard_address=None,
                 scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # or it asks for 8787, and warns
                 silence_logs=50,
@@ -103,24 +95,11 @@ def local_cluster(workers: int) -> LocalCluster:
         signal.pthread_sigmask(signal.SIG_SETMASK, held)
 
 
-@contextmanager
-def quiet() -> Iterator[None]:
+def quiet() -> AbstractContextManager[None]:
     """What Dask would log of a lost connection is said in one line, by what is raised."""
-    import distributed  # noqa: F401 - sets its handlers up
+    from distributed.utils import silence_logging_cmgr
 
-    names = [
-        "distributed",
-        *(name for name in logging.root.manager.loggerDict if name.startswith("distributed.")),
-    ]
-    handlers = {handler for name in names for handler in logging.getLogger(name).handlers}
-    before = {handler: handler.level for handler in handlers}
-    for handler in handlers:
-        handler.setLevel(logging.CRITICAL + 1)
-    try:
-        yield
-    finally:
-        for handler, level in before.items():
-            handler.setLevel(level)
+    return silence_logging_cmgr(logging.CRITICAL + 1)
 
 
 @contextmanager

@@ -37,13 +37,12 @@ class Engine:
     """Where parts are computed.
 
     A local Dask cluster of ``workers`` processes; a running ``scheduler``, such as ``tls://host:8786``, with
-    ``tls``, a folder with ca.pem, cert.pem and key.pem; else ``threads`` of this process (default: all
-    processors).
     """
 
     workers: int | None = None
     scheduler: str | None = None
     threads: int | None = None
+    # A folder with ca.pem, cert.pem and key.pem; else ``threads`` of this process (default: all processors)
     tls: Path | None = None
 
     @property
@@ -81,12 +80,8 @@ class Engine:
 
         Results go to the sink in any order; progress counts the sizes of the items.
 
-        Raises
-        ------
-        NumericalError
-            If workers keep dying, or the scheduler cannot be reached or is lost.
-        InputError
-            If a worker computes otherwise than this process (`analyses.studies.proof`).
+        Raises `NumericalError`: if workers keep dying, or the scheduler cannot be reached or is lost.
+        Raises `InputError`: if a worker computes otherwise than this process (`analyses.studies.proof`).
         """
         todo = list(items)
         if not todo:

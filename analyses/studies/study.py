@@ -136,7 +136,10 @@ def study_from_tree(tree: Tree, where: str, folder: Path, *, keep_going: bool = 
     head = root.table("study").read(_Head)
     extra = [dict(table.data) for table in root.tables("requirement")]
     maker = _Maker(_required(_design(head.base, folder), extra, where), where, folder, extra, keep_going)
-    variants = _bounded(chain(maker.variants(root), maker.sweeps(root), maker.grids(root)), where)
+    variants = list[Variant]()
+    for variant in chain(maker.variants(root), maker.sweeps(root), maker.grids(root)):
+        variants.append(variant)
+        STUDY_VARIANTS.check(len(variants), where)
     first = Variant(maker.base.name, slug(maker.base.name), maker.base)
     for name, times in Counter(variant.name for variant in (first, *variants)).items():
         if times > 1:
@@ -147,7 +150,7 @@ def study_from_tree(tree: Tree, where: str, folder: Path, *, keep_going: bool = 
         head.description,
         where,
         first,
-        variants,
+        tuple(variants),
         head.validation,
         _plan(root.table("monte_carlo")) if "monte_carlo" in root else None,
     )
@@ -194,14 +197,6 @@ def _design(name: str, folder: Path) -> Design:
     return load_design(name if name in shipped_designs() else folder / name)
 
 
-def _motor(name: str, folder: Path) -> Tree:
-    """The [motor] table of a file beside the study file."""
-    tree = read_toml(folder / name, "file with a [motor] table")
-    if not isinstance(tree.get("motor"), dict):
-        raise InputError("no [motor] table; allowed: a TOML file with one", where=shown_path(name))
-    return tree["motor"]
-
-
 def _located(place: str, where: str, make: Callable[[], Design]) -> Design:
     """Call something whose errors shall name the study file and a place in it."""
     try:
@@ -219,15 +214,6 @@ def _required(design: Design, extra: list[Tree], where: str) -> Design:
     return _located("requirement", where, lambda: with_overrides(design, {"requirement": [*kept, *extra]}))
 
 
-def _bounded(variants: Iterator[Variant], where: str) -> tuple[Variant, ...]:
-    """Take variants until there are too many."""
-    taken = []
-    for variant in variants:
-        taken.append(variant)
-        STUDY_VARIANTS.check(len(taken), where)
-    return tuple(taken)
-
-
 @dataclass(frozen=True)
 class _Maker:
     """Makes variants of a base."""
@@ -243,7 +229,11 @@ class _Maker:
             one = table.read(_Written, beside=("override",))
             overrides = dict(table.table("override").data)
             if one.motor is not None:
-                overrides = {"motor": _motor(one.motor, self.folder), **overrides}
+                motor = read_toml(self.folder / one.motor, "file with a [motor] table").get("motor")
+                if not isinstance(motor, dict):
+                    message = "no [motor] table; allowed: a TOML file with one"
+                    raise InputError(message, where=shown_path(one.motor))
+                overrides = {"motor": motor, **overrides}
             yield self._made(_name(table, one.name), overrides, one.base)
 
     def sweeps(self, root: Table) -> Iterator[Variant]:

@@ -18,7 +18,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Asked(OnMachines):
-    """A comparison."""
+    """Compare variants with their base: margins, bandwidths, verdicts, large signals, cause of each change.
+
+    What is found of each design is kept under --out; an interrupted comparison goes on where it stopped.
+
+    Try: actuator-lti compare joint --set control.position.gain="12 1/s" --set gear.harmonic.ratio=120
+    """
 
     validate: Annotated[
         bool | None,
@@ -32,17 +37,14 @@ def compared(
 ) -> Comparison | str:
     """Compare the variants of a study; what is found of each design is kept under ``out``.
 
-    Raises
-    ------
-    InputError
-        Without a study, unless the example of one is asked for.
+    Raises `InputError`: without a study, unless the example of one is asked for.
     """
     if asked.example:
         import textwrap
 
-        import analyses.studies.study
+        from analyses.studies import study as written
 
-        return textwrap.dedent((analyses.studies.study.__doc__ or "").split("::", 1)[1]).strip()
+        return textwrap.dedent((written.__doc__ or "").split("::", 1)[1]).strip()
     if study is None:
         raise InputError("compare: give a study file or a design; --example prints a study file")
     from analyses.comparison.variants import compare

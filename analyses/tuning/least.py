@@ -80,20 +80,17 @@ def _descend(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.nda
     """Minimise the change by sequential quadratic programming; rows from there back to the start."""
     from scipy.optimize import minimize
 
-    def limits(x: np.ndarray) -> np.ndarray:
-        return problem.distances(problem.values(x), working).reshape(len(x), -1) - MET
-
-    def cost(x: np.ndarray) -> float:
-        return float(problem.change(problem.values(x)[None, :])[0])
-
-    program = Program(problem, limits)
+    program = Program(problem, lambda x: problem.rows(x, working) - MET)
     low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
     begin = np.clip(problem.coordinates(start), low, high)
     met = {"type": "ineq", "fun": lambda x: program.model(x)[0], "jac": lambda x: program.model(x)[1]}
     settings = {"maxiter": 60, "ftol": 1e-10}
     bounds = [*zip(low, high, strict=True)]
     try:
-        result = minimize(cost, begin, method="SLSQP", bounds=bounds, constraints=met, options=settings).x
+        result = minimize(
+            lambda x: float(problem.change(problem.values(x)[None, :])[0]),
+            begin, method="SLSQP", bounds=bounds, constraints=met, options=settings,
+        ).x  # fmt: skip
     except Spent:
         result = program.best if program.seen else begin
     rows = result + WAY[:, None] * (begin - result)
@@ -126,8 +123,7 @@ def _evolved(problem: Problem, best: np.ndarray, working: np.ndarray) -> np.ndar
     box = np.clip([centre - reach, centre + reach], low, high)
 
     def limits(x: np.ndarray) -> np.ndarray:
-        rows = problem.values(np.atleast_2d(x.T))
-        made = (problem.distances(rows, working).reshape(len(rows), -1) - MET).T
+        made = (problem.rows(np.atleast_2d(x.T), working) - MET).T
         return made if x.ndim > 1 else made[:, 0]
 
     result = differential_evolution(

@@ -121,7 +121,7 @@ def place(design: Design, elements: tuple[Element, ...]) -> Placed:
         if element == "feedforward":
             variables += _feedforward(design)
             continue
-        item, rows = (_notch if element == "notch" else _lowpass)(design)
+        item, rows = _filter(design, element)
         velocity = design.controller.velocity
         assert velocity is not None
         filters = (*velocity.filters, item)
@@ -149,8 +149,11 @@ def resonance_rad_s(design: Design) -> float:
     return float(np.clip(free_resonance_rad_s(design), low, high))
 
 
-def _notch(design: Design) -> tuple[Filter, list[Variable]]:
+def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
     low, high = band_rad_s(design)
+    if element == "lowpass":
+        lowpass = Filter(kind="lowpass", frequency_rad_s=high)
+        return lowpass, [Variable("frequency", high, low, high, high)]
     centre = resonance_rad_s(design)
     item = Filter(kind="notch", frequency_rad_s=centre, width_rad_s=0.5 * centre, depth=1.0)
     return item, [
@@ -158,12 +161,6 @@ def _notch(design: Design) -> tuple[Filter, list[Variable]]:
         Variable("width", 0.5 * centre, 0.02 * low, 4.0 * high, None, per="frequency"),
         Variable("depth", 1.0, DEEPEST, 1.0, 1.0),
     ]
-
-
-def _lowpass(design: Design) -> tuple[Filter, list[Variable]]:
-    low, high = band_rad_s(design)
-    item = Filter(kind="lowpass", frequency_rad_s=high)
-    return item, [Variable("frequency", high, low, high, high)]
 
 
 def _feedforward(design: Design) -> list[Variable]:

@@ -144,6 +144,10 @@ class Problem:
         """`exact_distances` as far as the search looks."""
         return np.minimum(self.exact_distances(gains, corners), PLENTY)
 
+    def rows(self, coordinates: np.ndarray, corners: np.ndarray) -> np.ndarray:
+        """Distances at coordinates, one row for each: shape (candidates, corners * requirements)."""
+        return self.distances(self.values(coordinates), corners).reshape(len(coordinates), -1)
+
     def exact_distances(
         self, gains: np.ndarray, corners: np.ndarray, factors: tuple[Factor, ...] | None = None
     ) -> np.ndarray:

@@ -12,6 +12,7 @@ from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.batch import Population
 from actuator_lti.design import with_values
 from actuator_lti.loops import assemble_loops
+from analyses.finite import finite
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.specification.requirements import judged
@@ -138,15 +139,9 @@ def confirm(
         design = with_values(tuned, dict(corner), check=False)
         figures = all_loop_figures(assemble_loops(design), step=timed, certify=True)
         for requirement in asked:
-            verdicts += [
-                replace(each, id=f"{each.id}, worst corner") if corner else each
-                for each in judged(design, requirement, figures, _nothing)
-            ]
+            found = judged(design, requirement, figures, lambda name: (None, f"{name}: no figure of a loop"))
+            verdicts += [replace(each, id=f"{each.id}, worst corner") for each in found] if corner else found
     return tuple(verdicts)
-
-
-def _nothing(name: str) -> tuple[float | None, str]:
-    return None, f"{name}: not a figure of a loop"
 
 
 def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tuple[NonlinearCheck, ...]:
@@ -158,31 +153,28 @@ def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tup
     rows = {"nominal": problem.all_corners[0]}
     if worst:
         rows["worst corner"] = problem.all_corners[worst]
+    points = np.array(list(rows.values())).T
     population = Population(
-        tuned,
-        {f.path: np.array([row[k] for row in rows.values()]) for k, f in enumerate(problem.factors)},
-        len(rows),
+        tuned, {f.path: column for f, column in zip(problem.factors, points, strict=True)}, len(rows)
     )
     checks = []
     for share in (_SMALL, 1.0):
         step = StepCheck(share * plan.deflection_rad, plan.duration_s)
         columns = step_columns(step, population)
         for k, corner in enumerate(rows):
-            checks.append(_check({n: float(v[k]) for n, v in columns.items()}, corner, step.amplitude_rad))
+            one = {name.partition(".")[2]: float(values[k]) for name, values in columns.items()}
+            shares = {name: one[f"{name}_limited"] for name in ("speed", "current", "voltage")}
+            checks.append(
+                NonlinearCheck(
+                    corner=corner,
+                    amplitude_rad=step.amplitude_rad,
+                    rise_time_s=finite(one["rise_time"]),
+                    overshoot_percent=one["overshoot"],
+                    settling_time_s=finite(one["settling_time"]),
+                    final_error_percent=one["final_error"],
+                    limited=", ".join(
+                        f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0
+                    ),
+                )
+            )
     return tuple(checks)
-
-
-def _check(values: dict[str, float], corner: str, amplitude_rad: float) -> NonlinearCheck:
-    limited = [
-        f"{name} {values[f'nonlinear.{name}_limited']:.1f} %"
-        for name in ("speed", "current", "voltage")
-        if values[f"nonlinear.{name}_limited"] > 0.0
-    ]
-    return NonlinearCheck(
-        corner, amplitude_rad, _known(values["nonlinear.rise_time"]), values["nonlinear.overshoot"],
-        _known(values["nonlinear.settling_time"]), values["nonlinear.final_error"], ", ".join(limited),
-    )  # fmt: skip
-
-
-def _known(value: float) -> float | None:
-    return value if np.isfinite(value) else None

@@ -71,15 +71,8 @@ def integrator_gain(phase_margin_deg: float, delay_s: float, period_s: float = 0
 def pi_for_crossover(response: complex, omega_rad_s: float, phase_margin_deg: float) -> tuple[float, float]:
     """PI (gain, integral time) that puts the gain crossover at a frequency with a phase margin.
 
-    Parameters
-    ----------
-    response : complex
-        Of the plant at that frequency.
-
-    Raises
-    ------
-    InputError
-        If the plant's phase leaves no room: a PI lags by 0 to 90 deg.
+    ``response``: of the plant at that frequency.
+    Raises `InputError`: if the plant's phase leaves no room: a PI lags by 0 to 90 deg.
 
     Examples
     --------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from os import PathLike
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ from analyses.tuning.rules import RuleGains, rule_gains
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design, Requirement
+    from actuator_lti.design.model import Design
     from analyses.specification.requirements import RequirementVerdict
 
 Progress = Callable[[int, int], None]
@@ -80,7 +80,12 @@ def tune(
     placed, problem, solution = best.placed, best.problem, best.solution
     gains = _rounded(problem, solution, settings.aim) if settings.rounded else solution.gains
     result = problem.exact_distances(gains[None, :], problem.all_corners)[0]
-    tuned = replace(_tuned(problem, gains), name=f"{design.name}-tuned")
+    moved = {  # what did not move keeps its text and source
+        item.path: float(value)
+        for item, value in zip(problem.variables, gains, strict=True)
+        if item.home is None or value != item.home
+    }
+    tuned = replace(with_values(problem.design, moved), name=f"{design.name}-tuned")
     tell(len(choices) + 1, stages)
     requirements = _binding(problem, gains, result, settings.aim)
     confirmed = confirm(tuned, wanted, requirements)
@@ -90,20 +95,20 @@ def tune(
     searched += problem.evaluations - best.evaluations
     tell(stages, stages)
     return TuningResult(
-        bool(result.min() >= 0.0) and all(v.passes for v in confirmed),
-        design,
-        tuned,
-        _settings(problem, design, rules, solution.gains, gains),
-        requirements,
-        rules.steps,
-        len(problem.all_corners),
-        checks,
-        curve,
-        searched,
-        (*_notes(problem, gains, result), *_said(confirmed), *_left_out(design)),
-        settings.aim,
-        placed.elements,
-        confirmed,
+        feasible=bool(result.min() >= 0.0) and all(v.passes for v in confirmed),
+        before=design,
+        design=tuned,
+        gains=tuple(_settings(problem, design, rules, solution.gains, gains)),
+        requirements=requirements,
+        steps=rules.steps,
+        corners=len(problem.all_corners),
+        checks=checks,
+        trade_off=curve,
+        evaluations=searched,
+        notes=tuple(_notes(problem, gains, result, confirmed)),
+        aim=settings.aim,
+        placed=placed.elements,
+        confirmed=confirmed,
     )
 
 
@@ -123,23 +128,6 @@ class Attempt:
     evaluations: int
 
 
-def _said(confirmed: tuple[RequirementVerdict, ...]) -> tuple[str, ...]:
-    """Where a certified margin does not bear out what the search result."""
-    return tuple(
-        f"Not confirmed by certified margins: {v.id}: "
-        + (v.reason if v.value is None else f"{v.value:.6g} {v.requirement.unit}")
-        for v in confirmed
-        if v.verdict != "met"
-    )
-
-
-def _left_out(design: Design) -> tuple[str, ...]:
-    """Requirements on loops that the search does not see."""
-    of_loops = [item for item in design.requirements if item.quantity in LOOP_QUANTITIES]
-    names = ", ".join(item.id for item in of_loops if not in_populations(item, design))
-    return (f"Not searched for, as each takes a computation of one design: {names}.",) if names else ()
-
-
 def _rounded(problem: Problem, solution: Solution, aim: Aim) -> np.ndarray:
     """Of all roundings up and down: the least change that meets all, or else the one farthest from limits."""
     choices = neighbours(problem.design, problem.paths, solution.gains)
@@ -150,15 +138,8 @@ def _rounded(problem: Problem, solution: Solution, aim: Aim) -> np.ndarray:
     best = np.argsort(order, kind="stable")[:4]
     whole = problem.distances(choices[best], problem.all_corners).min(axis=(1, 2))
     if aim == "least-change" and np.any(whole >= 0.0):
-        return choices[best[int(np.argmax(whole >= 0.0))]]
+        whole = whole >= 0.0
     return choices[best[int(np.argmax(whole))]]
-
-
-def _tuned(problem: Problem, gains: np.ndarray) -> Design:
-    pairs = zip(problem.paths, map(float, gains), problem.variables, strict=True)
-    # what did not move keeps its text and source
-    moved = {path: value for path, value, v in pairs if v.home is None or value != v.home}
-    return with_values(problem.design, moved)
 
 
 def _binding(
@@ -170,70 +151,75 @@ def _binding(
     if aim == "least-change":  # nothing binds a design that meets all as it came
         enough = smallest >= _BINDS or np.array_equal(gains, problem.present)
     made = []
-    for k, requirement in enumerate(problem.requirements):
-        corner = int(np.argmin(result[:, k]))
-        relative = float(result[corner, k])
-        known = -3.0 < relative < np.inf
-        distance = relative * size_of(requirement) if known else None
+    for requirement, distances in zip(problem.requirements, result.T, strict=True):
+        worst = int(np.argmin(distances))
+        relative, limit = float(distances[worst]), limit_of(requirement)
+        distance = relative * size_of(requirement) if -3.0 < relative < np.inf else None
+        way = 1.0 if requirement.minimum is not None else -1.0
+        corner = zip(problem.factors, problem.all_corners[worst], strict=True) if worst else ()
         made.append(
             BindingRequirement(
-                requirement.id, label(requirement), requirement.unit, _value(requirement, distance),
-                limit_of(requirement), distance, relative, relative <= smallest + _BINDS and not enough,
-                {} if corner == 0 else {f.path: float(v) for f, v in
-                                        zip(problem.factors, problem.all_corners[corner], strict=True)},
+                id=requirement.id,
+                label=label(requirement),
+                unit=requirement.unit,
+                value=None if distance is None else limit + way * distance,
+                limit=limit,
+                distance=distance,
+                relative=relative,
+                binds=relative <= smallest + _BINDS and not enough,
+                corner={factor.path: float(value) for factor, value in corner},
             )
-        )  # fmt: skip
+        )
     return tuple(made)
-
-
-def _value(requirement: Requirement, distance: float | None) -> float | None:
-    """The figure itself, from its distance to the limit."""
-    if distance is None:
-        return None
-    limit = limit_of(requirement)
-    return limit + distance if requirement.minimum is not None else limit - distance
 
 
 def _settings(
     problem: Problem, before: Design, rules: RuleGains, tuned: np.ndarray, rounded: np.ndarray
-) -> tuple[GainSetting, ...]:
+) -> Iterator[GainSetting]:
     known_before = set(paths_of(before))
-    made = []
-    for k, path in enumerate(problem.paths):
+    for path, exact, value in zip(problem.paths, map(float, tuned), map(float, rounded), strict=True):
         known, step, field = (
             object_of(problem.design, path),
             step_of_gain(problem.design, path),
             field_of(path),
         )
         assert field is not None
-        made.append(
-            GainSetting(
-                path, field.unit(Structure.of(problem.design)),
-                parameter_value(before, path) if path in known_before else None,
-                rules.values.get(path), float(tuned[k]), "" if known is None else known.label,
-                "" if known is None else known.unit, None if step is None else round(rounded[k] / step),
-                float(rounded[k]),
-            )
-        )  # fmt: skip
-    return tuple(made)
+        yield GainSetting(
+            path=path,
+            unit=field.unit(Structure.of(problem.design)),
+            before=parameter_value(before, path) if path in known_before else None,
+            by_rule=rules.values.get(path),
+            tuned=exact,
+            object=known.label if known else "",
+            object_unit=known.unit if known else "",
+            steps=None if step is None else round(value / step),
+            rounded=value,
+        )
 
 
-def _notes(problem: Problem, gains: np.ndarray, result: np.ndarray) -> tuple[str, ...]:
-    notes = [
-        "Distances are the smallest over the nominal design and all corners of the tolerance box; a margin "
-        "that is worst inside the box is not seen here, `montecarlo` on the tuned design looks there.",
-    ]
-    left = [f.path for f in problem.toleranced if f not in problem.factors]
-    if left:
-        notes.append(f"Corners are those of the ten strongest tolerances; nominal: {', '.join(left)}.")
-    if problem.spent:
-        notes.append(f"The search ended after {problem.evaluations} designs, its bound.")
+def _notes(
+    problem: Problem, gains: np.ndarray, result: np.ndarray, confirmed: tuple[RequirementVerdict, ...]
+) -> Iterator[str]:
+    """What was missed, what was not looked at, what a certified margin does not bear out."""
     if result.min() < 0.0:
         missed = [r.id for k, r in enumerate(problem.requirements) if result[:, k].min() < 0.0]
-        notes.insert(0, f"Cannot be met together, best compromise found misses: {', '.join(missed)}.")
+        yield f"Cannot be met together, best compromise found misses: {', '.join(missed)}."
+    yield (
+        "Distances are the smallest over the nominal design and all corners of the tolerance box; a margin "
+        "that is worst inside the box is not seen here, `montecarlo` on the tuned design looks there."
+    )
+    if left := [f.path for f in problem.toleranced if f not in problem.factors]:
+        yield f"Corners are those of the ten strongest tolerances; nominal: {', '.join(left)}."
+    if problem.spent:
+        yield f"The search ended after {problem.evaluations} designs, its bound."
     at_end = (gains <= problem.lower * (1 + 1e-9)) | (gains >= problem.upper * (1 - 1e-9))
     at_end &= gains != problem.present
-    ends = [path for path, at in zip(problem.paths, at_end, strict=True) if at]
-    if ends:
-        notes.append(f"At the end of what may be set, and so binding too: {', '.join(ends)}.")
-    return tuple(notes)
+    if ends := [path for path, at in zip(problem.paths, at_end, strict=True) if at]:
+        yield f"At the end of what may be set, and so binding too: {', '.join(ends)}."
+    for one in confirmed:
+        if one.verdict != "met":
+            said = one.reason if one.value is None else f"{one.value:.6g} {one.requirement.unit}"
+            yield f"Not confirmed by certified margins: {one.id}: {said}"
+    of_loops = [item for item in problem.design.requirements if item.quantity in LOOP_QUANTITIES]
+    if names := [item.id for item in of_loops if not in_populations(item, problem.design)]:
+        yield f"Not searched for, as each takes a computation of one design: {', '.join(names)}."

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -48,7 +49,11 @@ def solve(problem: Problem, *, give_up: bool = False) -> Solution:
     starts = start_points(problem, working)
     best: Solution | None = None
     for _ in range(ROUNDS):
-        gains = _best_of([_climb(problem, start, working) for start in starts], problem, working)
+        rows = partial(problem.rows, corners=working)
+        found = np.array([maximise(problem, start, rows) for start in starts])
+        away = np.sum((problem.coordinates(found) - problem.coordinates(problem.start)) ** 2, axis=1)
+        near = np.minimum(problem.distances(found, working).min(axis=(1, 2)), RESERVE) - TIE * away
+        gains = found[int(np.argmax(near))]
         result = problem.distances(gains[None, :], corners)[0]
         slack = float(result.min())
         if best is None or slack > best.slack:
@@ -75,13 +80,6 @@ def start_points(problem: Problem, working: np.ndarray) -> np.ndarray:
     return np.vstack([cloud[:1], cloud[order[:2]]])
 
 
-def _best_of(candidates: list[np.ndarray], problem: Problem, working: np.ndarray) -> np.ndarray:
-    gains = np.array(candidates)
-    away = np.sum((problem.coordinates(gains) - problem.coordinates(problem.start)) ** 2, axis=1)
-    slack = np.minimum(problem.distances(gains, working).min(axis=(1, 2)), RESERVE) - TIE * away
-    return gains[int(np.argmax(slack))]
-
-
 def violated(
     result: np.ndarray, problem: Problem, gains: np.ndarray, corners: np.ndarray, working: np.ndarray
 ) -> np.ndarray:
@@ -90,22 +88,9 @@ def violated(
     fresh = []
     for k in range(result.shape[1]):
         worst = int(np.argmin(result[:, k]))
-        if result[worst, k] < known - 1e-6 and not _among(corners[worst], working):
+        if result[worst, k] < known - 1e-6 and not (working == corners[worst]).all(axis=1).any():
             fresh.append(corners[worst])
     return np.unique(np.array(fresh), axis=0) if fresh else np.empty((0, corners.shape[1]))
-
-
-def _among(corner: np.ndarray, working: np.ndarray) -> bool:
-    return bool(np.any(np.all(working == corner, axis=1)))
-
-
-def _climb(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.ndarray:
-    """Maximise t subject to distances >= t, from one start."""
-
-    def limits(x: np.ndarray) -> np.ndarray:
-        return problem.distances(problem.values(x), working).reshape(len(x), -1)
-
-    return maximise(problem, start, limits)
 
 
 class Spent(Exception):
@@ -152,7 +137,7 @@ def maximise(
     start: np.ndarray,
     limits: Functions,
     free: Functions | None = None,
-    iterations: int = 80,
+    most_rounds: int = 80,
 ) -> np.ndarray:
     """Maximise the smallest of some functions of the gains, from a start; all gains in SI.
 
@@ -181,7 +166,7 @@ def maximise(
             np.append(x0, first if most is None else min(first, most)),
             jac=lambda y: np.append(2 * TIE * (y[:-1] - rules), -1.0),
             method="SLSQP", bounds=[*zip(low, high, strict=True), (None, most)],
-            constraints=met, options={"maxiter": iterations, "ftol": 1e-9},
+            constraints=met, options={"maxiter": most_rounds, "ftol": 1e-9},
         ).x[:-1]  # fmt: skip
     except Spent:
         result = program.best
@@ -202,62 +187,67 @@ def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple
         k for k, r in enumerate(problem.requirements)
         if r.quantity != "phase_margin" and not (r.quantity == "bandwidth" and r.loop in ("position", None))
     ]  # fmt: skip
-    centre = float(np.min(problem.figure("bandwidth", "position", gains[None, :], working)))
+    trade = _TradeOff(problem, working, others)
+    centre = float(np.min(trade.width(gains[None, :])))
     if not np.isfinite(centre):
         return ()
     targets = [float(hz) for hz in centre * np.geomspace(*_SPAN, POINTS)]
     result: list[np.ndarray] = []
     for wanted in targets:
         starts = [gains, *result[-1:]]
-        tried = [_best(problem, start, working, wanted, others) for start in starts]
-        result.append(_better(problem, [*starts, *tried], working, wanted, others))
+        tried = [trade.best(start, wanted) for start in starts]
+        result.append(trade.better([*starts, *tried], wanted))
     for k in range(len(targets) - 2, -1, -1):  # what a higher bandwidth allows, a lower one does too
-        result[k] = _better(problem, result[k : k + 2], working, targets[k], others)
-    points = [_point(problem, one, working, others) for one in result]
+        result[k] = trade.better(result[k : k + 2], targets[k])
+    points = [trade.point(one[None, :]) for one in result]
     return tuple(point for point in points if np.isfinite(point.bandwidth_hz))
 
 
-def _margins(problem: Problem, rows: np.ndarray, working: np.ndarray) -> np.ndarray:
-    """Phase margins, shape (candidates, loops * corners); 180 without crossing."""
-    result = [problem.figure("phase_margin", loop, rows, working) for loop in loops_of(problem.design)]
-    return np.clip(np.concatenate(result, axis=1), -180.0, 180.0)
+@dataclass(frozen=True)
+class _TradeOff:
+    """Bandwidth, phase margins and the ``others`` of the requirements at some corners, of rows of gains."""
 
+    problem: Problem
+    working: np.ndarray
+    others: list[int]
 
-def _better(
-    problem: Problem, candidates: list[np.ndarray], working: np.ndarray, wanted_hz: float, others: list[int]
-) -> np.ndarray:
-    """Of some gains those with the largest phase margin that keep the bandwidth and the other limits."""
-    rows = np.array(candidates)
-    width = problem.figure("bandwidth", "position", rows, working)
-    margin = _margins(problem, rows, working).min(axis=1)
-    short = np.minimum(np.where(np.isnan(width), -3.0, width / wanted_hz - 1.0).min(axis=1) - _MET, 0.0)
-    if others:
-        kept = problem.distances(rows, working)[:, :, others].min(axis=(1, 2))
-        short = short + np.minimum(kept - _MET, 0.0)
-    return rows[int(np.lexsort((-margin, -short))[0])]
+    def width(self, rows: np.ndarray) -> np.ndarray:
+        return self.problem.figure("bandwidth", "position", rows, self.working)
 
+    def margins(self, rows: np.ndarray) -> np.ndarray:
+        """Phase margins, shape (candidates, loops * corners); 180 without crossing."""
+        loops = loops_of(self.problem.design)
+        result = [self.problem.figure("phase_margin", loop, rows, self.working) for loop in loops]
+        return np.clip(np.concatenate(result, axis=1), -180.0, 180.0)
 
-def _best(
-    problem: Problem, start: np.ndarray, working: np.ndarray, wanted_hz: float, others: list[int]
-) -> np.ndarray:
-    """Largest phase margin at a bandwidth or above, other requirements kept."""
+    def kept(self, rows: np.ndarray, wanted_hz: float) -> list[np.ndarray]:
+        """How far bandwidth, and the other figures, are from their limits, each (candidates, distances)."""
+        width = self.width(rows)
+        made = [np.where(np.isnan(width), -3.0, width / wanted_hz - 1.0)]
+        if self.others:
+            distances = self.problem.distances(rows, self.working)
+            made.append(distances[:, :, self.others].reshape(len(rows), -1))
+        return made
 
-    def goal(x: np.ndarray) -> np.ndarray:
-        return _margins(problem, problem.values(x), working) / 45.0
+    def better(self, candidates: list[np.ndarray], wanted_hz: float) -> np.ndarray:
+        """Of some gains those with the largest phase margin that keep the bandwidth and the other limits."""
+        rows = np.array(candidates)
+        margin = self.margins(rows).min(axis=1)
+        short = sum(np.minimum(part.min(axis=1) - _MET, 0.0) for part in self.kept(rows, wanted_hz))
+        return rows[int(np.lexsort((-margin, -np.asarray(short)))[0])]
 
-    def limits(x: np.ndarray) -> np.ndarray:
-        width = problem.figure("bandwidth", "position", problem.values(x), working)
-        kept = [np.where(np.isnan(width), -3.0, width / wanted_hz - 1.0)]
-        if others:
-            kept.append(problem.distances(problem.values(x), working)[:, :, others].reshape(len(x), -1))
-        return np.concatenate(kept, axis=1)
+    def best(self, start: np.ndarray, wanted_hz: float) -> np.ndarray:
+        """Largest phase margin at a bandwidth or above, other requirements kept."""
+        values = self.problem.values
+        return maximise(
+            self.problem,
+            start,
+            lambda x: np.concatenate(self.kept(values(x), wanted_hz), axis=1),
+            lambda x: self.margins(values(x)) / 45.0,
+            most_rounds=30,
+        )
 
-    return maximise(problem, start, limits, goal, iterations=30)
-
-
-def _point(problem: Problem, gains: np.ndarray, working: np.ndarray, others: list[int]) -> TradeOffPoint:
-    row = gains[None, :]
-    width = float(np.min(problem.figure("bandwidth", "position", row, working)))
-    margin = float(_margins(problem, row, working).min())
-    kept = problem.distances(row, working)[0][:, others]
-    return TradeOffPoint(width, margin, bool(kept.size == 0 or kept.min() >= _MET))
+    def point(self, row: np.ndarray) -> TradeOffPoint:
+        width, margin = float(np.min(self.width(row))), float(self.margins(row).min())
+        kept = self.problem.distances(row, self.working)[0][:, self.others]
+        return TradeOffPoint(width, margin, bool(kept.size == 0 or kept.min() >= _MET))

@@ -21,7 +21,7 @@ from analyses.validation.row import Row
 
 if TYPE_CHECKING:
     from analyses.friction_effects import FrictionEffects
-    from analyses.large_signal import LargeSignals
+    from analyses.large_signal.result import LargeSignals
     from analyses.specification import Specification
 
 REST = {

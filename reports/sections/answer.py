@@ -23,7 +23,7 @@ from reports.verdict_summary import gathered, tally
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
-    from analyses.corners import Corners
+    from analyses.corners.run import Corners
 
 SHOWN = 3
 MOST_BARS = 12

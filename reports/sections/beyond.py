@@ -10,8 +10,8 @@ import numpy as np
 
 from analyses.large_signal.at_rest import RestSweep
 from analyses.large_signal.conditional import Conditional, Prediction
-from analyses.limit_cycles import Confirmation
 from analyses.limit_cycles.counts import WITHIN, Counts
+from analyses.limit_cycles.run import Confirmation
 from reports import document as doc
 from reports.charts import style
 from reports.document_schema import FactItem

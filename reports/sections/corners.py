@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
-from analyses.corners import Corner, Corners
+from analyses.corners.run import Corner, Corners
 from reports import document as doc
 from reports.charts import style
 from reports.sections.margins import shown

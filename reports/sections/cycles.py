@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.limit_cycles import LimitCycles
+from analyses.limit_cycles.run import LimitCycles
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, judged_by, verdict_of, words
 from reports import document as doc
 from reports.sections.names import fine_unit, load_unit

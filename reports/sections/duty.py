@@ -6,7 +6,7 @@ import math
 from typing import Literal
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.duty import Duty, Heating
+from analyses.duty.run import Duty, Heating
 from reports import document as doc
 from reports.charts import style
 from reports.sections.names import load_unit, output_unit

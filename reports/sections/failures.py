@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
-from analyses.failures import Failures
+from analyses.failures.run import Failures
 from analyses.motion.settling import noticed, told, verdict_of
 from reports import document as doc
 from reports.charts import style

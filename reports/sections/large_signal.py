@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.model import Command, Design
-from analyses.large_signal import LargeSignals
 from analyses.large_signal.classify import CAUSE_RULE, CAUSES, CRITERIA
 from analyses.large_signal.map import AmplitudeBode
-from analyses.large_signal.result import LimitShift
+from analyses.large_signal.result import LargeSignals, LimitShift
 from analyses.large_signal.sawtooth import (
     FAST,
     GAIN_TOLERANCE,

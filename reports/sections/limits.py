@@ -13,8 +13,8 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.loops.limiters import Onset
-from analyses.large_signal import LargeSignals
 from analyses.large_signal.classify import CAUSES, WAVEFORMS
+from analyses.large_signal.result import LargeSignals
 from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style

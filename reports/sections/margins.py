@@ -10,7 +10,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.tree import Tree
 from analyses.linear.loop_figures import AWAY, HELD, OPEN, LoopFigures
 from analyses.linear.loop_survey import OperatingPointFigures
-from analyses.margins import Margins
+from analyses.margins.run import Margins
 from analyses.specification.weakest import Spread, figures_of, spread
 from reports import document as doc
 from reports.numbers import fixed, gain_margin, short, to_minus

@@ -13,7 +13,7 @@ from reports.sections.names import QUANTITIES, unit_words
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Requirement
-    from analyses.monte_carlo import Odds
+    from analyses.monte_carlo.result import Odds
 
 
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> doc.Section:

@@ -11,7 +11,7 @@ from actuator_lti.design.control import Stage
 from actuator_lti.drive.signals import LIMITERS, Limiter
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
-from analyses.motion import Motion
+from analyses.motion.run import Motion
 from analyses.motion.settling import conduct, summary
 from nonlinear import Trajectory
 from nonlinear.runs.trajectory import COMMAND_UNITS, LimitUse

@@ -7,7 +7,7 @@ from pathlib import Path
 from actuator_lti.design import write_design
 from actuator_lti.files.atomic import write_text
 from analyses.specification.requirements import RequirementVerdict
-from analyses.tuning import BindingRequirement, TuningResult
+from analyses.tuning.result import BindingRequirement, TuningResult
 from reports import document as doc
 from reports.charts import style
 from reports.sections.names import output_unit, unit_words
