@@ -21,7 +21,7 @@ from actuator_lti.drive.operating import RotorState
 from actuator_lti.drive.profile import command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops.assemble import loops_at
-from actuator_lti.systems.as_control import as_control
+from actuator_lti.systems.plain_delays import as_control
 from analyses.isolation import attempt
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from actuator_lti.files.tree import Tree
 from reports import document as doc
 from reports.nightly.machines import summary
 from reports.nightly.text import one_line
-from reports.nightly.view import STATE_WORDS, DesignView
+from reports.nightly.view import STATES, DesignView
 
 if TYPE_CHECKING:
     from reports.nightly.view import Overview
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def section(night: Overview) -> doc.Section:
     columns = [
-        doc.of(lambda design: STATE_WORDS[design.state], "state", "State"),
+        doc.of(lambda design: STATES[design.state][1], "state", "State"),
         doc.of(lambda design: one_line(design.name, 60), "name", "Design"),
         doc.of(_why, "why", "Why"),
     ]
@@ -36,10 +36,8 @@ def _why(design: DesignView) -> str:
 
 
 def data(night: Overview) -> Tree:
-    """Give what ``summary.json`` holds."""
     return summary(night)
 
 
 def write(night: Overview, _folder: Path | None) -> list[str]:
-    """Name the page that was published."""
     return [str(night.site / "index.html")]
