@@ -34,7 +34,7 @@ from analyses.limit_cycles.describing import (
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
 from nonlinear import Rows
-from nonlinear.bench.on_the_bench import without_counts
+from nonlinear.bench.operating_motion import without_counts
 
 if TYPE_CHECKING:
     from actuator_lti.loops import Loops

@@ -12,7 +12,7 @@ from analyses.friction_effects import friction_effects
 from analyses.motion.settling import conduct, settle
 from nonlinear import Rows, State, commands, simulate
 from nonlinear._kernels import layout as at
-from nonlinear.bench.on_the_bench import quiet
+from nonlinear.bench.operating_motion import quiet
 from nonlinear.settling.drift import overload, ticks_until_it_acts
 from nonlinear.settling.rest import first_motion_s, judge
 from tests.nonlinear.rest_agreement import answers

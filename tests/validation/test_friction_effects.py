@@ -17,7 +17,7 @@ from analyses.friction_effects.result import limit_cycles
 from analyses.linear.static_threshold import static_threshold
 from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
-from nonlinear.bench.on_the_bench import quiet
+from nonlinear.bench.operating_motion import quiet
 from nonlinear.settling.rest import first_motion_s
 from reports.sections.friction_effects import section
 

@@ -16,7 +16,7 @@ from analyses.specification import Specification, specification
 from analyses.specification.capability import drive_figures
 from analyses.specification.manoeuvres import thermal_duty, torque_speed_plane
 from nonlinear import commands, simulate
-from nonlinear.bench.on_the_bench import on_the_bench
+from nonlinear.bench.operating_motion import on_the_bench
 from reports import document as doc
 from reports.drawing import draw_svg
 from reports.sections import friction_effects as friction_section
