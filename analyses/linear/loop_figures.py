@@ -12,25 +12,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB
-from actuator_lti.design.model import Design
+from actuator_lti.bandwidth import Bandwidth, Peaks
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.angle import pushes_away
 from actuator_lti.drive.operating import RotorState
-from actuator_lti.drive.profile import command_mean, profile_note
+from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.loops import Loop, Loops
 from actuator_lti.loops.assemble import loops_at
+from actuator_lti.margins import StabilityMargins
+from actuator_lti.step import StepFigures
 from actuator_lti.systems.as_control import as_control
 from analyses.isolation import attempt
-
-if TYPE_CHECKING:
-    from actuator_lti.bandwidth import Bandwidth, Peaks
-    from actuator_lti.design.model import Requirement
-    from actuator_lti.drive.profile import CommandMean
-    from actuator_lti.loops import Loop, Loops
-    from actuator_lti.margins import StabilityMargins
-    from actuator_lti.step import StepFigures
 
 HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""

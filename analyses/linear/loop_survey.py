@@ -11,19 +11,18 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
+from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.loops import ExactMargins, Loops
+from actuator_lti.loops.delay_budget import DelayBudget
+from actuator_lti.loops.limiters import Onset
+from actuator_lti.loops.result import Form
 from analyses.isolation import attempt
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
-
-    from actuator_lti.drive.operating import OperatingPoint
-    from actuator_lti.loops import ExactMargins, Loops
-    from actuator_lti.loops.delay_budget import DelayBudget
-    from actuator_lti.loops.limiters import Onset
-    from actuator_lti.loops.result import Form
 
 Progress = Callable[[int, int], None]
 FORMS: tuple[Form, ...] = ("sampled", "continuous", "ideal")

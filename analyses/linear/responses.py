@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.systems.resolvent import responses
-
-if TYPE_CHECKING:
-    from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_figures import LoopFigures
 
 DECADES_BELOW = 2.0
 DECADES_ABOVE = 1.3

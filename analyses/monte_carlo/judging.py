@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES, judged_loops
+from actuator_lti.batch.figures import LinearFigures
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
-
-if TYPE_CHECKING:
-    from actuator_lti.batch.figures import LinearFigures
-    from actuator_lti.design.model import Design, Requirement
 
 Columns = Mapping[str, np.ndarray]
 

@@ -12,17 +12,15 @@ import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.model import Design, Requirement
 from analyses.monte_carlo.judging import by_loop, in_populations, judge
 from analyses.monte_carlo.statistics import Sketch
+from analyses.monte_carlo.task import SampleTask
 from analyses.studies.engine import Chunk
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design, Requirement
-    from analyses.monte_carlo.task import SampleTask
 
 WORST_KEPT = 8
 BLOCK = 4096  # samples that are in memory at once

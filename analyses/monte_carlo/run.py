@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
@@ -33,9 +33,6 @@ from analyses.monte_carlo.worst import worst_case
 from analyses.specification.requirements import RequirementVerdict
 from analyses.studies.engine import Chunk, Engine
 from analyses.studies.sampling import Table, sampler_of
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design, Requirement
 
 Progress = Callable[[int, int], None]
 KEPT = 1_000_000  # samples that are kept as Parquet, about 200 MB

@@ -18,14 +18,13 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
+from actuator_lti.design.model import Design, Tolerance
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import read_bytes, shown, shown_path
 from actuator_lti.start.extras import need
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from actuator_lti.design.model import Design, Tolerance
 
 _BITS = 32
 _SINGULAR = 1e-12  # what is left of a variance below this is rounding

@@ -11,18 +11,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 from math import ceil, floor, inf, pi, sqrt
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
-from actuator_lti.design.model import Filter
-from actuator_lti.design.object_dictionary import OBJECTS, step_of
+from actuator_lti.design.model import Design, Filter
+from actuator_lti.design.object_dictionary import OBJECTS, KnownObject, step_of
 from actuator_lti.drive.facts import resonance_rad_s as free_resonance_rad_s
 from actuator_lti.errors import InputError
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from actuator_lti.design.object_dictionary import KnownObject
 
 
 def object_of(design: Design, path: str) -> KnownObject | None:

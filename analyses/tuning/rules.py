@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, pi, radians, sin, tan
-from typing import TYPE_CHECKING
 
+from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import own_drag_Nms_rad, standing_gain
 from actuator_lti.errors import InputError
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
 
 WIDE = 2.0 + 3.0**0.5  # a of the symmetric optimum for a phase margin of 60 deg
 SEPARATION = 4.0  # crossover of the velocity loop over the gain of the position loop
