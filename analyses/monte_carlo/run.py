@@ -23,8 +23,20 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
 from analyses.finite import finite
-from analyses.monte_carlo.judging import by_loop, in_populations, judge, label, source_columns
-from analyses.monte_carlo.reduction import BLOCK, Reducing, Reduction, Tally, judged, reduced, unpacked
+from analyses.monte_carlo.judging import (
+    BLOCK,
+    Reducing,
+    Reduction,
+    Tally,
+    by_loop,
+    in_populations,
+    judge,
+    judged,
+    label,
+    reduced,
+    source_columns,
+    unpacked,
+)
 from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
 from analyses.monte_carlo.statistics import MOST, clopper_pearson, column_statistics
 from analyses.monte_carlo.store import CHUNK, Store

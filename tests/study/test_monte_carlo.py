@@ -10,7 +10,7 @@ import tomli_w
 from actuator_lti import load_design, read_design_text, write_design
 from actuator_lti.errors import InputError
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
-from analyses.monte_carlo.reduction import Reduction, reduced, unpacked
+from analyses.monte_carlo.judging import Reduction, reduced, unpacked
 from analyses.monte_carlo.statistics import MOST
 from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
