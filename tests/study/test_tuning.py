@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from toleranced import toleranced
 
-from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti import assemble_loops, load_design, read_design_text, stability_margins
+from actuator_lti.design import with_values
 from actuator_lti.design.model import (
     Controller,
     Design,
@@ -20,6 +21,7 @@ from actuator_lti.design.model import (
     Requirement,
     Validation,
 )
+from actuator_lti.design.objects import export_objects
 from actuator_lti.errors import InputError
 from analyses.tuning import TuningSettings, tune
 from analyses.tuning.problem import loop_requirements, problem_of, read_requirement
@@ -136,8 +138,6 @@ def tuned():
 
 
 def test_every_corner_of_the_tolerances_meets_the_requirements(tuned):
-    from actuator_lti.design import with_values
-
     assert tuned.feasible
     assert tuned.corners == 17
     for r in tuned.requirements:
@@ -150,8 +150,6 @@ def test_every_corner_of_the_tolerances_meets_the_requirements(tuned):
 
 
 def test_gains_are_whole_steps_of_the_controller_s_objects(tuned):
-    from actuator_lti.design.objects import export_objects
-
     exported = export_objects(tuned.design)
     gains = {g.object: g for g in tuned.gains}
     written = {item.label: item.value for item in exported.objects.values}
@@ -163,12 +161,10 @@ def test_gains_are_whole_steps_of_the_controller_s_objects(tuned):
 
 
 def test_bandwidth_is_paid_for_in_phase_margin(tuned):
-    curve = [p for p in tuned.trade_off if p.feasible]
+    curve = [(p.bandwidth_hz, -p.phase_margin_deg) for p in tuned.trade_off if p.feasible]
     assert len(curve) >= 4
-    width = [p.bandwidth_hz for p in curve]
-    margin = [p.phase_margin_deg for p in curve]
-    assert width == sorted(width)
-    assert margin == sorted(margin, reverse=True)
+    for values in zip(*curve, strict=True):
+        assert list(values) == sorted(values)
 
 
 def test_the_nonlinear_check_settles(tuned):
@@ -177,21 +173,9 @@ def test_the_nonlinear_check_settles(tuned):
     assert any(c.limited for c in tuned.checks)
 
 
-def test_the_command_writes_a_design_that_is_what_it_says(tmp_path):
-    from reports.cli.app import build
-
-    words = [
-        "tune",
-        "--require",
-        "position.bandwidth>=2000 Hz",
-        "--no-curve",
-        "--out",
-        str(tmp_path),
-        "--quiet",
-    ]
-    done = CliRunner().invoke(build(), words)
-    assert done.exit_code == 1
-    assert "misses" in done.output
+def test_the_command_writes_a_design_that_is_what_it_says(cli, tmp_path):
+    words = ("--require", "position.bandwidth>=2000 Hz", "--no-curve", "--out", tmp_path, "--quiet")
+    assert "misses" in cli.text("tune", *words, status=1)
     made = json.loads((tmp_path / "tune.json").read_text())
     assert made["verdict"]["passed"] is False
     gains = {row["path"]: row["rounded"] for row in made["sections"][0]["blocks"][1]["rows"]}
@@ -213,19 +197,9 @@ def test_a_design_without_requirements_on_loops_is_refused():
 
 
 def test_of_many_tolerances_the_strongest_make_the_corners():
-    import tomllib
-
-    import tomli_w
-
-    from actuator_lti import read_design_text, write_design
-
-    tree = tomllib.loads(write_design(load_design("ilr33-amber")))
-    for key in ("resistance", "inductance", "rotor_inertia"):
-        tree["motor"][key]["tolerance"] = "10 %"
-    for key in ("viscous", "dry_torque", "load_coefficient"):
-        tree["friction"][key]["tolerance"] = "30 %"
-    tree["limits"]["voltage"]["tolerance"] = "5 %"
-    design = read_design_text(tomli_w.dumps(tree))
+    motor = dict.fromkeys(("resistance", "inductance", "rotor_inertia"), 10)
+    friction = dict.fromkeys(("viscous", "dry_torque", "load_coefficient"), 30)
+    design = read_design_text(toleranced(motor=motor, friction=friction, limits={"voltage": 5}))
     problem = problem_of(design, loop_requirements(design), dict(rule_gains(design).values))
     kept = {f.path for f in problem.factors}
     assert len(problem.toleranced) == 11
