@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import replace
-from typing import Any, overload
+from typing import Any
 
 import flint
+import numpy as np
+from scipy.optimize import brentq
 
 from actuator_lti.bandwidth.exact_gain import exact_gain
-from actuator_lti.bandwidth.late_response import first_turn, nearest_behind_delay
 from actuator_lti.bandwidth.measured import measured_bandwidth
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
 from actuator_lti.errors import InputError
+from actuator_lti.margins.axis_parts import axis_ends, axis_parts, distances_over
+from actuator_lti.margins.axis_search import Factored, half_turn, passages
 from actuator_lti.margins.delays.form import delay_form, in_series
-from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS
+from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS, Distance
 from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.loop import exact_loop, exact_polynomials
-from actuator_lti.margins.given import Given, given_of, whole_samples
+from actuator_lti.margins.factored import Response, factored
+from actuator_lti.margins.given import Given, given_of, unwarped, whole_samples
 from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
+from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.exact_fraction import Fraction, dc_noise, double, exact_fraction, shown
 from actuator_lti.systems.measured_response import is_measured
@@ -28,6 +34,8 @@ from actuator_lti.systems.rest_mode import without_rest_mode
 _FLOOR = 1e-6  # of the gain at zero frequency: the phase is followed down to it
 _PEAKS = (MODULUS, COMPLEMENTARY)
 _TAKEN = flint.fmpq(1, 1000)
+_AT_NYQUIST = 1e8  # of the largest root: next to nothing is left of the half circle
+_NEAR = 1e-4  # relative: a crossing of the factors and one of the loop
 _POLE = "the response has a pole at zero frequency: it is no closed loop with a bandwidth"
 _NO_GAIN = "DC gain is 0: no -3 dB bandwidth (the response is zero at zero frequency)"
 
@@ -79,12 +87,13 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     if abs(double(gain.dc)) <= dc_noise(loop):
         raise InputError(_NO_GAIN)
     peak, place = gain.largest()
-    turn = _unwarped(gain.first_turn(_FLOOR**2), loop)
+    turned = gain.first_turn(_FLOOR**2)
+    turn = None if turned is None else unwarped(turned, loop.period_s)
     if delay_s:
         turn = first_turn(loop, delay_s, _FLOOR * abs(double(gain.dc)))
-    crossings = [_unwarped(w, loop) for w in gain.crossings(SQUARES[level])]
+    crossings = [unwarped(w, loop.period_s) for w in gain.crossings(SQUARES[level])]
     return _bandwidth(crossings, turn, 20.0 * math.log10(peak) if peak < math.inf else peak,
-                      _unwarped(place, loop), double(gain.dc), level)  # fmt: skip
+                      unwarped(place, loop.period_s), double(gain.dc), level)  # fmt: skip
 
 
 def _taken(fraction: Fraction, dc: flint.fmpq, at: int) -> bool:
@@ -126,17 +135,6 @@ def _bandwidth(
     )
 
 
-@overload
-def _unwarped(w: float, loop: RationalLoop | Given) -> float: ...
-@overload
-def _unwarped(w: float | None, loop: RationalLoop | Given) -> float | None: ...
-def _unwarped(w: float | None, loop: RationalLoop | Given) -> float | None:
-    """From the s-plane of an exact sampled system to rad/s."""
-    if w is None or loop.period_s is None:
-        return w
-    return 2.0 * math.atan(w) / loop.period_s
-
-
 def _of_delays(system: Any, delay_s: float, level: Level) -> Bandwidth:
     response = DelayResponse.of(delay_form(system, delay_s))
     if response.order > 0:
@@ -176,10 +174,48 @@ def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
     else:
         loop = exact_loop(replace(given, samples=whole))
         result = [smallest(loop, distance) for distance in _PEAKS]
-        result = [(value, _unwarped(w, given)) for value, w in result]
+        result = [(value, unwarped(w, given.period_s)) for value, w in result]
     (s_value, s_place), (t_value, t_place) = result
     return Peaks(_db(s_value), s_place, _db(t_value), t_place)
 
 
 def _db(inverse: float) -> float:
     return 0.0 - 20.0 * math.log10(inverse) if inverse > 0.0 else math.inf
+
+
+def nearest_behind_delay(
+    loop: RationalLoop, delay_s: float, distances: tuple[Distance, ...]
+) -> list[tuple[float, float]]:
+    """Smallest values of distances, each with its frequency; `Doubtful` where they could not be checked."""
+    response, factors = _factors(loop, delay_s)
+    with np.errstate(all="ignore"):
+        parts, _, _ = axis_parts(factors, None)
+        return distances_over(factors, response, parts, axis_ends(factors, response), distances)
+
+
+def first_turn(loop: RationalLoop, delay_s: float, floor: float) -> float | None:
+    """Where the phase first falls to 90 deg below that at zero frequency; ``None``: not above the floor."""
+    response, factors = _factors(loop, delay_s)
+    with np.errstate(all="ignore"):
+        level = half_turn(factors.log_at(0.0)[1]) - 0.5 * math.pi
+        if factors.delay:  # no factor turns by more than half a turn
+            top = (factors.roots.size + 1.0) * math.pi / factors.delay
+        else:
+            top = _AT_NYQUIST * max(float(np.abs(factors.roots).max(initial=0.0)), 1.0)
+        top = float(passages(factors, 0.0, top, math.log(floor)).min(initial=top))
+        turns = passages(factors, 0.0, top, level, 1)
+        if not turns.size:
+            return None
+        sign = cmath.exp(-1j * level)
+
+        def beyond(w: float) -> float:
+            return float(np.angle(response.at(np.array([w]))[0] * sign))
+
+        near = float(turns[0])
+        w = brentq(beyond, near * (1.0 - _NEAR), near * (1.0 + _NEAR), xtol=1e-300, rtol=1e-14)
+        return response.frequency(float(w))
+
+
+def _factors(loop: RationalLoop, delay_s: float) -> tuple[Response, Factored]:
+    response = Response(loop, delay_s / (loop.period_s or 1.0))
+    return response, factored(response, sorted_poles(loop.A, loop.in_z))

@@ -8,9 +8,9 @@ import math
 from actuator_lti.compiled.kernel import kernel
 
 from . import _figures as fig
-from ._at_dc import level_at_dc, rounding_at_dc
 from ._complex import copied
 from ._linalg import balance, hessenberg
+from ._resolvent import level_at_dc, rounding_at_dc
 from ._response import CAPACITY, DEEPEST, GAIN, PHASE, response_at, scan
 from ._step import step_figures
 from ._withheld import rounding_decides

@@ -17,11 +17,10 @@ import numpy as np
 
 from actuator_lti.compiled.kernel import kernel
 
-from ._at_dc import EPS, system_at_dc
 from ._complex import size_at
 from ._figures import DC_GAIN, FIRST_GAIN, FIRST_PHASE, GAIN_CROSSOVERS, LISTED, PHASE_CROSSOVERS, RADIUS
 from ._linalg import balance
-from ._resolvent import states_at
+from ._resolvent import EPS, states_at, system_at_dc
 
 AT_BORDER = 1e-10  # of the largest pole from the unit circle, or T(0) from 1/2: rounding decides
 GROWTH = 10.0  # of an open-loop pole in one sample: below it the entries stay small

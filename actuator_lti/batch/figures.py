@@ -17,10 +17,9 @@ from actuator_lti.drive.angle import pushes_away
 from actuator_lti.drive.operating import Operating, OperatingPoint
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
-from actuator_lti.loops.tick import TickProgram
+from actuator_lti.loops.tick import Block, TickProgram
 
 _CHUNK = 1024
 _MOST_ORDER = 80

@@ -129,17 +129,18 @@ class Expressions:
         return self._constant(node.attr, getattr(module, node.attr), node, module.__name__)
 
     def _constant(self, name: str, value: Any, node: ast.AST, module: str = "") -> Text:
-        """A named constant; one of another module that has its name gets that module's in front."""
         if type(value) not in (int, float):
             raise self.function.error(node, f"{name} is neither a whole number nor a float")
-        kind: Kind = "int" if type(value) is int else "float"
+        return self._kept(name, value, node, module), "int" if type(value) is int else "float"
+
+    def _kept(self, name: str, value: Constant, node: ast.AST, module: str = "") -> str:
+        """A named constant or table; one of another module that has its name gets that module's in front."""
         if self.constants.get(name, value) != value:
             name = f"{(module or self.function.module).rpartition('.')[2].upper().lstrip('_')}_{name}"
-        if self.constants.setdefault(name, value) != value:
-            raise self.function.error(
-                node, f"the constant {name} has two values: {self.constants[name]}, {value}"
-            )
-        return name, kind
+        known = self.constants.setdefault(name, value)
+        if known != value:
+            raise self.function.error(node, f"the constant {name} has two values: {known}, {value}")
+        return name
 
     def _Subscript(self, node: ast.Subscript) -> Text:
         length = self._length(node)
@@ -152,13 +153,7 @@ class Expressions:
     def _length(self, node: ast.Subscript) -> str | None:
         """``row.shape[0]`` of a table, or of a row that knows its length; None for anything else."""
         value, index = node.value, node.slice
-        if (
-            not isinstance(value, ast.Attribute)
-            or value.attr != "shape"
-            or not isinstance(value.value, ast.Name)
-        ):
-            return None
-        if not isinstance(index, ast.Constant) or index.value != 0:
+        if not isinstance(value, ast.Attribute) or value.attr != "shape" or ast.unparse(index) != "0":
             return None
         table = self._table(value.value)
         if table is not None:
@@ -192,12 +187,7 @@ class Expressions:
             return None
         if any(type(item) is not type(value[0]) for item in value) or type(value[0]) not in (int, float):
             return None
-        name = node.id
-        if self.constants.get(name, value) != value:
-            name = f"{self.function.module.rpartition('.')[2].upper()}_{name}"
-        if self.constants.setdefault(name, value) != value:
-            raise self.function.error(node, f"the table {name} has two values")
-        return name
+        return self._kept(node.id, value, node)
 
     def _BinOp(self, node: ast.BinOp) -> Text:
         (left, a), (right, b) = self.emit(node.left), self.emit(node.right)
@@ -259,7 +249,7 @@ class Expressions:
     def _Call(self, node: ast.Call) -> Text:
         callee, texts = self.called(node)
         if callee is None:
-            return texts[0], "float" if texts[1] == "float" else ("int" if texts[1] == "int" else "bool")
+            return texts[0], texts[1]  # type: ignore[return-value]  # the kind of one built in
         if callee.returns is None or len(callee.returns) != 1:
             raise self.function.error(node, f"{callee.name} returns no single value")
         return f"{callee.c_name}({', '.join(texts)})", callee.returns[0]
@@ -313,9 +303,7 @@ class Expressions:
                 raise self.function.error(node, f"an exponent that is a {kind}; use int()")
             return f"ldexp({mantissa}, {bare(whole)})", "float"
         texts = ", ".join(bare(self.as_float(argument)) for argument in node.args)
-        if (
-            name == "floor"
-        ):  # a whole number in Python; adding 0 turns -0 into 0 as the way through integers does
+        if name == "floor":  # a whole number in Python; adding 0 turns -0 into 0 as integers do
             return f"(floor({texts}) + 0.0)", "float"
         if name in _TESTS:
             return f"({name}({texts}) != 0)", "bool"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from actuator_lti.compiled.expressions import Constant
+from actuator_lti.compiled.expressions import Constant, Expressions
 from actuator_lti.compiled.form import Form
 from actuator_lti.compiled.kernel import is_seldom
 from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name
@@ -143,22 +143,17 @@ class Collector:
         tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
         assert isinstance(tree, ast.FunctionDef)
         names = [argument.arg for argument in tree.args.args]
-        file, arguments = (
-            Path(inspect.getsourcefile(python) or "?").name,
-            dict(zip(names, kinds, strict=False)),
-        )
-        function = Function(
-            python.__name__, python.__module__, file, first, tree, python.__globals__, arguments, self.prefix
-        )
+        file, scope = Path(inspect.getsourcefile(python) or "?").name, python.__globals__
+        given, own = dict(zip(names, kinds, strict=False)), (python.__name__, python.__module__)
+        function = Function(*own, file, first, tree, scope, given, self.prefix)
         if len(names) != len(kinds) or tree.args.defaults or tree.args.vararg or tree.args.kwonlyargs:
-            raise function.error(
-                tree, f"takes ({', '.join(names)}); defaults and stars are not in the subset"
-            )
+            taken = ", ".join(names)
+            raise function.error(tree, f"takes ({taken}); defaults and stars are not in the subset")
         return function
 
     def statements(self, function: Function) -> Statements:
         """What translates its body."""
-        return Statements(function, self.call, self.constants, self.helpers, self.form)
+        return Statements(Expressions(function, self.call, self.constants, self.helpers, self.form))
 
     def definition(self, function: Function, head: str, lines: list[str]) -> str:
         """Its definition in C."""

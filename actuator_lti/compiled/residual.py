@@ -181,16 +181,16 @@ class _Body(ast.NodeTransformer):
             self.known.pop(node.id, None)
             return node
         if node.id in self.known:
-            return _constant(self.known[node.id])
+            return ast.Constant(self.known[node.id])
         if node.id in self.local:
             return node
         value = self.residual.constants.get(node.id, self.scope.get(node.id))
-        return _constant(value) if type(value) in (int, float) else node
+        return ast.Constant(value) if type(value) in (int, float) else node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         module = self.scope.get(node.value.id) if isinstance(node.value, ast.Name) else None
         value = getattr(module, node.attr, None) if isinstance(module, ModuleType) else None
-        return _constant(value) if type(value) in (int, float) else node
+        return ast.Constant(value) if type(value) in (int, float) else node
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
         place = self.visit(node.slice)
@@ -198,34 +198,34 @@ class _Body(ast.NodeTransformer):
         if isinstance(node.ctx, ast.Load) and isinstance(place, ast.Constant):
             value = self.residual.look(row, number(place))
             if value is not None:
-                return _constant(value)
+                return ast.Constant(value)
         return ast.Subscript(node.value, place, node.ctx)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         left, right, kind = self.visit(node.left), self.visit(node.right), type(node.op)
         if isinstance(left, ast.Constant) and isinstance(right, ast.Constant) and kind in _FOLD:
-            return _constant(_FOLD[kind](left.value, right.value))
+            return ast.Constant(_FOLD[kind](left.value, right.value))
         return _shorter(left, kind, right) or ast.BinOp(left, node.op, right)
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
         inner = self.visit(node.operand)
         if isinstance(inner, ast.Constant):
-            return _constant(not inner.value if isinstance(node.op, ast.Not) else -number(inner))
+            return ast.Constant(not inner.value if isinstance(node.op, ast.Not) else -number(inner))
         return ast.UnaryOp(node.op, inner)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         ends = isinstance(node.op, ast.Or)
         values = [self.visit(each) for each in node.values]
         if any(isinstance(each, ast.Constant) and bool(each.value) is ends for each in values):
-            return _constant(ends)
+            return ast.Constant(ends)
         rest = [each for each in values if not isinstance(each, ast.Constant)]
-        return ast.BoolOp(node.op, rest) if len(rest) > 1 else rest[0] if rest else _constant(not ends)
+        return ast.BoolOp(node.op, rest) if len(rest) > 1 else rest[0] if rest else ast.Constant(not ends)
 
     def visit_Compare(self, node: ast.Compare) -> ast.expr:
         left, rights = self.visit(node.left), [self.visit(each) for each in node.comparators]
         result = ast.Compare(left, node.ops, rights)
         value = value_of(result, lambda _node: None)
-        return result if value is None else _constant(value)
+        return result if value is None else ast.Constant(value)
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         test = self.visit(node.test)
@@ -239,7 +239,7 @@ class _Body(ast.NodeTransformer):
         target = self._target(node.func)
         if not is_kernel(target):
             if callable(target) and all(isinstance(each, ast.Constant) for each in arguments):
-                return _constant(target(*(each.value for each in arguments)))
+                return ast.Constant(target(*(each.value for each in arguments)))
             return _unlimited(node.func, arguments) or ast.Call(node.func, arguments, [])
         if target in self.residual.replaced:
             instead = self.residual.replaced[target](arguments, self.left)
@@ -263,7 +263,7 @@ class _Body(ast.NodeTransformer):
             result: ast.expr = _Placed(given).visit(deepcopy(body[0].value))
             return result
         if isinstance(body[0], ast.Pass):
-            return _constant(None)
+            return ast.Constant(None)
         return ast.Call(ast.Name(left.name, ast.Load()), [given[name] for name in left.arguments], [])
 
 
@@ -289,10 +289,6 @@ def _is_brief(value: ast.expr | None, left: Leftover) -> bool:
 def number(node: ast.Constant) -> Any:
     """The number that a constant is."""
     return node.value
-
-
-def _constant(value: Any) -> ast.expr:
-    return ast.Constant(value)
 
 
 def _is(node: ast.expr, value: float) -> bool:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
 
-from actuator_lti.compiled.expressions import Calls, Constant, Expressions, bare, widened
-from actuator_lti.compiled.form import Form
+from actuator_lti.compiled.expressions import Expressions, bare, widened
 from actuator_lti.compiled.kinds import C_TYPES, Function, Kind, c_name
 
 INDENT = "    "
@@ -15,13 +13,9 @@ INDENT = "    "
 class Statements:
     """Translates the body of one function, line by line."""
 
-    def __init__(
-        self, function: Function, call: Calls, constants: dict[str, Constant], prefix: str,
-        form: Form | None = None,
-    ) -> None:  # fmt: skip
-        self.function = function
-        self.expressions = Expressions(function, call, constants, prefix, form)
-        self.once = assigned_once(function.tree) if form is not None else frozenset()
+    def __init__(self, expressions: Expressions) -> None:
+        self.function, self.expressions = expressions.function, expressions
+        self.once = assigned_once(self.function.tree) if expressions.form is not None else frozenset()
         self.lines: list[str] = []
         self.depth = 1
         self.temporaries = 0
@@ -106,8 +100,7 @@ class Statements:
             self._store(target, name, kind)
 
     def _temporary(self, kind: Kind, text: str) -> str:
-        self.temporaries += 1
-        name = f"value_{self.temporaries}"
+        name = f"value_{self._count()}"
         self._put(f"const {C_TYPES[kind]} {name} = {text};")
         return name
 
@@ -224,9 +217,7 @@ class Statements:
         values = [] if node.value is None else getattr(node.value, "elts", [node.value])
         emitted = [self.expressions.emit(value) for value in values]
         kinds: tuple[Kind, ...] | None = tuple(kind for _, kind in emitted) or None
-        if isinstance(self.function.returns, tuple) and self.function.returns != kinds:
-            raise self.function.error(node, f"returns {kinds} here and {self.function.returns} elsewhere")
-        self.function.returns = kinds
+        self._returns(node, kinds)
         if kinds is None:
             self._put("return;")
         elif len(kinds) == 1:
@@ -240,22 +231,22 @@ class Statements:
         callee, texts = self.expressions.called(call)
         if callee is None or callee.returns is None or len(callee.returns) == 1:
             return False
-        if self.function.returns not in (None, callee.returns):
-            raise self.function.error(
-                call, f"returns {callee.returns} here and {self.function.returns} elsewhere"
-            )
-        self.function.returns = callee.returns
+        self._returns(call, callee.returns)
         self._mark_callee_writes(call, callee)
         name = self._named_result(callee, texts)
         fields = ", ".join(f"{name}.r{n}" for n in range(len(callee.returns)))
         self._put(f"return ({result_type(self.function)}){{{fields}}};")
         return True
 
+    def _returns(self, node: ast.AST, kinds: tuple[Kind, ...] | None) -> None:
+        known = self.function.returns
+        if known not in (None, kinds):
+            raise self.function.error(node, f"returns {kinds} here and {known} elsewhere")
+        self.function.returns = kinds
+
     def _named_result(self, callee: Function, texts: list[str]) -> str:
-        self.temporaries += 1
-        name = f"result_{self.temporaries}"
-        called = f"{callee.c_name}({', '.join(texts)})"
-        self._put(f"const {result_type(callee)} {name} = {called};")
+        name = f"result_{self._count()}"
+        self._put(f"const {result_type(callee)} {name} = {callee.c_name}({', '.join(texts)});")
         return name
 
 
@@ -270,10 +261,9 @@ def check_order(function: Function, node: ast.stmt, expressions: Expressions) ->
     That is one with a call that writes a row, and beside it another such call or a look into that row.
     """
     for expression in _own_expressions(node):
-        calls = [n for n in ast.walk(expression) if isinstance(n, ast.Call) and _rows_of(n, function)]
-        if not calls:
-            continue
-        for call in calls:
+        for call in ast.walk(expression):
+            if not isinstance(call, ast.Call) or not any(_is_row(each, function) for each in call.args):
+                continue
             callee, _ = expressions.called(call)
             if callee is None or not callee.written:
                 continue
@@ -284,24 +274,16 @@ def check_order(function: Function, node: ast.stmt, expressions: Expressions) ->
 
 
 def _refuse_beside(function: Function, expression: ast.expr, call: ast.Call, row: str) -> None:
-    inside = {id(n) for n in ast.walk(call)}
-    around = {id(n) for n in _path_to(expression, call)}
-    for other in ast.walk(expression):
-        if id(other) in inside or id(other) in around:
-            continue
-        if isinstance(other, ast.Name) and other.id == row:
-            raise function.error(call, f"writes {row} beside another use of {row}; give it a line of its own")
+    everywhere, inside = (
+        sum(isinstance(each, ast.Name) and each.id == row for each in ast.walk(tree))
+        for tree in (expression, call)
+    )
+    if everywhere > inside:
+        raise function.error(call, f"writes {row} beside another use of {row}; give it a line of its own")
 
 
-def _path_to(root: ast.AST, wanted: ast.AST) -> Iterator[ast.AST]:
-    if any(n is wanted for n in ast.walk(root)):
-        yield root
-        for child in ast.iter_child_nodes(root):
-            yield from _path_to(child, wanted)
-
-
-def _rows_of(call: ast.Call, function: Function) -> bool:
-    return any(isinstance(a, ast.Name) and function.arguments.get(a.id) == "row" for a in call.args)
+def _is_row(node: ast.expr, function: Function) -> bool:
+    return isinstance(node, ast.Name) and function.arguments.get(node.id) == "row"
 
 
 def _own_expressions(node: ast.stmt) -> list[ast.expr]:

@@ -121,13 +121,11 @@ class _Members(Expressions):
         return super()._compared(left, sign, right)
 
     def _Call(self, node: ast.Call) -> Text:
-        if isinstance(node.func, ast.Name) and node.func.id == "int" and self.emit(node.args[0])[1] == "int":
-            return self.emit(node.args[0])
-        if isinstance(node.func, ast.Name) and node.func.id == "float":
-            text, kind = self.emit(node.args[0])
-            if kind == "count":
-                return f"((double){text})", "float"
-        return super()._Call(node)
+        name = node.func.id if isinstance(node.func, ast.Name) else ""
+        text, kind = self.emit(node.args[0]) if name in ("int", "float") else ("", "")
+        if (name, kind) == ("int", "int"):
+            return text, "int"
+        return (f"((double){text})", "float") if (name, kind) == ("float", "count") else super()._Call(node)
 
 
 def _as_whole(node: ast.expr) -> ast.expr:
@@ -171,8 +169,7 @@ class _MemberCollector(Collector):
     def __init__(self, prefix: str, rows: Rows, functions: Mapping[str, Leftover]) -> None:
         super().__init__(prefix)
         self.rows, self.functions = rows, functions
-        self.scope: dict[str, Any] = {"math": math}
-        self.scope |= {name: _named(name) for name in functions}
+        self.scope: dict[str, Any] = {"math": math, **{name: _named(name) for name in functions}}
 
     def parsed(self, python: Any, kinds: list[Kind]) -> Function:
         left = self.functions[python.__name__]
@@ -180,11 +177,9 @@ class _MemberCollector(Collector):
         return Function(left.name, __name__, "", 0, left.tree, self.scope, arguments, self.prefix)
 
     def statements(self, function: Function) -> Statements:
-        made = _MemberStatements(function, self.call, self.constants, self.helpers)
         members = _Members(function, self.call, self.constants, self.helpers)
         members.rows = self.rows
-        made.expressions = members
-        return made
+        return _MemberStatements(members)
 
     def head(self, function: Function) -> str:
         text = super().head(function)
@@ -197,13 +192,9 @@ class _MemberCollector(Collector):
         left = self.functions[function.name]
         lines = [re.sub(r"\(\(double\)(\d+)\)", r"\1.0", line) for line in lines]
         body = [*declared(function), *(line.replace("fabs(", f"{self.prefix}abs(") for line in lines)]
-        names = {
-            name: self.rows.structs[name].argument
-            for name, kind in function.arguments.items()
-            if kind == "row"
-        }
-        unused = [name for name in names.values() if not re.search(rf"\b{name}\b", "\n".join(body))]
-        body[:0] = [f"{INDENT}(void){name};" for name in unused]
+        text, rows = "\n".join(body), [name for name, kind in function.arguments.items() if kind == "row"]
+        names = dict.fromkeys(self.rows.structs[row].argument for row in rows)
+        body[:0] = [f"{INDENT}(void){name};" for name in names if not re.search(rf"\b{name}\b", text)]
         about = (left.python.__doc__ or "").splitlines()[0]
         return "\n".join([f"/* {about} */", head, "{", *body, "}", ""])
 

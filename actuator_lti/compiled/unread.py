@@ -53,11 +53,8 @@ def _reached(functions: dict[str, Leftover], entries: Iterable[str]) -> dict[str
 
 
 def _calls(functions: dict[str, Leftover], tree: ast.AST) -> list[ast.Call]:
-    return [
-        node
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in functions
-    ]
+    calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
+    return [each for each in calls if isinstance(each.func, ast.Name) and each.func.id in functions]
 
 
 def _narrow(functions: dict[str, Leftover], left: Leftover) -> None:
@@ -79,11 +76,8 @@ class _Shorter(ast.NodeTransformer):
         self, functions: dict[str, Leftover], left: Leftover, read: set[object], place: Place
     ) -> None:
         self.functions, self.read, self.place = functions, read, place
-        self.loaded = {
-            node.id
-            for node in ast.walk(left.tree)
-            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)
-        }
+        names = [node for node in ast.walk(left.tree) if isinstance(node, ast.Name)]
+        self.loaded = {node.id for node in names if isinstance(node.ctx, ast.Load)}
 
     def _is_read(self, target: ast.expr) -> bool:
         if isinstance(target, ast.Subscript):
@@ -103,12 +97,9 @@ class _Shorter(ast.NodeTransformer):
     def _tuple(self, node: ast.Assign, target: ast.Tuple) -> ast.stmt | None:
         """Several assignments at once; results of a call that nobody reads get a name that says so."""
         if isinstance(node.value, ast.Tuple):
-            pairs = [
-                (each, value)
-                for each, value in zip(target.elts, node.value.elts, strict=True)
-                if self._is_read(each) or _writing(self.functions, value)
-            ]
-            node.value.elts, target.elts = [value for _, value in pairs], [each for each, _ in pairs]
+            pairs = list(zip(target.elts, node.value.elts, strict=True))
+            pairs = [(a, b) for a, b in pairs if self._is_read(a) or _writing(self.functions, b)]
+            target.elts, node.value.elts = [a for a, _ in pairs], [b for _, b in pairs]
             return node if pairs else None
         for each in target.elts:
             if isinstance(each, ast.Name) and not self._is_read(each):
@@ -144,19 +135,17 @@ class _Shorter(ast.NodeTransformer):
         return [each for k, each in enumerate(rest) if not self._is_written_over(each, rest[k + 1 :])]
 
     def _is_written_over(self, node: ast.stmt, behind: list[ast.stmt]) -> bool:
-        if not (
-            isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and len(node.targets) == 1
-        ):
+        targets = node.targets if isinstance(node, ast.Assign) else []
+        if len(targets) != 1 or not isinstance(targets[0], ast.Name) or _calls(self.functions, node):
             return False
-        name = node.targets[0].id
         for other in behind:
-            uses = [each for each in ast.walk(other) if isinstance(each, ast.Name) and each.id == name]
-            if any(isinstance(each.ctx, ast.Load) for each in uses) or (
-                isinstance(other, ast.AugAssign) and uses
-            ):
+            uses = [
+                each for each in ast.walk(other) if isinstance(each, ast.Name) and each.id == targets[0].id
+            ]
+            if (uses and isinstance(other, ast.AugAssign)) or any(isinstance(u.ctx, ast.Load) for u in uses):
                 return False
-            if isinstance(other, ast.Assign) and uses:
-                return not _calls(self.functions, node.value)
+            if uses and isinstance(other, ast.Assign):
+                return True
         return False
 
 
@@ -166,7 +155,5 @@ def _writing(functions: dict[str, Leftover], tree: ast.AST) -> list[ast.Call]:
 
 
 def _writes(functions: dict[str, Leftover], tree: ast.AST) -> bool:
-    stores = any(
-        isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store) for node in ast.walk(tree)
-    )
-    return stores or bool(_writing(functions, tree))
+    stored = (isinstance(each, ast.Subscript) and isinstance(each.ctx, ast.Store) for each in ast.walk(tree))
+    return any(stored) or bool(_writing(functions, tree))

@@ -115,18 +115,6 @@ def _curve(system: Any, margins: StabilityMargins | None = None) -> tuple[np.nda
     return omega, response(system, omega)
 
 
-def _phase_deg(system: Any, omega_rad_s: np.ndarray, L: np.ndarray) -> np.ndarray:
-    """Unwrapped; of measured data along the shorter turn from point to point."""
-    from actuator_lti.systems.measured_response import is_measured
-    from actuator_lti.systems.phase import unwrapped_phase_deg
-
-    return (
-        np.degrees(np.unwrap(np.angle(L)))
-        if is_measured(system)
-        else unwrapped_phase_deg(system, omega_rad_s)
-    )
-
-
 @face
 def plot_bode(
     system: Any, *, label: str = "", margins: StabilityMargins | None = None, axes: Any = None
@@ -154,9 +142,14 @@ def plot_bode(
     >>> both[1].get_xlabel()
     'frequency, Hz'
     """
+    from actuator_lti.systems.measured_response import is_measured
+    from actuator_lti.systems.phase import unwrapped_phase_deg
+
     magnitude, phase = _panels(axes, 2)
     omega, L = _curve(system, margins)
-    hertz, turned = omega / (2.0 * np.pi), _phase_deg(system, omega, L)
+    hertz = omega / (2.0 * np.pi)
+    along = is_measured(system)  # the shorter turn from point to point
+    turned = np.degrees(np.unwrap(np.angle(L))) if along else unwrapped_phase_deg(system, omega)
     with np.errstate(divide="ignore"):
         magnitude.semilogx(hertz, 20.0 * np.log10(np.abs(L)), label=label or None)
     phase.semilogx(hertz, turned)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuator_lti.drive.choice import finite, larger, smaller, where
 from actuator_lti.drive.operating import dry_torque, segments
-from actuator_lti.drive.steady_gains import droop
+from actuator_lti.drive.steady import circuit_resistance_ohm, droop, winding
 from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
 
@@ -53,23 +53,10 @@ def stall_torque_Nm(design: Design) -> Any:
     motor, limits = design.effective_motor, design.limits
     if motor.source_gain_Nm_V is not None:
         return motor.source_gain_Nm_V * limits.voltage_V
-    assert motor.torque_constant_Nm_A is not None
-    assert motor.resistance_ohm is not None
     current = limits.voltage_V / circuit_resistance_ohm(design)
     if design.controller.current is not None:
         current = smaller(current, limits.peak_current_A)
-    return motor.torque_constant_Nm_A * current
-
-
-def circuit_resistance_ohm(design: Design) -> Any:
-    """Resistance between the source and the back-EMF while the voltage is at its limit: R + R_s.
-
-    There u = U = U_s - R_s i, so ``U_s = (R + R_s) i + kE w``. It holds for motoring and R_s <= R; a supply
-    of more resistance than the winding gives its most current at less than its whole voltage.
-    """
-    resistance = design.effective_motor.resistance_ohm
-    assert resistance is not None
-    return resistance if design.supply is None else resistance + design.supply.resistance_ohm
+    return winding(motor)[1] * current
 
 
 def resonance_rad_s(design: Design) -> Any:
@@ -150,10 +137,7 @@ def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) ->
             bounds.append((DROOP, where(pulls[0] > against, rises, 0.0)))
     bounds.append((FORCE, _first_root(against - stall, slopes, 0.0)))
     if motor.source_gain_Nm_V is None:
-        R, kM, kE = circuit_resistance_ohm(design), motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
-        assert R is not None
-        assert kM is not None
-        assert kE is not None
+        R, (_, kM, kE) = circuit_resistance_ohm(design), winding(motor)
         bounds.append((VOLTAGE, _first_root(against - kM * limits.voltage_V / R, slopes, kM * kE / R)))
     speed: Any = math.inf
     cause: Any = NOTHING
@@ -178,6 +162,11 @@ def _speed_torque(slopes: list[tuple[float, Any]], speed: Any) -> Any:
         total = total + (slope - last) * larger(bounded - start, 0.0)
         last = slope
     return total
+
+
+def steady_torque_Nm(design: Design, load_Nm: float, speed_rad_s: Any) -> Any:
+    """Motor torque for a steady motion forward against a load, friction and damping on the way."""
+    return resistance_Nm(design, load_Nm, 1) + speed_torque_Nm(design, speed_rad_s)
 
 
 def _first_root(start_value: Any, slopes: list[tuple[float, Any]], more: Any) -> Any:
@@ -236,14 +225,11 @@ def capability(design: Design, load_Nm: float = 0.0) -> Capability:
     slower = back.output_rate_rad_s < ahead.output_rate_rad_s
     weaker = back.acceleration_rad_s2 < ahead.acceleration_rad_s2
     as_strong = back.acceleration_rad_s2 == ahead.acceleration_rad_s2
-    hungrier = _or_zero(back.motor_current_A) > _or_zero(ahead.motor_current_A)
+    currents = (back.motor_current_A, ahead.motor_current_A)
+    hungry, content = (where(each == each, each, 0.0) for each in currents)  # NaN: none
+    hungrier = hungry > content
     as_fast = back.output_rate_rad_s == ahead.output_rate_rad_s
     worse = slower | (as_fast & (weaker | (as_strong & hungrier)))
     names = Capability.__dataclass_fields__
     figures = {n: where(worse, getattr(back, n), getattr(ahead, n)) for n in names}
     return Capability(**{**figures, "torque_margin": smaller(ahead.torque_margin, back.torque_margin)})
-
-
-def _or_zero(current: Any) -> Any:
-    """A current, 0 where there is none (NaN)."""
-    return where(current == current, current, 0.0)

@@ -71,37 +71,13 @@ class Operating:
         return self
 
 
-def friction_slope(
-    design: Design,
-    operating_point: OperatingPoint = "sliding",
-    load_Nm: float = 0.0,
-    speed_amplitude_rad_s: float | None = None,
-    direction: int = 1,
-    speed_rad_s: float = 0.0,
-) -> Any:
+def slope_at(design: Design, at: Operating) -> Any:
     """Slope of the motor's friction torque over speed, in N m s/rad (motor side).
 
     ``sliding``: Cv, or the slope of the friction map at a speed. ``rest``: plus Tc/w_s. Describing function:
     Cv + 4 Tc/(pi W), exact for the fundamental; where friction differs by direction, the mean of both; of a
     map exact as well, every bend being a dead zone. A float, or an array for stacked designs.
-
-    Raises
-    ------
-    InputError
-        As `Operating`.
     """
-    at = Operating(
-        point=operating_point,
-        load_Nm=load_Nm,
-        speed_amplitude_rad_s=speed_amplitude_rad_s,
-        direction=direction,
-        speed_rad_s=speed_rad_s,
-    )
-    return slope_at(design, at)
-
-
-def slope_at(design: Design, at: Operating) -> Any:
-    """The friction slope at an `Operating`, see `friction_slope`."""
     if at.point == "describing-function":
         return sum(_described(design, at, way) for way in (1, -1)) / 2
     points = design.friction.map(at.direction)

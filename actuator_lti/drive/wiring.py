@@ -13,6 +13,7 @@ from actuator_lti.drive.blocks import Block
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.plant import Plant, motor_plant
 from actuator_lti.drive.signals import SIGNALS
+from actuator_lti.drive.steady import standing_gain
 from actuator_lti.errors import InputError
 from actuator_lti.systems.sampling import DelayedHold, delayed_hold
 
@@ -83,6 +84,17 @@ class Drive:
         point = self.target[stage]
         return (point, f"{point}_returned") if self.has_own_law(stage) else (ERRORS[stage], MEASURED[stage])
 
+    def cut_of(self, stage: str) -> tuple[str, str, Any]:
+        """Where the loop of a stage is cut, the signal that comes back there, and its factor.
+
+        With a law of one's own it is cut at what the stage drives: one loop, whatever the law takes.
+        """
+        if self.has_own_law(stage):
+            return self.target[stage], self.target[stage], -1.0
+        if stage == "position":
+            return ERRORS[stage], "output", self.ratio
+        return ERRORS[stage], MEASURED[stage], 1.0
+
     def period_s(self, stage: str) -> Any:
         """Period T of a stage in s."""
         return self.interval[stage] * self.tick_s
@@ -116,20 +128,9 @@ class Drive:
         return blocks.biquad(command.lowpass(T, self.design.name), T)
 
     @property
-    def torque_per_target(self) -> Any:
-        """Motor torque per unit of what drives it (A: kM; V: kM/R at rest; a source's gain)."""
-        motor = self.design.effective_motor
-        if motor.source_gain_Nm_V is not None:
-            return motor.source_gain_Nm_V
-        assert motor.torque_constant_Nm_A is not None
-        assert motor.resistance_ohm is not None
-        per_ampere = motor.torque_constant_Nm_A
-        return per_ampere if self.design.controller.current is not None else per_ampere / motor.resistance_ohm
-
-    @property
     def acceleration_gain(self) -> Any:
-        """J/kM (J over `torque_per_target`), what an acceleration of the motor needs."""
-        return self.design.inertia_kgm2 / self.torque_per_target
+        """J/kM (J over `standing_gain`), what an acceleration of the motor needs of what drives it."""
+        return self.design.inertia_kgm2 / standing_gain(self.design)
 
     def producer(self, signal: str) -> str:
         """The stage that updates a break point (``"output"`` is read by the position stage)."""

@@ -15,6 +15,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.loops.flow import ALL, SOURCES, FlowProgram
 from actuator_lti.loops.result import Form
 from actuator_lti.loops.tick import TickProgram
+from actuator_lti.loops.walk import INPUTS
 from actuator_lti.systems.plain_delays import PlainDelaySystem
 
 if TYPE_CHECKING:
@@ -102,7 +103,7 @@ def _sampled(wired: Drive, command: str) -> control.StateSpace:
 
     program = TickProgram(wired, wired.outermost)
     tick, n = program.tick(0), len(program.states)
-    columns = [program.inputs.index(name) for name in ("ref", "moment")]
+    columns = [INPUTS.index(name) for name in ("ref", "moment")]
     signals, names = _names(tick.signals, command)
     rows = np.array([tick.signals[signal] for signal in signals])
     parts = (tick.A, tick.B[:, columns], rows[:, :n], rows[:, n:][:, columns], wired.tick_s)

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.drive.wiring import ERRORS, MEASURED, Drive
+from actuator_lti.drive.wiring import Drive
 from actuator_lti.errors import InputError
-from actuator_lti.loops.blocks import seen
 from actuator_lti.loops.flow import SOURCES, Flow, FlowProgram
 from actuator_lti.loops.limiters import LimiterPath, Response, limiter_paths
 from actuator_lti.loops.result import Loop, loop_of
 from actuator_lti.loops.sampled import whole_path
+from actuator_lti.loops.tick import seen
 from actuator_lti.systems.plain_delays import PlainDelaySystem, static
 from actuator_lti.systems.rest_mode import without_rest_mode
 
@@ -94,13 +94,8 @@ def stage_system(
     wired: Drive, stage: str, delays: frozenset[str], opened: tuple[str, ...] = ()
 ) -> PlainDelaySystem:
     """The open loop of a stage at its own error, inner loops closed (unless opened), outer ones absent."""
-    if wired.has_own_law(stage):
-        point = wired.target[stage]
-        flow = FlowProgram(wired, stage, point, opened, delays).flow()
-        return joined(systems(flow, "cut", point, scale=-1.0))
-    flow = FlowProgram(wired, stage, ERRORS[stage], opened, delays).flow()
-    measured = "output" if stage == "position" else MEASURED[stage]
-    return joined(systems(flow, "cut", measured, wired.ratio if stage == "position" else 1.0))
+    cut, signal, scale = wired.cut_of(stage)
+    return joined(systems(FlowProgram(wired, stage, cut, opened, delays).flow(), "cut", signal, scale))
 
 
 def stage_loop(wired: Drive, stage: str, delays: frozenset[str], opened: tuple[str, ...] = ()) -> Loop:

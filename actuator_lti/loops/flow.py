@@ -68,7 +68,10 @@ class FlowWalk(Walk):
         self.rate: dict[str, Row] = {}
         self.delay: dict[str, float] = {}
         self.waiting: dict[str, Row] = {}
-        self.flow_plant()
+        plant = self.drive.plant
+        for r, name in enumerate(plant.states):  # left to itself
+            own = (float(plant.A[r, c]) * Row.of(s) for c, s in enumerate(plant.states))
+            self.rate[name] = total(own)
         self.drive_plant(self.controllers())
 
     def state(self, name: str) -> Row:
@@ -130,13 +133,6 @@ class FlowWalk(Walk):
         """From the speed itself, as late as the estimate."""
         age = block.age_s if "measurement" in self.delays else 0.0
         return self.late("speed", self.apply("estimate", block, speed), age)
-
-    def flow_plant(self) -> None:
-        """The plant left to itself."""
-        plant = self.drive.plant
-        for r, name in enumerate(plant.states):
-            own = (float(plant.A[r, c]) * Row.of(s) for c, s in enumerate(plant.states))
-            self.rate[name] = total(own)
 
     def drive_plant(self, u: Row) -> None:
         """What acts on the plant."""

@@ -21,8 +21,7 @@ import numpy.typing as npt
 
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.blocks import Block, siso, used
-from actuator_lti.loops.tick import TickProgram
+from actuator_lti.loops.tick import Block, TickProgram, siso, used
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.systems.rest_mode import System, without_common_rest_mode
 

@@ -6,13 +6,12 @@ from functools import partial
 
 import numpy as np
 
-from actuator_lti.drive.wiring import COMMANDS, ERRORS, MEASURED, Drive
-from actuator_lti.loops.blocks import Block, compose
+from actuator_lti.drive.wiring import COMMANDS, Drive
 from actuator_lti.loops.limiters import LimiterPath, Response, limiter_paths
 from actuator_lti.loops.periodic import cyclic, fundamental, phase_blocks, point_blocks
 from actuator_lti.loops.result import Loop, loop_of
 from actuator_lti.loops.simulation import OUTPUTS, TickSystem
-from actuator_lti.loops.tick import TickProgram
+from actuator_lti.loops.tick import Block, TickProgram, compose
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.resolvent import states_at
 
@@ -31,18 +30,10 @@ def _loop(wired: Drive, blocks: list[Block], name: str, point: str) -> Loop:
 def stage_blocks(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> list[Block]:
     """The loop of a stage broken at its own error, inner loops closed (unless opened), outer ones absent.
 
-    With a law of one's own it is broken at what the stage drives: one loop, whatever the law takes.
     One block, or several where a slower speed measurement is fed forward inside (then it is periodic).
     """
-    if wired.has_own_law(stage):
-        point = wired.target[stage]
-        return phase_blocks(
-            TickProgram(wired, stage, point, opened), wired.interval[stage], "cut", point, -1.0
-        )
-    program = TickProgram(wired, stage, ERRORS[stage], opened)
-    measured = "output" if stage == "position" else MEASURED[stage]
-    scale = wired.ratio if stage == "position" else 1.0
-    return phase_blocks(program, wired.interval[stage], "cut", measured, scale)
+    cut, signal, scale = wired.cut_of(stage)
+    return phase_blocks(TickProgram(wired, stage, cut, opened), wired.interval[stage], "cut", signal, scale)
 
 
 def stage_loop(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> Loop:

@@ -22,8 +22,7 @@ import numpy.typing as npt
 from actuator_lti.drive.choice import where
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
-from actuator_lti.loops.blocks import Block, pruned, siso
-from actuator_lti.loops.tick import TickProgram
+from actuator_lti.loops.tick import Block, TickProgram, pruned, siso
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design

@@ -8,20 +8,24 @@ estimate.
 
 An estimated speed is computed from ``acc`` and not from stored angles: so the velocity loop has no
 eigenvalue at 1 that it does not see.
+
+Several ticks as one are a block: a slower loop sees A^n, (I + A + ... + A^(n-1)) B (model.md section 3).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from actuator_lti.design.law import Law, Matrices
-from actuator_lti.drive.blocks import Block
+from actuator_lti.drive import blocks as own
 from actuator_lti.loops.rows import Row, table, total
 from actuator_lti.loops.walk import INPUTS, Program, Walk
+from actuator_lti.systems.rest_mode import without_rest_mode
 
 
 @dataclass(frozen=True)
@@ -57,11 +61,6 @@ class TickProgram(Program):
         if name in plant:
             return 0, plant.index(name)
         return (1, int(name[1:])) if name[0] == "u" and name[1:].isdigit() else (2, 0)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """``ref`` (of the outer stage), ``torque`` (N m at the motor, accelerating), ``moment``, ``cut``."""
-        return INPUTS
 
     @cached_property
     def _ticks(self) -> dict[tuple[bool, ...], Tick]:
@@ -110,7 +109,7 @@ class TickWalk(Walk):
         """At the next update."""
         self.next[name] = value
 
-    def apply(self, name: str, block: Block, value: Row) -> Row:
+    def apply(self, name: str, block: own.Block, value: Row) -> Row:
         """The sampled realisation."""
         return self.realised([f"{name}.{state}" for state in block.states], block.sampled, value)
 
@@ -120,7 +119,7 @@ class TickWalk(Walk):
         self.next[f"{name}_prev"] = value
         return (value - before) / period_s
 
-    def estimated(self, block: Block, speed: Row, angle: Row) -> Row:
+    def estimated(self, block: own.Block, speed: Row, angle: Row) -> Row:
         """From the angle gained since the last update."""
         self.angle = angle
         gained = self.state("acc")
@@ -173,3 +172,89 @@ def _nonzero(value: Any) -> Any:
     if np.ndim(value) == 0:
         return float(value)
     return value if np.any(value != 0) else 0.0
+
+
+def seen(depends: np.ndarray, start: np.ndarray) -> np.ndarray:
+    """Which states an output sees, through others as well.
+
+    ``depends[r, c]``: state r is computed from state c; ``start``: what the output looks at itself.
+    """
+    result, new = start.copy(), start
+    while new.any():
+        new = depends[new].any(axis=0) & ~result
+        result |= new
+    return result
+
+
+@dataclass(frozen=True)
+class Block:
+    """A sampled SISO system ``x+ = A x + B v, y = C x + D v``.
+
+    Shapes (n,n), (n,1), (1,n), (1,1), or stacked over designs in front. ``states`` are their names.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    states: tuple[str, ...]
+
+    def pruned(self) -> Block:
+        """Without the states that are not used, see `pruned`."""
+        return pruned([self])[0]
+
+    def shown(self) -> Block:
+        """Without a mode at zero frequency that it does not show, see `rest_mode`; one design only."""
+        A, B, C, kept = without_rest_mode(self.A, self.B, self.C, 1.0)
+        names = tuple(name for name, there in zip(self.states, kept, strict=True) if there)
+        return Block(A, B, C, self.D, names)
+
+    def feedback(self) -> Block:
+        """Closed with negative unit feedback, output kept: T = L/(1 + L). Needs D = 0."""
+        return replace(self, A=self.A - self.B @ self.C)
+
+    def sensitivity(self) -> Block:
+        """S = 1/(1 + L). Needs D = 0."""
+        return replace(self, A=self.A - self.B @ self.C, C=-self.C, D=np.ones_like(self.D))
+
+
+def used(blocks: Sequence[Block]) -> np.ndarray:
+    """Which of the common states of blocks their outputs see and their inputs reach, in any of the blocks.
+
+    The motor angle inside an inner loop is not seen, the filter of the command not reached.
+    """
+    n = len(blocks[0].states)
+
+    def there(name: str, *shape: int) -> np.ndarray:
+        parts = (getattr(block, name).reshape(-1, *shape) for block in blocks)
+        return np.any([np.any(part != 0, axis=0) for part in parts], axis=0)
+
+    depends = there("A", n, n)
+    return seen(depends, there("C", n)) & seen(depends.T, there("B", n))
+
+
+def pruned(blocks: Sequence[Block]) -> list[Block]:
+    """The blocks without the states that none of them uses."""
+    kept = used(blocks)
+    names = tuple(name for name, there in zip(blocks[0].states, kept, strict=True) if there)
+    return [
+        Block(b.A[..., kept, :][..., :, kept], b.B[..., kept, :], b.C[..., :, kept], b.D, names)
+        for b in blocks
+    ]
+
+
+def compose(ticks: Sequence[Tick]) -> tuple[np.ndarray, np.ndarray]:
+    """State and input matrix over several ticks with all inputs held."""
+    A, B = ticks[0].A, ticks[0].B
+    for tick in ticks[1:]:
+        A, B = tick.A @ A, tick.A @ B + tick.B
+    return A, B
+
+
+def siso(program: TickProgram, ticks: Sequence[Tick], source: str, signal: str, scale: Any = 1.0) -> Block:
+    """From an input held over the ticks to a signal at the start of the first of them."""
+    n = len(program.states)
+    column = INPUTS.index(source)
+    A, B = compose(ticks)
+    row = np.asarray(scale)[..., None, None] * ticks[0].signals[signal][..., None, :]
+    return Block(A, B[..., :, [column]], row[..., :n], row[..., [n + column]], program.states)

@@ -24,6 +24,7 @@ from actuator_lti.drive.wiring import ERRORS, Drive, present
 from actuator_lti.loops.rows import Row, total
 
 INPUTS = ("ref", "torque", "moment", "cut")
+"""Reference of the outer stage, torque in N m at the motor, moment on the output shaft, a cut signal."""
 OWN_SIGNALS = {"current": "i", "angle": "th", "output_angle": "output_angle"}
 """What a law of one's own takes of the plant as it is."""
 
@@ -121,10 +122,14 @@ class Walk(ABC):
 
     def realised(self, names: list[str], block: Realisation, value: Row) -> Row:
         """Put the states of a block's realisation on, under their names, and give its output."""
-        x = [self.state(each) for each in names]
-        for each, row, gain in zip(names, block.A, block.B, strict=True):
-            self.moves(each, total(a * s for a, s in zip(row, x, strict=True)) + gain * value)
-        return total(c * s for c, s in zip(block.C, x, strict=True)) + block.D * value
+        return self.linear(names, block.A, [(gain,) for gain in block.B], block.C, (block.D,), [value])
+
+    def linear(self, names: list[str], A: Any, B: Any, C: Any, D: Any, inputs: list[Row]) -> Row:
+        """Put states on that move by A x + B e, and give C x + D e."""
+        x = [self.state(name) for name in names]
+        for name, row, driven in zip(names, A, B, strict=True):
+            self.moves(name, _sum(row, x) + _sum(driven, inputs))
+        return _sum(C, x) + _sum(D, inputs)
 
     # -- the drive ----------------------------------------------------------------------------------------
 
@@ -281,10 +286,7 @@ class Walk(ABC):
                 e["speed"] = self.speed_in_use(stage)
         inputs = [e.get(name, Row()) for name in law.inputs]
         matrices, names = self.own_matrices(law), [f"{stage}.x{k}" for k in range(1, len(law.A) + 1)]
-        x = [self.state(name) for name in names]
-        for name, row, driven in zip(names, matrices.A, matrices.B, strict=True):
-            self.moves(name, _sum(row, x) + _sum(driven, inputs))
-        return law.gain * (_sum(matrices.C, x) + _sum(matrices.D, inputs))
+        return law.gain * self.linear(names, matrices.A, matrices.B, matrices.C, matrices.D, inputs)
 
     def output_speed(self) -> Row:
         """Speed of the output shaft; none where the rotor is locked."""
@@ -305,4 +307,4 @@ class Walk(ABC):
 
 def _sum(gains: Iterable[Any], rows: Iterable[Row]) -> Row:
     """A product of a row of gains and signals."""
-    return total(float(gain) * row for gain, row in zip(gains, rows, strict=True))
+    return total(gain * row for gain, row in zip(gains, rows, strict=True))

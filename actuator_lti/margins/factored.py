@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.margins.axis_search import Factored, half_turn
+from actuator_lti.margins.given import unwarped
 from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.poles import SortedPoles, eigenvalues, polynomial_roots
 from actuator_lti.margins.trust import Doubtful
@@ -37,8 +38,7 @@ class Response:
 
     def frequency(self, w: float) -> float:
         """Angular frequency in rad/s."""
-        period = self.loop.period_s
-        return float(w) if period is None else 2.0 * math.atan(w) / period
+        return unwarped(w, self.loop.period_s)
 
     def at(self, w: Real) -> Complex:
         """L at w."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
@@ -114,6 +115,11 @@ def _refuse_coefficients(num: Real, den: Real) -> None:
 def period_of(system: Any) -> float | None:
     """Sampling period, s; 1 where it is not stated (``True``), ``None`` where continuous."""
     return float(system.dt) if system.dt else None
+
+
+def unwarped(w: float, period_s: float | None) -> float:
+    """Angular frequency in rad/s for w of the s-plane, which of a sampled loop is tan(angle/2)."""
+    return float(w) if period_s is None else 2.0 * math.atan(w) / period_s
 
 
 def whole_samples(samples: float) -> int | None:

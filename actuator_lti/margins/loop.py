@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgebal
 
-from actuator_lti.margins.given import Given, Real, given_of
+from actuator_lti.margins.given import Given, Real, given_of, unwarped
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 Mask = NDArray[np.bool_]
@@ -53,9 +53,7 @@ class RationalLoop:
 
     def frequency(self, x: float) -> float:
         """Angular frequency in rad/s for x."""
-        if self.period_s is None:
-            return float(x)
-        return float(x if self.in_z else 2.0 * math.atan(x)) / self.period_s
+        return float(x) / self.period_s if self.in_z and self.period_s else unwarped(x, self.period_s)
 
     def point(self, x: Real) -> Complex:
         """Point of the stability boundary: j x, or exp(j x)."""

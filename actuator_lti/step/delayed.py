@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import flint
 import numpy as np
-from scipy.interpolate import BarycentricInterpolator, PPoly
+from scipy.interpolate import BarycentricInterpolator
 from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
@@ -15,8 +16,7 @@ from actuator_lti.margins.delays.form import DelayForm, delay_form
 from actuator_lti.margins.exact.roots import at_enough_bits
 from actuator_lti.margins.loop import Complex, Real, balanced
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.step.motion import BAND, Motion
-from actuator_lti.step.rational import NO_FINAL, UNSTABLE, free_motion
+from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecided, free_motion
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.delay_stepper import step_of
 from actuator_lti.systems.exact_fraction import product
@@ -33,55 +33,31 @@ _CIRCLE, _AROUND = 0.25, 32  # radius, of the way to what lies next, and points 
 _BITS = 256
 
 
-@dataclass(frozen=True)
 class Stepped:
-    """The first part of the response, in polynomials: deviation from the final value, relative to it."""
+    """The first part of the response, over each step a polynomial of the part of it.
 
-    e: PPoly
+    From the values at the start, at each quarter and at the end of each step, shape (steps, 5).
+    """
 
-    @classmethod
-    def through(cls, values: Real, h: float) -> Stepped:
-        """From the values at the start, at each quarter and at the end of each step, shape (steps, 5)."""
-        t = np.linspace(0.0, h, values.shape[1])
-        return cls(PPoly((values @ np.linalg.inv(np.vander(t)).T).T, h * np.arange(len(values) + 1)))
+    sampled, tie = False, 0.0
 
-    @property
-    def end(self) -> float:
-        """The end of the last step."""
-        return float(self.e.x[-1])
+    def __init__(self, values: Real, h: float) -> None:
+        self.shortest, self.end = h, h * len(values)
+        self._series = values @ np.linalg.inv(np.vander(np.linspace(0.0, 1.0, values.shape[1]))).T
+
+    def spans(self, undecided: Undecided, of: Callable[[Real], Real]) -> Spans:
+        """See `actuator_lti.step.motion.Motion.spans`."""
+        a, series = self.shortest * np.arange(len(self._series)), self._series
+        left, right = of(series[:, -1]), of(series.sum(axis=1))
+        most = left + np.abs(series[:, :-1]).sum(axis=1)
+        keep = undecided(a, a + self.shortest, left, right, most)
+        return list(zip(a[keep], series[keep], strict=True))
 
     def curve(self, end: float, count: int) -> tuple[Real, Real]:
         """Times up to ``end``, and e there."""
         time = np.linspace(0.0, end, count)
-        return time, self.e(time)
-
-    def first_at_least(self, level: float) -> float | None:
-        """First time at or above a level; ``None``: not in this part."""
-        if self.e(0.0) >= level - 1.0:
-            return 0.0
-        return next(iter(self._passages(level - 1.0)), None)
-
-    def settled(self) -> float:
-        """From when on it stays within 2 %."""
-        if abs(self.e(self.end)) > BAND:
-            return self.end
-        return max([0.0, *self._passages(-BAND), *self._passages(BAND)])
-
-    def _passages(self, level: float) -> list[float]:
-        return _finite(self.e.solve(level, extrapolate=False)).tolist()
-
-    def greatest(self, least: float) -> tuple[float, float]:
-        """Largest value and its time, be it above ``least`` or not."""
-        inside = _finite(self.e.derivative().roots(extrapolate=False))
-        ends = np.nextafter(self.e.x[1:], 0.0)
-        time = np.sort(np.concatenate((self.e.x[:-1], inside, ends)))
-        value = self.e(time)
-        return float(value.max()), float(time[value.argmax()])
-
-
-def _finite(roots: Real) -> Real:
-    """Without the marks of polynomials that are the level everywhere."""
-    return np.sort(roots[np.isfinite(roots)])
+        step = np.minimum((time / self.shortest).astype(int), len(self._series) - 1)
+        return time, (np.vander(time / self.shortest - step, _PARTS + 1) * self._series[step]).sum(axis=1)
 
 
 def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
@@ -97,7 +73,9 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     if at_rest.order > 0 or poles.unstable or poles.border > 1:
         raise InputError(UNSTABLE)
     final = 0.0 if at_rest.order else at_rest.lead
-    _refuse_no_final(system, final, poles.values)
+    around = 1j * np.abs(poles.values[np.abs(poles.values) > 0.0])
+    if abs(final) <= _ZERO * float(np.abs(response(system, around)).max(initial=0.0)):
+        raise InputError(NO_FINAL)
     head = _FIRST * float(form.delays_s.max())
     while True:
         h = _grid_step(form.delays_s, head)
@@ -106,16 +84,9 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
         late = np.arange(len(values) * 3 // 4, len(values))
         modes = (np.exp(h * np.outer(late, exact)) @ weights).real / final
         if np.abs(modes - values[late, 0]).max() <= _MEET:
-            early = Stepped.through(values, h)
+            early = Stepped(values, h)
             return early, _motion(exact, weights * np.exp(exact * early.end) / final, early.end), final
         head *= 2.0
-
-
-def _refuse_no_final(system: Any, final: float, poles: Complex) -> None:
-    around = 1j * np.abs(poles[np.abs(poles) > 0.0])
-    largest = float(np.abs(response(system, around)).max(initial=0.0))
-    if abs(final) <= _ZERO * largest:
-        raise InputError(NO_FINAL)
 
 
 def collocated(form: DelayForm, points: int) -> Real:
@@ -149,12 +120,11 @@ def _modes(system: Any, poles: Complex, start: float) -> tuple[Complex, Complex]
     real, a weight counts for the pair.
     """
     alive = (poles.real > -_FORGOTTEN / start) & (poles.imag >= 0.0) & (poles.real < 0.0)
-    exact: list[complex] = []
-    weights: list[complex] = []
+    turn = np.exp(2j * np.pi * (np.arange(_AROUND) + 0.5) / _AROUND)
+    found: list[tuple[complex, complex]] = []
     for k in np.flatnonzero(alive):
         pole = complex(poles[k])
-        radius = _CIRCLE * min(abs(pole), float(np.abs(np.delete(poles, k) - pole).min(initial=np.inf)))
-        z = radius * np.exp(2j * np.pi * (np.arange(_AROUND) + 0.5) / _AROUND)
+        z = _CIRCLE * min(abs(pole), float(np.abs(np.delete(poles, k) - pole).min(initial=np.inf))) * turn
         weighted = response(system, pole + z)[0, 0] * z
         residue = complex(weighted.mean())
         if abs(residue) <= _ZERO * float(np.abs(weighted).max()):
@@ -162,9 +132,9 @@ def _modes(system: Any, poles: Complex, start: float) -> tuple[Complex, Complex]
         off = complex((weighted * z).mean()) / residue
         if pole.imag == 0.0:
             off, residue = complex(off.real), complex(residue.real)
-        exact.append(pole + off)
-        weights.append(residue / exact[-1] * (1.0 if pole.imag == 0.0 else 2.0))
-    return np.array(exact, dtype=complex), np.array(weights, dtype=complex)
+        found.append((pole + off, residue / (pole + off) * (1.0 if pole.imag == 0.0 else 2.0)))
+    exact, weights = np.array(found, dtype=complex).reshape(-1, 2).T
+    return exact, weights
 
 
 def _motion(poles: Complex, weights: Complex, start: float) -> Motion:
@@ -174,10 +144,9 @@ def _motion(poles: Complex, weights: Complex, start: float) -> Motion:
     parts = np.concatenate((np.where(real, weights, 0.5 * weights), 0.5 * weights[~real].conj()))
 
     def motion() -> Motion | None:
-        rest = flint.acb_poly([0])
-        for k, weight in enumerate(parts):
-            rest += product(every[:k] + every[k + 1 :]) * flint.acb(complex(weight))
-        return free_motion(rest, every, False, start)
+        beside = (product(every[:k] + every[k + 1 :]) for k in range(len(every)))
+        terms = (p * flint.acb(complex(w)) for p, w in zip(beside, parts, strict=True))
+        return free_motion(sum(terms, flint.acb_poly([0])), every, False, start)
 
     return at_enough_bits(motion, _BITS, "a pole of the step response")
 

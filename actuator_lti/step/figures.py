@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
-from actuator_lti.margins.loop import Real, rational_loop
+from actuator_lti.margins.loop import Mask, Real, rational_loop
 from actuator_lti.step.delayed import Stepped, delayed_response
-from actuator_lti.step.motion import OVER, Motion
-from actuator_lti.step.rational import notes, rational_motion
+from actuator_lti.step.motion import OVER, Motion, notes, rational_motion
 from actuator_lti.systems.measured_response import refuse_measured
 
 _SHOWN = 2000
+_BAND = 0.02
+_FLAT = 1e-12
 
 
 @dataclass(frozen=True)
@@ -83,24 +87,28 @@ def step_figures(system: Any) -> StepFigures:
     if hasattr(system, "delays_s"):
         if system.delays_s.size:
             early, later, final = delayed_response(system)
-            return _figures((early, later), final)
+            return _figures([early], later, final)
         system = system.to_state_space()
     loop = rational_loop(system)
-    motion, final = rational_motion(system, loop)
-    return _figures((motion,), final, loop.period_s, notes(loop))
+    return _figures([], *rational_motion(system, loop), loop.period_s, notes(loop))
 
 
 def _figures(
-    parts: tuple[Stepped | Motion, ...],
+    early: list[Stepped],
+    later: Motion,
     final: float,
     period_s: float | None = None,
     notes: tuple[str, ...] = (),
 ) -> StepFigures:
     scale = 1.0 if period_s is None else period_s
-    ten, ninety = (_first(parts, level) for level in (0.1, 0.9))
-    settled = next((at for part in parts[::-1] if (at := part.settled()) is not None), 0.0)
-    excess, peak_time = _peak(parts)
-    time, deviation = _curve(parts, ninety, settled)
+    parts: list[Stepped | Motion] = [*early, later]
+    ten, ninety = (min(_first_at_least(part, level) for part in parts) for level in (0.1, 0.9))
+    settled = max(0.0, *(_settled(part) for part in parts))
+    excess, peak_time = OVER, np.inf
+    for part in parts:
+        excess, peak_time = _greatest(part, excess, peak_time)
+    excess = excess if np.isfinite(peak_time) else 0.0
+    time, deviation = _curve(early, later, ninety, settled)
     return StepFigures(
         rise_time_s=(ninety - ten) * scale,
         overshoot_percent=100.0 * excess,
@@ -115,24 +123,71 @@ def _figures(
     )
 
 
-def _first(parts: tuple[Stepped | Motion, ...], level: float) -> float:
-    return next(time for part in parts if (time := part.first_at_least(level)) is not None)
+def _first_at_least(part: Stepped | Motion, level: float) -> float:
+    """First time at which 1 + e reaches a level below 1; infinity: not in this part."""
+    target, best = level - 1.0 - part.tie, np.inf
+
+    def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
+        nonlocal best
+        best = min(best, a[left >= target].min(initial=np.inf), b[right >= target].min(initial=np.inf))
+        return (a < best) & (left < target) & (most >= target)
+
+    for a, series in sorted(part.spans(undecided, np.asarray), key=itemgetter(0)):
+        for root in _within(series, target):
+            return a + root * part.shortest
+    return float(best)
 
 
-def _peak(parts: tuple[Stepped | Motion, ...]) -> tuple[float, float]:
-    """Excess over the final value and when; 0 and infinity where there is none."""
-    best, place = OVER, np.inf
-    for part in parts:
-        excess, time = part.greatest(best)
-        if excess > best:
-            best, place = excess, time
-    return (best, place) if np.isfinite(place) else (0.0, place)
+def _settled(part: Stepped | Motion) -> float:
+    """From when on |e| is no more than 2 %; minus infinity: in all of this part."""
+    band, best = _BAND + part.tie, -np.inf
+
+    def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
+        nonlocal best
+        best = max(best, a[left > band].max(initial=-np.inf), b[right > band].max(initial=-np.inf))
+        return (b > best) & (most > band)
+
+    for a, series in sorted(part.spans(undecided, np.abs), key=itemgetter(0), reverse=True):
+        if roots := [*_within(series, _BAND), *_within(series, -_BAND)]:
+            return a + max(roots) * part.shortest
+    return float(best) + part.sampled
 
 
-def _curve(parts: tuple[Stepped | Motion, ...], ninety: float, settled: float) -> tuple[Real, Real]:
+def _greatest(part: Stepped | Motion, best: float, place: float) -> tuple[float, float]:
+    """Largest e and its time, where it is above the best so far."""
+
+    def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
+        nonlocal best, place
+        for t, e in ((a, left), (b, right)):
+            k = int(e.argmax())
+            if e[k] > best or (e[k] == best and t[k] < place):
+                best, place = float(e[k]), float(t[k])
+        return most > best * (1.0 + _FLAT)
+
+    for a, series in part.spans(undecided, np.asarray):
+        for top in _within(np.polyder(series)):
+            if (e := float(np.polyval(series, top))) > best:
+                best, place = e, a + top * part.shortest
+    return best, place
+
+
+def _within(series: Real, level: float = 0.0) -> list[float]:
+    """Where a power series takes a level in [0, 1], in order: its derivative's zeros part its passages."""
+    f = np.poly1d(series) - level
+    if not f.order:
+        return []
+    slope = f.deriv().coeffs
+    turns = [] if abs(slope[-1]) > np.abs(slope[:-1]).sum() else _within(slope)
+    edges = (0.0, *turns, 1.0)
+    return [
+        float(brentq(f, low, high, xtol=1e-15))
+        for low, high in pairwise(edges)
+        if min(f(low), f(high)) <= 0.0 <= max(f(low), f(high))
+    ]
+
+
+def _curve(early: list[Stepped], later: Motion, ninety: float, settled: float) -> tuple[Real, Real]:
     """Times until well after settling, close together while it rises, and the deviation there."""
-    *early, later = parts
-    assert isinstance(later, Motion)
     end = max(2.0 * settled or 2.0 * ninety or (5.0 / later.slowest or 1.0), later.start)
     spans = [later.curve(end, _SHOWN), *(part.curve(later.start, _SHOWN) for part in early)]
     if later.start < (rising := min(5.0 * ninety, end)):

@@ -6,6 +6,9 @@ A* A + c* c = 1). exp(A t) is a contraction, so poles that lie together, repeat 
 digit. Over spans of time that are halved, bounds of e and of its second derivative say where it may pass a
 level; what remains is one sample, or a few terms of a power series.
 
+Of a rational system the transfer function follows exactly from its doubles, its roots are isolated in
+certified balls, and the coordinates of the motion are computed in as many digits as they need.
+
 Heuberger, Van den Hof, Wahlberg, Modelling and Identification with Rational Orthogonal Basis Functions, 2005.
 """
 
@@ -13,18 +16,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from itertools import pairwise
+from typing import Any
 
 import flint
 import numpy as np
-from scipy.optimize import brentq
 
-from actuator_lti.errors import NumericalError
-from actuator_lti.margins.loop import Complex, Mask, Real
+from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.margins.exact.roots import at_enough_bits
+from actuator_lti.margins.given import ULP
+from actuator_lti.margins.loop import Complex, Mask, RationalLoop, Real
+from actuator_lti.systems.exact_fraction import (
+    Fraction,
+    balls,
+    dc_noise,
+    divided,
+    double,
+    exact_fraction,
+    exact_sum,
+    near_dc,
+    roots,
+    shown,
+)
 
-BAND = 0.02
 OVER = 1e-9  # an excess below this part of the final value is no overshoot
-_FLAT = 1e-12
 _TIE = 1e-12  # a sample this near to a level has reached it, and this near to the band is inside
 _FINE = 512.0  # parts of the shortest time constant: a span that its power series covers
 _TERMS = 8
@@ -32,6 +46,15 @@ _LEVELS = 60
 _BITS = 160  # of the transitions
 _VANISHED = 1e-100  # what is smaller would only slow the processor down
 _MOST = 200_000  # spans of one length
+_EPS = float(np.finfo(float).eps)
+_FIRST_BITS = 192
+_SURE_BITS = 60
+UNSTABLE = "the system is not stable: it has no step figures"
+NO_FINAL = "the final value of the step response is zero: it has no rise, overshoot or settling"
+_INTEGRATES = "the system integrates: its step response has no final value"
+_Poles = list[flint.acb]  # each as often as it is repeated
+Undecided = Callable[[Real, Real, Real, Real, Real], Mask]
+Spans = list[tuple[float, Real]]
 _LONG = "the step response rings for too long: what it settles to is known, when is not"
 
 
@@ -50,7 +73,7 @@ class Motion:
         self._A, self._c = _doubles(exact), np.array([complex(each) for each in output], dtype=complex)
         rates = [1 - abs(each) if sampled else -each.real for each in poles]
         self._decay = np.array([float(rate.mid()) for rate in rates], dtype=float)
-        self._tie = _TIE if sampled else 0.0
+        self.tie = _TIE if sampled else 0.0
         size = float(np.linalg.norm(self._A, 2)) if poles and not sampled else 0.0
         self.shortest = 2.0 ** -np.ceil(np.log2(_FINE * size)) if size else 1.0
         turned = self._A - np.eye(len(poles)) if sampled else self._A
@@ -93,52 +116,6 @@ class Motion:
         """Smallest decay rate; infinity where there is no motion."""
         return float(self._decay.min(initial=np.inf))
 
-    def first_at_least(self, level: float) -> float:
-        """First time at which 1 + e reaches a level below 1."""
-        target, best = level - 1.0 - self._tie, np.inf
-
-        def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
-            nonlocal best
-            best = min(best, a[left >= target].min(initial=np.inf), b[right >= target].min(initial=np.inf))
-            return (a < best) & (left < target) & (most >= target)
-
-        for a, series in sorted(self._spans(undecided, np.asarray), key=lambda span: span[0]):
-            for root in _within(series - target * _ONE):
-                return self.start + a + root * self.shortest
-        return self.start + best
-
-    def settled(self) -> float | None:
-        """From when on |e| is no more than 2 %; ``None``: all the time."""
-        band, best = BAND + self._tie, -np.inf
-
-        def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
-            nonlocal best
-            best = max(best, a[left > band].max(initial=-np.inf), b[right > band].max(initial=-np.inf))
-            return (b > best) & (most > band)
-
-        for a, series in sorted(self._spans(undecided, np.abs), key=lambda span: -span[0]):
-            if roots := [*_within(series - BAND * _ONE), *_within(series + BAND * _ONE)]:
-                return self.start + a + max(roots) * self.shortest
-        return self.start + best + self.sampled if np.isfinite(best) else None
-
-    def greatest(self, least: float) -> tuple[float, float]:
-        """Largest e above ``least`` and its time; ``(least, inf)`` where there is none."""
-        best, place = least, np.inf
-
-        def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
-            nonlocal best, place
-            for t, e in ((a, left), (b, right)):
-                k = int(e.argmax())
-                if e[k] > best or (e[k] == best and t[k] < place):
-                    best, place = float(e[k]), float(t[k])
-            return most > best * (1.0 + _FLAT)
-
-        for a, series in self._spans(undecided, np.asarray):
-            for top in _within(np.polyder(series)):
-                if (e := float(np.polyval(series, top))) > best:
-                    best, place = e, a + top * self.shortest
-        return best, self.start + place
-
     def curve(self, end: float, count: int) -> tuple[Real, Real]:
         """Times from the start on to ``end``, at most twice ``count`` and evenly apart, and e there."""
         spans = (end - self.start) / self.shortest
@@ -149,9 +126,7 @@ class Motion:
             x, move = np.concatenate((x, x @ move.T)), _flushed(move @ move)
         return self.start + step * np.arange(points), (x[:points] @ self._c).real
 
-    def _spans(
-        self, undecided: Callable[[Real, Real, Real, Real, Real], Mask], of: Callable[[Real], Real]
-    ) -> list[tuple[float, Real]]:
+    def spans(self, undecided: Undecided, of: Callable[[Real], Real]) -> Spans:
         """Halve all of time; a span stays where ``undecided(a, b, of(e(a)), of(e(b)), most of of(e))``.
 
         Returns the shortest spans that stay: when they begin, and e over them as a power series.
@@ -163,13 +138,14 @@ class Motion:
                 a, x = np.concatenate((a, a + span)), np.concatenate((x, x @ move.T))
             left, right = of((x @ self._c).real), of((x @ (self._c @ move)).real)
             size, bend = (np.abs(x) @ row for row in self._bounds[level])
-            keep = undecided(a, a + span, left, right, np.minimum(size, np.maximum(left, right) + bend))
+            most = np.minimum(size, np.maximum(left, right) + bend)
+            keep = undecided(self.start + a, self.start + a + span, left, right, most)
             a, x = a[keep], x[keep]
             if not a.size:
                 return []
             if a.size > _MOST:
                 raise NumericalError(_LONG)
-        return [] if self.sampled else list(zip(a.tolist(), self._series(x), strict=True))
+        return [] if self.sampled else list(zip(self.start + a, self._series(x), strict=True))
 
     def _series(self, x: Complex) -> Real:
         """Coefficients of e over one shortest span, highest power first; shape (m, terms)."""
@@ -178,19 +154,6 @@ class Motion:
             rows.append((x @ factor).real)
             factor = factor @ self._A * (self.shortest / (k + 1.0))
         return np.array(rows[::-1]).T
-
-
-_ONE = np.eye(_TERMS)[-1]
-
-
-def _within(series: Real) -> list[float]:
-    """Roots in [0, 1] of a power series that is a parabola but for small terms, in order."""
-    f, top = np.poly1d(series), -series[-2] / (2.0 * series[-3]) if series[-3] else 0.0
-    return [
-        float(brentq(f, low, high, xtol=1e-15))
-        for low, high in pairwise((0.0, min(max(top, 0.0), 1.0), 1.0))
-        if f(low) * f(high) <= 0.0
-    ]
 
 
 def gain_of(p: flint.acb, sampled: bool) -> flint.arb:
@@ -223,3 +186,77 @@ def _doubles(exact: flint.acb_mat) -> Complex:
 
 def _flushed(move: Complex) -> Complex:
     return np.where(np.abs(move) < _VANISHED, 0.0, move)
+
+
+def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float]:
+    """The motion and the final value of the unit step response of a stable rational system.
+
+    ``loop`` is the same, balanced (which is exact); coefficients are taken from the system itself.
+    """
+    whole = exact_fraction(system)
+    f, dc = shown(whole, loop), 1 if loop.in_z else 0
+
+    def motion() -> Motion | None:
+        poles = _poles(loop, f, whole.whole_den / whole.den)
+        final = f.num(dc) / f.den(dc)
+        if final == 0:
+            raise InputError(NO_FINAL)
+        if abs(double(final)) <= dc_noise(loop):
+            raise NumericalError(NO_FINAL.replace("is zero:", "is zero within the rounding of the entries:"))
+        rest = (f.num / final - f.den) / flint.fmpq_poly([-dc, 1])
+        return free_motion(balls(rest / f.den[f.den.degree()]), poles, loop.in_z)
+
+    return at_enough_bits(motion, _FIRST_BITS, "a pole of the step response"), double(f.num(dc) / f.den(dc))
+
+
+def free_motion(rest: flint.acb_poly, poles: _Poles, sampled: bool, start: float = 0.0) -> Motion | None:
+    """The motion with the transform rest/(product of x - pole); ``None``: more digits are needed.
+
+    Sampled: e_0 + e_1/z + ... is z times that. The fastest pole first, which alone its function has.
+    """
+    poles = sorted(poles, key=lambda p: -abs(complex(p)) if sampled else -complex(p).real)
+    mirrored = [flint.acb_poly([1])]
+    for p in poles:
+        q = p.conjugate()
+        mirrored.append(mirrored[-1] * flint.acb_poly([1, -q] if sampled else [q, 1]))
+    state: list[flint.acb] = [flint.acb(0)] * len(poles)
+    for j in reversed(range(len(poles))):
+        gain = gain_of(poles[j], sampled)
+        state[j] = rest(poles[j]) / (gain * mirrored[j](poles[j]))
+        rest = divided(rest - state[j] * gain * mirrored[j], poles[j])
+        if not _sharp(state[j] * gain, 1.0) or not _sharp(poles[j], abs(complex(poles[j]))):
+            return None
+    return Motion(poles, state, sampled, start)
+
+
+def _sharp(value: flint.acb, unit: float) -> bool:
+    radius = max(float(value.real.rad()), float(value.imag.rad()))
+    return radius <= max(unit, 1e-300) * 2.0**-_SURE_BITS
+
+
+def _poles(loop: RationalLoop, f: Fraction, hidden: flint.fmpq_poly) -> _Poles:
+    dc = flint.acb(1 if loop.in_z else 0)
+    seen = roots(f.den)
+    unseen = [p for p, _ in roots(hidden) if not near_dc(p, loop)]
+    for p in [*unseen, *(p for p, _ in seen)]:
+        inside = abs(p) < 1 if loop.in_z else p.real < 0  # true only where certain
+        if not inside and not (p - dc).contains(flint.acb(0)):
+            raise InputError(UNSTABLE)
+    for p, times in seen:
+        if (p - dc).contains(flint.acb(0)):
+            raise InputError(_INTEGRATES if times == 1 else UNSTABLE)
+    return [p for p, times in seen for _ in range(times)]
+
+
+def notes(loop: RationalLoop) -> tuple[str, ...]:
+    """Say where the last digits of the coefficients decide about the final value."""
+    if not loop.in_z or loop.coefficients is None:
+        return ()
+    sums = [(abs(exact_sum(p)), float(np.abs(p).sum())) for p in loop.coefficients]
+    moved = ULP * _EPS * sum(whole / total for total, whole in sums)
+    if moved < 0.01:
+        return ()
+    return (
+        f"{ULP} units in the last place of the coefficients move the final value by {100 * moved:.2g} %: "
+        "the figures are those of the coefficients as given; a state space would hold the system better",
+    )

@@ -10,10 +10,9 @@ import numpy as np
 from flint import arb, ctx, fmpq, fmpq_poly
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.delays.axis import IMAGINARY, REAL, Axis, Form, zeros
+from actuator_lti.margins.delays.axis import IMAGINARY, REAL, Axis, Form, smallest, zeros
 from actuator_lti.margins.delays.exact import HIGHEST_ORDER, ExactDelayLoop, Quasi, exact_inside_delays
 from actuator_lti.margins.delays.form import DelayForm
-from actuator_lti.margins.delays.nearest import smallest
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.loop import Real
 

@@ -1,8 +1,8 @@
 """A linear system as matrices and names only.
 
 `assemble_loops` works with these, and with `actuator_lti.systems.plain_delays.PlainDelaySystem` where there
-are exact delays. The python-control system of one (`actuator_lti.systems.as_control`) is made where somebody
-asks for it: importing python-control takes longer than the margins of a drive.
+are exact delays. The python-control system of one (`as_control` there) is made where somebody asks for it:
+importing python-control takes longer than the margins of a drive.
 """
 
 from __future__ import annotations

@@ -17,7 +17,13 @@ HOT_DEGC, COLD_DEGC, SUPPLY_SHARE = 120.0, -40.0, 0.8
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """Where the corners lie; the viscous factor is on motor and load (grease in the cold)."""
+    """Judge the linear loops at the corners of the drive: hot, cold, low supply, worst tolerances.
+
+    Resistance and torque constant follow [temperature] of the design, or copper and NdFeB. The exit status
+    is 1 where a requirement is not met, or a loop not stable, at any corner.
+
+    Try: actuator-lti corners fin --hot 85 --cold -54 --supply 22
+    """
 
     hot_degC: Annotated[float, Option("Winding and magnets when hot; the winding's limit, or 120.", "DEGC")]
     cold_degC: Annotated[float, Option("Winding and magnets when cold; -40.", "DEGC")]

@@ -17,7 +17,14 @@ USUAL_SHARE, USUAL_HZ = 0.5, 1.0  # of the full deflection, where none is stated
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """A duty: a sine of the command, for a share of the time, the drive holding still for the rest (S3)."""
+    """Hold a duty cycle against continuous current, overload protection (I2t) and winding temperature.
+
+    The duty is a sine under a load, for a share of the time; what is not given comes from [duty]. The
+    temperature needs thermal_resistance and thermal_time in [temperature], the protection limits.peak_time.
+    The exit status is 1 where the duty is beyond the continuous rating, or where none is stated.
+
+    Try: actuator-lti duty joint --amplitude "10 deg" --load "40 N*m" --share 0.3 --cycle 20
+    """
 
     amplitude_rad: Annotated[
         float, Option('Peak, such as "5 deg"; half the full deflection.', "ANGLE", kind="output")

@@ -63,7 +63,32 @@ class Settings:
 
 @dataclass(frozen=True, kw_only=True)
 class Asked(Settings):
-    """Files, and what is looked for in them: friction of a campaign, a motion's model, or two masses."""
+    """Identify a drive from bench records, and write the result as a design with tolerances.
+
+    Five ways to call it:
+
+    identify campaign.toml --out result: C0, Cv and CM from the steady parts of many runs. A bad run is set
+    aside and named, the others go on. --example prints a campaign file.
+
+    identify A.csv B.csv --validate C.csv --design my.toml: inertia, friction and offset from records of a
+    motion together, by the inverse dynamic model; --refine simulates the drive as well. The EMPS benchmark's
+    file is known as it is.
+
+    identify --frequency-response chirp.csv --play reversal.csv --design my.toml: inertias, stiffness,
+    damping and play of a two-mass drive.
+
+    identify --response loop.csv --of T --design my.toml: inertias, stiffness, damping and delay from a
+    measured frequency response of any loop.
+
+    identify --plan my.toml --within 2 --out result: motions that make the intervals as small as asked; with
+    records after it, what to measure next.
+
+    Every column of every file is accounted for. Each record is held against itself and against the design's
+    limits, and the written design against the record that it came from. Where a check fails the status is 1,
+    and no design is written without --accept; with --out, page and JSON are.
+
+    Try: actuator-lti identify DATA_EMPS.mat --design emps --out result
+    """
 
     files: Annotated[
         list[Path],

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.steady_gains import stage_gain
+from actuator_lti.drive.steady import stage_gain
 from actuator_lti.errors import TooManyTicks
 from actuator_lti.loops import ExactMargins, Loops, exact_margins, periodic_loop
 from actuator_lti.loops.periodic import PeriodicLoop

@@ -203,16 +203,16 @@ def operating_points(
     ``refused`` gets the loops whose margins are not found, and why; ``described``: friction described at
     small speeds as well; ``certify``: margins by exact arithmetic.
     """
-    from actuator_lti.drive.operating import friction_slope
-    from actuator_lti.loops import assemble_loops
+    from actuator_lti.drive.operating import Operating, slope_at
+    from actuator_lti.loops.assemble import loops_at
     from analyses.specification.capability import drive_figures
 
     def point(
         label: str, load: float | None, kind: OperatingPoint, speed: float | None = None
     ) -> OperatingPointFigures:
         moment = load or 0.0
-        slope = friction_slope(design, kind, moment, speed, 1)
-        loops = assemble_loops(design, operating_point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
+        at = Operating(point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
+        slope, loops = slope_at(design, at), loops_at(design, at)
         figures = all_loop_figures(loops, step=False, refused=refused, certify=certify, locked=False)
         unit = "N" if design.axis == "linear" else "N m"
         return OperatingPointFigures(kind, label, load, slope, figures, unit)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import breakaway_torque_Nm, stall_torque_Nm
-from actuator_lti.drive.steady_gains import torque_gain_Nm_rad
+from actuator_lti.drive.steady import torque_gain_Nm_rad
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,13 @@ from analyses.request import LOAD, POINT, Option
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """Where the loops are looked at."""
+    """Print margins, bandwidths and verdicts of every loop; the margins are certified.
+
+    Requirements are judged on the sampled loops with sliding friction, whatever form is printed.
+
+    Try: actuator-lti margins joint --set control.position.gain="12 1/s", or actuator-lti margins joint
+    --operating-point rest --load "60 N*m"
+    """
 
     form: Annotated[str, Option("Linear form: sampled, continuous or ideal; sampled.", "FORM")] = "sampled"
     operating_point: Annotated[str, POINT] = "sliding"

@@ -24,7 +24,11 @@ USUAL_CYCLES = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """A motion; amplitude and bias in the unit of the command of the outermost loop."""
+    """Move the drive in the nonlinear simulator: every limit, stick and slip, exact between the ticks.
+
+    Try: actuator-lti simulate joint --amplitude "5 deg" --duration 0.5 --load "20 N*m" --csv step.csv, or
+    actuator-lti simulate fin --command chirp --amplitude 0.5 --frequency 1 --to 50 --duration 4
+    """
 
     command: Annotated[str | None, Option(f"One of {KINDS}; default step.", "KIND")] = None
     amplitude: Annotated[

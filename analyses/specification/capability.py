@@ -10,8 +10,8 @@ import numpy as np
 from actuator_lti.design.model import Command, Design
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.drive import facts
-from actuator_lti.drive.facts import stall_torque_Nm
-from actuator_lti.drive.steady import motor_torque_Nm, steady_torque_Nm, voltage_limit_torque_Nm
+from actuator_lti.drive.facts import stall_torque_Nm, steady_torque_Nm
+from actuator_lti.drive.steady import motor_torque_Nm, voltage_limit_torque_Nm
 from analyses.large_signal.tones import tone
 from nonlinear import commands, simulate
 

@@ -18,7 +18,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Asked(OnMachines):
-    """A comparison."""
+    """Compare variants with their base: margins, bandwidths, verdicts, large signals, cause of each change.
+
+    What is found of each design is kept under --out; an interrupted comparison goes on where it stopped.
+
+    Try: actuator-lti compare joint --set control.position.gain="12 1/s" --set gear.harmonic.ratio=120
+    """
 
     validate: Annotated[
         bool | None,

@@ -33,7 +33,18 @@ class TuningSettings:
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """Requirements and elements as texts; `of` reads them."""
+    """Find gains that meet the requirements at every corner of the tolerances, or say by how much none can.
+
+    By default the least change of the design. With --place also a notch, a low-pass, feed-forward where
+    gains alone do not do.
+
+    The result is confirmed by certified margins, nominal and at each requirement's worst corner.
+
+    Writes tuned.toml (a design), tune.html and tune.json. Exit status 1 where the requirements cannot be
+    met.
+
+    Try: actuator-lti tune joint --require "position.bandwidth>=60 Hz" --place notch,feedforward
+    """
 
     require: Annotated[
         list[str] | None,

@@ -9,8 +9,8 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
-from actuator_lti.drive.facts import circuit_resistance_ohm, resonance_rad_s
-from actuator_lti.drive.steady import motor_torque_Nm, steady_torque_Nm
+from actuator_lti.drive.facts import resonance_rad_s, steady_torque_Nm
+from actuator_lti.drive.steady import circuit_resistance_ohm, motor_torque_Nm
 from actuator_lti.errors import InputError
 from analyses.identification.two_mass import angle_responses
 from examples.virtual_bench.two_mass import TwoMassPlan

@@ -15,15 +15,7 @@ from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
-from nonlinear.export.program import (
-    c_text,
-    filled,
-    header_text,
-    replaced,
-    single,
-    source_hash,
-    source_text,
-)
+from nonlinear.export.program import c_text, filled, header_text, replaced, single, source_hash, source_text
 from nonlinear.export.rows import place_words
 from nonlinear.native import parameters
 from nonlinear.row.elastic import is_elastic
@@ -109,13 +101,7 @@ def c_export(design: Design, *, single_precision: bool = False, prefix: str = "d
 
 
 def refuse_prefix(prefix: str) -> None:
-    """Refuse what no name in C begins with.
-
-    Raises
-    ------
-    InputError
-        With what is allowed.
-    """
+    """Refuse what no name in C begins with, by an `InputError` that says what is allowed."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*_", prefix):
         raise InputError(f"prefix = {prefix!r}: allowed: letters, digits and _, a letter first, _ last")
 
@@ -125,11 +111,15 @@ def _refuse_single(design: Design) -> None:
     instruments = design.instruments
     noise = (instruments.current_noise_A, instruments.angle_noise_rad, instruments.output_angle_noise_rad)
     if any(noise) or instruments.jitter_s:
-        message = "instruments: noise and jitter need double precision; allowed: none of them, or no --single"
-        raise InputError(message, where=where)
-    if is_elastic(design):
-        message = "coupling, friction.point: an elastic drive train or a friction map needs double precision"
-        raise InputError(f"{message}; allowed: neither, or no --single", where=where)
+        message = "instruments: noise and jitter need double precision; allowed: none of them"
+    elif is_elastic(design):
+        message = (
+            "coupling, friction.point: an elastic drive train or a friction map needs double precision; "
+        )
+        message += "allowed: neither"
+    else:
+        return
+    raise InputError(f"{message}, or no --single", where=where)
 
 
 def stage_words(design: Design) -> tuple[str, str]:

@@ -28,6 +28,7 @@ from nonlinear.export.controller_names import signal_name, state_name
 
 Floats = npt.NDArray[np.float64]
 MOTOR_COUNTS, OUTPUT_COUNTS = layout.IO_SIZE, layout.IO_SIZE + 1  # places of inputs that are whole numbers
+_ENTRIES = ("controller_start", "controller_step")
 _SINGLE = {"STANDING": 1e-6}  # what is no change of a reference but rounding, in single precision
 
 
@@ -90,32 +91,23 @@ def controller_of(design: Design, prefix: str, *, single_precision: bool = False
     structs = _structs(design, p, prefix, functions.values())
     rows = Rows(structs, float(p[layout.COUNTS_PER_RAD]))
     _zeroed(functions["controller_start"], structs["s"])
-    entries = {
-        name: ["row"] * len(functions[name].arguments) for name in ("controller_start", "controller_step")
-    }
-    program = emit_structs(functions, entries, prefix, rows)  # type: ignore[arg-type]
+    entries: dict[str, list[Kind]] = {name: ["row"] * len(functions[name].arguments) for name in _ENTRIES}
+    program = emit_structs(functions, entries, prefix, rows)
     measured = {each.name: each for row in ("p", "io") for each in structs[row].members}
     structs["io"] = replace(structs["io"], members=tuple(measured.values()))
-    return Controller(
-        design=design, p=p, program=program, state=structs["s"], measured=structs["io"], out=structs["to"]
-    )
+    ours = dict(zip(("state", "measured", "out"), (structs[row] for row in ("s", "io", "to")), strict=True))
+    return Controller(design=design, p=p, program=program, **ours)
 
 
 def _followed(p: Floats, single_precision: bool) -> dict[str, Leftover]:
     """What is left of step and start, with the numbers of the state that never change in their places."""
-    bounds = begins(p)
+    bounds, named = begins(p), _SINGLE if single_precision else {}
     constant: dict[int, float] = {}
     while True:
-        residual = Residual(
-            partial(_look, p, constant),
-            {counted: partial(_counts, p)},
-            _SINGLE if single_precision else {},
-        )
-        for entry, arguments in ((controller_step, ("s", "io", "to")), (controller_start, ("s", "p"))):
-            residual.follow(entry).arguments = arguments
-        functions = without_unread(
-            residual.functions, ("controller_step", "controller_start"), partial(_owner, bounds)
-        )
+        residual = Residual(partial(_look, p, constant), {counted: partial(_counts, p)}, named)
+        residual.follow(controller_step).arguments = ("s", "io", "to")
+        residual.follow(controller_start).arguments = ("s", "p")
+        functions = without_unread(residual.functions, _ENTRIES, partial(_owner, bounds))
         found = constant | _never_changed(functions, bounds)
         if found == constant:
             return functions
@@ -164,8 +156,7 @@ def _owner(bounds: dict[int, str], row: str, index: ast.expr) -> object:
 
 
 def _begin(index: ast.expr) -> int:
-    """The known part of an index."""
-    return split_index(index)[0]
+    return split_index(index)[0]  # the known part of an index
 
 
 def _part(bounds: dict[int, str], place: int) -> str:
@@ -206,14 +197,11 @@ def _never_changed(functions: dict[str, Leftover], bounds: dict[int, str]) -> di
 
 def _structs(design: Design, p: Floats, prefix: str, functions: Iterable[Leftover]) -> dict[str, Struct]:
     functions = list(functions)
-    state = Struct(f"{prefix}controller_state", "state", tuple(_state(design, p, functions)))
-    ours = {row: tuple(_members(design, functions, row)) for row in ("p", "io", "to")}
-    names = {"p": "input", "io": "input", "to": "output"}
-    result = {
-        row: Struct(f"{prefix}controller_{names[row]}", "out" if row == "to" else "in", members)
-        for row, members in ours.items()
-    }
-    return {"s": state, **result}
+    result = {"s": Struct(f"{prefix}controller_state", "state", tuple(_state(design, p, functions)))}
+    for row, name, argument in (("p", "input", "in"), ("io", "input", "in"), ("to", "output", "out")):
+        members = tuple(_members(design, functions, row))
+        result[row] = Struct(f"{prefix}controller_{name}", argument, members)
+    return result
 
 
 def _state(design: Design, p: Floats, functions: list[Leftover]) -> Iterable[Member]:
@@ -248,11 +236,10 @@ def _members(design: Design, functions: list[Leftover], row: str) -> Iterable[Me
 
 def _zeroed(start: Leftover, state: Struct) -> None:
     """Begin with zero in what the start itself leaves."""
-    lines: list[ast.stmt] = []
-    for each in state.members:
-        if each.length:
-            text = f"for j in range({each.length}): s[{each.first} + j] = 0.0"
-        else:
-            text = f"s[{each.first}] = 0.0"
-        lines += ast.parse(text).body
-    start.tree.body = lines + start.tree.body
+    texts = [
+        f"for j in range({each.length}): s[{each.first} + j] = 0.0"
+        if each.length
+        else f"s[{each.first}] = 0.0"
+        for each in state.members
+    ]
+    start.tree.body = ast.parse("\n".join(texts)).body + start.tree.body

@@ -14,22 +14,12 @@ from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from nonlinear.export import variables as of
 from nonlinear.export.c_files import c_export, exported, spare_parameters
 from nonlinear.export.model_description import MODEL, build_description, description
 from nonlinear.export.program import c_text, filled, template
 from nonlinear.export.relations import relation_functions
 from nonlinear.export.trace import KeyTrace, trace_keys
-from nonlinear.export.variables import (
-    FIRST_CONSTANT,
-    FIRST_KEY,
-    FIRST_TEXT,
-    Variable,
-    flag_bits,
-    key_low,
-    supply_voltage,
-    texts_of,
-    variables_of,
-)
 
 Version = Literal[2, 3]
 PLATFORMS = ("linux64", "win64")
@@ -76,13 +66,12 @@ def fmu_bytes(
     """
     refuse_unknown(version, platforms)
     trace = trace_keys(design)
-    variables = variables_of(design, trace)
+    variables = of.variables_of(design, trace)
     texts = _sources(design, trace, version)
     names = [name for name in texts if name.endswith(".c")]
-    files = {
-        "modelDescription.xml": description(design, variables, _token(texts, variables), version, names, tool)
-    }
-    texts["fmu_design.h"] = texts["fmu_design.h"].replace("@TOKEN@", _token(texts, variables))
+    token = _token(texts, variables)
+    files = {"modelDescription.xml": description(design, variables, token, version, names, tool)}
+    texts["fmu_design.h"] = texts["fmu_design.h"].replace("@TOKEN@", token)
     for platform in platforms:
         library = f"{MODEL}.{_SUFFIX[platform]}"
         place = f"binaries/{_FOLDERS[version][platform]}/{library}"
@@ -97,13 +86,7 @@ def fmu_bytes(
 
 
 def refuse_unknown(version: int, platforms: Sequence[str]) -> None:
-    """Refuse a version or a platform that there is not.
-
-    Raises
-    ------
-    InputError
-        With what is allowed.
-    """
+    """Refuse a version or a platform that there is not, by an `InputError` that says what is allowed."""
     if version not in (2, 3):
         raise InputError(f"fmi = {version}: allowed: 2 or 3")
     for platform in platforms:
@@ -113,12 +96,9 @@ def refuse_unknown(version: int, platforms: Sequence[str]) -> None:
 
 def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str]:
     texts = c_export(design)
-    bits = ", ".join(str(bit) for bit in flag_bits())
+    bits = ", ".join(str(bit) for bit in of.flag_bits())
     return {
-        "drive.h": texts["drive.h"],
-        "drive.c": texts["drive.c"],
-        "drive_design.h": texts["drive_design.h"],
-        "drive_design.c": texts["drive_design.c"],
+        **{name: texts[name] for name in ("drive.h", "drive.c", "drive_design.h", "drive_design.c")},
         "fmu_design.h": filled("fmu_design.h", _header_values(design, trace)),
         "fmu_design.c": filled("fmu_design.c", _source_values(design, trace)),
         "fmu_core.h": template("fmu_core.h"),
@@ -127,7 +107,7 @@ def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str
     }
 
 
-def _token(texts: Mapping[str, str], variables: Sequence[Variable]) -> str:
+def _token(texts: Mapping[str, str], variables: Sequence[of.Variable]) -> str:
     """An identifier that another program or other variables change."""
     digest = hashlib.sha256("".join([*texts.values(), repr(variables)]).encode())
     return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
@@ -139,26 +119,22 @@ def _header_values(design: Design, trace: KeyTrace) -> dict[str, str]:
         "SPARE": str(spare_parameters(exported(design))),
         "KEYS": str(len(trace.keys)),
         "CONSTANTS": str(len(trace.constants)),
-        "TEXTS": str(len(texts_of(design))),
-        "FIRST_KEY": str(FIRST_KEY),
-        "FIRST_CONSTANT": str(FIRST_CONSTANT),
-        "FIRST_TEXT": str(FIRST_TEXT),
-        "SUPPLY_VOLTAGE": c_float(supply_voltage(design)),
+        "TEXTS": str(len(of.texts_of(design))),
+        **{name: str(getattr(of, name)) for name in ("FIRST_KEY", "FIRST_CONSTANT", "FIRST_TEXT")},
+        "SUPPLY_VOLTAGE": c_float(of.supply_voltage(design)),
     }
 
 
 def _source_values(design: Design, trace: KeyTrace) -> dict[str, str]:
     """What stands for the words of ``fmu_design.c``."""
     keys = [
-        f"    {{{c_float(key.value)}, {c_float(key_low(key))}, {c_float(key.high)}, {int(key.fixed)}, "
+        f"    {{{c_float(key.value)}, {c_float(of.key_low(key))}, {c_float(key.high)}, {int(key.fixed)}, "
         f"{int(key.whole)}}}, /* {key.path} */"
         for key in trace.keys
     ]
-    constants = [
-        f"    {{{c_float(_finite(key.value))}, {int(key.whole)}}}, /* {key.path} */"
-        for key in trace.constants
-    ]
-    texts = [f"    {c_text(value)}, /* {path} */" for path, value, _ in texts_of(design)]
+    numbers = [(key, key.value if math.isfinite(key.value) else 0.0) for key in trace.constants]
+    constants = [f"    {{{c_float(value)}, {int(key.whole)}}}, /* {key.path} */" for key, value in numbers]
+    texts = [f"    {c_text(value)}, /* {path} */" for path, value, _ in of.texts_of(design)]
     lines = [f"    {line}" for line in trace.lines]
     parts = {"KEYS": keys, "CONSTANTS": constants, "TEXTS": texts, "LINES": lines}
     relations = _relations_text(relation_functions(design, trace.keys))
@@ -175,10 +151,6 @@ def _relations_text(relations: Sequence[Sequence[str]]) -> str:
     calls = "".join(f" && (related_{number}(k, why, size) != 0)" for number in range(len(relations)))
     texts.append(f"int fmu_related({arguments})\n{{\n    return ((size > 0U){calls}) ? 1 : 0;\n}}\n")
     return "\n".join(texts)
-
-
-def _finite(value: float) -> float:
-    return value if math.isfinite(value) else 0.0
 
 
 def _zipped(files: Mapping[str, bytes]) -> bytes:

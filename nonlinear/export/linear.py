@@ -24,6 +24,11 @@ from nonlinear.export.linear_row import at_rest, set_off
 MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
 AT_SPEED, AT_CURRENT, AT_VOLTAGE = range(4, 7)  # break points of the closed drive; POSITION is the output's
+# the probe of each; -1: it is run through its command
+POINT = (
+    layout.POINT_CURRENT, -1, layout.POINT_OUTPUT, -1,
+    layout.POINT_SPEED, layout.POINT_CURRENT, layout.POINT_VOLTAGE,
+)  # fmt: skip
 NO_LOOP, TOO_LONG, LOST = 0, -1, -2  # lost: no double holds what a tick gives
 MOST_TICKS = 16  # of a column that are noted
 # signals in front of limiters, and the integral that the limit of one clamps as well (0: none)
@@ -72,15 +77,7 @@ def cut_of(q, stage):
 @kernel
 def cut_point(q, stage):
     """The probe that cuts the loop, or -1."""
-    if stage == CURRENT and q[layout.HAS_VELOCITY] > 0.0:
-        return layout.POINT_CURRENT
-    if stage == POSITION:
-        return layout.POINT_OUTPUT
-    if stage == AT_SPEED:
-        return layout.POINT_SPEED
-    if stage == AT_CURRENT:
-        return layout.POINT_CURRENT
-    return layout.POINT_VOLTAGE if stage == AT_VOLTAGE else -1
+    return -1 if stage == CURRENT and q[layout.HAS_VELOCITY] <= 0.0 else POINT[stage]
 
 
 @kernel
@@ -111,12 +108,9 @@ def interval(q, stage):
         return 1 if current else NO_LOOP
     if stage == VELOCITY:
         return speed_interval(q) if velocity else NO_LOOP
-    if stage == POSITION:
-        return command_interval(q) if position else NO_LOOP
-    if stage == COMMAND:
-        return command_interval(q)
-    if stage == AT_SPEED:
-        return command_interval(q) if velocity and position else NO_LOOP
+    if stage == POSITION or stage == COMMAND or stage == AT_SPEED:
+        there = stage == COMMAND or (position and (stage == POSITION or velocity))
+        return command_interval(q) if there else NO_LOOP
     if stage == AT_VOLTAGE and current:
         return 1
     if (not velocity and not position) or (stage == AT_CURRENT and not current):
@@ -195,14 +189,8 @@ def put_inputs(q, s, io, stage, size):
         io[layout.IN_COMMAND] = size / q[layout.RATIO]
     elif stage == CURRENT or stage == COMMAND:
         io[layout.IN_COMMAND] = size
-    elif stage == POSITION:
-        io[layout.IN_PROBE + layout.POINT_OUTPUT] = -size / q[layout.RATIO]
-    elif stage == AT_SPEED:
-        io[layout.IN_PROBE + layout.POINT_SPEED] = -size
-    elif stage == AT_CURRENT:
-        io[layout.IN_PROBE + layout.POINT_CURRENT] = -size
     else:
-        io[layout.IN_PROBE + layout.POINT_VOLTAGE] = -size
+        io[layout.IN_PROBE + POINT[stage]] = -size / q[layout.RATIO] if stage == POSITION else -size
 
 
 @kernel

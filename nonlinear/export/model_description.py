@@ -29,6 +29,10 @@ def description(
     ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime="1", stepSize=period)
     _variables(root, variables, version)
     _structure(root, variables, version)
+    return _written(root)
+
+
+def _written(root: ET.Element) -> bytes:
     ET.indent(root)
     text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
     return text
@@ -96,12 +100,6 @@ def _bounds(item: Variable) -> dict[str, str]:
     return result
 
 
-def _initial(item: Variable) -> dict[str, str]:
-    if item.causality == "input":
-        return {}
-    return {"initial": "exact" if item.start is not None else "calculated"}
-
-
 def _start(item: Variable) -> dict[str, str]:
     if item.start is None:
         return {}
@@ -111,14 +109,14 @@ def _start(item: Variable) -> dict[str, str]:
 
 
 def _common(item: Variable) -> dict[str, str]:
-    return {
+    about = {
         "name": item.name,
         "valueReference": str(item.reference),
-        "description": item.description,
-        "causality": item.causality,
-        "variability": item.variability,
-        **_initial(item),
+        **{name: getattr(item, name) for name in ("description", "causality", "variability")},
     }
+    if item.causality != "input":
+        about["initial"] = "exact" if item.start is not None else "calculated"
+    return about
 
 
 _TYPES = {
@@ -152,14 +150,9 @@ def _structure(root: ET.Element, variables: Sequence[Variable], version: int) ->
         part = ET.SubElement(structure, f"{name}s") if version == 2 else structure
         tag, key = ("Unknown", "index") if version == 2 else (name, "valueReference")
         for item in (item for item in variables if item.causality == "output"):
-            known = _known(item) if name == "InitialUnknown" else []
-            text = " ".join(str(place[reference]) for reference in known)
+            started = name == "InitialUnknown" and item.name in ("output.angle", "motor.angle")
+            text = str(place[INITIAL_ANGLE]) if started else ""
             ET.SubElement(part, tag, {key: str(place[item.reference])}, dependencies=text)
-
-
-def _known(item: Variable) -> list[int]:
-    """What an output's value at the start depends on: the angles on the start angle."""
-    return [INITIAL_ANGLE] if item.name in ("output.angle", "motor.angle") else []
 
 
 def build_description(sources: Sequence[str]) -> bytes:
@@ -169,6 +162,4 @@ def build_description(sources: Sequence[str]) -> bytes:
     files = ET.SubElement(build, "SourceFileSet", language="C99", compilerOptions="-ffp-contract=off")
     for name in sources:
         ET.SubElement(files, "SourceFile", name=name)
-    ET.indent(root)
-    text: bytes = ET.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text
+    return _written(root)

@@ -17,6 +17,8 @@ from nonlinear._kernels.tick import get, set_state, tick
 from nonlinear.export.part_of_tick import part_of_tick
 from nonlinear.export.rows import names_of, parameter_names, words
 
+HEAD = '#include "drive.h"\n\n#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n'
+
 _ROW: Kind = "row"
 ENTRIES: dict[object, tuple[Kind, ...]] = {
     prepare_sizes: (_ROW,),
@@ -77,12 +79,14 @@ def replaced(text: str, values: Mapping[str, str]) -> str:
 @cache
 def header_text() -> str:
     """``drive.h``: lengths, places in the rows with units and words, prototypes."""
+    outputs = [(n, v) for n, v in names_of(at.IO_REFERENCE, at.IO_SIZE, "IO_") if n != "IO_SIZE"]
+    derived = [(n, getattr(at, n)) for n in ("DELAY_LINE", "RARE_LOAD", "STATE_SIZE", "PARAMETER_SIZE")]
     groups = (
         ("Parameters p: of a run, then what drive_derive derives from them", parameter_names()),
-        ("Derived parameters that a program may want", [(n, getattr(at, n)) for n in _DERIVED]),
+        ("Derived parameters that a program may want", derived),
         ("State s", names_of(0, at.S_NOISE, "S_")),
         ("Inputs of a tick, in io", names_of(0, at.IN_PROBE, "IN_")),
-        ("Outputs of a tick, in io: what was at its beginning", _outputs()),
+        ("Outputs of a tick, in io: what was at its beginning", outputs),
         ("Status", [(name, getattr(at, name)) for name in STATUS]),
         ("Bits of io[DRIVE_IO_FLAGS]", list(FLAGS)),
     )
@@ -93,41 +97,22 @@ def header_text() -> str:
     return filled("drive.h", {"BLOCKS": blocks, "FUNCTIONS": heads, "SIZES": sizes})
 
 
-_DERIVED = ("DELAY_LINE", "RARE_LOAD", "STATE_SIZE", "PARAMETER_SIZE")
-
-
-def _outputs() -> list[tuple[str, int]]:
-    return [(n, v) for n, v in names_of(at.IO_REFERENCE, at.IO_SIZE, "IO_") if n != "IO_SIZE"]
-
-
 def _enum(title: str, items: list[tuple[str, int]]) -> str:
     lines = [f"/* {title} */", "enum {"]
     for name, value in items:
         said = STATUS.get(name) or FLAGS.get((name, value)) or words().get(name, "")
         end = "," if (name, value) != items[-1] else ""
-        lines.append(f"    DRIVE_{name} = {value}{end}" + (f" /* {_plain(said)} */" if said else ""))
+        said = said.replace("*/", "* /").replace("/*", "/ *")
+        lines.append(f"    DRIVE_{name} = {value}{end}" + (f" /* {said} */" if said else ""))
     return "\n".join([*lines, "};", ""])
-
-
-def _plain(text: str) -> str:
-    return text.replace("*/", "* /").replace("/*", "/ *")
 
 
 @cache
 def source_text() -> str:
     """``drive.c``: constants, helpers, types, functions."""
     emitted = program()
-    parts = [
-        '#include "drive.h"\n\n#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n',
-        emitted.constants_text(words()),
-        "",
-        *emitted.helpers,
-        "",
-        emitted.types,
-        "",
-        emitted.functions,
-    ]
-    return template("drive_head.c") + "\n".join(parts)
+    parts = [emitted.constants_text(words()), "", *emitted.helpers, "", emitted.types, "", emitted.functions]
+    return template("drive_head.c") + "\n".join([HEAD, *parts])
 
 
 def source_hash() -> str:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from actuator_lti.design.access import located, parameter_value, paths_of, stack
 from actuator_lti.design.field import Structure
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout as at
-from nonlinear.export.statement import Statement, Term, used
+from nonlinear.export.statement import Statement, used
 from nonlinear.row.parameters import design_row
 
 
@@ -43,17 +43,19 @@ class Tape:
     def value(self, does: str, terms: tuple[Any, ...], number: float) -> Traced:
         """A new intermediate value."""
         self.count += 1
-        self.statements.append(Statement("value", self.count, does, tuple(map(_term, terms))))
+        self._note("value", self.count, does, terms)
         return Traced(self, f"v{self.count}", number)
 
     def condition(self, does: str, terms: tuple[Any, ...], outcome: bool) -> bool:
         """Note what was found of a value."""
-        self.statements.append(Statement("condition", int(outcome), does, tuple(map(_term, terms))))
+        self._note("condition", int(outcome), does, terms)
         return outcome
 
-
-def _term(value: Any) -> Term:
-    return value.name if isinstance(value, Traced) else float(value)
+    def _note(
+        self, kind: Literal["value", "condition"], target: int, does: str, terms: tuple[Any, ...]
+    ) -> None:
+        named = (each.name if isinstance(each, Traced) else float(each) for each in terms)
+        self.statements.append(Statement(kind, target, does, tuple(named)))
 
 
 def _number(value: Any) -> float:
@@ -124,20 +126,17 @@ class Traced:
 
     def __and__(self, other: Any) -> Any:
         """Both; of comparisons that are values."""
-        both = bool(self.number) and bool(_number(other))
-        return self.tape.value("&&", (self, other), both)
+        return self.tape.value("&&", (self, other), bool(self.number) and bool(_number(other)))
 
     def __or__(self, other: Any) -> Any:
         """One at least."""
-        one = bool(self.number) or bool(_number(other))
-        return self.tape.value("||", (self, other), one)
+        return self.tape.value("||", (self, other), bool(self.number) or bool(_number(other)))
 
     __rand__, __ror__ = __and__, __or__
 
     def either(self, yes: Any, no: Any) -> Traced:
         """One value where this comparison holds, else the other."""
-        number = _number(yes if self.number else no)
-        return self.tape.value("where", (self, yes, no), number)
+        return self.tape.value("where", (self, yes, no), _number(yes if self.number else no))
 
     def zero_below(self, least: Any) -> Traced:
         """The value, or 0 where its size is less."""
@@ -236,12 +235,8 @@ def trace_keys(design: Design) -> KeyTrace:
     free: list[Key] = []
     constants: list[Key] = []
     for path in paths_of(design):
-        key = _key(design, path)
-        places = None if path in _DECIDED else reached(design, path, Tape())
-        if places:
-            free.append(replace(key, fixed=bool(places & _FIXED)))
-        else:
-            constants.append(key)
+        places = set() if path in _DECIDED else reached(design, path, Tape())
+        (free if places else constants).append(_key(design, path, fixed=bool(places and places & _FIXED)))
     statements = row_statements(design, {key.path: key.value for key in free}, Tape())
     return KeyTrace(tuple(free), tuple(constants), tuple(each.c for each in statements))
 
@@ -272,16 +267,13 @@ def _traced(row: Any) -> list[int]:
     return [place for place in range(row.size) if isinstance(row[place], Traced)]
 
 
-def _key(design: Design, path: str) -> Key:
-    known, _ = located(design, path)
-    value = parameter_value(design, path)
+def _key(design: Design, path: str, *, fixed: bool) -> Key:
+    known, value = located(design, path)[0], parameter_value(design, path)
     return Key(
         path=path,
         value=value,
         unit=known.unit(Structure.of(design)),
-        description=known.description,
-        low=known.low,
-        high=known.high,
-        low_open=known.low_open,
         whole=known.kind == "integer" and value <= LARGEST_INTEGER,
+        fixed=fixed,
+        **{name: getattr(known, name) for name in ("description", "low", "high", "low_open")},
     )

@@ -48,7 +48,12 @@ class Variable:
 
 def variables_of(design: Design, trace: KeyTrace) -> tuple[Variable, ...]:
     """All variables of a design's unit, in the order of the model description."""
-    return (*_inputs(design), *_outputs(design), *_flags(), *_parameters(design, trace), *_texts(design))
+    texts = (
+        Variable(name=structured(path), reference=FIRST_TEXT + n, causality="local", variability="constant",
+                 description=f"{text} (decided at the export)", kind="string", start=value)
+        for n, (path, value, text) in enumerate(texts_of(design))
+    )  # fmt: skip
+    return (*_inputs(design), *_outputs(design), *_flags(), *_parameters(design, trace), *texts)
 
 
 def supply_voltage(design: Design) -> float:
@@ -99,8 +104,7 @@ def _signal(design: Design, number: int, text: tuple[str, str, str], **more: Any
 
 
 def _inputs(design: Design) -> tuple[Variable, ...]:
-    words, unit = stage_words(design)
-    _, torque = _units(design)
+    (words, unit), (_, torque) = stage_words(design), _units(design)
     moment = "moment of the load on the output shaft, beside that of the design"
     texts = (
         ("command", words, unit, 0.0, -math.inf),
@@ -131,11 +135,8 @@ def _outputs(design: Design) -> tuple[Variable, ...]:
 
 
 def _flags() -> tuple[Variable, ...]:
-    names = [
-        (f"limiter.{name.replace('-', '_')}", f"the {name} limit acted at the last tick")
-        for name in at.LIMITERS
-    ]
-    names.append(("at_rest", "the rotor was held by friction at the last tick"))
+    acted = [(f"limiter.{n.replace('-', '_')}", f"the {n} limit acted at the last tick") for n in at.LIMITERS]
+    names = [*acted, ("at_rest", "the rotor was held by friction at the last tick")]
     return tuple(
         Variable(name=name, reference=FIRST_FLAG + n, causality="output", variability="discrete",
                  description=text, kind="boolean")
@@ -186,14 +187,12 @@ def structured(path: str) -> str:
     """
     indexed = re.sub(r"\.(\d+)(?=\.|$)", r"[\1]", path)
     parts = [
-        part if re.fullmatch(r"[A-Za-z_]\w*(\[\d+\])?", part) else _quoted(part)
+        part
+        if re.fullmatch(r"[A-Za-z_]\w*(\[\d+\])?", part)
+        else "'" + re.sub(r"[^A-Za-z0-9_ !#$%&()*+,\-/:;<>=?@\[\]^{}|~]", "_", part) + "'"
         for part in indexed.split(".")
     ]
     return ".".join(parts)
-
-
-def _quoted(name: str) -> str:
-    return "'" + re.sub(r"[^A-Za-z0-9_ !#$%&()*+,\-/:;<>=?@\[\]^{}|~]", "_", name) + "'"
 
 
 def texts_of(design: Design) -> tuple[tuple[str, str, str], ...]:
@@ -207,11 +206,3 @@ def texts_of(design: Design) -> tuple[tuple[str, str, str], ...]:
         if field.kind in ("choice", "flag")
     ]
     return (*about, *result)
-
-
-def _texts(design: Design) -> tuple[Variable, ...]:
-    return tuple(
-        Variable(name=structured(path), reference=FIRST_TEXT + n, causality="local", variability="constant",
-                 description=f"{text} (decided at the export)", kind="string", start=value)
-        for n, (path, value, text) in enumerate(texts_of(design))
-    )  # fmt: skip

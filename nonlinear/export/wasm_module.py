@@ -28,7 +28,7 @@ from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.files.tree import Tree
 from nonlinear.export import linear, linear_limiters, linear_loops
-from nonlinear.export.program import ENTRIES, header_text, template
+from nonlinear.export.program import ENTRIES, HEAD, header_text, template
 
 MOST_BYTES = 100_000
 _NAME, _RECORD = "drive.wasm", "drive.wasm.json"
@@ -50,23 +50,16 @@ _LINEAR: dict[Any, tuple[Kind, ...]] = {
     _quoted.quoted: (_ROW, "float", _ROW),
 }
 _SIZES = {
-    "MOST": linear.MOST,
-    "MOST_STATES": linear_loops.MOST_STATES,
-    "MOST_PHASES": linear_loops.MOST_PHASES,
-    "BLOCK": linear_loops.BLOCK,
-    "MOST_TICKS": linear.MOST_TICKS,
-    "SEEN": linear.SEEN,
+    **{name: getattr(linear, name) for name in ("MOST", "MOST_TICKS", "SEEN", "POSITION", "COMMAND")},
+    **{name: getattr(linear_loops, name) for name in ("MOST_STATES", "MOST_PHASES", "BLOCK")},
+    **{name: getattr(_response, name) for name in ("DEEPEST", "CAPACITY")},
     "SHOWN": linear_limiters.SHOWN,
     "STAGES": linear.AT_VOLTAGE + 1,
-    "POSITION": linear.POSITION,
-    "COMMAND": linear.COMMAND,
     "COLUMNS": _figures.COLUMNS,
     "FIRST_CLOSED": _figures.PEAK_T,
     "LAST_CLOSED": _figures.FINAL,
     "QUOTED": _quoted.QUOTED,
     "POINTS": _run.POINTS,
-    "DEEPEST": _response.DEEPEST,
-    "CAPACITY": _response.CAPACITY,
 }
 
 
@@ -80,21 +73,14 @@ def _linear_header() -> str:
     """Prototypes and lengths beyond those of ``drive.h``."""
     known = {function.__name__ for function in _LINEAR}
     heads = [text for name, text in program().declarations.items() if name in known]
-    return "\n".join(
-        [
-            "#include <stdbool.h>",
-            *(f"enum {{ {name} = {size} }};" for name, size in _SIZES.items()),
-            *heads,
-            "",
-        ]
-    )
+    sizes = [f"enum {{ {name} = {size} }};" for name, size in _SIZES.items()]
+    return "\n".join(["#include <stdbool.h>", *sizes, *heads, ""])
 
 
 def _source() -> str:
     """The program behind its prototypes."""
     emitted = program()
-    head = '#include "drive.h"\n\n#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n'
-    return "\n".join([head, emitted.constants_text(), *emitted.helpers, emitted.types, emitted.functions])
+    return "\n".join([HEAD, emitted.constants_text(), *emitted.helpers, emitted.types, emitted.functions])
 
 
 def sources() -> dict[str, str]:

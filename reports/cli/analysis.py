@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from inspect import Parameter, Signature, cleandoc
+from inspect import Parameter, Signature
 from pathlib import Path
 from textwrap import dedent
 from typing import TYPE_CHECKING, Annotated, Any
@@ -55,38 +55,51 @@ VariantOption = Annotated[
 def command(one: Analysis) -> Callable[..., None]:
     """The function that typer makes a command of."""
 
+    usual = getattr(one.request, "design_of", lambda _given: DEFAULT_DESIGN)
+
     def run(design: str | None = None, changes: list[str] | None = None, **given: Any) -> None:
-        name = (usual(given) if usual else DEFAULT_DESIGN) if design is None else design
-        subject = None if one.alone else _study(design, changes) if one.study else load_drive(name, changes)
+        subject: Design | Study | None = None
+        if one.study and design is not None:
+            subject = study_with(design, {words: read_changes([words]) for words in changes or ()})
+        elif not one.alone and not one.study:
+            subject = load_drive(usual(given) if design is None else design, changes)
         answer(one, subject, **given)
 
-    usual = getattr(one.request, "design_of", None)  # then the design is an option
-    needed = any(  # then a design is, too
-        option.argument and not hasattr(one.request, name) for name, (_, option) in _options(one).items()
+    parameters = _parameters(one)
+    run.__signature__ = Signature(  # type: ignore[attr-defined]
+        [
+            Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+            for name, (annotation, default) in parameters.items()
+        ]
     )
-    subject: tuple[Any, Any] = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
-    parameters = [
-        _parameter("design", DesignOption, None)
-        if usual
-        else _parameter("design", *((StudyArgument, None) if one.study else subject)),
-        _parameter("changes", VariantOption if one.study else SetOption, None),
-        *(
-            _parameter(name, *_option(name, *each, getattr(one.request, name, None)))
-            for name, each in _options(one).items()
-        ),
-        _parameter("out", FolderOption, Path(one.out) if one.out else None),
-        _parameter("as_json", JsonOption, False),
-        _parameter("quiet", QuietOption, False),
-        *([_parameter("example", _example(one), False)] if one.example else []),
-    ]
-    paged = one.page and not one.alone
-    left_out = ("design", "changes") * one.alone + ("out",) * (not paged)
-    left_out += ("quiet",) * (not paged and not one.doing)
-    parameters = [each for each in parameters if each.name not in left_out]
-    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {each.name: each.annotation for each in parameters}
-    run.__doc__ = cleandoc(one.words) + (f"\n\nIn the report: --also {one.name}." if one.also else "")
+    run.__annotations__ = {name: annotation for name, (annotation, _) in parameters.items()}
+    words = one.help.replace("[", "\\[")  # of keys, no markup
+    run.__doc__ = words + (f"\n\nIn the report: --also {one.name}." if one.also else "")
     return run
+
+
+def _parameters(one: Analysis) -> dict[str, tuple[Any, Any]]:
+    """Annotation and default of every parameter of a command, by name."""
+    asked = [(name, *each, getattr(one.request, name, None)) for name, each in _options(one).items()]
+    needed = any(option.argument and default is None for _, _, option, default in asked)  # so is a design
+    paged = one.page and not one.alone
+    made: dict[str, tuple[Any, Any]] = {}
+    if one.study:
+        made = {"design": (StudyArgument, None), "changes": (VariantOption, None)}
+    elif hasattr(one.request, "design_of"):
+        made = {"design": (DesignOption, None), "changes": (SetOption, None)}
+    elif not one.alone:
+        design = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
+        made = {"design": design, "changes": (SetOption, None)}
+    made |= {name: _option(name, kind, option, default) for name, kind, option, default in asked}
+    if paged:
+        made["out"] = (FolderOption, Path(one.out) if one.out else None)
+    made["as_json"] = (JsonOption, False)
+    if paged or one.doing:
+        made["quiet"] = (QuietOption, False)
+    if one.example:
+        made["example"] = (_example(one), False)
+    return made
 
 
 def _example(one: Analysis) -> Any:
@@ -115,6 +128,7 @@ def answer(
     from actuator_lti.design import warnings_of
     from analyses.isolation import isolated
     from reports import document as doc
+    from reports.as_json import as_json as plain_data
     from reports.build import notices
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line, print_note, print_warning
@@ -134,29 +148,23 @@ def answer(
         more: dict[str, Any] = {"progress": doing} if one.doing else {}
         more |= {"out": out} if one.keeps else {}
         result = one.run(subject, *asked, **more)
-    if (text := one.text(result)) is not None:
+    if (text := one.shows("text", _nothing)(result)) is not None:
         print_line(text)
         return
     parts = [*notices(missing, one.name), *one.sections(result)]
     if drive is not None:
         doc.waived(parts, drive)
     passed = getattr(result, "verdict", getattr(result, "passed", None))
-    files = one.write(result, out)
+    files = one.shows("write", lambda *_: [])(result, out)
     if out is not None:
         files += _pages(one, drive, parts, out, quiet)
     if as_json:
-        print_json(one.data(result))
+        print_json(one.shows("data", plain_data)(result))
     else:
         _print(one, getattr(drive, "name", ""), result, parts, passed)
         for path in files:
             print_line(f"wrote {path}")
     leave_with(passed in (None, True, "met"))
-
-
-def _study(path: str | None, changes: list[str] | None) -> Study | None:
-    return (
-        None if path is None else study_with(path, {words: read_changes([words]) for words in changes or ()})
-    )
 
 
 def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, quiet: bool) -> list[str]:
@@ -177,7 +185,7 @@ def _print(
     """Print the sections, or in brief what they say."""
     from reports.terminal import print_blocks, print_section, print_verdict
 
-    brief = one.brief(result)
+    brief = one.shows("brief", _nothing)(result)
     if brief is not None:
         print_verdict(passed or False, f"{name}: {brief.words}")
         print_blocks(brief.blocks, brief.notes)
@@ -206,5 +214,5 @@ def _read(name: str, option: Option, value: Any, drive: Design) -> Any:
     return value if option.kind == "plain" else read_quantity(of, value, option.kind, drive)
 
 
-def _parameter(name: str, annotation: Any, default: Any) -> Parameter:
-    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+def _nothing(*_result: Any) -> None:
+    """What a section's module says that says nothing special."""

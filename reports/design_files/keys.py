@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """Which keys."""
+    """List the keys of a design file: unit, default, allowed range, meaning, example.
+
+    A repeated table stands as gear.* (by name), friction.point.* and control.velocity.filter.* (by number).
+    Try: actuator-lti keys notch, or actuator-lti keys --explain my.toml
+    """
 
     match: Annotated[
         str,

@@ -16,7 +16,11 @@ KINDS: dict[str, str | None] = {"servo-axis": None, "joint": "joint", "ballscrew
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """Where to write, and what to start from."""
+    """Write a commented design file to start one's own drive from.
+
+    Try: actuator-lti init arm.toml --kind joint, or with values of data sheets: actuator-lti init arm.toml
+    --motor maxon-ec-i-40-100w-48v --gear harmonic-drive-csf-17-30
+    """
 
     file: Annotated[Path, Option(words="Design file to write.", metavar="FILE", argument=True)] = Path(
         "my-drive.toml"

@@ -17,7 +17,10 @@ CHECK = Option(
 
 @dataclass(frozen=True, kw_only=True)
 class AskedC:
-    """C files."""
+    """Write the drive as C99: drive.h, drive.c, the design's parameters, an example and a README.
+
+    Try: actuator-lti export c fin --out fin-c --prefix fin_
+    """
 
     target: Annotated[Path, Option(words="Folder for the files; drive-c.", metavar="DIR", flag="out")] = Path(
         "drive-c"
@@ -32,7 +35,10 @@ class AskedC:
 
 @dataclass(frozen=True, kw_only=True)
 class AskedController:
-    """The controller alone."""
+    """Write the controller alone as C99 for firmware, with test vectors and a class for C++.
+
+    Try: actuator-lti export controller joint --type float --prefix joint_ --out joint-controller
+    """
 
     target: Annotated[
         Path, Option(words="Folder for the files; controller-c.", metavar="DIR", flag="out")
@@ -46,7 +52,10 @@ class AskedController:
 
 @dataclass(frozen=True, kw_only=True)
 class AskedFmu:
-    """A unit for co-simulation."""
+    """Write the drive as a co-simulation FMU: binaries, sources, every key of the design as a parameter.
+
+    Try: actuator-lti export fmu joint --platform linux64
+    """
 
     target: Annotated[Path | None, Option(words="File to write; NAME.fmu.", metavar="FILE", flag="out")] = (
         None
@@ -63,7 +72,10 @@ class AskedFmu:
 
 @dataclass(frozen=True, kw_only=True)
 class AskedLinear:
-    """Linear models."""
+    """Write every loop, break point, command and load response as state space, with units and margins.
+
+    Try: actuator-lti export linear joint --to mat
+    """
 
     to: Annotated[Literal["json", "mat", "python"], Option(words="Format; json.")] = "json"
     target: Annotated[

@@ -56,7 +56,14 @@ class Settings(OnMachines):
 
 @dataclass(frozen=True, kw_only=True)
 class Asked(Settings):
-    """A night of a study on a site, or the approval of its last night."""
+    """Build every design and variant of a study, keep every figure, and publish a site of it.
+
+    What has not changed is not computed again. Exit status 1 where a requirement fails, a design has no
+    result, or a figure is worse than the approved baseline.
+
+    Try: actuator-lti nightly study.toml --site site; to make the last night the baseline: actuator-lti
+    nightly approve study.toml --site site --by NAME --reason TEXT
+    """
 
     words: Annotated[
         list[str],

@@ -18,20 +18,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from actuator_lti.errors import InputError
+from actuator_lti.files.atomic import write_bytes
 from reports.nightly.text import sha256
 
 MAGIC = b"actuator-lti/nightly-cache 1 "
 MAX_ENTRY_BYTES = 256_000_000
 MAX_UNPACKED_BYTES = 2_000_000_000
 _COMPRESSION = 3
+_NO_ENTRY = (zipfile.BadZipFile, KeyError, ValueError, zlib.error, NotImplementedError)
+
+
+class CorruptEntry(ValueError):
+    """An entry whose checksum or layout is wrong."""
 
 
 @dataclass(frozen=True)
 class Entry:
     """A result as stored: ``meta`` at once, the files of the report when asked for."""
 
-    key: str
     meta: Mapping[str, Any]
     archive: bytes
 
@@ -39,10 +43,6 @@ class Entry:
         """Content of one file of the report."""
         with zipfile.ZipFile(io.BytesIO(self.archive)) as archive:
             return archive.read(f"files/{name}")
-
-
-class CorruptEntry(ValueError):
-    """An entry whose checksum or layout is wrong."""
 
 
 @dataclass(frozen=True)
@@ -57,15 +57,8 @@ class Cache:
 
     def take(self, key: str, data: bytes) -> Entry:
         """Store an entry that was made elsewhere (see `sealed`), whole or not at all (`CorruptEntry`)."""
-        entry, path = _opened(key, data), self.path(key)
-        temporary = path.with_name(f".{path.name[:16]}.{os.getpid()}.part")
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            temporary.write_bytes(data)
-            temporary.replace(path)  # what a power cut does to it the checksum finds
-        except OSError as error:
-            temporary.unlink(missing_ok=True)
-            raise InputError(f"cannot write: {error.strerror or error}", where=str(path)) from error
+        entry = _opened(key, data)
+        write_bytes(self.path(key), data)
         return entry
 
     def read(self, key: str) -> Entry | None:
@@ -92,16 +85,12 @@ class Cache:
             self.path(key).unlink(missing_ok=True)
             return None
 
-    def collect_garbage(self, keep: Iterable[str], older_than_days: float) -> int:
-        """Remove entries that are not in ``keep`` and have not been used for so long; how many."""
-        kept = set(keep)
-        limit = time.time() - older_than_days * 86400.0
-        removed = 0
+    def collect_garbage(self, keep: Iterable[str], older_than_days: float) -> None:
+        """Remove entries that are not in ``keep`` and have not been used for so long."""
+        kept, limit = {self.path(key) for key in keep}, time.time() - older_than_days * 86400.0
         for path in self.folder.glob("*/*.entry"):
-            if path.name.removesuffix(".entry") not in kept and path.stat().st_mtime < limit:
+            if path not in kept and path.stat().st_mtime < limit:
                 path.unlink(missing_ok=True)
-                removed += 1
-        return removed
 
 
 def sealed(key: str, meta: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
@@ -123,13 +112,12 @@ def _opened(key: str, data: bytes) -> Entry:
         raise CorruptEntry("checksum differs")
     try:
         with zipfile.ZipFile(io.BytesIO(body)) as archive:
-            if sum(item.file_size for item in archive.infolist()) > MAX_UNPACKED_BYTES:
-                raise CorruptEntry(f"more than {MAX_UNPACKED_BYTES} bytes unpacked")
-            meta = json.loads(archive.read("meta.json"))
-    except CorruptEntry:
-        raise
-    except (zipfile.BadZipFile, KeyError, ValueError, zlib.error, NotImplementedError) as error:
+            size = sum(item.file_size for item in archive.infolist())
+            meta = json.loads(archive.read("meta.json")) if size <= MAX_UNPACKED_BYTES else {}
+    except _NO_ENTRY as error:
         raise CorruptEntry("layout differs") from error
+    if size > MAX_UNPACKED_BYTES:
+        raise CorruptEntry(f"more than {MAX_UNPACKED_BYTES} bytes unpacked")
     if not isinstance(meta, dict) or meta.get("key") != key:
         raise CorruptEntry("stored under another key")
-    return Entry(key, meta, body)
+    return Entry(meta, body)

@@ -11,14 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from reports.nightly.code_version import commits_between
 from reports.nightly.figures import Figure
 from reports.nightly.history import History
 from reports.nightly.records import Baseline, Result, Run
+from reports.nightly.source import commits_between
 from reports.nightly.tolerance import Tolerances
 from reports.nightly.trend import WINDOW, flaps
 
 SHOWN_CHANGES = 100
+Differences = tuple[tuple[str, str, str], ...]  # name, before, after
 _CODE = Path(__file__).resolve().parents[2]
 
 
@@ -43,11 +44,11 @@ class Change:
 
 @dataclass(frozen=True, kw_only=True)
 class Cause:
-    """What differs between the two nights that a result comes from."""
+    """What differs between the two nights that a result comes from; commits are those in between."""
 
-    parameters: tuple[tuple[str, str, str], ...] = ()
-    settings: tuple[tuple[str, str, str], ...] = ()
-    libraries: tuple[tuple[str, str, str], ...] = ()
+    parameters: Differences = ()
+    settings: Differences = ()
+    libraries: Differences = ()
     commits: tuple[tuple[str, str], ...] = ()
     code: bool = False
 
@@ -117,32 +118,6 @@ def _order(change: Change) -> tuple[bool, bool, float, str]:
     return not change.worse, change.kind != "verdict", -far, change.figure
 
 
-def cause_of(
-    old: Run,
-    new: Run,
-    inputs: tuple[Mapping[str, Any], Mapping[str, Any]],
-    commits: tuple[tuple[str, str], ...],
-) -> Cause:
-    """Say what differs: parameters and settings of the design, libraries, sources, commits between."""
-    before, after = inputs
-    return Cause(
-        parameters=_differences(before.get("parameters", {}), after.get("parameters", {})),
-        settings=_differences(before.get("settings", {}), after.get("settings", {})),
-        libraries=_differences(old.libraries, new.libraries),
-        commits=commits,
-        code=old.code != new.code,
-    )
-
-
-def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> tuple[tuple[str, str, str], ...]:
-    names = [*new, *(n for n in old if n not in new)]
-    return tuple((str(n), _text(old.get(n)), _text(new.get(n))) for n in names if old.get(n) != new.get(n))
-
-
-def _text(value: object) -> str:
-    return "(none)" if value is None else str(value)
-
-
 class Between:
     """Compares nights of a history; ``origin`` is the study's file, whose commits are told."""
 
@@ -150,6 +125,7 @@ class Between:
         self.history = history
         self.tolerances = tolerances
         self.origin = origin
+        self._runs = {run.id: run for run in history.runs}
         self._columns: dict[tuple[int, int], Columns] = {}
 
     def last_night(self, result: Result, past: list[Result]) -> Comparison:
@@ -160,15 +136,15 @@ class Between:
             return Comparison(
                 note="no earlier night has a result" if earlier else "first night of this design"
             )
-        skipped = sum(good[-1].run < run.id < result.run for run in self.history.runs)
+        skipped = sum(good[-1].run < night < result.run for night in self._runs)
         note = f"{skipped} night(s) without a result before; compared with the last that has one"
         found = self._compare(good[-1], result, note if skipped else "")
         return replace(found, changes=self._flapping(found.changes, past))
 
     def baseline(self, result: Result, approval: Baseline | None) -> Comparison:
         """What changed since the approved night, else since the first that has a result."""
-        nights = (run.id for run in self.history.runs) if approval is None else (approval.run,)
-        first = next(filter(None, (self.history.result(night, result.name) for night in nights)), None)
+        nights = self.history.runs if approval is None else [self._runs[approval.run]]
+        first = self.history.first(result.name, nights)
         if first is None:
             return Comparison(note="no baseline: no night has a result")
         if approval is not None:
@@ -181,16 +157,24 @@ class Between:
         )
 
     def _compare(self, old: Result, new: Result, note: str) -> Comparison:
-        runs = {run.id: run for run in self.history.runs}
-        before, after = runs[old.run], runs[new.run]
+        before, after = self._runs[old.run], self._runs[new.run]
         if new.home is None:
             return Comparison(run=before, note=note or "no result tonight")
         if new.home == old.home:
             return Comparison(run=before, note=note)
         columns = self._columns_of(old, new)
-        inputs = (self.history.inputs(old), self.history.inputs(new))
-        cause = cause_of(before, after, inputs, self._commits(before, after))
         changes = columns.compare(*self.history.matrix((old, new), columns.names))
+        inputs = [self.history.inputs(result) for result in (old, new)]
+        parameters, settings = (
+            _differences(*(each.get(kind, {}) for each in inputs)) for kind in ("parameters", "settings")
+        )
+        cause = Cause(
+            parameters=parameters,
+            settings=settings,
+            libraries=_differences(before.libraries, after.libraries),
+            commits=self._commits(before, after),
+            code=before.code != after.code,
+        )
         return Comparison(run=before, changes=changes, cause=cause, note=note)
 
     def _columns_of(self, old: Result, new: Result) -> Columns:
@@ -205,13 +189,11 @@ class Between:
     def _flapping(self, changes: tuple[Change, ...], past: list[Result]) -> tuple[Change, ...]:
         """Mark those of the changes that a page shows that go to and fro."""
         shown = changes[:SHOWN_CHANGES]
-        if not shown or len(past) < 4:
-            return changes
         values = self.history.matrix(past[-WINDOW:], [c.figure for c in shown])
-        to_and_fro = {
-            c.figure for c, column in zip(shown, values.T, strict=True) if flaps(column, c.tolerance)
-        }
-        return tuple(replace(c, flapping=True) if c.figure in to_and_fro else c for c in changes)
+        marked = [
+            replace(c, flapping=flaps(column, c.tolerance)) for c, column in zip(shown, values.T, strict=True)
+        ]
+        return (*marked, *changes[SHOWN_CHANGES:])
 
     def _commits(self, old: Run, new: Run) -> tuple[tuple[str, str], ...]:
         """First lines of the commits between two nights, each with where: those of the code, of the study."""
@@ -220,3 +202,11 @@ class Between:
         if self.origin is not None and own != places["code"][1:]:
             places["study"] = (self.origin, *own)
         return tuple((where, line) for where, each in places.items() for line in commits_between(*each))
+
+
+def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Differences:
+    def text(value: object) -> str:
+        return "(none)" if value is None else str(value)
+
+    names = [*new, *(name for name in old if name not in new)]
+    return tuple((n, text(old.get(n)), text(new.get(n))) for n in names if old.get(n) != new.get(n))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
-from reports.document_schema import Document, Section
+from reports.document_schema import Document
 from reports.nightly.figures import digest
 
 if TYPE_CHECKING:
@@ -31,10 +31,12 @@ def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     drain()
     if "refused" in payload:
         raise InputError(str(payload["refused"]))
+    settings = payload.get("settings", {})
     comparison = "study" in payload
-    plain = doc.loads(doc.dumps(comparison_document(payload) if comparison else design_document(payload)))
+    made = _comparison(payload) if comparison else _report(_design(payload), settings)
+    plain = doc.loads(doc.dumps(made))
     files = {"report.html": page(plain).encode(), "report.json": doc.dumps(plain).encode()}
-    if payload.get("settings", {}).get("pdf"):
+    if settings.get("pdf"):
         from reports.pdf import pdf_bytes
 
         files["report.pdf"] = pdf_bytes(plain)
@@ -44,39 +46,36 @@ def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     return meta, files
 
 
-def design_document(payload: Mapping[str, Any]) -> Document:
-    """Compute the report of a design, with validation and Monte Carlo where the settings ask for them."""
+def _design(payload: Mapping[str, Any]) -> Design:
+    from actuator_lti.design.loader import read_design_text
+
+    return read_design_text(str(payload["design"]), str(payload["name"]))
+
+
+def _report(design: Design, settings: Mapping[str, Any]) -> Document:
+    """The report of a design, with validation and sampled tolerances where the settings ask for them."""
     from reports.build import design_report, validation_sections
 
-    design = _design(payload)
-    settings: Mapping[str, Any] = payload.get("settings", {})
-    sections: list[Section] = []
-    if settings.get("validation"):
-        sections += validation_sections(design)
-    if settings.get("monte_carlo"):
-        sections += _tolerances(design, settings["monte_carlo"])
+    sections = validation_sections(design) if settings.get("validation") else []
+    plan = settings.get("monte_carlo")
+    if plan and any(one.tolerance is not None for one in design.parameters.values()):
+        from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo
+        from analyses.studies.engine import Engine
+        from reports.sections.monte_carlo import section
+
+        sampled = MonteCarloSettings(samples=plan["samples"], seed=plan["seed"])
+        with TemporaryDirectory(prefix="nightly-") as folder:
+            found = monte_carlo(design, Path(folder), sampled, engine=Engine(threads=1))
+            sections = [*sections, section(found)]
     return design_report(design, validation=sections)
 
 
-def _tolerances(design: Design, plan: Mapping[str, int]) -> list[Section]:
-    """Sample the tolerances of a design; nothing where none of its values has one."""
-    from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo
-    from analyses.studies.engine import Engine
-    from reports.sections.monte_carlo import section
-
-    if not any(p.tolerance is not None for p in design.parameters.values()):
-        return []
-    with TemporaryDirectory(prefix="nightly-") as folder:
-        settings = MonteCarloSettings(samples=plan["samples"], seed=plan["seed"])
-        return [section(monte_carlo(design, Path(folder), settings, engine=Engine(threads=1)))]
-
-
-def comparison_document(payload: Mapping[str, Any]) -> Document:
-    """Compare all designs of a study on one page."""
+def _comparison(payload: Mapping[str, Any]) -> Document:
+    """All designs of a study compared on one page."""
     from analyses.comparison.variants import compare
     from analyses.slugs import slug
     from analyses.studies.study import Study, Variant
-    from reports.sections.compare import section as sections
+    from reports.sections.compare import section
     from reports.study_pages import study_document
 
     designs = [
@@ -94,10 +93,4 @@ def comparison_document(payload: Mapping[str, Any]) -> Document:
     title = str(payload["study"]["title"])
     plan = Study(str(payload["name"]), title, "", title, designs[0], tuple(designs[1:]))
     subtitle = f"{designs[0].name} and {len(designs) - 1} variants"
-    return study_document(base, sections(compare(plan)), title=title, subtitle=subtitle, kind="compare")
-
-
-def _design(payload: Mapping[str, Any]) -> Design:
-    from actuator_lti.design.loader import read_design_text
-
-    return read_design_text(str(payload["design"]), str(payload["name"]))
+    return study_document(base, section(compare(plan)), title=title, subtitle=subtitle, kind="compare")

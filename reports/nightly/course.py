@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,7 +13,7 @@ from reports.charts import style
 from reports.charts.chart import Chart
 from reports.charts.svg import page_svg
 from reports.nightly.changes import Columns
-from reports.nightly.figures import Figure, Verdict
+from reports.nightly.figures import Figure
 from reports.nightly.history import History
 from reports.nightly.records import Result
 from reports.nightly.text import one_line, to_seconds
@@ -46,58 +46,51 @@ def course_of(night: Overview, design: DesignView, history: History, past: Seque
     if not good:
         return Course()
     figures = list(history.figures(past[good[-1]]).values())
-    columns = Columns(figures, night.tolerances)
+    columns = Columns(figures, night.study.tolerances)
     values = history.matrix(past, columns.names)
     moved = columns.moved(values[good[:-1]], values[good[1:]]).sum(axis=1).tolist()
     course = Course(moved={past[i].run: count for i, count in zip(good[1:], moved, strict=True)})
     size = np.max(np.abs(np.nan_to_num(values)), axis=0)
     allowed = columns.allowed(size, size).tolist()
-    of = _Design(design, past, {run.id: run.started for run in night.runs})
+    started = {run.id: run.started for run in night.runs}
+    nights = [(result.run, started[result.run]) for result in past]
+    verdicts = {f"{v['id']}: value": v for v in design.verdicts}
     for k in sorted(range(len(figures)), key=lambda k: figures[k].kind != "requirement"):
-        shown = figures[k].kind in ("requirement", "check") or (
-            figures[k].better and figures[k].kind == "figure"
-        )
+        figure = figures[k]
+        shown = figure.kind in ("requirement", "check") or (figure.better and figure.kind == "figure")
         if shown and np.isfinite(values[:, k]).any():
-            of.add(course, figures[k], values[:, k], allowed[k])
+            _add(course, figure, verdicts.get(figure.name, {}), nights, values[:, k], allowed[k])
     return course
 
 
-class _Design:
-    """A design whose figures are charted."""
-
-    def __init__(self, design: DesignView, past: Sequence[Result], started: Mapping[int, str]) -> None:
-        self.past, self.nights = past, [started[result.run] for result in past]
-        self.verdicts: Mapping[str, Verdict] = {f"{v.id}: value": v for v in design.verdicts}
-
-    def add(self, course: Course, figure: Figure, values: np.ndarray, tolerance: float) -> None:
-        """Chart a figure, or count it among the steady ones."""
-        points, to_and_fro = _recent(values, tolerance), flaps(values, tolerance)
-        moved = bool(points) or to_and_fro
-        if figure.kind != "requirement" and (not moved or len(course.charts) >= MAX_CHARTS):
-            course.steady.append(figure)
-            return
-        for point in points:
-            course.marks.setdefault(self.past[point.index].run, []).append((figure, point))
-        verdict = self.verdicts.get(figure.name)
-        title, limit = (verdict.label, verdict.bound) if verdict else (figure.name, None)
-        drawn = line_chart(title, figure.unit, self.nights, values, points, limit, f"t{len(course.charts)}")
-        course.charts.append(
-            {
-                "title": title,
-                "id": verdict.id if verdict else "",
-                "unit": figure.unit,
-                "svg": Markup(drawn),
-                "points": [(self.nights[p.index][:10], p) for p in points],
-                "flaps": to_and_fro,
-            }
-        )
-
-
-def _recent(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ...]:
-    """Find the changes of level of the last nights."""
-    start = max(len(values) - LOOK_BACK, 0)
-    result = change_points(values[start:], tolerance)
-    return tuple(replace(point, index=start + point.index) for point in result)
+def _add(
+    course: Course, figure: Figure, verdict: Tree, nights: Sequence[tuple[int, str]], values: np.ndarray,
+    tolerance: float,
+) -> None:  # fmt: skip
+    """Chart a figure, or count it among the steady ones."""
+    skipped = max(len(values) - LOOK_BACK, 0)
+    points = [replace(p, index=skipped + p.index) for p in change_points(values[skipped:], tolerance)]
+    to_and_fro = flaps(values, tolerance)
+    moved = bool(points) or to_and_fro
+    if figure.kind != "requirement" and (not moved or len(course.charts) >= MAX_CHARTS):
+        course.steady.append(figure)
+        return
+    for point in points:
+        course.marks.setdefault(nights[point.index][0], []).append((figure, point))
+    title, started = verdict.get("label", figure.name), [start for _, start in nights]
+    drawn = line_chart(
+        title, figure.unit, started, values, points, verdict.get("bound"), f"t{len(course.charts)}"
+    )
+    course.charts.append(
+        {
+            "title": title,
+            "id": verdict.get("id", ""),
+            "unit": figure.unit,
+            "svg": Markup(drawn),
+            "points": [(started[p.index][:10], p) for p in points],
+            "flaps": to_and_fro,
+        }
+    )
 
 
 def line_chart(
@@ -108,9 +101,6 @@ def line_chart(
 
     Steps with gaps where there is none, lines at changes of level, the limit dashed.
     """
-    finite = np.isfinite(values)
-    if not finite.any():
-        return ""
     chart = Chart(width=WIDTH, height=HEIGHT)
     panel, days = chart.panel(), np.array([to_seconds(night) for night in nights]) / DAY
     first, last, span = float(days[0]), float(days[-1]), float(days[-1] - days[0])
@@ -123,8 +113,11 @@ def line_chart(
         panel.rule_y(limit, "limit", seen=True, colour=style.RED, dash=1)
     for point in points:
         panel.rule_x(float(days[point.index]), "▼", colour=style.ORANGE, dash=2)
-    x, y = _steps(days, values, finite)
-    panel.curve(x, y, colour=style.BLUE, width=1.8)
+    corners = _corners(values)
+    up = np.repeat(values[corners], 2)[:-1]
+    up[1::2][np.isnan(values[corners[1:]])] = np.nan  # no step into a gap
+    panel.curve(np.repeat(days[corners], 2)[1:], up, colour=style.BLUE, width=1.8)
+    finite = np.isfinite(values)
     padded = np.concatenate([[False], finite, [False]])
     alone = np.flatnonzero(finite & ~padded[:-2] & ~padded[2:])  # a line does not show them
     shown = [*alone.tolist(), int(np.flatnonzero(finite)[-1])]
@@ -144,26 +137,14 @@ def _words(
     return text if limit is None else f"{text}; limit {significant(limit, 4)}{unit}"
 
 
-def _steps(days: np.ndarray, values: np.ndarray, finite: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Give corners of the steps from night to night, NaN in the gaps, long courses thinned."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]]).astype(int)))
-    x: list[np.ndarray] = []
-    y: list[np.ndarray] = []
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        kept = begin + _thinned(values[begin:end])
-        across, up = np.repeat(days[kept], 2)[1:], np.repeat(values[kept], 2)[:-1]
-        x += [across, np.array([np.nan])]
-        y += [up, np.array([np.nan])]
-    return np.concatenate(x), np.concatenate(y)
-
-
-def _thinned(y: np.ndarray) -> np.ndarray:
-    """Indexes that keep the shape of steps: ends and changes, of long rows the extremes of each stretch."""
-    n = len(y)
-    index = np.flatnonzero(np.concatenate([[True], np.abs(np.diff(y)) > 0.0]))
-    index = np.unique(np.append(index, n - 1))
-    if len(index) <= _MAX_POINTS:
-        return index
-    parts = np.array_split(np.arange(n), _MAX_POINTS // 2)
-    extremes = [i for p in parts for i in sorted({int(p[np.argmin(y[p])]), int(p[np.argmax(y[p])])})]
-    return np.array(sorted({0, *extremes, n - 1}))
+def _corners(values: np.ndarray) -> np.ndarray:
+    """Indexes that keep the shape of steps: changes, ends and gaps, of long rows extremes of each stretch."""
+    gap = np.isnan(values)
+    ends = gap | np.append(gap[1:], True)
+    ends[0] = True
+    corners = np.flatnonzero(ends | np.append(True, values[1:] != values[:-1]))
+    if len(corners) <= _MAX_POINTS:
+        return corners
+    parts = [part[~gap[part]] for part in np.array_split(np.arange(len(values)), _MAX_POINTS // 2)]
+    extremes = [part[f(values[part])] for part in parts if len(part) for f in (np.argmin, np.argmax)]
+    return np.union1d(np.flatnonzero(ends), extremes).astype(int)

@@ -20,6 +20,7 @@ MAX_TABLE_ROWS = 200
 REQUIREMENTS = "requirements"  # verdicts on the design's own requirements; others are checks and odds
 _NO_RESULTS = ("Where the time went",)  # tables that differ from run to run
 _INPUT_SECTIONS = ("parameters", "provenance")
+_AS_THEY_ARE = ("value", "unit", "distance", "verdict", "waiver", "source", "reason")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,38 +34,6 @@ class Figure:
     kind: str = "figure"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Verdict:
-    """One requirement: ``distance`` is positive where it is met; ``waiver`` of one that is not proven.
-
-    ``limit`` says its limit in words, ``bound`` is the number.
-    """
-
-    id: str
-    label: str
-    value: float | None
-    limit: str
-    unit: str
-    distance: float | None
-    relative: float | None
-    verdict: str
-    waiver: str = ""
-    source: str = ""
-    reason: str = ""
-    what: str = REQUIREMENTS
-    bound: float | None = None
-
-    @property
-    def role(self) -> str:
-        """Its colour."""
-        return role(asdict(self))
-
-    @property
-    def why(self) -> str:
-        """What stands beside its word."""
-        return why(asdict(self))
-
-
 def digest(document: Mapping[str, Any]) -> Tree:
     """What the nightly keeps of a report document: figures, verdicts, title, revision (plain JSON)."""
     judged = document["verdict"]
@@ -72,7 +41,7 @@ def digest(document: Mapping[str, Any]) -> Tree:
     return {
         "title": document["title"],
         "revision": document["design"].get("revision") or "",
-        "verdicts": [asdict(v) for v in verdicts_of(document)],
+        "verdicts": verdicts_of(document),
         "figures": [asdict(f) for f in islice(figures_of(document), MAX_FIGURES)],
         "words": verdict_words({"parts": judged["parts"]}),
         "failed": count.not_met,
@@ -82,49 +51,55 @@ def digest(document: Mapping[str, Any]) -> Tree:
     }
 
 
-def verdicts_of(document: Mapping[str, Any]) -> Iterator[Verdict]:
-    """Return the requirements of a document, each once, in its order."""
-    seen: set[str] = set()
+def verdicts_of(document: Mapping[str, Any]) -> list[Tree]:
+    """Return the requirements of a document, each once, in its order.
+
+    ``distance`` is positive where it is met, ``relative`` that of the limit; ``limit`` is in words, ``bound``
+    the number; ``what`` is `REQUIREMENTS` or the kind of check; ``role`` its colour, ``why`` beside its word.
+    """
+    made: dict[str, Tree] = {}
     for _, block in _blocks(document):
         for item in block["items"] if block["kind"] == "verdicts" else ():
             name = one_line(item["id"], 200)
-            if name not in seen:
-                seen.add(name)
-                yield _verdict(name, item, block.get("what", REQUIREMENTS))
+            if name not in made:
+                made[name] = _verdict(name, item, block.get("what", REQUIREMENTS))
+    return list(made.values())
 
 
-def _verdict(name: str, item: Mapping[str, Any], what: str) -> Verdict:
+def _verdict(name: str, item: Mapping[str, Any], what: str) -> Tree:
     """Make a verdict; one that the design does not require is ranked only where it fails."""
     value, limit, distance = (item[key] for key in ("value", "limit", "distance"))
     left = None
     if distance is not None and (what == REQUIREMENTS or item["verdict"] == "not met"):
         of = str(item.get("quantity", ""))
         left = distance if limit is None or value is None else reserve(of, value, limit, distance)
-    same = {key: item[key] for key in ("value", "unit", "distance", "verdict", "waiver", "source", "reason")}
-    words = "" if limit is None else f"{item['comparison']} {limit:.6g}".strip()
-    named: dict[str, Any] = {"id": name, "label": item["label"] or name, "what": what}
-    return Verdict(limit=words, bound=number(limit), relative=left, **named, **same)
+    return {
+        "id": name,
+        "label": item["label"] or name,
+        "what": what,
+        "limit": "" if limit is None else f"{item['comparison']} {limit:.6g}".strip(),
+        "bound": number(limit),
+        "relative": left,
+        "role": role(item),
+        "why": why(item),
+        **{key: item[key] for key in _AS_THEY_ARE},
+    }
 
 
 def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:
     """Return every number of verdicts, facts and tables; the inputs (parameters, provenance) are none."""
-    seen: set[str] = set()
     for verdict in verdicts_of(document):
-        kind = "requirement" if verdict.what == REQUIREMENTS else "check"
-        yield Figure(name=f"{verdict.id}: value", value=verdict.value, unit=verdict.unit, kind=kind)
+        name, unit = verdict["id"], verdict["unit"]
+        kind = "requirement" if verdict["what"] == REQUIREMENTS else "check"
+        met = {"met": 1.0, "not met": 0.0}.get(verdict["verdict"])
+        yield Figure(name=f"{name}: value", value=verdict["value"], unit=unit, kind=kind)
         yield Figure(
-            name=f"{verdict.id}: distance",
-            value=verdict.distance,
-            unit=verdict.unit,
-            better=1,
-            kind="distance",
+            name=f"{name}: distance", value=verdict["distance"], unit=unit, better=1, kind="distance"
         )
-        met = {"met": 1.0, "not met": 0.0}.get(verdict.verdict)
-        yield Figure(name=f"{verdict.id}: met", value=met, kind="verdict")
+        yield Figure(name=f"{name}: met", value=met, kind="verdict")
+    seen: set[str] = set()
     for section, block in _blocks(document):
-        if section in _INPUT_SECTIONS:
-            continue
-        for figure in _of_block(section, block):
+        for figure in () if section in _INPUT_SECTIONS else _of_block(section, block):
             if figure.name not in seen:
                 seen.add(figure.name)
                 yield figure

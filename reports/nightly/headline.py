@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from actuator_lti.files.tree import Tree
 from reports.nightly.changes import Cause, Change, Comparison
-from reports.nightly.figures import Verdict
 from reports.nightly.text import one_line
 from reports.numbers import or_none
 
@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from reports.nightly.view import DesignView
 
 SHOWN = 5
-_VALUE, _DISTANCE, _MET = ": value", ": distance", ": met"
+_VALUE, _DISTANCE = ": value", ": distance"
+NO_FIGURE = "no figure with a value changed"
+CODE_CHANGED = "sources of actuator-lti changed without a commit"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,10 +44,11 @@ def headlines(designs: Sequence[DesignView]) -> tuple[Headline, ...]:
 
 
 def _headline(cause: str, result: Sequence[DesignView]) -> Headline:
-    ordered = sorted(result, key=lambda d: (not d.last_night.regressions, d.rank))
-    first = ordered[0]
-    effect, worse = gravest(first.last_night, first.verdicts)
-    return Headline(cause=cause, effect=effect, worse=worse, designs=tuple(ordered))
+    first, *more = sorted(result, key=lambda d: (not d.last_night.regressions, d.rank))
+    shown = main_changes(first.last_night)
+    effect = change_words(shown[0], first.last_night, first.verdicts) if shown else NO_FIGURE
+    worse = bool(shown[0].worse if shown else first.last_night.regressions)
+    return Headline(cause=cause, effect=effect, worse=worse, designs=(first, *more))
 
 
 def cause_words(cause: Cause) -> str:
@@ -55,14 +58,20 @@ def cause_words(cause: Cause) -> str:
         more = len(values) - 2
         return one_line("; ".join(values[:2]) + (f"; {more} more values" if more > 0 else ""), 200)
     if cause.commits:
-        _where, line = cause.commits[0]
         more = len(cause.commits) - 1
-        return one_line(f"commit {line}", 120) + (f" and {more} more" if more else "")
+        return one_line(f"commit {cause.commits[0][1]}", 120) + (f" and {more} more" if more else "")
     if cause.libraries:
         return one_line("; ".join(f"{name} {old} → {new}" for name, old, new in cause.libraries), 200)
-    if cause.code:
-        return "sources of actuator-lti changed without a commit"
-    return "no input differs"
+    return CODE_CHANGED if cause.code else "no input differs"
+
+
+def cause_lines(cause: Cause) -> list[str]:
+    """What lies behind a change, one line each."""
+    kinds = {"parameter": cause.parameters, "setting": cause.settings, "library": cause.libraries}
+    lines = [f"{kind} {name}: {old} → {new}" for kind, each in kinds.items() for name, old, new in each]
+    lines += [f"commit ({where}) {line}" for where, line in cause.commits]
+    silent = cause.code and not cause.commits and not cause.libraries
+    return [*lines, CODE_CHANGED] if silent else lines
 
 
 def _step(old: str, new: str) -> str:
@@ -72,15 +81,6 @@ def _step(old: str, new: str) -> str:
     return f"{before} → {after} {unit}".rstrip() if unit == other else f"{old} → {new}"
 
 
-def gravest(comparison: Comparison, verdicts: Sequence[Verdict]) -> tuple[str, bool]:
-    """Say what happened to the figure that matters most, and whether it got worse."""
-    shown = main_changes(comparison)
-    if not shown:
-        return "no figure with a value changed", bool(comparison.regressions)
-    first = shown[0]
-    return change_words(first, comparison, verdicts), bool(first.worse)
-
-
 def main_changes(comparison: Comparison) -> tuple[Change, ...]:
     """Give the changes to read first: distances to requirements, then the rest; no figure twice."""
     valued = [c for c in comparison.changes if c.kind not in ("verdict", "requirement", "check")]
@@ -88,25 +88,19 @@ def main_changes(comparison: Comparison) -> tuple[Change, ...]:
     return tuple(ranked[:SHOWN])
 
 
-def change_words(change: Change, comparison: Comparison, verdicts: Sequence[Verdict]) -> str:
+def change_words(change: Change, comparison: Comparison, verdicts: Sequence[Tree]) -> str:
     """Say one change; of a distance to a requirement, the required figure itself."""
-    name, before, after, unit = change.figure, change.before, change.after, change.unit
+    name, moved = change.figure.removesuffix(_DISTANCE), change
     if change.kind == "distance":
-        known = {c.figure: c for c in comparison.changes}
-        own = known.get(name.removesuffix(_DISTANCE) + _VALUE)
-        label = next((v.label for v in verdicts if v.id + _DISTANCE == name), name.removesuffix(_DISTANCE))
-        before, after = (own.before, own.after) if own else (before, after)
-        return f"{_turned(label)} {_pair(before, after)} {unit}".rstrip()
-    *_, row, column = ["", *name.split(" / ")]
-    label = f"{column[:1].lower()}{column[1:]} of {row}" if row else column
-    return f"{one_line(label, 100)} {_pair(before, after)} {unit}".rstrip()
+        moved = next((c for c in comparison.changes if c.figure == name + _VALUE), change)
+        label = _turned(next((v["label"] for v in verdicts if v["id"] == name), name))
+    else:
+        *_, row, column = ["", *name.split(" / ")]
+        label = one_line(f"{column[:1].lower()}{column[1:]} of {row}" if row else column, 100)
+    return f"{label} {or_none(moved.before)} → {or_none(moved.after)} {change.unit}".rstrip()
 
 
 def _turned(label: str) -> str:
     """Turn "Position loop: phase margin" into "phase margin of the position loop"."""
     place, colon, what = label.partition(": ")
     return one_line(f"{what} of the {place[:1].lower()}{place[1:]}" if colon else label, 100)
-
-
-def _pair(before: float | None, after: float | None) -> str:
-    return f"{or_none(before)} → {or_none(after)}"

@@ -21,14 +21,12 @@ from pydantic import TypeAdapter, ValidationError
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from reports.nightly.figures import Figure
-from reports.nightly.memory import Memory
 from reports.nightly.records import Baseline, Content, Index, Named, Night, Result, Run, packed, unpacked
+from reports.nightly.state import INDEX, NIGHTS, Memory
 from reports.nightly.text import one_line, sha256
 
 SCHEMA = "actuator-lti/nightly-history"
 VERSION = 1
-FILE = "history.json"
-NIGHTS = "nights"
 Shape = TypeVar("Shape")
 Reported = tuple[Sequence[Figure], dict[str, Any]]  # figures and inputs
 
@@ -80,7 +78,7 @@ class History:
         data = _NIGHT.dump_json(night)
         write_bytes(self._path(run.id), data)
         ended = replace(run, finished=finished, sha256=sha256(data))
-        self._put(replace(self.index, running="", runs=[*self.index.runs, ended]))
+        self._put(replace(self.index, running="", runs=[*self.runs, ended]))
 
     def _stored(
         self, result: Result, figures: Sequence[Figure], inputs: dict[str, Any],
@@ -88,8 +86,7 @@ class History:
     ) -> Result:  # fmt: skip
         """The result with its content, or with the night that has the same of this design."""
         layout, values = tuple((f.name, f.unit, f.better, f.kind) for f in figures), packed(figures)
-        past = (self.result(run.id, result.name) for run in reversed(self.runs))
-        before = next(filter(None, past), None)
+        before = self.first(result.name, reversed(self.runs))
         if before is not None and before.home is not None:
             night, content = self.night(before.home), self._content(before)
             known = (tuple(night.layouts[content.layout]), content.values, content.inputs)
@@ -116,7 +113,7 @@ class History:
 
     def _put(self, index: Index) -> None:
         sealed = _Sealed(schema=SCHEMA, version=VERSION, sha256=sha256(_INDEX.dump_json(index)), index=index)
-        write_bytes(self.state / FILE, _SEALED.dump_json(sealed))
+        write_bytes(self.state / INDEX, _SEALED.dump_json(sealed))
         self.index = index
 
     # ---- reading -----------------------------------------------------------------------------------
@@ -147,10 +144,10 @@ class History:
         found = (by_name[name] for by_name in from_last if name in by_name)
         return list(islice(found, last))[::-1]
 
-    def result(self, run: int, name: str) -> Result | None:
-        """What a design came to in a night; None where it has no figures of it."""
-        found = self.night(run).by_name.get(name)
-        return found if found is not None and found.home is not None else None
+    def first(self, name: str, runs: Iterable[Run]) -> Result | None:
+        """What a design came to in the first of some nights that has figures of it."""
+        found = (self.night(run.id).by_name.get(name) for run in runs)
+        return next((result for result in found if result is not None and result.home is not None), None)
 
     def _content(self, result: Result) -> Content:
         content = self.night(result.home or 0).by_name[result.name].content
@@ -194,7 +191,7 @@ class History:
 
 def open_history(state: Path) -> History:
     """Open (or begin) the history of a state folder; one that is damaged or newer is refused."""
-    path = state / FILE
+    path = state / INDEX
     if not path.exists() or not path.stat().st_size:
         return History(state, Index(id=secrets.token_hex(16)))
     data = _read(path)

@@ -7,9 +7,10 @@ from dataclasses import asdict
 from xml.etree import ElementTree as Xml
 
 from actuator_lti.files.tree import Tree
-from reports.nightly.changes import Cause, Change, Comparison
+from reports.nightly.changes import Change, Comparison
+from reports.nightly.headline import cause_lines
 from reports.nightly.text import markdown_cell, one_line
-from reports.nightly.view import STATE_WORDS, DesignView, Overview
+from reports.nightly.view import STATES, DesignView, Overview
 from reports.numbers import or_none
 from reports.visible import visible
 
@@ -19,7 +20,6 @@ _MAX_TEXT = 20_000
 _LISTED = 20
 _OF_REQUIREMENT = ("id", "label", "value", "limit", "unit", "distance", "verdict", "waiver")
 _OF_CHANGE = ("figure", "unit", "before", "after", "tolerance", "worse", "flapping")
-SIGNS = {"broken": "⚠", "fail": "✗", "unproven": "?", "regression": "▼", "pass": "✓"}
 
 
 def summary(night: Overview) -> Tree:
@@ -27,7 +27,7 @@ def summary(night: Overview) -> Tree:
     return {
         "schema": SCHEMA,
         "version": VERSION,
-        "study": night.study,
+        "study": night.study.name,
         "run": night.run.id,
         "started": night.run.started,
         "finished": night.run.finished,
@@ -39,7 +39,7 @@ def summary(night: Overview) -> Tree:
         "study_commit": night.run.study_commit,
         "history": asdict(night.memory),
         "exit_status": int(not night.passed),
-        "counts": {state: night.count(state) for state in STATE_WORDS},
+        "counts": {state: night.count(state) for state in STATES},
         "gone": list(night.gone),
         "designs": [_design(d) for d in night.designs],
     }
@@ -60,7 +60,7 @@ def _design(design: DesignView) -> Tree:
         "worst_relative_distance": result.worst,
         "flapping": design.status_flaps,
         "report": None if design.broken else f"{design.report}/report.html",
-        "requirements": [{name: getattr(v, name) for name in _OF_REQUIREMENT} for v in design.verdicts],
+        "requirements": [{name: v[name] for name in _OF_REQUIREMENT} for v in design.verdicts],
         "changes_since_last_night": _comparison(design.last_night),
         "changes_since_baseline": _comparison(design.baseline),
         "approved_by": approval.by if approval else None,
@@ -77,20 +77,9 @@ def _comparison(comparison: Comparison) -> Tree:
     }
 
 
-def cause_lines(cause: Cause) -> list[str]:
-    """What lies behind a change, one line each."""
-    lines = [f"parameter {name}: {old} → {new}" for name, old, new in cause.parameters]
-    lines += [f"setting {name}: {old} → {new}" for name, old, new in cause.settings]
-    lines += [f"library {name}: {old} → {new}" for name, old, new in cause.libraries]
-    lines += [f"commit ({where}) {line}" for where, line in cause.commits]
-    if cause.code and not cause.commits and not cause.libraries:
-        lines.append("sources of actuator-lti changed without a commit")
-    return lines
-
-
 def junit(night: Overview) -> str:
     """JUnit XML: a suite a design, a case a requirement, one for its build and one for regressions."""
-    top = Xml.Element("testsuites", name=_line(night.study))
+    top = Xml.Element("testsuites", name=_line(night.study.name))
     for design in night.designs:
         suite = Xml.SubElement(
             top, "testsuite", name=_line(design.name), time=f"{design.result.seconds:.3f}",
@@ -116,12 +105,10 @@ def _cases(suite: Xml.Element, design: DesignView) -> None:
             Xml.SubElement(one, tag, about).text = visible(text)[:_MAX_TEXT]
 
     if design.broken:
-        rest = design.result.message.partition("\n")[2]
-        case("is built", "error", design.why, design.result.status, rest)
+        case("is built", "error", design.why, design.result.status, design.result.message.partition("\n")[2])
         return
     case("is built")
-    worse = design.regressions
-    if worse:
+    if worse := design.regressions:
         lines = [f"{c.figure}: {_value(c.before)} -> {_value(c.after)} {c.unit}" for c in worse]
         text = "\n".join([*lines, *cause_lines(design.baseline.cause)])
         message = f"{len(worse)} figure(s) worse than the baseline"
@@ -129,16 +116,16 @@ def _cases(suite: Xml.Element, design: DesignView) -> None:
     else:
         case("no unapproved regression")
     for v in design.verdicts:
-        name = f"{v.id} {v.label}" if v.label != v.id else v.id
-        if v.verdict == "met":
+        name = f"{v['id']} {v['label']}" if v["label"] != v["id"] else v["id"]
+        if v["verdict"] == "met":
             case(name)
-        elif v.waiver:
-            case(name, "skipped", v.why)
-        elif v.verdict == "not met":
-            found = f"found {_value(v.value)}, limit {v.limit}, distance {_value(v.distance)} {v.unit}"
-            case(name, "failure", found, "requirement", v.reason)
+        elif v["waiver"]:
+            case(name, "skipped", v["why"])
+        elif v["verdict"] == "not met":
+            found = f"found {_value(v['value'])}, limit {v['limit']}, distance {_value(v['distance'])}"
+            case(name, "failure", f"{found} {v['unit']}", "requirement", v["reason"])
         else:
-            case(name, "failure", "not proven", "not proven", v.reason)
+            case(name, "failure", "not proven", "not proven", v["reason"])
     for title in design.meta.get("failed_sections", ()):
         case(f"section {title}", "failure", "does not pass", "section")
 
@@ -158,11 +145,8 @@ def markdown(night: Overview) -> str:
     lines = [f"## {sign} Nightly {markdown_cell(night.title)}: {night.counts}", "", run, ""]
     notable = [d for d in night.designs if d.state != "pass" or d.last_night.changes]
     if notable:
-        lines += [
-            "| design | state | worst requirement | distance | moved since last night |",
-            "|---|---|---|---:|---:|",
-        ]
-        lines += [_row(d) for d in notable[:_LISTED]]
+        lines += ["| design | state | worst requirement | distance | moved since last night |"]
+        lines += ["|---|---|---|---:|---:|", *map(_row, notable[:_LISTED])]
         if len(notable) > _LISTED:
             lines.append(f"| and {len(notable) - _LISTED} more | | | | |")
     else:
@@ -174,7 +158,7 @@ def markdown(night: Overview) -> str:
 
 def _row(design: DesignView) -> str:
     worst = "" if design.result.worst is None else f"{100 * design.result.worst:+.1f} %"
-    state = f"{SIGNS[design.state]} {STATE_WORDS[design.state]}"
+    state = " ".join(STATES[design.state])
     cells = (markdown_cell(design.name), state, markdown_cell(design.result.worst_id), worst)
     return f"| {' | '.join(cells)} | {len(design.last_night.changes)} |"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,21 +10,18 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import shown_path
-from reports.nightly import memory
+from actuator_lti.start.extras import need
 from reports.nightly import site as site_files
-from reports.nightly.apart import Limits, Task, build_each
-from reports.nightly.asked import Settings
+from reports.nightly.asked import Asked, Settings
 from reports.nightly.cache import Cache, CorruptEntry
-from reports.nightly.code_version import CodeVersion, code_version, commit_of
 from reports.nightly.figures import Figure
-from reports.nightly.history import FILE, NIGHTS, History, Reported, open_history
-from reports.nightly.lock import hold
+from reports.nightly.history import History, Reported, open_history
+from reports.nightly.processes import Answer, Limits, Task, build_each
 from reports.nightly.records import Result, Run
-from reports.nightly.source import Job, Study, check_jobs
+from reports.nightly.source import CodeVersion, Job, Study, check_jobs, code_version, commit_of, read_study
+from reports.nightly.state import CACHE, INDEX, HistoryLost, Memory, check_memory, hold, state_of
 from reports.nightly.text import now, one_line
 from reports.nightly.view import Overview, overview
-from reports.nightly.worker import Answer
 from reports.visible import visible
 
 DESIGNS_A_LIMIT = 50  # of a comparison, within one time limit
@@ -37,49 +33,40 @@ def _nobody(*_said: object) -> None:
     """Whom nothing is told."""
 
 
-class Outcome(NamedTuple):
-    """What came of a job, and what its report says where there is one."""
+def nightly(asked: Asked, progress: Progress) -> Overview:
+    """Build a night, or approve the last one, and publish the site."""
+    import typer
 
-    job: Job
+    from reports.cli.errors import VERDICT_FAILED
+    from reports.cli.output import print_note
+
+    def say(line: str) -> None:
+        print_note(f"actuator-lti: {line}")
+
+    need("filelock", "nightly", "a nightly build")
+    need("ruptures", "nightly", "a nightly build")
+    approving = len(asked.words) == 2 and asked.words[0] == "approve"
+    if len(asked.words) != 1 + approving or asked.site is None:
+        raise InputError(
+            "write 'nightly STUDY --site DIR' or 'nightly approve STUDY --site DIR --by NAME --reason TEXT'"
+        )
+    study = read_study(asked.words[-1], pdf=asked.pdf, validation=False if asked.no_validation else None)
+    try:
+        if approving:
+            names = asked.only or ()
+            return approve(study, asked.site, by=asked.by, reason=asked.reason, names=names, settings=asked)
+        return run_night(study, asked.site, asked, progress=progress, say=say)
+    except HistoryLost as lost:  # no bad input: the gate cannot judge, so it does not open
+        say(str(lost))
+        raise typer.Exit(VERDICT_FAILED) from lost
+
+
+class Outcome(NamedTuple):
+    """What came of a job; what its report says and what the history keeps, where there is one."""
+
     result: Result
     meta: Mapping[str, Any]
-
-
-def state_of(site: Path, settings: Settings) -> Path:
-    """Return the folder of history, cache and lock: beside the site, so that none of it is published.
-
-    Refused is what is no folder, leads elsewhere or lies inside the site.
-    """
-    state = _state_of(site, settings)
-    folders = (state, state / "cache", state / NIGHTS)
-    for folder in folders:
-        if os.path.lexists(folder) and not folder.is_dir():
-            raise InputError("is no folder; allowed: a folder, or none yet", where=shown_path(folder))
-    inside = [path for folder in folders if folder.is_dir() for path in folder.iterdir()]
-    for path in (state, *inside):
-        if path.is_symlink():
-            raise InputError(
-                "is a symbolic link: history and cache are kept in the state folder itself",
-                where=shown_path(path),
-            )
-    return state
-
-
-def _state_of(site: Path, settings: Settings) -> Path:
-    if settings.state is None:
-        place = Path(os.path.abspath(site))  # "." and ".." have names, too
-        if not place.name:
-            raise InputError(
-                "is the root of the disk: --site takes a folder below it", where=shown_path(site)
-            )
-        return place.with_name(place.name + ".state")
-    inside = os.path.realpath(settings.state), os.path.realpath(site)
-    if os.path.commonpath(inside) == inside[1]:
-        raise InputError(
-            "lies inside the site and would be published with it: --state takes a folder elsewhere",
-            where=shown_path(settings.state),
-        )
-    return settings.state
+    reported: Reported | None
 
 
 def run_night(
@@ -111,40 +98,17 @@ def run_night(
     with _held(study, site, use) as (history, cache):
         site_files.remove_leftovers(site, history.state)
         site_files.mark(site)
-        run = history.start_run(started=clock(), **_about(version, study))
+        run = history.start_run(
+            started=clock(),
+            code=version.hash,
+            code_commit=version.commit,
+            study_commit=commit_of(study.origin) if study.origin is not None else "",
+            libraries={**version.libraries, "python": platform.python_version()},
+            host=socket.gethostname(),
+        )
         outcomes = _outcomes(run, jobs, cache, use, progress, say)
-        history.finish_run(run, clock(), [(o.result, _reported(o)) for o in outcomes])
-        return publish(study, site, history, cache, use, {o.result.key: o.meta for o in outcomes})
-
-
-@contextmanager
-def _held(study: Study, site: Path, use: Settings, *, begun: bool = False) -> Iterator[tuple[History, Cache]]:
-    """Hold history and cache of a site, both as they should be; ``begun``: only where there is a history."""
-    state = state_of(site, use)
-    site_files.check_place(site)
-    if not (use.accept_lost_history or (state / FILE).exists()):
-        memory.check(site, memory.Memory(), state)  # before one is begun
-    if begun and not (state / FILE).exists():
-        raise InputError("no night has been built here yet", where=str(site))
-    with hold(state, use.wait_s):
-        history = open_history(state)
-        if not use.accept_lost_history:
-            memory.check(site, history.memory(), state)
-        history.claim(study.name)
-        yield history, Cache(state / "cache")
-
-
-def publish(
-    study: Study, site: Path, history: History, cache: Cache, settings: Settings,
-    metas: Mapping[str, Mapping[str, Any]],
-) -> Overview:  # fmt: skip
-    """Make the site of the last finished night anew from history and cache.
-
-    ``metas`` holds what is known already of the results, by content address; the rest is read.
-    """
-    view = overview(history, cache, study, metas, site)
-    site_files.publish(site, view, history, cache, keep_reports=settings.keep)
-    return view
+        history.finish_run(run, clock(), [(one.result, one.reported) for one in outcomes])
+        return publish(study, site, history, cache, use, {one.result.key: one.meta for one in outcomes})
 
 
 def approve(
@@ -167,28 +131,47 @@ def approve(
     with _held(study, site, use, begun=True) as (history, cache):
         if not history.runs:
             raise InputError("no night has been finished here yet", where=str(site))
-        last = history.runs[-1].id
-        there = {r.name for r in history.night(last).results if r.home is not None}
+        last = history.runs[-1]
         for name in names:
-            if name not in there:
+            if history.first(name, [last]) is None:
                 raise InputError(
                     f"{one_line(name, 80)!r} has no result in the last night: nothing to approve",
                     where=study.name,
                 )
-        limits = {"by": one_line(by, 200), "reason": one_line(reason, 2000)}
-        history.approve(last, list(names) or None, at=clock(), **limits)
+        about = {"by": one_line(by, 200), "reason": one_line(reason, 2000)}
+        history.approve(last.id, list(names) or None, at=clock(), **about)
         return publish(study, site, history, cache, use, {})
 
 
-def _about(version: CodeVersion, study: Study) -> dict[str, Any]:
-    """What is known of a night as it begins."""
-    return {
-        "code": version.hash,
-        "code_commit": version.commit,
-        "study_commit": commit_of(study.origin) if study.origin is not None else "",
-        "libraries": {**version.libraries, "python": platform.python_version()},
-        "host": socket.gethostname(),
-    }
+def publish(
+    study: Study, site: Path, history: History, cache: Cache, settings: Settings,
+    metas: Mapping[str, Mapping[str, Any]],
+) -> Overview:  # fmt: skip
+    """Make the site of the last finished night anew from history and cache.
+
+    ``metas`` holds what is known already of the results, by content address; the rest is read.
+    """
+    view = overview(history, cache, study, metas, site)
+    site_files.publish(site, view, history, cache, keep_reports=settings.keep)
+    return view
+
+
+@contextmanager
+def _held(study: Study, site: Path, use: Settings, *, begun: bool = False) -> Iterator[tuple[History, Cache]]:
+    """Hold history and cache of a site, both as they should be; ``begun``: only where there is a history."""
+    state = state_of(site, use.state)
+    site_files.check_place(site)
+    there = (state / INDEX).exists()
+    if not there and not use.accept_lost_history:
+        check_memory(site, Memory(), state)  # before one is begun
+    if begun and not there:
+        raise InputError("no night has been built here yet", where=str(site))
+    with hold(state, use.wait_s):
+        history = open_history(state)
+        if not use.accept_lost_history:
+            check_memory(site, history.memory(), state)
+        history.claim(study.name)
+        yield history, Cache(state / CACHE)
 
 
 def _outcomes(
@@ -198,13 +181,14 @@ def _outcomes(
     done: dict[str, Outcome] = {}
     todo: dict[str, Job] = {}
     for job in jobs:
-        key = job.key(run.code)
-        corrupt = f"cache entry of {one_line(job.name, 60)!r} is corrupt (%s): built again"
-        entry = cache.whole(key, lambda why, words=corrupt: say(words % why))  # type: ignore[misc]
+        key, corrupt = job.key(run.code), list[str]()
+        entry = cache.whole(key, corrupt.append)
+        for why in corrupt:
+            say(f"cache entry of {one_line(job.name, 60)!r} is corrupt ({why}): built again")
         if entry is None:
             todo[key] = job
         else:
-            done[job.name] = _outcome(run, job, key, entry.meta, cached=True)
+            done[job.name] = _reported(run, job, key, entry.meta, cached=True)
 
     def take(task: Task, answer: Answer) -> None:
         job = todo[task.key]
@@ -220,9 +204,8 @@ def _outcomes(
 
 def _task(key: str, job: Job) -> Task:
     """What a job asks for; a comparison takes as long as the designs that it holds."""
-    study = job.payload.get("study")
-    designs = len(study["designs"]) if isinstance(study, Mapping) else 1
-    return Task(key=key, payload=job.payload, limits=-(-designs // DESIGNS_A_LIMIT))
+    designs = len(job.payload["study"]["designs"]) if "study" in job.payload else 1
+    return Task(key, job.payload, limits=-(-designs // DESIGNS_A_LIMIT))
 
 
 def _built(run: Run, job: Job, key: str, answer: Answer, cache: Cache) -> Outcome:
@@ -230,37 +213,34 @@ def _built(run: Run, job: Job, key: str, answer: Answer, cache: Cache) -> Outcom
     status, message = answer.status, "\n".join(filter(None, (answer.message, answer.detail)))
     if status == "done":
         try:
-            meta = cache.take(key, answer.entry).meta
-            return _outcome(run, job, key, meta, seconds=answer.seconds)
+            return _reported(run, job, key, cache.take(key, answer.entry).meta, seconds=answer.seconds)
         except CorruptEntry as error:
             status, message = "crash", f"its result came damaged ({error})"
         except InputError as error:
             raise InputError(f"result of {one_line(job.name, 60)!r} cannot be kept: {error}") from error
-    return Outcome(job, _result(run, job, status, seconds=answer.seconds, message=visible(message)), {})
+    said: dict[str, Any] = {"status": status, "seconds": answer.seconds, "message": visible(message)}
+    return Outcome(Result(run=run.id, name=job.name, kind=job.kind, **said), {}, None)
 
 
-def _outcome(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any) -> Outcome:
-    """What came of a job that has a result."""
+def _reported(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any) -> Outcome:
+    """What came of a job that has a report: its result, its figures and what is behind them."""
     failing = meta["failed"] or meta["failed_sections"]
-    status = "fail" if failing else "unproven" if meta["unproven"] else "pass"
     ranked = [v for v in meta["verdicts"] if v["relative"] is not None]
-    worst = min(ranked, key=lambda v: v["relative"], default={"relative": None, "id": ""})
+    worst: Mapping[str, Any] = min(ranked, key=lambda v: v["relative"], default={"relative": None, "id": ""})
     sections = ", ".join(meta["failed_sections"])
-    more |= {"failed": meta["failed"], "total": meta["total"], "key": key}
-    more |= {"worst": worst["relative"], "worst_id": worst["id"]}
-    message = f"not passed: {sections}" if sections else ""
-    return Outcome(job, _result(run, job, status, message=message, **more), meta)
-
-
-def _result(run: Run, job: Job, status: str, **more: Any) -> Result:
-    return Result(run=run.id, name=job.name, kind=job.kind, status=status, **more)
-
-
-def _reported(outcome: Outcome) -> Reported | None:
-    """Figures of an outcome and what is behind them; None where there is no result."""
-    job = outcome.job
-    if not outcome.result.key:
-        return None
+    result = Result(
+        run=run.id,
+        name=job.name,
+        kind=job.kind,
+        status="fail" if failing else "unproven" if meta["unproven"] else "pass",
+        key=key,
+        failed=meta["failed"],
+        total=meta["total"],
+        worst=worst["relative"],
+        worst_id=worst["id"],
+        message=f"not passed: {sections}" if sections else "",
+        **more,
+    )
     settings = job.payload.get("settings") or {}
     inputs = {
         "parameters": dict(job.parameters),
@@ -268,4 +248,4 @@ def _reported(outcome: Outcome) -> Reported | None:
         "design_hash": job.design_hash,
         "revision": job.revision,
     }
-    return [Figure(**f) for f in outcome.meta["figures"]], inputs
+    return Outcome(result, meta, ([Figure(**f) for f in meta["figures"]], inputs))

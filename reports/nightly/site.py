@@ -27,7 +27,9 @@ from reports.nightly.view import DesignView, Overview, report_folder
 MARKER = ".nightly-site"
 KEPT_NIGHTS = 3
 KEPT_CACHE_DAYS = 30.0
-_FOR_MACHINES = ("summary.json", "junit.xml", "summary.md")
+_FOR_MACHINES = {
+    "summary.json": machines.summary_text, "junit.xml": machines.junit, "summary.md": machines.markdown
+}  # fmt: skip
 _NIGHT = re.compile(r"\d{6,}-[0-9a-f]{8}\Z")
 _CONTENT = re.compile(r"[0-9a-f]{16}\Z")
 
@@ -53,14 +55,11 @@ def mark(site: Path) -> None:
     write_text(site / MARKER, "actuator-lti nightly site 1\n")
 
 
-def remove_leftovers(*folders: Path) -> int:
-    """Delete the half-written files that a killed run left; how many."""
-    count = 0
+def remove_leftovers(*folders: Path) -> None:
+    """Delete the half-written files that a killed run left."""
     for folder in folders:
         for leftover in folder.rglob(".*.part"):
             leftover.unlink(missing_ok=True)
-            count += 1
-    return count
 
 
 def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep_reports: int) -> None:
@@ -76,33 +75,29 @@ def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep
     except InputError:
         shutil.rmtree(site / folder, ignore_errors=True)
         raise
-    texts = (machines.summary_text(night), machines.junit(night), machines.markdown(night))
-    write_together((site / name, text.encode()) for name, text in zip(_FOR_MACHINES, texts, strict=True))
+    write_together((site / name, text(night).encode()) for name, text in _FOR_MACHINES.items())
     _collect_garbage(site, folder, kept)
     cache.collect_garbage({d.result.key for d in night.designs}, KEPT_CACHE_DAYS)
 
 
 def _lacking(site: Path, design: DesignView, cache: Cache) -> Iterator[tuple[Path, bytes]]:
     """The files of a report that the site has not, or not whole; out of the cache."""
-    if design.broken:
-        return
     folder = site / design.report
-    for part in (folder, folder.parent):
+    wanted: Mapping[str, str] = {} if design.broken else design.meta.get("files", {})
+    for part in (folder, folder.parent) if wanted else ():
         if part.is_symlink():
             raise InputError("is a symbolic link: a site holds its reports itself", where=str(part))
-    wanted: Mapping[str, str] = design.meta.get("files", {})
     for name in wanted:
         if os.path.lexists(folder / name) and not stat.S_ISREG((folder / name).lstat().st_mode):
             raise InputError("is no regular file: a site holds its reports itself", where=str(folder / name))
     missing = [name for name, digest in wanted.items() if not _is_there(folder / name, digest)]
-    if not missing:
-        return
-    entry = cache.whole(design.result.key)
-    if entry is None:
-        raise InputError(
-            f"the result of {design.name[:60]!r} has vanished from the cache: run again", where=str(site)
-        )
-    yield from ((folder / name, entry.file(name)) for name in missing)
+    entry = cache.whole(design.result.key) if missing else None
+    for name in missing:
+        if entry is None:
+            raise InputError(
+                f"the result of {design.name[:60]!r} has vanished from the cache: run again", where=str(site)
+            )
+        yield folder / name, entry.file(name)
 
 
 def _is_there(path: Path, digest: str) -> bool:
@@ -117,16 +112,13 @@ def _reports_to_keep(history: History, night: Overview, nights: int) -> set[str]
     wanted = {run.id for run in night.runs[-max(1, nights) :]}
     wanted |= {d.approval.run for d in night.designs if d.approval is not None}
     kept = (result for run in wanted for result in history.night(run).results)
-    return {report_folder(result.name, result.key) for result in kept if result.key}
+    return {report_folder(result) for result in kept if result.key}
 
 
 def _collect_garbage(site: Path, current: str, kept: set[str]) -> None:
     """Remove the pages of nights long past, and the reports that no kept night refers to."""
-    nights = sorted(p for p in (site / "nights").iterdir() if _NIGHT.match(p.name))
-    old = [p for p in nights if p.name != Path(current).name]
-    for path in old[: -KEPT_NIGHTS or None]:
+    nights = sorted(path for path in (site / "nights").iterdir() if _NIGHT.match(path.name))
+    old = [path for path in nights if path != site / current][:-KEPT_NIGHTS]
+    reports = [path for path in (site / "reports").glob("*/*") if _CONTENT.match(path.name)]
+    for path in (*old, *(p for p in reports if p.relative_to(site).as_posix() not in kept)):
         shutil.rmtree(path, ignore_errors=True)
-    reports = site / "reports"
-    for path in sorted(reports.glob("*/*")) if reports.is_dir() else []:
-        if _CONTENT.match(path.name) and path.relative_to(site).as_posix() not in kept:
-            shutil.rmtree(path, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""From a study file, or a single design, to the jobs of a night.
+"""From a study file, or a single design, to the jobs of a night, and which code builds them.
 
 A study file may hold a table for the nightly beside what `analyses.studies.study` reads::
 
@@ -10,26 +10,31 @@ A study file may hold a table for the nightly beside what `analyses.studies.stud
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+import platform
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from actuator_lti.bounds import JOB_BYTES, NIGHTLY_JOBS
 from actuator_lti.design import design_hash, load_design, write_design
-from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import read_toml, shown_path
 from actuator_lti.files.tree import Tree
+from analyses.studies.proof import hash_of
 from analyses.studies.study import Study as StudyFile
 from analyses.studies.study import Variant, is_study, study_from_tree, study_of
 from analyses.toml_tables import Table
 from reports.nightly.text import one_line, sha256
 from reports.nightly.tolerance import Tolerances, read_tolerances
+from reports.provenance import git, package_version
 
-BROKEN = ("error", "timeout", "crash")  # how a job ends without a result
-
+PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
+LIBRARIES = ("control", "numpy", "scipy", "matplotlib", "jinja2", "typst")
+COMMITS = 8  # named at most between two nights
 MAX_NAME = 20_000
+_SUFFIXES = (".py", ".toml", ".html", ".j2", ".css", ".js", ".typ", ".svg")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,6 +66,44 @@ class Study:
     title: str = ""
     origin: Path | None = None
     tolerances: Tolerances = field(default_factory=Tolerances)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CodeVersion:
+    """Which code makes a result: hash of the sources, the libraries, and the commit if there is one."""
+
+    sources: str
+    libraries: dict[str, str]
+    commit: str
+
+    @property
+    def hash(self) -> str:
+        """What enters the address of a result; a commit that changes no source does not."""
+        return sha256(canonical([self.sources, self.libraries, platform.python_version()]))
+
+
+def code_version(root: Path | None = None) -> CodeVersion:
+    """Version of the code as installed (or below ``root``)."""
+    folder = Path(__file__).resolve().parents[2] if root is None else root
+    return CodeVersion(
+        sources=sha256(canonical([hash_of(folder / package, _SUFFIXES) for package in PACKAGES])),
+        libraries={name: package_version(name, "absent") for name in LIBRARIES},
+        commit=commit_of(folder),
+    )
+
+
+def commit_of(path: Path) -> str:
+    """Commit that is checked out where a path lies; empty where there is none."""
+    return git(path, "rev-parse", "--verify", "HEAD^{commit}") or ""
+
+
+@cache
+def commits_between(path: Path, old: str, new: str) -> tuple[str, ...]:
+    """First lines of the commits that lead from one commit to another, newest first."""
+    if not old or not new or old == new:
+        return ()
+    text = git(path, "log", f"--max-count={COMMITS}", "--format=%h %s", f"{old}..{new}", "--")
+    return tuple(one_line(line, 120) for line in (text or "").splitlines() if line.strip())
 
 
 def canonical(value: Any) -> str:
@@ -103,7 +146,8 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
     """Read what is to be built every night: a study file, or a design, which is then a study of one.
 
     A variant that its design's checks refuse becomes a job that fails with their words; the others are built.
-    ``pdf`` and ``validation`` are as the study says where left out.
+    ``pdf`` and ``validation`` are as the study says where left out. The comparison of several comes first, as
+    it takes longest.
     """
     table = Table({}, "nightly", shown_path(path))
     if is_study(path):
@@ -113,59 +157,26 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
     else:
         file = replace(study_of(load_design(path)), validation=True)
     plan = table.read(_Nightly, beside=("tolerance",))
-    tolerances = read_tolerances(table.table("tolerance").data, table.origin)
     check = file.validation if validation is None else validation
     settings: Tree = {"pdf": pdf or plan.pdf, "validation": check}
     if file.monte_carlo is not None:
         settings["monte_carlo"] = {"samples": file.monte_carlo.samples, "seed": file.monte_carlo.seed}
+    jobs = [_design_job(variant, settings) for variant in file.all]
+    first = [_comparison_job(file, jobs, settings)] if file.variants else []
     return Study(
         name=file.name,
         title=file.title or file.name,
-        jobs=tuple(_jobs(file, settings)),
+        jobs=(*first, *jobs),
         origin=Path(path).resolve() if Path(path).is_file() else None,
-        tolerances=tolerances,
+        tolerances=read_tolerances(table.table("tolerance").data, table.origin),
     )
 
 
-def _jobs(study: StudyFile, settings: Mapping[str, Any]) -> Iterator[Job]:
-    """Give the comparison first, as it takes longest, then every design."""
-    jobs = [
-        refused_job(variant) if variant.design is None else design_job(variant.design, settings, variant.name)
-        for variant in study.all
-    ]
-    if study.variants:
-        yield comparison_job(study, jobs, settings)
-    yield from jobs
-
-
-def comparison_job(study: StudyFile, jobs: Sequence[Job], settings: Mapping[str, Any]) -> Job:
-    """Make the job that compares all designs of a study on one page."""
-    names = {job.name for job in jobs}
-    name = "Comparison of all variants"
-    while name in names:
-        name += " (study)"
-    kept = ("name", "design", "refused")
-    designs = [{k: job.payload[k] for k in kept if k in job.payload} for job in jobs]
-    for one, variant in zip(designs, study.all, strict=True):
-        one["overrides"] = {key: str(value) for key, value in variant.overrides.items()}
-    payload = {
-        "name": name,
-        "study": {"title": study.title or study.name, "designs": designs},
-        "settings": {"pdf": settings["pdf"]},
-    }
-    return Job(name=name, kind="compare", payload=payload)
-
-
-def refused_job(variant: Variant) -> Job:
-    """Make the job of a variant that cannot be a design: it fails with the words of the refusal."""
-    parameters = {key: str(value) for key, value in variant.overrides.items()}
-    return Job(
-        name=variant.name, payload={"name": variant.name, "refused": variant.error}, parameters=parameters
-    )
-
-
-def design_job(design: Design, settings: Mapping[str, Any], name: str) -> Job:
-    """Make the job that builds one design's report."""
+def _design_job(variant: Variant, settings: Mapping[str, Any]) -> Job:
+    """The job of one design's report; one that was refused fails with the words of the refusal."""
+    name, design = variant.name, variant.design
+    if design is None:
+        return Job(name=name, payload={"name": name, "refused": variant.error}, parameters=_texts(variant))
     return Job(
         name=name,
         payload={"name": name, "design": write_design(design), "settings": dict(settings)},
@@ -173,3 +184,25 @@ def design_job(design: Design, settings: Mapping[str, Any], name: str) -> Job:
         parameters={path: parameter.text for path, parameter in design.parameters.items()},
         revision=design.revision,
     )
+
+
+def _comparison_job(study: StudyFile, jobs: Sequence[Job], settings: Mapping[str, Any]) -> Job:
+    """The job that compares all designs of a study on one page."""
+    name = "Comparison of all variants"
+    while name in {job.name for job in jobs}:
+        name += " (study)"
+    designs = [
+        {k: job.payload[k] for k in ("name", "design", "refused") if k in job.payload}
+        | {"overrides": _texts(variant)}
+        for job, variant in zip(jobs, study.all, strict=True)
+    ]
+    whole = {"title": study.title or study.name, "designs": designs}
+    return Job(
+        name=name,
+        kind="compare",
+        payload={"name": name, "study": whole, "settings": {"pdf": settings["pdf"]}},
+    )
+
+
+def _texts(variant: Variant) -> dict[str, str]:
+    return {key: str(value) for key, value in variant.overrides.items()}

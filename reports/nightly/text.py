@@ -54,22 +54,16 @@ def csv_cell(value: object) -> str:
     >>> csv_cell("=1+1"), csv_cell("-3.5"), csv_cell(None), csv_cell(2.0)
     ("'=1+1", '-3.5', '', '2.0')
     """
-    if value is None:
-        return ""
-    if isinstance(value, float | int):
-        return repr(value)
-    text = visible(str(value))
-    if text.lstrip(" ").startswith(_FORMULA_STARTS) and not _NUMBER.match(text):
-        return "'" + text
-    return text
+    text = "" if value is None else visible(str(value))
+    harmful = text.lstrip(" ").startswith(_FORMULA_STARTS) and not _NUMBER.match(text)
+    return f"'{text}" if harmful else text
 
 
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """A CSV table (RFC 4180) whose cells are safe to open in a spreadsheet."""
     buffer = io.StringIO()
     writer = csv.writer(buffer)
-    writer.writerow([csv_cell(h) for h in header])
-    writer.writerows([csv_cell(v) for v in row] for row in rows)
+    writer.writerows([csv_cell(value) for value in row] for row in (header, *rows))
     return buffer.getvalue()
 
 
@@ -79,11 +73,5 @@ def now() -> str:
 
 
 def to_seconds(text: str) -> float:
-    """Seconds since 1970 of such a text.
-
-    Examples
-    --------
-    >>> to_seconds("1970-01-02T00:00:00Z")
-    86400.0
-    """
-    return datetime.fromisoformat(text.replace("Z", "+00:00")).timestamp()
+    """Seconds since 1970 of such a text."""
+    return datetime.fromisoformat(text).timestamp()

@@ -8,7 +8,6 @@ smaller than the tolerance are dropped.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -50,12 +49,11 @@ def change_points(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ..
     noise = float(np.median(np.abs(np.diff(x)))) / (0.6745 * math.sqrt(2.0))
     scale = max(noise, tolerance / 3.0, 1e-12 * float(np.max(np.abs(x))))
     ends = _segments((x - x[0]) / scale, 2.0 * math.log(len(x)))
-    edges = [0, *ends, len(x)]
-    levels = [float(np.mean(x[a:b])) for a, b in itertools.pairwise(edges)]
+    levels = [float(np.mean(part)) for part in np.split(x, ends)]
     return tuple(
-        ChangePoint(index=int(there[end]), before=levels[k], after=levels[k + 1])
-        for k, end in enumerate(ends)
-        if abs(levels[k + 1] - levels[k]) > tolerance
+        ChangePoint(index=int(there[end]), before=before, after=after)
+        for end, before, after in zip(ends, levels[:-1], levels[1:], strict=True)
+        if abs(after - before) > tolerance
     )
 
 
@@ -95,11 +93,8 @@ def missing_nights(starts: Sequence[str]) -> tuple[tuple[int, int], ...]:
     >>> missing_nights(["2026-01-0%dT02:00:00Z" % d for d in (1, 2, 3, 6, 7)])
     ((2, 2),)
     """
-    times = np.array([to_seconds(s) for s in starts])
-    pauses = np.diff(times)
-    if len(pauses) < 3:
-        return ()
-    usual = float(np.median(pauses[-60:]))
+    pauses = np.diff([to_seconds(start) for start in starts])
+    usual = float(np.median(pauses[-60:])) if len(pauses) >= 3 else 0.0
     if usual < 3600.0:
         return ()
     return tuple(

@@ -4,32 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from actuator_lti.files.tree import Tree
 from analyses.slugs import hashed
-from reports.nightly.cache import Cache, Entry
+from reports.nightly.cache import Cache
 from reports.nightly.changes import Between, Change, Comparison
-from reports.nightly.figures import Verdict
 from reports.nightly.history import History
-from reports.nightly.memory import Memory
 from reports.nightly.records import Baseline, Result, Run
-from reports.nightly.source import BROKEN, Study
+from reports.nightly.source import Study
+from reports.nightly.state import Memory
 from reports.nightly.trend import WINDOW, missing_nights
 
+BROKEN = ("error", "timeout", "crash")  # how a job ends without a result
 STRIP = 30
 CLOSER = 1e-3  # of the limit; a smaller step of the distance is none
-STATE_WORDS = {
-    "broken": "no result",
-    "fail": "failing",
-    "unproven": "not proven",
-    "regression": "regressed",
-    "pass": "passing",
+STATES = {
+    "broken": ("⚠", "no result"),
+    "fail": ("✗", "failing"),
+    "unproven": ("?", "not proven"),
+    "regression": ("▼", "regressed"),
+    "pass": ("✓", "passing"),
 }
+"""Sign and words of the states of a design."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,10 +71,10 @@ class DesignView:
         title = str(self.meta.get("title", ""))
         return "" if title == self.name else title
 
-    @cached_property
-    def verdicts(self) -> tuple[Verdict, ...]:
-        """Requirements of tonight's report."""
-        return tuple(Verdict(**v) for v in self.meta.get("verdicts", ()))
+    @property
+    def verdicts(self) -> list[Tree]:
+        """Requirements of tonight's report (`reports.nightly.figures.verdicts_of`)."""
+        return list(self.meta.get("verdicts", ()))
 
     @property
     def regressions(self) -> tuple[Change, ...]:
@@ -82,7 +83,7 @@ class DesignView:
 
     @property
     def state(self) -> str:
-        """One of `STATE_WORDS`."""
+        """One of `STATES`."""
         if self.broken:
             return "broken"
         if self.result.status != "pass":
@@ -92,7 +93,7 @@ class DesignView:
     @property
     def report(self) -> str:
         """Folder of its report on the site."""
-        return report_folder(self.name, self.result.key)
+        return report_folder(self.result)
 
     @property
     def rank(self) -> tuple[float, ...]:
@@ -105,17 +106,20 @@ class DesignView:
 class Overview:
     """A whole night: its designs, the worst first."""
 
-    study: str
+    study: Study
     title: str
     site: Path  # on which it is published
-    run: Run
     designs: tuple[DesignView, ...]
     runs: tuple[Run, ...]
     gone: tuple[str, ...]
     missing: tuple[tuple[int, int], ...]
     interrupted: tuple[str, ...]
-    tolerances: Any
     memory: Memory
+
+    @property
+    def run(self) -> Run:
+        """This night."""
+        return self.runs[-1]
 
     @property
     def alone(self) -> tuple[DesignView, ...]:
@@ -129,7 +133,7 @@ class Overview:
     @property
     def counts(self) -> str:
         """How many designs are in each state, in words."""
-        counted = ((self.count(state), words) for state, words in STATE_WORDS.items())
+        counted = ((self.count(state), words) for state, (_, words) in STATES.items())
         return ", ".join(f"{count} {words}" for count, words in counted if count)
 
     @property
@@ -138,78 +142,65 @@ class Overview:
         return all(d.state == "pass" for d in self.designs)
 
 
-def report_folder(name: str, key: str) -> str:
+def report_folder(result: Result) -> str:
     """Folder of a report below the site: by design, then by content."""
-    return f"reports/{hashed(name)}/{key[:16]}"
+    return f"reports/{hashed(result.name)}/{result.key[:16]}"
 
 
 def overview(
-    history: History,
-    cache: Cache,
-    study: Study,
-    metas: Mapping[str, Mapping[str, Any]],
-    site: Path,
+    history: History, cache: Cache, study: Study, metas: Mapping[str, Mapping[str, Any]], site: Path
 ) -> Overview:
     """Put together what the site says about the last finished night."""
     runs = history.runs
-    run = runs[-1]
-    reader = _Reader(history, cache, study, metas)
-    tonight = history.night(run.id).by_name
-    designs = sorted((reader.design(r) for r in tonight.values()), key=lambda d: d.rank)
+    between = Between(history, study.tolerances, study.origin)
+    tonight = history.night(runs[-1].id).by_name
+    designs = [_design(result, between, cache, metas) for result in tonight.values()]
     before = history.night(runs[-2].id).by_name if len(runs) > 1 else {}
     return Overview(
-        study=study.name,
+        study=study,
         title=study.title or study.name,
         site=site,
-        run=run,
-        designs=tuple(designs),
+        designs=tuple(sorted(designs, key=lambda design: design.rank)),
         runs=tuple(runs),
         gone=tuple(sorted(before.keys() - tonight.keys())),
-        missing=missing_nights([r.started for r in runs]),
+        missing=missing_nights([run.started for run in runs]),
         interrupted=tuple(history.index.interrupted),
-        tolerances=study.tolerances,
         memory=history.memory(),
     )
 
 
-class _Reader:
-    """Reads what belongs to each design."""
-
-    def __init__(self, history: History, cache: Cache, study: Study, metas: Mapping[str, Any]) -> None:
-        self.history = history
-        self.cache = cache
-        self.metas = metas
-        self.between = Between(history, study.tolerances, study.origin)
-
-    def design(self, result: Result) -> DesignView:
-        past = self.history.results(result.name, last=2 * STRIP)
-        approval = self._approval(result.name)
-        return DesignView(
-            result=result,
-            meta=self._meta(result),
-            last_night=self.between.last_night(result, past),
-            baseline=self.between.baseline(result, approval),
-            approval=approval,
-            strip=self._strip(past),
-            status_flaps=sum(a.status != b.status for a, b in pairwise(past[-WINDOW:])) >= 3,
-        )
-
-    def _meta(self, result: Result) -> Mapping[str, Any]:
-        known = self.metas.get(result.key) or (result.key and self.cache.whole(result.key))
-        return known.meta if isinstance(known, Entry) else known or {}
-
-    def _strip(self, past: list[Result]) -> tuple[tuple[Run, str], ...]:
-        known = {r.run: outcome(r, before) for r, before in zip(past, [None, *past], strict=False)}
-        return tuple((run, known.get(run.id, "absent")) for run in self.history.runs[-STRIP:])
-
-    def _approval(self, name: str) -> Baseline | None:
-        nights = {run.id for run in self.history.runs}
-        own = (one for one in self.history.index.baselines[::-1] if one.name in (None, name))
-        return next((one for one in own if one.run in nights and self.history.result(one.run, name)), None)
+def _design(
+    result: Result, between: Between, cache: Cache, metas: Mapping[str, Mapping[str, Any]]
+) -> DesignView:
+    history = between.history
+    past = history.results(result.name, last=2 * STRIP)
+    approval, known = _approval(history, result.name), outcomes(past)
+    meta = metas.get(result.key)
+    if meta is None and result.key and (entry := cache.whole(result.key)):
+        meta = entry.meta
+    return DesignView(
+        result=result,
+        meta=meta or {},
+        last_night=between.last_night(result, past),
+        baseline=between.baseline(result, approval),
+        approval=approval,
+        strip=tuple((run, known.get(run.id, "absent")) for run in history.runs[-STRIP:]),
+        status_flaps=sum(a.status != b.status for a, b in pairwise(past[-WINDOW:])) >= 3,
+    )
 
 
-def outcome(result: Result, before: Result | None) -> str:
-    """Give the state of a night; it regressed where its nearest limit came closer than the night before."""
-    if result.status != "pass" or before is None or result.worst is None or before.worst is None:
-        return result.status
-    return "regressed" if result.worst < before.worst - CLOSER else "pass"
+def _approval(history: History, name: str) -> Baseline | None:
+    """The last approval of a design whose night has a result of it."""
+    runs = {run.id: run for run in history.runs}
+    own = (one for one in history.index.baselines[::-1] if one.name in (None, name) and one.run in runs)
+    return next((one for one in own if history.first(name, [runs[one.run]])), None)
+
+
+def outcomes(past: list[Result]) -> dict[int, str]:
+    """Give the state of each night; regressed: its nearest limit is closer than the night before."""
+    states = {}
+    for before, result in zip([None, *past], past, strict=False):
+        was, now = None if before is None else before.worst, result.worst
+        closer = was is not None and now is not None and now < was - CLOSER
+        states[result.run] = "regressed" if closer and result.status == "pass" else result.status
+    return states

@@ -9,7 +9,7 @@ from actuator_lti.files.tree import Tree
 from reports import document as doc
 from reports.nightly.machines import summary
 from reports.nightly.text import one_line
-from reports.nightly.view import STATE_WORDS, DesignView
+from reports.nightly.view import STATES, DesignView
 
 if TYPE_CHECKING:
     from reports.nightly.view import Overview
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def section(night: Overview) -> doc.Section:
     columns = [
-        doc.of(lambda design: STATE_WORDS[design.state], "state", "State"),
+        doc.of(lambda design: STATES[design.state][1], "state", "State"),
         doc.of(lambda design: one_line(design.name, 60), "name", "Design"),
         doc.of(_why, "why", "Why"),
     ]

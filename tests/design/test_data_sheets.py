@@ -16,8 +16,7 @@ from actuator_lti.design import (
     write_design,
 )
 from actuator_lti.design.explained import explained
-from actuator_lti.drive.facts import capability
-from actuator_lti.drive.steady import steady_torque_Nm
+from actuator_lti.drive.facts import capability, steady_torque_Nm
 from actuator_lti.errors import InputError, Mistakes
 from analyses.linear.loop_survey import survey_loops
 from analyses.studies.sampling import sampler_of

@@ -25,10 +25,10 @@ from actuator_lti.design.loader import shipped_designs
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.drive.wiring import wire
-from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import point_blocks
 from actuator_lti.loops.result import Loop
 from actuator_lti.loops.sampled import stage_blocks
+from actuator_lti.loops.tick import Block
 from nonlinear.export import linear, linear_loops
 from nonlinear.export.c_files import exported
 from nonlinear.export.page import line_of

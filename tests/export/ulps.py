@@ -15,9 +15,9 @@ from actuator_lti.batch._figures import COLUMNS
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
-from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import stage_blocks
+from actuator_lti.loops.tick import Block
 
 COUNT = 64
 TIMES = ("rise_time", "settling_time")

@@ -38,9 +38,9 @@ from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColum
 from analyses.studies.sampling import read_table
 from nonlinear.runs.records import read_columns
 from reports.nightly.cache import Cache, CorruptEntry, sealed
-from reports.nightly.history import FILE, NIGHTS, open_history
-from reports.nightly.memory import remembered
+from reports.nightly.history import open_history
 from reports.nightly.source import read_study
+from reports.nightly.state import INDEX, NIGHTS, remembered
 
 Fault = Callable[[bytes, random.Random], bytes]
 
@@ -171,10 +171,10 @@ def report(path: Path) -> None:
 
 
 def history(path: Path) -> None:
-    path.rename(path.parent / FILE)
+    path.rename(path.parent / INDEX)
     (path.parent / NIGHTS).mkdir(exist_ok=True)
     for name, data in history_files().items():
-        if name != FILE:
+        if name != INDEX:
             (path.parent / NIGHTS / name).write_bytes(data)
     opened = open_history(path.parent)
     opened.memory()
@@ -373,7 +373,7 @@ def targets() -> tuple[Target, ...]:
         Target("outer loop", AROUND, read_outer_loop, ".json", tree_fault, share=1000),
         Target("report", (small_report(),), report, ".json", tree_fault, share=600),
         Target("site", (SUMMARY,), summary, ".json", tree_fault, share=1000),
-        Target("history", (history_files()[FILE],), history, ".json", tree_fault, share=100),
+        Target("history", (history_files()[INDEX],), history, ".json", tree_fault, share=100),
         Target("cache entry", (entry_file(),), entry, ".entry", share=1000),
         Target("command line", seeds(), command_line, ".json", hostile, share=6),
         Target("command margins", designs, command(*linear), fault=extreme, share=1),

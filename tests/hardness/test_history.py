@@ -13,9 +13,9 @@ from nightly_fakes import CODE, INLINE, job, study
 
 from actuator_lti.errors import InputError
 from reports.cli.main import main
-from reports.nightly.history import _INDEX, FILE, open_history
-from reports.nightly.memory import HistoryLost, Memory, remembered
+from reports.nightly.history import _INDEX, open_history
 from reports.nightly.night import Settings, approve, run_night
+from reports.nightly.state import INDEX, HistoryLost, Memory, remembered
 from reports.nightly.text import sha256
 
 AGAIN = replace(INLINE, accept_lost_history=True)
@@ -42,7 +42,7 @@ def site(tmp_path) -> Path:
 
 def rewritten(site: Path, change: Callable[[dict[str, Any]], object]) -> None:
     """Change the index, and its checksum with it."""
-    path = state(site) / FILE
+    path = state(site) / INDEX
     sealed = json.loads(path.read_text())
     change(sealed["index"])
     try:
@@ -62,8 +62,8 @@ def take_that_of_another(site: Path) -> None:
 
 LOSSES: dict[str, Callable[[Path], object]] = {
     "all": lambda site: shutil.rmtree(state(site)),
-    "the index": lambda site: (state(site) / FILE).unlink(),
-    "what the index holds": lambda site: (state(site) / FILE).write_bytes(b""),
+    "the index": lambda site: (state(site) / INDEX).unlink(),
+    "what the index holds": lambda site: (state(site) / INDEX).write_bytes(b""),
     "the last night": lambda site: rewritten(site, lambda index: index["runs"].pop()),
     "the approval": lambda site: rewritten(site, lambda index: index["baselines"].clear()),
     "its own, for another's": take_that_of_another,
@@ -114,7 +114,7 @@ def test_the_command_exits_1_with_one_line(tmp_path, capsys, monkeypatch) -> Non
 
 
 def test_the_history_of_an_earlier_version_is_refused_and_left(site) -> None:
-    (state(site) / FILE).rename(state(site) / "history.sqlite")
+    (state(site) / INDEX).rename(state(site) / "history.sqlite")
     for begin in (lambda: night(site, 3.0), lambda: approve(study(job("a")), site, by="x", reason="y")):
         with pytest.raises(HistoryLost, match=r"earlier version.*--accept-lost-history"):
             begin()
@@ -124,7 +124,7 @@ def test_the_history_of_an_earlier_version_is_refused_and_left(site) -> None:
 
 def test_any_damage_is_told_or_harmless(site) -> None:
     """Bytes are overwritten, cut off and inserted: every text and number is held by a checksum."""
-    paths = [state(site) / FILE, *sorted((state(site) / "nights").iterdir())]
+    paths = [state(site) / INDEX, *sorted((state(site) / "nights").iterdir())]
     draw, told = random.Random(18), []
     before = everything(site)
     for turn in range(DAMAGE_ROUNDS):

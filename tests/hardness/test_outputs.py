@@ -18,9 +18,8 @@ from nightly_fakes import CODE, INLINE, job, study
 
 from actuator_lti.errors import InputError
 from actuator_lti.files import atomic
-from reports.nightly.lock import hold
-from reports.nightly.memory import HistoryLost
-from reports.nightly.night import Settings, approve, run_night, state_of
+from reports.nightly.night import Settings, approve, run_night
+from reports.nightly.state import HistoryLost, hold, state_of
 
 SIMULATE = ("simulate", "ilr33-amber", "--duration", "0.01", "--quiet")
 
@@ -233,7 +232,7 @@ def test_a_site_is_where_one_stands_and_its_state_beside_it(tmp_path, monkeypatc
     assert sorted(os.listdir(tmp_path)) == ["site", "site.state"]
     assert (tmp_path / "site" / "index.html").is_file()
     with pytest.raises(InputError, match="root of the disk"):
-        state_of(Path("/"), INLINE)
+        state_of(Path("/"))
 
 
 @pytest.mark.parametrize("state", ["site", "site/state", "elsewhere/../site/x", "link/state"])

@@ -4,9 +4,10 @@ from dataclasses import replace
 from math import pi
 from typing import Any
 
+import numpy as np
 from hypothesis import strategies as st
 
-from actuator_lti.design import model
+from actuator_lti.design import load_design, model
 
 
 def amber(
@@ -40,14 +41,38 @@ def amber(
     return replace(design, **changes)
 
 
+def controlled(design: model.Design, **changes: Any) -> model.Design:
+    """The design with parts of its controller changed: keys of a stage in a dict, or the value itself."""
+    control = design.controller
+    made = {
+        name: replace(getattr(control, name), **value) if isinstance(value, dict) else value
+        for name, value in changes.items()
+    }
+    return replace(design, controller=replace(control, **made))
+
+
+def sprung(name: str, slope_Nm_rad: float, **more: Any) -> model.Design:
+    """A shipped drive whose load follows the angle through a back-drivable path."""
+    design = load_design(name)
+    load = replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope_Nm_rad, **more)
+    return replace(design, load=load)
+
+
+def faster(design: model.Design, factor: float) -> model.Design:
+    """The same continuous drive, sampled faster and later by less (its filters stay)."""
+    times = {name: getattr(design.controller, name) / factor for name in ("period_s", "computing_delay_s")}
+    return controlled(design, **times)
+
+
+def response(system: Any, omega: np.ndarray) -> np.ndarray:
+    """Of a sampled or continuous system over rad/s."""
+    return np.asarray(system(np.exp(1j * omega * system.dt) if system.isdtime(strict=True) else 1j * omega))
+
+
 def without(design: model.Design, *stages: str, gain: float) -> model.Design:
     """The design without its current and/or velocity loop; ``gain`` goes to the stage outside the gap."""
-    control = replace(design.controller, **dict.fromkeys(stages))
-    if "velocity" in stages:
-        control = replace(control, position=replace(control.position, gain=gain))
-    elif control.velocity is not None:
-        control = replace(control, velocity=replace(control.velocity, gain=gain))
-    return replace(design, controller=control)
+    outside = "position" if "velocity" in stages else "velocity"
+    return controlled(design, **dict.fromkeys(stages), **{outside: {"gain": gain}})
 
 
 def emps(delay_s: float = 0.0, **changes: Any) -> model.Design:

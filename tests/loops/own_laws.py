@@ -9,7 +9,7 @@ from actuator_lti.design import Design
 from actuator_lti.design.law import LAW_INPUTS, Law
 from actuator_lti.design.model import Command, Encoder, Instruments, Limits, OutputEncoder
 from actuator_lti.loops.assemble import assemble_loops
-from actuator_lti.loops.blocks import compose
+from actuator_lti.loops.tick import compose
 
 SIZES = {"command": 1.0, "error": 1.0, "speed": 1e-3, "angle": 0.1, "current": 1e-2, "output_angle": 0.1,
          "output_speed": 1e-3}  # fmt: skip

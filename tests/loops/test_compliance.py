@@ -8,7 +8,6 @@ import pytest
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
 from actuator_lti.batch import drive_figures as many
-from actuator_lti.batch.static import drive_figures
 from actuator_lti.design import load_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.loops import assemble_loops
@@ -105,11 +104,3 @@ def test_the_simulator_starts_above_one(load_Nm: float, margin: float, moves: bo
         run = simulate(design, commands.step(sign * 0.2), duration_s=0.3, load_Nm=-sign * load_Nm)
         starts.append(bool(np.abs(run.motor_speed_rad_s).max() > 1e-6))
     assert all(starts) is moves
-
-
-def test_many_designs_have_the_figure_of_each() -> None:
-    scale = np.array([0.5, 1.0, 2.0])
-    path = "motor.torque_constant"
-    values = {path: AMBER.parameters[path].value * scale}
-    many = drive_figures(Population(AMBER, values, 3), "torque_margin", 4.0)
-    assert many == pytest.approx(scale * drive_figure(AMBER, "torque_margin", 4.0), rel=1e-12)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from loop_designs import amber, emps, without
+from loop_designs import amber, controlled, emps, without
 from test_stacked import DRIVES, scattered
 from two_mass import drive_d, drive_e
 
@@ -18,7 +18,7 @@ from actuator_lti.drive.facts import (
     capability,
     stall_torque_Nm,
 )
-from actuator_lti.drive.steady_gains import torque_gain_Nm_rad
+from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.specification.capability import drive_figures
 
 
@@ -89,9 +89,7 @@ def test_a_hot_motor_is_weaker() -> None:
 
 def test_torque_gain_with_a_p_current_loop_and_resistance_feedforward() -> None:
     """Rotor at rest: u = Kp (i_ref - i) + k R i_ref = R i, so i = (Kp + k R)/(Kp + R) i_ref."""
-    base = drive_e()
-    current = replace(base.controller.current, integral_time_s=None, resistance_feedforward=0.6)
-    design = replace(base, controller=replace(base.controller, current=current))
+    design = controlled(drive_e(), current={"integral_time_s": None, "resistance_feedforward": 0.6})
     share = (0.8 + 0.3) / (0.8 + 0.5)
     assert torque_gain_Nm_rad(design) == pytest.approx(20.0 * 10 * 0.05 * 0.05 * share)
 
@@ -156,24 +154,18 @@ def test_a_p_velocity_loop_stays_below_its_limit_by_its_droop(load: float, deg_s
 
 def test_an_integral_or_a_drive_without_friction_leaves_no_droop() -> None:
     """Kp (w_lim - w) is nothing where nothing holds the motor back: a current integral feeds the back-EMF."""
-    control = replace(amber().controller, velocity=replace(amber().controller.velocity, integral_time_s=None))
-    free = replace(amber(), friction=model.Friction(), controller=control)
+    free = controlled(amber(friction=model.Friction()), velocity={"integral_time_s": None})
     assert drive_figures(free) == replace(drive_figures(replace(free, controller=amber().controller)))
     held = replace(free, friction=model.Friction(dry_torque_Nm=0.01))
     current = 0.01 / held.motor.torque_constant_Nm_A
-    below = held.limits.speed_rad_s - current / control.velocity.gain
+    below = held.limits.speed_rad_s - current / held.controller.velocity.gain
     assert capability(held).output_rate_rad_s * held.total_ratio == pytest.approx(below, rel=1e-12)
 
 
 def test_the_droop_of_many_drives_with_p_loops_is_that_of_each() -> None:
     """Voltage of a P current loop: kp (i_ref - i) = R i + kE w."""
-    base = amber()
-    control = replace(
-        base.controller,
-        velocity=replace(base.controller.velocity, integral_time_s=None),
-        current=replace(base.controller.current, integral_time_s=None),
-    )
-    design = replace(base, controller=control)
+    design = controlled(amber(), velocity={"integral_time_s": None}, current={"integral_time_s": None})
+    control = design.controller
     gains = np.array([0.5, 1.0, 2.0]) * control.current.gain_V_A
     many = capability(stacked(design, {"control.current.gain": gains})).output_rate_rad_s * design.total_ratio
     motor, friction, kp = design.effective_motor, design.friction, control.velocity.gain

@@ -5,7 +5,7 @@ from math import inf, pi, sin
 
 import numpy as np
 import pytest
-from loop_designs import amber, ctms_position, emps
+from loop_designs import amber, controlled, ctms_position, emps
 from recursion import run
 
 from actuator_lti import InputError, assemble_loops, load_design, onset
@@ -40,19 +40,9 @@ def test_onset_of_each_limiter_in_the_multirate_drive(cycles: int, feedforward: 
 
 def test_speed_clamp_of_a_p_position_loop_with_ideal_inner_loops() -> None:
     """Onset at A = R sqrt(1 + (w/Kv)^2)/w, R the rate limit at the output (model.md section 5)."""
-    design = amber()
-    control = design.controller
     # inner loops so fast that they count as ideal
-    motor = replace(design.motor, inductance_H=1e-12, back_emf_constant_Vs_rad=1e-9)
-    fast = replace(
-        design,
-        motor=motor,
-        controller=replace(
-            control,
-            velocity=replace(control.velocity, gain=1e4),
-            current=replace(control.current, gain_V_A=1e6),
-        ),
-    )
+    motor = replace(amber().motor, inductance_H=1e-12, back_emf_constant_Vs_rad=1e-9)
+    fast = controlled(amber(motor=motor), velocity={"gain": 1e4}, current={"gain_V_A": 1e6})
     path = assemble_loops(fast, "ideal").limiters["speed"]
     omega = np.array([10.0, 120.0, 500.0])
     R = 942.5 / 2376
@@ -75,7 +65,7 @@ def test_the_active_limiter_and_its_bias() -> None:
 
 def test_the_command_of_a_speed_drive_is_that_of_the_output() -> None:
     """At low frequency the voltage is what a steady speed takes: N (k_E + R C_v/k_M) of it, in every form."""
-    design = replace(amber(), controller=replace(amber().controller, position=None))
+    design = controlled(amber(), position=None)
     motor, viscous = design.effective_motor, design.friction.viscous_Nms_rad
     constants = motor.back_emf_constant_Vs_rad, motor.resistance_ohm, motor.torque_constant_Nm_A
     k_E, R, k_M = (float(value or 0.0) for value in constants)
@@ -117,16 +107,10 @@ def test_three_forms_agree_at_low_frequency() -> None:
 
 def heavy(n_v: int, rate_A_s: float) -> Design:
     """A speed drive with P control whose load hardly moves: i_ref is Kp times the speed command."""
-    design = amber(n_v)
-    control = design.controller
-    velocity = replace(control.velocity, integral_time_s=None, every=n_v)
-    return replace(
-        design,
-        motor=replace(design.motor, rotor_inertia_kgm2=1e9),
-        friction=Friction(),
-        limits=Limits(voltage_V=1e9, current_rate_A_s=rate_A_s),
-        controller=replace(control, position=None, velocity=velocity),
-    )
+    motor = replace(amber().motor, rotor_inertia_kgm2=1e9)
+    limits = Limits(voltage_V=1e9, current_rate_A_s=rate_A_s)
+    heavy = amber(n_v, motor=motor, friction=Friction(), limits=limits)
+    return controlled(heavy, position=None, velocity={"integral_time_s": None})
 
 
 @pytest.mark.parametrize("n_v", [1, 3])
@@ -156,11 +140,11 @@ def test_multirate_onset_divides_the_runs(hertz: float) -> None:
 
 def test_a_torque_drive_ramps() -> None:
     """A step of 5 A at 2 A/ms and Ts = 0.1 ms: 0.2 A a tick, 25 ticks, of which the last needs no limit."""
-    base = load_design("ilr33-amber")
-    control = replace(base.controller, position=None, velocity=None)
-    design = replace(base, controller=control, limits=Limits(voltage_V=1e6, current_rate_A_s=2000.0))
-    run = simulate(design, commands.step(5.0), 40 * control.period_s)
-    step = 2000.0 * control.period_s
+    torque_drive = controlled(load_design("ilr33-amber"), position=None, velocity=None)
+    design = replace(torque_drive, limits=Limits(voltage_V=1e6, current_rate_A_s=2000.0))
+    period_s = design.controller.period_s
+    run = simulate(design, commands.step(5.0), 40 * period_s)
+    step = 2000.0 * period_s
     expected = np.minimum(5.0, step * np.arange(1, run.time_s.size + 1))
     assert np.allclose(run.current_command_A, expected, rtol=0, atol=1e-12)
     acting = run.limit_active("current-rate")
@@ -176,14 +160,9 @@ def test_a_torque_drive_ramps() -> None:
 
 def test_the_integral_of_a_position_controller_waits() -> None:
     """PI of position straight on the current: behind the slope limit out is not v, so I is kept."""
-    base = load_design("ilr33-amber")
-    loop = replace(base.controller.position_loop, gain=0.1, every=1, integral_time_s=1e-3)
-    design = replace(
-        base,
-        controller=replace(base.controller, velocity=None, position=loop),
-        limits=Limits(voltage_V=1e6, current_rate_A_s=1.0),
-    )
-    drive = Drive(design)
+    loop = {"gain": 0.1, "every": 1, "integral_time_s": 1e-3}
+    design = controlled(load_design("ilr33-amber"), velocity=None, position=loop)
+    drive = Drive(replace(design, limits=Limits(voltage_V=1e6, current_rate_A_s=1.0)))
     for k in range(1, 4):
         drive.control(1.0, 0.0, 0.0, 0.0)
         assert drive.value("position_integrator") == 0.0

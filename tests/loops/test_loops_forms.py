@@ -8,45 +8,19 @@ import flint
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from loop_designs import amber, ctms_position, designs, emps, without
+from loop_designs import amber, controlled, ctms_position, designs, emps, faster, response, without
 
 from actuator_lti import DelaySystem, InputError, assemble_loops
 from actuator_lti.design.model import Design, Encoder, Friction, Load
-from actuator_lti.drive.operating import friction_slope
+from actuator_lti.drive.operating import Operating, slope_at
 from actuator_lti.loops import exact_margins
 
 R, L, K, J, Cv = 0.055, 6e-6, 5.9e-3, 1.05e-6, 5.25e-6  # of `amber`
 
 
-def response(system: Any, omega: np.ndarray) -> np.ndarray:
-    return np.asarray(system(np.exp(1j * omega * system.dt) if system.isdtime(strict=True) else 1j * omega))
-
-
 def proportional(design: Design) -> Design:
     """The design with P controllers only."""
-    control_ = design.controller
-    return replace(
-        design,
-        controller=replace(
-            control_,
-            velocity=replace(control_.velocity, integral_time_s=None),
-            current=replace(control_.current, integral_time_s=None),
-        ),
-    )
-
-
-def faster(design: Design, factor: float) -> Design:
-    """The same continuous drive, all sampling and delay shortened by a factor."""
-    control_ = design.controller
-    return replace(
-        design,
-        controller=replace(
-            control_,
-            period_s=control_.period_s / factor,
-            computing_delay_s=control_.computing_delay_s / factor,
-        ),
-        encoder=replace(design.encoder, filter_time_s=design.encoder.filter_time_s / factor),
-    )
+    return controlled(design, velocity={"integral_time_s": None}, current={"integral_time_s": None})
 
 
 def phase_gaps(design: Design, omega: np.ndarray) -> np.ndarray:
@@ -74,27 +48,15 @@ def test_delays_are_placed_right(encoder: Encoder) -> None:
     """
     design = proportional(amber(2, 10, delay_s=1.5e-4, encoder=encoder))
     omega = np.array([30.0, 100.0])
-    gaps = [np.max(np.abs(phase_gaps(faster(design, k), omega)), axis=1) for k in (8, 16, 32)]
+    gaps = []
+    for k in (8, 16, 32):
+        quick = replace(encoder, filter_time_s=encoder.filter_time_s / k)
+        quicker = replace(faster(design, k), encoder=quick)
+        gaps.append(np.max(np.abs(phase_gaps(quicker, omega)), axis=1))
     order = np.log2(gaps[1] / gaps[2])
     assert np.all(order > 1.9)
     # and in size: far less than half a tick
     assert np.all(gaps[2] < 0.02 * 100.0 * 0.5e-4 / 32)
-
-
-def test_sampled_tends_to_continuous_and_both_to_ideal() -> None:
-    design, omega = amber(2, 10, delay_s=1e-4), np.array([20.0, 100.0, 300.0])
-    ideal = assemble_loops(design, "ideal")
-    for form in ("sampled", "continuous"):
-        errors = []
-        for k in (64, 128):
-            loops = assemble_loops(faster(design, k), form).present
-            ratios = [
-                response(loop.open_loop, omega) / response(getattr(ideal, name).open_loop, omega)
-                for name, loop in loops.items()
-            ]
-            errors.append(np.abs(np.array(ratios) - 1).max())
-        assert errors[1] < 5e-3
-        assert errors[0] / errors[1] == pytest.approx(2, abs=0.1)  # first order in Ts
 
 
 def test_ideal_loops_are_the_hand_transfer_functions() -> None:
@@ -144,8 +106,7 @@ def test_feedforward_is_the_derivative_of_the_command(form: Any) -> None:
 
 def test_feedforward_of_a_position_loop_on_a_force_source() -> None:
     design = without(emps(1e-3), "velocity", gain=2e4)
-    control_ = replace(design.controller, position=replace(design.controller.position, feedforward=200.0))
-    loops = assemble_loops(replace(design, controller=control_), "continuous")
+    loops = assemble_loops(controlled(design, position={"feedforward": 200.0}), "continuous")
     omega = np.geomspace(1, 100, 10)
     s = 1j * omega
     P = 35.15065 / (s * (95.1089 * s + 203.5034)) * np.exp(-1.5e-3 * s)
@@ -226,10 +187,8 @@ def test_exact_margins_of_the_multirate_drive_bring_it_to_its_border() -> None:
     design = amber(2, 10)
     exact = exact_margins(assemble_loops(design), "u")
     for change, stable in ((0.999, True), (1.001, False)):
-        slower = replace(
-            design.controller, computing_delay_s=design.controller.computing_delay_s + change * exact.delay_s
-        )
-        system = assemble_loops(replace(design, controller=slower)).tick_system
+        delay_s = design.controller.computing_delay_s + change * exact.delay_s
+        system = assemble_loops(controlled(design, computing_delay_s=delay_s)).tick_system
         assert bool(np.max(np.abs(np.linalg.eigvals(system.lifted().A))) < 1) is stable
 
 
@@ -258,20 +217,20 @@ def test_trap_back_emf_and_the_locked_rotor() -> None:
 
 def test_operating_points_of_the_friction() -> None:
     design = amber()
-    assert friction_slope(design) == 5.25e-6
-    assert friction_slope(design, "rest", load_Nm=-8.0) == pytest.approx(5.25e-6 + 2.25e-3 + 1.34e-3 * 8)
-    slope = friction_slope(design, "describing-function", 8.0, speed_amplitude_rad_s=100.0)
-    assert slope == pytest.approx(5.25e-6 + 4 * (2.25e-3 + 1.34e-3 * 8) / (np.pi * 100))
+    assert slope_at(design, Operating()) == 5.25e-6
+    still = Operating(point="rest", load_Nm=-8.0)
+    assert slope_at(design, still) == pytest.approx(5.25e-6 + 2.25e-3 + 1.34e-3 * 8)
+    swings = Operating(point="describing-function", load_Nm=8.0, speed_amplitude_rad_s=100.0)
+    assert slope_at(design, swings) == pytest.approx(5.25e-6 + 4 * (2.25e-3 + 1.34e-3 * 8) / (np.pi * 100))
     uneven = replace(
         design,
         friction=Friction(
             dry_torque_Nm=2e-3, dry_torque_reverse_Nm=4e-3, viscous_Nms_rad=1e-6, viscous_reverse_Nms_rad=3e-6
         ),
     )
-    assert friction_slope(uneven, direction=-1) == 3e-6
-    assert friction_slope(uneven, "describing-function", speed_amplitude_rad_s=10.0) == pytest.approx(
-        2e-6 + 4 * 3e-3 / (np.pi * 10)
-    )
+    assert slope_at(uneven, Operating(direction=-1)) == 3e-6
+    slow = replace(swings, load_Nm=0.0, speed_amplitude_rad_s=10.0)
+    assert slope_at(uneven, slow) == pytest.approx(2e-6 + 4 * 3e-3 / (np.pi * 10))
     rest = assemble_loops(design, operating_point="rest", load_Nm=8.0).velocity
     sliding = assemble_loops(design).velocity
     z = np.exp(1j * 50 * 1e-4)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import scipy.signal
 import tomli_w
+from loop_designs import controlled
 from own_laws import PlainLaw, drawn, period_s
 from scipy.io import savemat
 
@@ -136,7 +137,7 @@ def test_what_a_law_sees_and_how_it_is_limited() -> None:
         limits=Limits(voltage_V=24.0, speed_rad_s=30.0, acceleration_rad_s2=4e4, peak_current_A=2.0,
                       current_rate_A_s=4e3),
     )  # fmt: skip
-    base = replace(base, controller=replace(base.controller, period_s=1e-4, computing_delay_s=1e-4))
+    base = controlled(base, period_s=1e-4, computing_delay_s=1e-4)
     inputs = ["command", "error", "speed", "angle", "current", "output_angle", "output_speed"]
     for stage, size in (("current", 0.1), ("velocity", 0.1), ("position", 1.0)):
         rng = np.random.default_rng(7)

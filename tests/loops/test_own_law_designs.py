@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from loop_designs import controlled
 from own_laws import linear, period_s
 from scipy.linalg import solve_continuous_are, solve_discrete_are
 from scipy.signal import place_poles
@@ -33,7 +34,7 @@ def same_poles(found: np.ndarray, wanted: np.ndarray, within: float) -> None:
 def test_lqg_velocity_controller() -> None:
     """Separation: the closed drive has the poles of the regulator and of the observer, by scipy's Riccati."""
     base = replace(linear(load_design("ilr33-amber")), requirements=(), encoder=Encoder())
-    base = replace(base, controller=replace(base.controller, position=None))
+    base = controlled(base, position=None)
     system, T = plant(base, command="i_ref"), period_s(base, "velocity")
     seen = [k for k, name in enumerate(system.state_labels) if name != "th"]
     A, B = system.A[np.ix_(seen, seen)], system.B[seen, :1]
@@ -122,9 +123,8 @@ def test_h_infinity_position_controller_of_order_6() -> None:
 def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
     """All poles where they were placed: current, motor, coupling and load measured, the delay remembered."""
     base = replace(linear(load_design("joint")), requirements=(), encoder=Encoder())
-    control = replace(base.controller, current=None, velocity=None, position=PositionLoop(gain=1.0),
+    base = controlled(base, current=None, velocity=None, position=PositionLoop(gain=1.0),
                       computing_delay_s=base.controller.period_s)  # fmt: skip
-    base = replace(base, controller=control)
     system, T = plant(base, command="u"), base.controller.period_s
     names = list(system.state_labels)
     assert names == ["i", "w", "th", "W", "twist", "u1"]
@@ -149,14 +149,9 @@ def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
     loop = assemble_loops(mine).position
     assert loop is not None
     z = np.exp(1j * np.geomspace(1e-3, 3.0, 50))
-    bare, own = (
-        np.where(np.arange(6) == 5, 0.0, K),
-        gains["u1"],
-    )  # its own output it remembers: no loop is cut
-    theirs = np.array([(bare @ np.linalg.solve(one * np.eye(6) - A, B)).item() for one in z]) / (
-        1.0 + own / z
-    )
-    np.testing.assert_allclose(loop.open_loop(z), theirs, rtol=1e-7)
+    bare = np.where(np.arange(6) == 5, 0.0, K)  # its own output it remembers: no loop is cut
+    theirs = np.array([(bare @ np.linalg.solve(one * np.eye(6) - A, B)).item() for one in z])
+    np.testing.assert_allclose(loop.open_loop(z), theirs / (1.0 + gains["u1"] / z), rtol=1e-7)
 
 
 def test_torque_loop_on_the_twist() -> None:
@@ -164,8 +159,7 @@ def test_torque_loop_on_the_twist() -> None:
     base = replace(linear(load_design("joint")), requirements=(), encoder=Encoder())
     coupling = base.coupling
     assert coupling is not None
-    base = replace(base, controller=replace(base.controller, position=None),
-                   load=replace(base.load, inertia_kgm2=1e9))  # fmt: skip
+    base = replace(controlled(base, position=None), load=replace(base.load, inertia_kgm2=1e9))
     T, k = period_s(base, "velocity"), coupling.stiffness_Nm_rad
     kp, ki, per_command = 2e-3, 0.4, 5.0  # A/(N m), A/(N m s), N m per rad/s of the command
     row = np.array([per_command, -k / base.ratio_to_coupling, k * base.ratio_behind_coupling])
@@ -178,12 +172,8 @@ def test_torque_loop_on_the_twist() -> None:
     A, B, C = system.A, system.B[:, :1], system.C[[system.output_labels.index("twist")]]
     z = np.exp(1j * np.geomspace(1e-2, 3.0, 40))
     held = sum(np.linalg.matrix_power(A, j) @ B for j in range(ticks))
-    P = np.array(
-        [
-            (C @ np.linalg.solve(one * np.eye(len(A)) - np.linalg.matrix_power(A, ticks), held)).item()
-            for one in z
-        ]
-    )
+    over = np.linalg.matrix_power(A, ticks)
+    P = np.array([(C @ np.linalg.solve(one * np.eye(len(A)) - over, held)).item() for one in z])
     np.testing.assert_allclose(loop.open_loop(z), k * P * (kp + ki * T * z / (z - 1.0)), rtol=1e-6)
     rows = Rows.of(mine, limits_on=False)
     rows["ticks"] = int(4.0 / base.controller.period_s)

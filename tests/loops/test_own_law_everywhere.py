@@ -1,18 +1,18 @@
 """A law of one's own in what asks for the loops and the running drive: validator, C code, page, tuning."""
 
 import sys
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from loop_designs import controlled
 from own_laws import period_s
 
 from actuator_lti import load_design
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.compiled.compiler import system_compiler
 from actuator_lti.design import Design
-from actuator_lti.drive.steady_gains import torque_gain_Nm_rad
+from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.linear.code_check import check_code
 from analyses.linear.loop_survey import survey_loops
 from analyses.tuning.rules import rule_gains
@@ -80,8 +80,7 @@ def test_many_designs_have_the_gain_of_the_law() -> None:
 def test_torque_at_rest() -> None:
     """Of a static law the product of the gains; a law that integrates has no end of it."""
     design = load_design("ilr33-amber")
-    base = replace(design, controller=replace(design.controller, velocity=replace(
-        design.controller.velocity, integral_time_s=None)))  # type: ignore[arg-type,type-var]  # fmt: skip
+    base = controlled(design, velocity={"integral_time_s": None})
     gain = base.controller.velocity.gain  # type: ignore[union-attr]
     T = period_s(base, "velocity")
     static = base.with_law("velocity", ([[0.5]], [[0.5]], [[0.4 * gain]], [[0.6 * gain]], T), ["error"])

@@ -5,8 +5,9 @@ from math import cos, pi, radians
 
 import numpy as np
 import pytest
+from loop_designs import sprung
 
-from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins
+from actuator_lti import assemble_loops, closed_loop_bandwidth, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, Gravity
 from actuator_lti.drive.angle import moment_slope
@@ -17,9 +18,7 @@ QUARTERS = (radians(90), radians(270), radians(-90), -3 * pi / 2, 5 * pi / 2)
 
 
 def hung(name: str, gravity: Gravity | None, slope_Nm_rad: float = 0.0) -> Design:
-    design = load_design(name)
-    load = replace(design.load, path="back-drivable", gravity=gravity, moment_slope_Nm_rad=slope_Nm_rad)
-    return replace(design, load=load)
+    return sprung(name, slope_Nm_rad, gravity=gravity)
 
 
 def level(offset_rad: float) -> Gravity:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from loop_designs import amber, designs, emps, without
+from loop_designs import amber, controlled, designs, emps, without
 from recursion import run
 from test_stacked import DRIVES, FILTERS, everything
 from two_mass import drive_d, drive_e
@@ -83,8 +83,7 @@ def test_force_source_on_a_linear_axis() -> None:
 @pytest.mark.parametrize("delay", DELAYS)
 def test_driving_and_driven_for_every_delay(point: str, delay: float) -> None:
     design = replace(everything(), friction=model.Friction(viscous_Nms_rad=1e-5, load_coefficient=0.02))
-    control = replace(design.controller, computing_delay_s=delay * 2e-4)
-    agree(replace(design, controller=control), 5000, 1e-9, point)
+    agree(controlled(design, computing_delay_s=delay * 2e-4), 5000, 1e-9, point)
 
 
 @st.composite
@@ -184,18 +183,17 @@ def test_the_gate_has_teeth() -> None:
     velocity = design.controller.velocity
     assert velocity.filters == FILTERS
     moved = replace(FILTERS[1], frequency_rad_s=900.9)
-    other = replace(velocity, filters=(FILTERS[0], moved, *FILTERS[2:]))
-    late = replace(amber().controller, computing_delay_s=1.01e-4)
+    other = controlled(design, velocity={"filters": (FILTERS[0], moved, *FILTERS[2:])})
+    late = controlled(amber(), computing_delay_s=1.01e-4)
     command = 0.1 * np.sin(np.arange(2000) / 40)
-    for base, changed in ((design, replace(design.controller, velocity=other)), (amber(), late)):
+    for base, changed in ((design, other), (amber(), late)):
         ours = assemble_loops(base).tick_system.respond(command)["u"]
-        assert worst(ours, run(replace(base, controller=changed), command)["u"]) > 1e-6
+        assert worst(ours, run(changed, command)["u"]) > 1e-6
 
 
 def test_position_loop_of_a_rigid_drive_does_not_care_for_the_sensor() -> None:
-    design = amber()
-    other = replace(design.controller, position=model.PositionLoop(gain=120.0, sensor="output"))
-    one, two = (assemble_loops(each).position for each in (design, replace(design, controller=other)))
+    other = controlled(amber(), position={"sensor": "output"})
+    one, two = (assemble_loops(each).position for each in (amber(), other))
     np.testing.assert_allclose(one.open_loop.A, two.open_loop.A, rtol=1e-14)
 
 

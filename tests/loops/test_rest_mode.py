@@ -1,35 +1,28 @@
 """Loops at zero frequency: a spring or pendulum, a free rotor; what cancels there is known so."""
 
 import warnings
-from dataclasses import replace
 from typing import Any
 
 import control
 import numpy as np
 import pytest
+from loop_designs import controlled, sprung
 from mpmath import lu_solve, matrix, mp
 
-from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins, step_figures
+from actuator_lti import assemble_loops, closed_loop_bandwidth, stability_margins, step_figures
 from actuator_lti.design import read_design_text
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import exact_margins
-from actuator_lti.loops.blocks import Block
 from actuator_lti.loops.periodic import fundamental, point_blocks
 from actuator_lti.loops.sampled import stage_blocks
+from actuator_lti.loops.tick import Block
 from actuator_lti.systems.rest_mode import without_rest_mode
 from nonlinear.bench.on_the_bench import on_the_bench
 from nonlinear.bench.operating_motion import on_its_stand
 from tests.validation.random_drives import full_drive
 
 SLOPES = (-6000.0, -100.0, -0.1, 50.0)
-
-
-def sprung(name: str, slope_Nm_rad: float) -> Any:
-    """A shipped drive whose load follows the angle through a back-drivable path."""
-    design = load_design(name)
-    load = replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope_Nm_rad)
-    return replace(design, load=load)
 
 
 def at_rest(design: Any) -> float:
@@ -39,11 +32,8 @@ def at_rest(design: Any) -> float:
     return law.gain / law.integral_time_s * motor.torque_constant_Nm_A / stiffness
 
 
-@pytest.mark.parametrize(
-    ("form", "slope"),
-    [(form, slope) for form in ("sampled", "ideal") for slope in SLOPES]
-    + [("continuous", slope) for slope in SLOPES],
-)
+@pytest.mark.parametrize("slope", SLOPES)
+@pytest.mark.parametrize("form", ["sampled", "ideal", "continuous"])
 def test_the_velocity_loop_has_the_gain_at_zero_that_the_spring_gives(form: Any, slope: float) -> None:
     design = sprung("ilr33-amber", slope)
     loop = assemble_loops(design, form=form).velocity
@@ -183,7 +173,7 @@ def test_both_sides_and_values_that_are_not_finite() -> None:
 def test_the_mode_at_rest_is_no_border_of_stability(slope: float) -> None:
     """Eigenvalues at 1 + 1e-16 whatever the gain; certified margins of the loop say where the border is."""
     design = sprung("ilr33-amber", slope)
-    design = replace(design, controller=replace(design.controller, position=None))
+    design = controlled(design, position=None)
     loops = assemble_loops(design)
     exact = exact_margins(loops, "u")
     certified = stability_margins(loops.break_points["u"].open_loop, certify=True)
@@ -263,9 +253,7 @@ def test_a_gain_of_one_at_rest_has_its_distances(certify: bool) -> None:
 @pytest.mark.parametrize("slope", [-0.1, 0.1, 5.0, 50.0])
 def test_a_weak_spring_is_told_from_none(slope: float) -> None:
     """Closed at the current only, the motor is held by the spring alone: unstable where that drives."""
-    design = load_design("ilr33-amber")
-    load = replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope)
-    loops = assemble_loops(replace(design, load=load), form="continuous")
+    loops = assemble_loops(sprung("ilr33-amber", slope), form="continuous")
     assert stability_margins(loops.current.open_loop).stable is (slope < 0.0)
     assert stability_margins(loops.velocity.open_loop).stable is True
 
@@ -282,9 +270,7 @@ def test_the_gain_at_rest_of_a_current_loop_on_a_free_rotor() -> None:
 @pytest.mark.parametrize("slope", [-40.0, -0.1, 50.0])
 def test_a_slow_pole_behind_two_integrators_is_no_turn_of_the_delay(slope: float) -> None:
     """Cut at the voltage L falls by 25 decades before it crosses one: by its factors or exactly."""
-    design = load_design("ilr33-amber")
-    load = replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope)
-    cuts = assemble_loops(replace(design, load=load), form="continuous").break_points
+    cuts = assemble_loops(sprung("ilr33-amber", slope), form="continuous").break_points
     result = stability_margins(cuts["u"].open_loop)
     assert result.evidence in ("checked", "certified")
     assert result.stable is stability_margins(cuts["w_ref"].open_loop).stable  # the same closed-loop poles

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from loop_designs import amber, emps, without
+from loop_designs import amber, controlled, emps, sprung, without
 from two_mass import drive_d, drive_e
 
 from actuator_lti import assemble_loops, load_design, stability_margins
@@ -38,22 +38,17 @@ MAP = tuple(
 def everything() -> Design:
     """A position loop in front of a spring, every slot of the controller filled."""
     base = drive_e()
-    control = base.controller
     position = PositionLoop(
         gain=20.0, every=4, feedforward=0.8, integral_time_s=0.2, derivative_time_s=2e-3,
         derivative_filter_s=1e-3, acceleration_feedforward=0.7, sensor="output",
     )  # fmt: skip
-    controller = replace(
-        control,
-        computing_delay_s=3e-4,
-        position=position,
-        velocity=replace(control.velocity, every=2, filters=FILTERS),
-        current=replace(control.current, back_emf_feedforward=0.9, resistance_feedforward=0.5),
-    )
     encoder = Encoder(speed="tracking", bandwidth_rad_s=800.0, filter_time_s=2e-4)
     command = Command(filter_time_s=3e-3, filter_order=2)
     load = replace(base.load, moment_slope_Nm_rad=-30.0)
-    return replace(base, controller=controller, encoder=encoder, command=command, load=load)
+    fed = {"back_emf_feedforward": 0.9, "resistance_feedforward": 0.5}
+    filled = controlled(base, computing_delay_s=3e-4, position=position,
+                        velocity={"every": 2, "filters": FILTERS}, current=fed)  # fmt: skip
+    return replace(filled, encoder=encoder, command=command, load=load)
 
 
 def bent() -> Design:
@@ -73,7 +68,7 @@ DRIVES = {
     "position only": without(amber(), "current", "velocity", gain=0.05),
     "force source": emps(delay_s=5e-4),
     "speed drive": drive_d(),
-    "torque drive": replace(drive_d(), controller=replace(drive_d().controller, velocity=None)),
+    "torque drive": controlled(drive_d(), velocity=None),
     "everything": everything(),
     "friction map": replace(amber(), friction=replace(amber().friction, points=MAP)),
     "bent spring": bent(),
@@ -156,18 +151,13 @@ def test_many_designs_figures_know_the_wide_drive() -> None:
         assert result == pytest.approx(expected, rel=1e-6, abs=1e-6), quantity
 
 
-def pushed(base: str, slope: float) -> Design:
-    design = load_design(base)
-    return replace(design, load=replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope))
-
-
 @pytest.mark.parametrize(
     ("design", "k", "loop", "told"),
     [
         (DRIVES["speed drive"], 3, "current", False),  # a crossover at 2.5e-4 rad/s, 2e8 samples a turn
         (load_design("fin"), 8, "velocity", True),  # nearest to -1 at zero frequency itself
-        (pushed("ilr33-amber", 3000.0), 10, "velocity", True),  # L(0) from two slow poles
-        (pushed("ilr33-amber", 3000.0), 20, "velocity", True),  # the same, and nearest to -1 there
+        (sprung("ilr33-amber", 3000.0), 10, "velocity", True),  # L(0) from two slow poles
+        (sprung("ilr33-amber", 3000.0), 20, "velocity", True),  # the same, and nearest to -1 there
     ],
 )
 def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
@@ -198,9 +188,8 @@ def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
 @pytest.mark.parametrize("slope", [-1e3, -1.0, -1e-3])
 def test_behind_a_soft_spring_the_gain_at_zero_frequency_keeps_its_digits(slope: float, gain: float) -> None:
     """A spring takes the speed's gain at rest away, the integral of the PI gives it back: L(0) is finite."""
-    design = pushed("ilr33-amber", slope)
-    velocity = replace(design.controller.velocity, gain=gain * design.controller.velocity.gain)
-    design = replace(design, controller=replace(design.controller, velocity=velocity))
+    design = sprung("ilr33-amber", slope)
+    design = controlled(design, velocity={"gain": gain * design.controller.velocity.gain})
     figures = linear_figures(Population(design, {}, 1), time_figures=False)
     response = assemble_loops(design).present["velocity"].open_loop
     A, b, c = (np.asarray(part, dtype=float) for part in (response.A, response.B, response.C))
@@ -217,7 +206,7 @@ def test_gravity_may_differ_from_design_to_design() -> None:
     assert moment_slope(many, Operating(angle_rad=0.3)) == pytest.approx(expected, rel=1e-14)
 
 
-STATIC = ("output_rate", "motor_current", "acceleration")
+STATIC = ("output_rate", "motor_current", "acceleration", "torque_margin")
 
 
 def rich() -> Design:

@@ -5,44 +5,46 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from loop_designs import amber
+from loop_designs import amber, controlled
 from two_mass import drive_d, drive_e
 
 from actuator_lti import InputError, assemble_loops, stability_margins
 from actuator_lti.design import model
 from actuator_lti.drive.blocks import biquad
-from actuator_lti.drive.operating import friction_slope
+from actuator_lti.drive.operating import Operating, slope_at
 
 NOTCH = model.Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
 
 
-def table(margins: list) -> list[tuple[float, float]]:
-    return sorted((m.deg, m.frequency_rad_s) for m in margins)
+PUBLISHED = {  # loop, filters, phase margins (deg, rad/s), gain margin (ratio, rad/s)
+    "K1, current loop, rotor free": (
+        "current", (),
+        [(77.98855712, 610.7379071), (166.4429489, 645.4654402), (77.45285893, 1612.214119)],
+        (6.503072809, 10479.30493),
+    ),
+    "K2, velocity loop": (
+        "velocity", (),
+        [(74.46418674, 245.4593817), (-129.7195634, 541.7421541), (62.39378704, 872.8623258)],
+        (7.624731944, 2860.527035),
+    ),
+    "K3, with a notch": ("velocity", (NOTCH,), [(63.34614837, 241.6147984)], (8.849712773, 3101.308198)),
+}  # fmt: skip
 
 
-def same(result: list[tuple[float, float]], expected: list[tuple[float, float]], digits: float) -> None:
-    assert len(result) == len(expected)
-    for have, want in zip(result, sorted(expected), strict=True):
-        assert have == pytest.approx(want, rel=digits)
+@pytest.mark.parametrize("case", PUBLISHED)
+def test_published_margins(case: str) -> None:
+    name, filters, phases, gain = PUBLISHED[case]
+    margins = stability_margins(getattr(assemble_loops(drive_d(*filters)), name).open_loop)
+    for have, want in (
+        (sorted((m.deg, m.frequency_rad_s) for m in margins.phase_margins), sorted(phases)),
+        ([(m.ratio, m.frequency_rad_s) for m in margins.gain_margins], [gain]),
+    ):
+        assert [each for pair in have for each in pair] == pytest.approx(
+            [each for pair in want for each in pair], rel=1e-8
+        )
 
 
-def test_k1_current_loop_with_the_rotor_free() -> None:
-    loop = assemble_loops(drive_d()).current
-    margins = stability_margins(loop.open_loop)
-    phases = [(77.98855712, 610.7379071), (166.4429489, 645.4654402), (77.45285893, 1612.214119)]
-    same(table(margins.phase_margins), phases, 1e-8)
-    same([(m.ratio, m.frequency_rad_s) for m in margins.gain_margins], [(6.503072809, 10479.30493)], 1e-8)
-
-
-def test_k2_velocity_loop() -> None:
-    loop = assemble_loops(drive_d()).velocity
-    margins = stability_margins(loop.open_loop)
-    phases = [(74.46418674, 245.4593817), (-129.7195634, 541.7421541), (62.39378704, 872.8623258)]
-    same(table(margins.phase_margins), phases, 1e-8)
-    same([(m.ratio, m.frequency_rad_s) for m in margins.gain_margins], [(7.624731944, 2860.527035)], 1e-8)
-
-
-def test_k3_notch() -> None:
+def test_coefficients_of_the_notch_of_k3() -> None:
     realisation = biquad(NOTCH, 2e-4).sampled
     b = [
         realisation.D,
@@ -53,10 +55,6 @@ def test_k3_notch() -> None:
     np.testing.assert_allclose(
         [-realisation.A[0][0], -realisation.A[1][0]], [-1.922292822062545, 0.9381484683269357], rtol=1e-13
     )
-    loop = assemble_loops(drive_d(NOTCH)).velocity
-    margins = stability_margins(loop.open_loop)
-    same(table(margins.phase_margins), [(63.34614837, 241.6147984)], 1e-8)
-    same([(m.ratio, m.frequency_rad_s) for m in margins.gain_margins], [(8.849712773, 3101.308198)], 1e-8)
 
 
 def test_k4_dynamic_stiffness() -> None:
@@ -115,7 +113,6 @@ def test_an_ever_stiffer_coupling_tends_to_the_rigid_drive(form: str) -> None:
 
 def test_driving_and_driven_change_the_reaction() -> None:
     """With CM the motor feels T_s (1/N_c + CM' sgn(w T_s)); a gap takes the spring away."""
-    from actuator_lti.drive.operating import Operating
     from actuator_lti.drive.plant import motor_plant
 
     design = replace(drive_d(), friction=model.Friction(load_coefficient=0.02))
@@ -131,11 +128,8 @@ def test_driving_and_driven_change_the_reaction() -> None:
 
 def test_output_sensor_sees_the_spring() -> None:
     """Below the resonance both sensors agree; above it the output lags the motor by half a turn."""
-    design = drive_e()
-    control = replace(design.controller, position=model.PositionLoop(gain=20.0, sensor="output"))
-    motor, output = (
-        assemble_loops(each, "ideal").position for each in (design, replace(design, controller=control))
-    )
+    drives = (drive_e(), controlled(drive_e(), position={"sensor": "output"}))
+    motor, output = (assemble_loops(each, "ideal").position for each in drives)
     s = 1j * np.array([1.0, 3000.0])
     ratio = output.open_loop(s) / motor.open_loop(s)
     # phi N_c/th = (c s + k)/(J_l s^2 + (c + Cv_l) s + k)
@@ -160,8 +154,8 @@ def test_slope_and_describing_function_of_a_friction_map() -> None:
         model.FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in ((0.0, 0.02), (10.0, 0.01), (50.0, 0.03))
     )
     design = replace(drive_d(), friction=model.Friction(points=points))
-    assert friction_slope(design) == pytest.approx(-1e-3)
-    assert friction_slope(design, speed_rad_s=-80.0) == pytest.approx(5e-4)
+    assert slope_at(design, Operating()) == pytest.approx(-1e-3)
+    assert slope_at(design, Operating(speed_rad_s=-80.0)) == pytest.approx(5e-4)
     # fundamental of the torque of a sinusoidal speed, by quadrature over a quarter turn
     W = 40.0
     edges = np.arcsin(np.array([0.0, 10.0, W]) / W)
@@ -173,5 +167,5 @@ def test_slope_and_describing_function_of_a_friction_map() -> None:
         torque = np.where(speed < 10, 0.02 - 1e-3 * speed, 0.01 + 5e-4 * (speed - 10))
         whole += float(np.sum(weights * torque * np.sin(x)) * (high - low) / 2)
     expected = 4 / np.pi * whole / W
-    result = friction_slope(design, "describing-function", speed_amplitude_rad_s=W)
+    result = slope_at(design, Operating(point="describing-function", speed_amplitude_rad_s=W))
     assert result == pytest.approx(expected, rel=1e-12)

@@ -5,6 +5,7 @@ from math import acos, asin, cos, exp, pi, sin, sqrt
 
 import numpy as np
 import pytest
+from loop_designs import controlled
 
 from actuator_lti import InputError, load_design
 from actuator_lti.design import model, read_design_text
@@ -220,9 +221,7 @@ def test_a_self_locking_drive_feels_its_cogging() -> None:
     assert follows_angle(design)
     assert not follows_angle(CASES[0].put(plain))
     start = State(motor_angle_rad=CASES[1].stable)
-    open_loop = replace(
-        design, controller=replace(design.controller, position=None, velocity=None, current=None)
-    )
+    open_loop = controlled(design, position=None, velocity=None, current=None)
     volts = 0.5 * A * plain.motor.resistance_ohm / plain.motor.torque_constant_Nm_A
     run = simulate(open_loop, commands.step(volts), 1.0, initial=start)
     assert run.motor_angle_rad[-1] == pytest.approx(CASES[1].stable + asin(0.5) / 12.0, rel=1e-6)
@@ -249,19 +248,10 @@ def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: 
     motion = operating_motion(design)
     assert motion.speed_rad_s == 0.0
     start = State(motor_angle_rad=0.0, output_angle_rad=motion.output_rad(design))
-    control = replace(design.controller, position=None, velocity=None, current=None)
-    free = replace(design, controller=control, command=model.Command())
+    free = replace(controlled(design, position=None, velocity=None, current=None), command=model.Command())
+    at = {"disturbance_Nm": motion.extra_Nm, "initial": start, "friction_on": False, "limits_on": False}
     turned = [
-        simulate(
-            free,
-            commands.step(volts),
-            0.01,
-            motion.load_Nm,
-            disturbance_Nm=motion.extra_Nm,
-            initial=start,
-            friction_on=False,
-            limits_on=False,
-        ).motor_angle_rad
+        simulate(free, commands.step(volts), 0.01, motion.load_Nm, **at).motor_angle_rad
         for volts in (0.0, 1e-4, -1e-4)
     ]
     assert np.max(np.abs(turned[0] - start.motor_angle_rad)) < 1e-9
@@ -333,8 +323,7 @@ def test_top_speed_is_that_of_the_run(path: str) -> None:
     """(kM U/R - C0) over kM kE/R + Cv + (1/N + CM) D/N, or CM D/N where the path locks itself."""
     base = load_design("ilr33-amber")
     load = replace(base.load, path=path, moment_damping_Nms_rad=20.0)
-    open_loop = replace(base.controller, position=None, velocity=None, current=None)
-    design = replace(base, load=load, controller=open_loop)
+    design = controlled(replace(base, load=load), position=None, velocity=None, current=None)
     motor, friction, N = design.effective_motor, design.friction, design.total_ratio
     per_volt = motor.torque_constant_Nm_A / motor.resistance_ohm
     passed = friction.load_coefficient + (1.0 / N if path == "back-drivable" else 0.0)

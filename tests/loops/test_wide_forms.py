@@ -6,27 +6,15 @@ from typing import Any
 import control
 import numpy as np
 import pytest
+from loop_designs import controlled, faster, response
 from test_stacked import FILTERS, everything
 from two_mass import drive_d, drive_e
 
 from actuator_lti import InputError, assemble_loops
-from actuator_lti.design.model import Design, Encoder, Filter, Limits, PositionLoop
+from actuator_lti.design.model import Encoder, Filter, Limits, PositionLoop
 from actuator_lti.drive.blocks import biquad, lag, tracking
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.loops.delay_budget import delay_budget
-
-
-def faster(design: Design, factor: float) -> Design:
-    """The same continuous drive, sampled faster (its filters stay)."""
-    control_ = design.controller
-    quick = replace(
-        control_, period_s=control_.period_s / factor, computing_delay_s=control_.computing_delay_s / factor
-    )
-    return replace(design, controller=quick)
-
-
-def response(system: Any, omega: np.ndarray) -> np.ndarray:
-    return np.asarray(system(np.exp(1j * omega * system.dt) if system.isdtime(strict=True) else 1j * omega))
 
 
 @pytest.mark.parametrize("form", ["sampled", "continuous"])
@@ -52,10 +40,8 @@ def test_pid_with_filters_by_hand() -> None:
     """Ideal form: Kv (1 + 1/(Ti s) + Td s/(TD s + 1)) in front of the closed velocity loop."""
     base = drive_e()
     pid = PositionLoop(gain=20.0, integral_time_s=0.2, derivative_time_s=2e-3, derivative_filter_s=1e-3)
-    one, two = (
-        assemble_loops(replace(base, controller=replace(base.controller, position=law)), "ideal").position
-        for law in (PositionLoop(gain=20.0), pid)
-    )
+    laws = (PositionLoop(gain=20.0), pid)
+    one, two = (assemble_loops(controlled(base, position=law), "ideal").position for law in laws)
     s = 1j * np.geomspace(1, 1000, 10)
     law = 1 + 1 / (0.2 * s) + 2e-3 * s / (1e-3 * s + 1)
     np.testing.assert_allclose(two.open_loop(s), law * one.open_loop(s), rtol=1e-9)
@@ -74,12 +60,12 @@ def test_torque_filters_multiply_the_velocity_loop() -> None:
 def test_resistance_and_back_emf_feedforward_make_the_current_loop_ideal() -> None:
     """With k = 1 and w itself measured, the current loop is that of a locked rotor: back-EMF is gone."""
     base = drive_d()
-    fed = replace(base.controller, current=replace(base.controller.current, back_emf_feedforward=1.0))
-    free = assemble_loops(replace(base, controller=fed), "ideal").current
+    fed = controlled(base, current={"back_emf_feedforward": 1.0})
+    free = assemble_loops(fed, "ideal").current
     locked = assemble_loops(base, "ideal", rotor="locked").current
     s = 1j * np.geomspace(1, 1e4, 10)
     np.testing.assert_allclose(free.open_loop(s), locked.open_loop(s), rtol=1e-9)
-    sampled = assemble_loops(replace(base, controller=fed)).current
+    sampled = assemble_loops(fed).current
     assert sampled.periodic  # the speed is measured every other tick
 
 
@@ -122,9 +108,8 @@ def test_the_budget_has_a_share_for_each_filter() -> None:
         assert sum(budget.items.values()) == pytest.approx(budget.total_deg, abs=1e-9)
         assert (budget.total_deg - exact + 180) % 360 - 180 == pytest.approx(0, abs=1e-6)
         assert len(budget.filters_deg) == 5
-    current = design.controller.current
-    unfed = replace(design.controller, current=replace(current, back_emf_feedforward=0.0))
-    shares = delay_budget(replace(design, controller=unfed), "velocity", omega).filters_deg
+    unfed = controlled(design, current={"back_emf_feedforward": 0.0})
+    shares = delay_budget(unfed, "velocity", omega).filters_deg
     s = 1j * omega
     own = np.angle(2000.0**2 / (s**2 + np.sqrt(2) * 2000.0 * s + 2000.0**2), deg=True)
     assert shares["torque lowpass 1 2000 rad/s"] == pytest.approx(own, abs=1e-6)
@@ -189,7 +174,7 @@ def test_a_derivative_without_a_filter_is_refused_only_where_it_is_improper() ->
     """A bare D is proper in front of this plant, as the angle's derivative is a state."""
     base = drive_e()
     bare = PositionLoop(gain=20.0, derivative_time_s=2e-3)
-    loop = assemble_loops(replace(base, controller=replace(base.controller, position=bare)), "ideal").position
+    loop = assemble_loops(controlled(base, position=bare), "ideal").position
     plain = assemble_loops(base, "ideal").position
     s = 1j * np.geomspace(1, 1000, 10)
     np.testing.assert_allclose(loop.open_loop(s), (1 + 2e-3 * s) * plain.open_loop(s), rtol=1e-8)

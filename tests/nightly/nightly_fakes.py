@@ -11,9 +11,8 @@ from typing import Any
 
 from reports.document import column, document, section, table, verdict, verdicts
 from reports.nightly.asked import Settings
-from reports.nightly.code_version import CodeVersion
 from reports.nightly.figures import digest
-from reports.nightly.source import Job, Study
+from reports.nightly.source import CodeVersion, Job, Study
 from reports.verdict_summary import role
 
 CODE = CodeVersion(sources="s", libraries={"numpy": "2"}, commit="c" * 40)

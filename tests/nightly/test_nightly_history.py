@@ -93,15 +93,15 @@ def test_a_night_enters_whole_or_not_at_all(tmp_path, monkeypatch) -> None:
 def test_a_newer_history_is_refused(tmp_path) -> None:
     history = open_history(tmp_path)
     add(history, {"x": 1.0})
-    index = json.loads((tmp_path / files.FILE).read_text())
-    (tmp_path / files.FILE).write_text(json.dumps({**index, "version": files.VERSION + 1, "index": 3}))
+    index = json.loads((tmp_path / files.INDEX).read_text())
+    (tmp_path / files.INDEX).write_text(json.dumps({**index, "version": files.VERSION + 1, "index": 3}))
     with pytest.raises(InputError, match=r"has version 2.*use a newer"):
         open_history(tmp_path)
 
 
 @pytest.mark.parametrize("text", ["no JSON", "[" * 100_000, "{}", '{"schema": "other", "version": 1}'])
 def test_what_is_no_history_is_refused(tmp_path, text) -> None:
-    path: Path = tmp_path / files.FILE
+    path: Path = tmp_path / files.INDEX
     path.write_text(text)
     with pytest.raises(InputError, match="no history of a nightly"):
         open_history(tmp_path)

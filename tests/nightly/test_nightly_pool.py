@@ -15,10 +15,9 @@ from nightly_fakes import BUILD, CODE, INLINE, Calendar, Fakes, job, study
 from site_checks import check_whole
 
 from analyses.studies.engine import Engine
-from reports.nightly.apart import Limits, Task, build_each
 from reports.nightly.cache import Cache
 from reports.nightly.night import run_night
-from reports.nightly.worker import Answer
+from reports.nightly.processes import Answer, Limits, Task, build_each
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +78,7 @@ def workers_left() -> list[list[str]]:
     import psutil
 
     lines = [child.cmdline() for child in psutil.Process().children()]
-    return [line for line in lines if "nightly.worker" in str(line)]
+    return [line for line in lines if "nightly.processes" in str(line)]
 
 
 def test_no_worker_stays_behind(troubled) -> None:
@@ -113,12 +112,12 @@ def test_a_process_goes_from_job_to_job(tmp_path) -> None:
 
 def test_a_process_that_died_while_it_waited_is_replaced() -> None:
     """By the system, short of memory, say: the next job does not pay for it."""
-    from reports.nightly.apart import _Warm
+    from reports.nightly.processes import Warm
 
-    warm = _Warm(Limits(build=BUILD, time_limit_s=60.0, memory_bytes=10**10))
+    warm = Warm(Limits(build=BUILD, time_limit_s=60.0, memory_bytes=10**10))
     try:
         first = warm.build(Task(key="0" * 64, payload=job("a", mode="pid").payload))
-        (waiting,) = warm._idle
+        (waiting,) = warm._children.values()
         waiting._process.kill()
         waiting._process.wait()
         second = warm.build(Task(key="1" * 64, payload=job("b", mode="pid").payload))

@@ -9,7 +9,7 @@ import pytest
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, Filter, Limits
-from actuator_lti.drive.steady_gains import torque_gain_Nm_rad
+from actuator_lti.drive.steady import torque_gain_Nm_rad
 from actuator_lti.errors import InputError
 from nonlinear import Drive, commands, simulate
 from nonlinear.row.filters import section

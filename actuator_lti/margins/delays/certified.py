@@ -6,9 +6,8 @@ from flint import acb, arb, ctx
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
-from actuator_lti.margins.delays.axis import GAIN, IMAGINARY, Axis, turn, zeros
+from actuator_lti.margins.delays.axis import GAIN, IMAGINARY, NOWHERE, Axis, smallest, turn, zeros
 from actuator_lti.margins.delays.exact import ExactDelayLoop
-from actuator_lti.margins.delays.nearest import NOWHERE, smallest
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.exact.certified import difference
 from actuator_lti.margins.exact.crossings import Crossing
@@ -53,6 +52,8 @@ def certified_delayed_margins(
         near[1],
     )
     hidden = loops[0].hidden
+    unstable += hidden.right  # proven by the turn of N + D; the count in double precision stands beside it
+    second = None if start is None else start.agreement.unstable_nyquist
     notes = (
         *hidden_notes(hidden.at_zero, hidden.pairs, hidden.right),
         *far_note(sum(out_of_sight(c.L) for c in reals)),
@@ -61,7 +62,7 @@ def certified_delayed_margins(
         notes = (*notes, f"gain margins above 40 dB beyond {listed_to:.4g} rad/s are not listed")
     return assembled(
         None,
-        Agreement(None, None) if problem else _agreement(unstable + hidden.right, start),
+        Agreement(None, None) if problem else Agreement(unstable, second if second == unstable else None),
         figures if problem is None else None,
         method=_METHOD,
         notes=notes,
@@ -75,20 +76,10 @@ def certified_delayed_margins(
 
 def _known(start: StabilityMargins | None) -> list[tuple[float, float]]:
     """Both distances as double precision has them, each with its frequency."""
-    if start is None or start.modulus_frequency_rad_s is None:
+    if start is None or start.modulus_frequency_rad_s is None or start.disk_margin is None:
         return [NOWHERE] * 2
-    assert start.modulus_margin is not None
-    assert start.disk_margin is not None
-    return [
-        (start.modulus_margin, start.modulus_frequency_rad_s),
-        (start.disk_margin.alpha, start.disk_margin.frequency_rad_s),
-    ]
-
-
-def _agreement(unstable: int, start: StabilityMargins | None) -> Agreement:
-    """The turn of N + D is proven; the count in double precision stands beside it where it is the same."""
-    second = None if start is None else start.agreement.unstable_nyquist
-    return Agreement(unstable, second if second == unstable else None)
+    disk, modulus = start.disk_margin, start.modulus_margin or 0.0
+    return [(modulus, start.modulus_frequency_rad_s), (disk.alpha, disk.frequency_rad_s)]
 
 
 _Answer = tuple[tuple[Crossing, ...], tuple[Crossing, ...], int, float]

@@ -8,7 +8,9 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import islice, takewhile
+from operator import attrgetter
 
 import numpy as np
 
@@ -16,9 +18,9 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.exact.crossings import Crossing, Findings, crossings, smallest
-from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
+from actuator_lti.margins.exact.loop import exact_loop, neighbours
 from actuator_lti.margins.exact.roots import half_planes
-from actuator_lti.margins.given import ULP, Given
+from actuator_lti.margins.given import ULP, Given, unwarped
 from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
@@ -43,25 +45,16 @@ def certified_margins(given: Given) -> StabilityMargins:
     The answer is given where it is the same for neighbours of the data, each entry 8 ulp away.
     """
     loop = exact_loop(given)
-    _refuse_ill_posed(loop)
+    above, below = (loop.N(1), loop.D(1)) if loop.sampled else (loop.N[loop.degree], loop.D[loop.degree])
+    if below and abs(above + below) <= abs(below) * 2 * ULP // (1 << 53):
+        raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
     others = neighbours(given, loop)
     base = Findings(loop)
     return _margins(given, base, _settled(base, [Findings(other) for other in others]))
 
 
-def _refuse_ill_posed(loop: ExactLoop) -> None:
-    above, below = (loop.N(1), loop.D(1)) if loop.sampled else (loop.N[loop.degree], loop.D[loop.degree])
-    if below and abs(above + below) <= abs(below) * 2 * ULP // (1 << 53):
-        raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
-
-
 def _margins(given: Given, base: Findings, result: _Settled) -> StabilityMargins:
-    T = given.period_s
-
-    def frequency(w: float) -> float:
-        return w if T is None else 2.0 * math.atan(w) / T
-
-    figures = None
+    frequency, figures = partial(unwarped, period_s=given.period_s), None
     if result.problem is None:
         modulus, disk = (smallest(base.loop, distance) for distance in (MODULUS, DISK))
         figures = Figures(
@@ -71,7 +64,7 @@ def _margins(given: Given, base: Findings, result: _Settled) -> StabilityMargins
             (disk[0], frequency(disk[1])),
         )
     return assembled(
-        T,
+        given.period_s,
         Agreement(result.unstable, None, result.border),
         figures,
         method=_METHOD,
@@ -163,14 +156,10 @@ def _far(c: Crossing) -> bool:
 
 def _partner(c: Crossing, others: tuple[Crossing, ...]) -> Crossing | None:
     """The crossing that is the same one in another list, which is in order."""
-    first = bisect_left(others, c.w / (1.0 + _SAME_W), key=_place)
+    first = bisect_left(others, c.w / (1.0 + _SAME_W), key=attrgetter("w"))
     beside = takewhile(lambda other: other.w <= c.w * (1.0 + _SAME_W), islice(others, first, None))
     same = (other for other in beside if c.touch == other.touch and _same_size(abs(c.L), abs(other.L)))
     return next(same, None)
-
-
-def _place(c: Crossing) -> float:
-    return c.w
 
 
 def _same_size(a: float, b: float) -> bool:
@@ -192,7 +181,7 @@ def difference(ours: tuple[Crossing, ...], theirs: tuple[Crossing, ...], line: s
 
 
 def _movement(c: Crossing, others: tuple[Crossing, ...]) -> float:
-    at = bisect_left(others, c.w, key=_place)
+    at = bisect_left(others, c.w, key=attrgetter("w"))
     beside = others[max(at - _BESIDE, 0) : at + _BESIDE]
     other = min(beside, key=lambda o: abs(o.L - c.L) + abs(o.w - c.w) / (c.w or 1.0), default=None)
     if other is None or not 0.0 < c.w < math.inf or not c.L:
@@ -204,14 +193,10 @@ def _poles(base: Findings, others: list[Findings]) -> tuple[int | None, int, int
     hidden = base.hidden.at_zero
     counts = {(f.unstable, f.on_border, f.hidden.at_zero) for f in (base, *others)}
     closed = _values(base, closed=True)
-    size = np.sort(np.abs(closed))
-    if len(counts) == 1 and not _some_near_zero(size[size > 0.0]):
+    size = np.sort(np.abs(closed[closed != 0.0]))
+    if len(counts) == 1 and not (size.size and size[0] < _TOLD * size[size.size // 2]):
         return base.unstable, base.on_border, hidden, None
     return _by_movement(base, others, closed)
-
-
-def _some_near_zero(size: Real) -> bool:
-    return bool(size.size) and bool(size[0] < _TOLD * size[size.size // 2])
 
 
 def _values(f: Findings, closed: bool) -> Complex:

@@ -160,7 +160,8 @@ def _merged(
         at = float(v.mid())
         if (touched_ends[0] and at <= min(sizes)) or (touched_ends[1] and at >= max(sizes)):
             continue
-        if out and not touch and not out[-1][1] and _close(out[-1][0], v):
+        close = out and float(((v - out[-1][0]) / v).mid()) < _NEAR
+        if close and not touch and not out[-1][1]:
             between = (0.5 * (out[-1][0] + v)).mid()
             if _touches(between, off):
                 out[-1] = (between, True)
@@ -175,10 +176,6 @@ def _merged(
 
 def _touches(v: arb, off: Callable[[arb], arb]) -> bool:
     return abs(float(off(v).mid())) <= TOUCH
-
-
-def _close(a: arb, b: arb) -> bool:
-    return float(((b - a) / b).mid()) < _NEAR
 
 
 def smallest(loop: ExactLoop, distance: Distance) -> tuple[float, float]:

@@ -1,0 +1,297 @@
+"""Jobs of a night, each in a process that can be ended; how many at once says `analyses.studies.engine`.
+
+A process of its own can be ended when it takes too long or too much memory, and a job that kills it takes
+nobody along. Here a process a thread stays warm from job to job, on a Dask cluster each job has a fresh one.
+Its result comes home as an entry of the cache; a lost Dask worker's jobs are done again elsewhere.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing, suppress
+from functools import partial
+from queue import SimpleQueue
+from threading import Lock, Thread, Timer, get_ident
+from typing import Any, BinaryIO, NamedTuple
+
+from actuator_lti.errors import InputError
+from analyses.studies.engine import Engine
+from reports.arithmetic import ONE_THREAD  # the jobs themselves are what runs in parallel
+from reports.nightly.cache import sealed
+from reports.nightly.text import one_line
+
+START_LIMIT_S = 180.0
+END_S = 10.0
+# A process that hangs in compiled code without its parent is ended by the system this long after its limit.
+GRACE_S = 15
+READY = b"ready"
+_CHILD = "import sys; from reports.nightly.processes import main; main(sys.argv[1], int(sys.argv[2]))"
+
+
+class Task(NamedTuple):
+    """Something to build: an address, what the build function gets, and how many time limits it may take."""
+
+    key: str
+    payload: Mapping[str, Any]
+    limits: int = 1
+
+
+class Limits(NamedTuple):
+    """What builds a task, ``module:function`` from a payload to ``(meta, files)``, and what it may take."""
+
+    build: str
+    time_limit_s: float
+    memory_bytes: int
+
+
+class Answer(NamedTuple):
+    """How a job ended: ``done`` with an entry for the cache, ``error``, ``timeout`` or ``crash``, and why."""
+
+    status: str
+    message: str = ""
+    detail: str = ""
+    entry: bytes = b""
+    seconds: float = 0.0
+
+
+def build_each(
+    tasks: Sequence[Task], limits: Limits, engine: Engine | None, sink: Callable[[Task, Answer], None]
+) -> None:
+    """Build every task once and tell how each ended, in the order in which they end.
+
+    Without an engine they are built in this process: with no limit, and in the order of the tasks.
+    """
+    if engine is None:
+        function = _resolved(limits.build)
+        for task in tasks:
+            start = time.monotonic()
+            sink(task, _since(start, execute(function, task.key, task.payload)))
+    elif engine.distributed:
+        engine.map(partial(build_apart, limits), tasks, sink)
+    else:
+        with closing(Warm(limits)) as warm:
+            engine.map(warm.build, tasks, sink)
+
+
+def build_apart(limits: Limits, task: Task) -> Answer:
+    """Build one task in a process of its own."""
+    with closing(_Child(limits)) as child:
+        return child.build(task)
+
+
+def _since(start: float, answer: Answer) -> Answer:
+    return answer._replace(seconds=time.monotonic() - start)
+
+
+# ---- the side of the night -----------------------------------------------------------------------------
+
+
+class Warm:
+    """Processes that go from task to task: one for each thread that asks."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._lock = Lock()
+        self._children: dict[int, _Child] = {}
+        self._closed = False
+
+    def build(self, task: Task) -> Answer:
+        """Build a task in the process of this thread, in a new one where that has ended."""
+        with self._lock:
+            if self._closed:
+                raise RuntimeError("no task after the end")
+            child = self._children.get(get_ident())
+            if child is None or not child.alive:
+                if child is not None:
+                    child.close()
+                child = self._children[get_ident()] = _Child(self._limits)
+        return child.build(task)
+
+    def close(self) -> None:
+        """End all processes, also one whose answer is awaited: its thread then has its end."""
+        with self._lock:
+            self._closed = True
+            for child in self._children.values():
+                child.close()
+
+
+class _Child:
+    """A process that builds one task after the other, seen from its parent."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
+        self._late = self._ready = False
+        self._asked = Lock()
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", _CHILD, limits.build, str(limits.memory_bytes)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said,
+            env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )  # fmt: skip
+
+    @property
+    def alive(self) -> bool:
+        """Whether it can take another task."""
+        return not self._late and self._process.poll() is None
+
+    def build(self, task: Task) -> Answer:
+        """Build a task within its time; where that fails the process is at its end."""
+        with self._asked:
+            if not self._ready:
+                self._ready = self._answer(START_LIMIT_S) == READY
+                if not self._ready:
+                    why = f"the worker process could not start: {self._end(START_LIMIT_S)}"
+                    return Answer("crash", why, self._last_words(0))
+            said, start = os.fstat(self._said.fileno()).st_size, time.monotonic()
+            limit_s = self._limits.time_limit_s * task.limits
+            answer = self._answer(limit_s, (task.key, dict(task.payload), limit_s))
+            if answer is None and self._late:
+                answer = Answer("timeout", self._end(limit_s))
+            elif answer is None:
+                answer = Answer("crash", self._end(limit_s), self._last_words(said))
+            return _since(start, answer)
+
+    def _answer(self, limit_s: float, question: Any = None) -> Any:
+        """What the process says within the limit; None where it ends instead."""
+        ask, listen = self._process.stdin, self._process.stdout
+        assert ask is not None
+        assert listen is not None
+        clock = Timer(limit_s, self._too_late)
+        clock.daemon = True
+        clock.start()
+        try:
+            if question is not None:
+                _say(ask, question)
+            return pickle.load(listen)
+        except (EOFError, OSError, pickle.UnpicklingError, ValueError):
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(END_S)  # it ends by itself, and its status says why
+            self._process.kill()
+            self._process.wait()
+            return None
+        finally:
+            clock.cancel()
+            clock.join()  # from here on it ends nobody
+
+    def _too_late(self) -> None:
+        self._late = True
+        self._process.kill()
+
+    def _end(self, limit_s: float) -> str:
+        """In words how the process ended."""
+        if self._late:
+            return f"did not end within {limit_s:g} s"
+        code = self._process.returncode
+        return f"its process ended ({f'signal {-code}' if code < 0 else f'status {code}'})"
+
+    def _last_words(self, since: int) -> str:
+        size = self._said.seek(0, os.SEEK_END)
+        self._said.seek(max(since, size - 2000))
+        return self._said.read().decode("latin-1")
+
+    def close(self) -> None:
+        """End the process, whatever it does; then whoever waits for its answer has none, and its pipes go."""
+        self._process.kill()
+        with self._asked:
+            self._process.wait()
+            for stream in (self._process.stdin, self._process.stdout, self._said):
+                if stream is not None:
+                    with suppress(OSError):  # a question that nobody has read
+                        stream.close()
+
+
+# ---- the side of the process ---------------------------------------------------------------------------
+
+
+def main(build: str, memory_bytes: int) -> None:
+    """Read ``(key, payload, limit)`` from standard input, build, answer on standard output; never returns."""
+    _die_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what a build prints is no answer
+    _limit_memory(memory_bytes)
+    questions: SimpleQueue[tuple[str, Mapping[str, Any], float]] = SimpleQueue()
+    Thread(target=_listen, args=(os.fdopen(os.dup(0), "rb"), questions), daemon=True).start()
+    function = _resolved(build)
+    _say(answers, READY)
+    while True:
+        key, payload, time_limit_s = questions.get()
+        _alarm(time_limit_s + GRACE_S)
+        _say(answers, execute(function, key, payload))
+        _alarm(0)
+
+
+def execute(function: Callable[..., Any], key: str, payload: Mapping[str, Any]) -> Answer:
+    """Build one report; its entry, or what went wrong and where.
+
+    Any error of the build belongs to its design and is reported as such.
+    """
+    try:
+        meta, files = function(dict(payload))
+    except InputError as error:
+        return Answer("error", one_line(str(error), 600))
+    except MemoryError:
+        return Answer("error", "needs more memory than a job may take: see --memory-limit")
+    except Exception as error:  # noqa: BLE001 - the one place where a design may raise anything
+        where = "".join(traceback.format_exception(error)[-6:])
+        return Answer("error", f"{type(error).__name__}: {one_line(str(error), 400)}", where[-4000:])
+    try:
+        return Answer("done", entry=sealed(key, meta, files))
+    except (TypeError, ValueError) as error:
+        return Answer("error", f"result is no JSON: {one_line(str(error), 300)}")
+
+
+def _resolved(name: str) -> Callable[..., Any]:
+    """Return the function that ``package.module:function`` names."""
+    module, _, function = name.partition(":")
+    return getattr(importlib.import_module(module), function)
+
+
+def _listen(source: BinaryIO, questions: SimpleQueue[Any]) -> None:
+    """Hand on what is asked; the end of the pipe is that of the parent."""
+    while True:
+        try:
+            questions.put(pickle.load(source))
+        except EOFError:
+            os._exit(0)
+
+
+def _say(pipe: Any, what: Any) -> None:
+    pickle.dump(what, pipe)
+    pipe.flush()
+
+
+def _alarm(seconds: float) -> None:
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+
+
+def _limit_memory(limit_bytes: int) -> None:
+    """Bound what this process may allocate; beyond it Python raises MemoryError, others give up.
+
+    Counted is what can be written to (heap, stacks, private mappings), not files and code that are mapped.
+    """
+    with suppress(ImportError):  # Windows has no such limit
+        import resource
+
+        hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+        most = limit_bytes if hard == resource.RLIM_INFINITY else min(limit_bytes, hard)
+        resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+
+
+def _die_with_parent() -> None:
+    """Let the system end this process with its parent, also where a build never lets go (Linux)."""
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG

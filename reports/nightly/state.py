@@ -1,0 +1,143 @@
+"""The folder beside a site that holds history and cache: where it lies, who holds it, and that it is whole.
+
+``summary.json`` is published with the site and survives where the state folder does not (a cache that was
+not restored, a deleted file). A night is refused where the history knows less than the site, so that a lost
+one does not pass for a first night.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from actuator_lti.errors import InputError
+from actuator_lti.files.atomic import write_bytes
+from actuator_lti.files.reading import read_json, shown_path
+from reports.nightly.text import now, one_line
+
+INDEX, NIGHTS, CACHE = "history.json", "nights", "cache"
+
+
+def state_of(site: Path, state: Path | None = None) -> Path:
+    """Return the folder of history, cache and lock: beside the site, so that none of it is published.
+
+    Refused is what is no folder, leads elsewhere or lies inside the site.
+    """
+    place = Path(os.path.abspath(site))  # "." and ".." have names, too
+    if state is None and not place.name:
+        raise InputError("is the root of the disk: --site takes a folder below it", where=shown_path(site))
+    if state is not None and Path(os.path.realpath(state)).is_relative_to(os.path.realpath(site)):
+        raise InputError(
+            "lies inside the site and would be published with it: --state takes a folder elsewhere",
+            where=shown_path(state),
+        )
+    state = place.with_name(f"{place.name}.state") if state is None else state
+    folders = (state, state / CACHE, state / NIGHTS)
+    for folder in folders:
+        if os.path.lexists(folder) and not folder.is_dir():
+            raise InputError("is no folder; allowed: a folder, or none yet", where=shown_path(folder))
+    inside = [path for folder in folders if folder.is_dir() for path in folder.iterdir()]
+    for path in (state, *inside):
+        if path.is_symlink():
+            raise InputError(
+                "is a symbolic link: history and cache are kept in the state folder itself",
+                where=shown_path(path),
+            )
+    return state
+
+
+@contextmanager
+def hold(state: Path, wait_s: float = 0.0) -> Iterator[None]:
+    """Hold the lock of a state folder; the system frees it when the process ends, however it ends.
+
+    Where it is still held after ``wait_s``, the refusal names process, host and since when.
+    """
+    from filelock import FileLock, Timeout
+
+    state.mkdir(parents=True, exist_ok=True)
+    lock, note = FileLock(state / "nightly.lock"), state / "holder.json"
+    try:
+        lock.acquire(timeout=wait_s)
+    except Timeout as error:
+        raise InputError(
+            f"another nightly holds the lock: {_holder(note)}; wait for it with --wait SECONDS",
+            where=str(state),
+        ) from error
+    try:
+        who = {"pid": os.getpid(), "host": socket.gethostname(), "since": now()}
+        write_bytes(note, json.dumps(who).encode())
+        yield
+    finally:
+        note.unlink(missing_ok=True)
+        lock.release()
+
+
+def _holder(note: Path) -> str:
+    try:
+        who = json.loads(note.read_text(encoding="utf-8"))
+        return one_line(f"process {who['pid']} on {who['host']} since {who['since']}", 200)
+    except (OSError, ValueError, KeyError, TypeError):
+        return "a process that has just started or ended"
+
+
+class HistoryLost(Exception):
+    """The history beside a site is missing, empty or older than the site; the message says what to do."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """How much a history held when the site was published; ``id`` is empty where it is not known."""
+
+    id: str = ""
+    nights: int = 0
+    approvals: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.nights} night(s) and {self.approvals} approval(s)"
+
+
+_MEMORY = TypeAdapter(Memory)
+
+
+def remembered(site: Path) -> Memory | None:
+    """What a site remembers; ``None`` where nothing was ever published there."""
+    if not any((site / name).exists() for name in ("index.html", "summary.json")):
+        return None
+    try:
+        known = read_json(site / "summary.json", "summary.json").get("history")
+        found = _MEMORY.validate_python(known)
+    except (InputError, AttributeError, ValidationError):
+        return Memory("", 1)  # published by an older version, or damaged: at least one night
+    return replace(found, nights=max(found.nights, 1), approvals=max(found.approvals, 0))
+
+
+def check_memory(site: Path, now: Memory, state: Path) -> None:
+    """Refuse a history that knows less than its site: what is missing, how to go on."""
+    old = state / "history.sqlite"
+    if not now.nights and old.exists():
+        raise HistoryLost(
+            f"{old}: is the history of an earlier version, which this one does not read: go on with that"
+            " version, or begin anew on purpose with --accept-lost-history"
+        )
+    before = remembered(site)
+    if before is None:
+        return
+    if now.nights == 0:
+        what = "is missing or empty"
+    elif before.id and now.id != before.id:
+        what = "is that of another site"
+    elif now.nights < before.nights or now.approvals < before.approvals:
+        what = f"holds {now}"
+    else:
+        return
+    raise HistoryLost(
+        f"{state / INDEX}: {what}, but the site knows of {before}: regressions cannot be determined."
+        " Restore the state folder from a copy, or begin anew on purpose with --accept-lost-history"
+    )
