@@ -28,7 +28,7 @@ from analyses.comparison.variant_figures import (
 from analyses.comparison.variant_store import Changed, Contribution, Found, Kept
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures
 from analyses.specification.requirements import evaluate_requirements, tally
-from analyses.specification.sensitivity import Sensitivities
+from analyses.specification.sensitivity import Sensitivities, moved, population_figures, sensitivities
 from analyses.studies.engine import Engine
 from analyses.studies.study import Study, Variant, load_study
 from analyses.validation import CHECKS, validate
@@ -132,7 +132,6 @@ def compare(
     InputError, NumericalError
         From the base or a variant.
     """
-    from analyses.specification.sensitivity import sensitivities
 
     study = study if isinstance(study, Study) else load_study(as_path(study))
     origin = _design(study.base)
@@ -236,7 +235,6 @@ def _moved_by(
     base: Design, other: Design, changed: tuple[Changed, ...], differences: Mapping[str, float]
 ) -> dict[str, tuple[Contribution, ...]]:
     """Change one number at a time, starting from the base."""
-    from analyses.specification.sensitivity import moved, population_figures
 
     if len(changed) == 1:
         return {key: (Contribution(changed[0].path, amount),) for key, amount in differences.items()}

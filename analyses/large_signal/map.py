@@ -13,6 +13,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
+from actuator_lti.start.extras import need
 from analyses.finite import finite
 from analyses.large_signal.classify import (
     CAUSES,
@@ -92,7 +93,6 @@ class AmplitudeMap:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A data frame with one row a point: command, what acts, waveform, fundamental (pandas needed)."""
-        from actuator_lti.start.extras import need
 
         frame = need("pandas", "tables", "to_pandas")
         amplitude, frequency = np.meshgrid(self.amplitude_rad, self.frequency_hz, indexing="ij")

@@ -31,7 +31,7 @@ from analyses.limit_cycles.describing import (
     quantum_of,
     without_nonlinearities,
 )
-from analyses.limit_cycles.run import Confirmation
+from analyses.limit_cycles.run import Confirmation, confirm
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
 from nonlinear import Rows
@@ -99,7 +99,6 @@ def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, 
 
 
 def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Counts:
-    from analyses.limit_cycles.run import confirm
 
     sensor, other = SENSORS[cause]
     quantum, velocity = quantum_of(design, cause) or 0.0, design.controller.velocity

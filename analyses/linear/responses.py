@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.margins.loop import rational_loop
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import LoopFigures
 
@@ -129,7 +130,6 @@ def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:
 
 def sampled_step(system: Any, samples: int) -> np.ndarray:
     """Give the first samples of the unit step response of a sampled system, for a figure."""
-    from actuator_lti.margins.loop import rational_loop
 
     loop = rational_loop(system)
     state, response = np.zeros(loop.order), np.empty(samples)

@@ -19,7 +19,7 @@ from actuator_lti.design.units import parse_limit
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.judging import in_populations, judge, loop_columns, loops_of
 from analyses.studies.sampling import Factor, correlation_of, semidefinite_root
-from analyses.tuning.placing import Variable, change
+from analyses.tuning.placing import Variable, allowed_range, change
 
 GAINS = (
     "control.current.gain",
@@ -214,7 +214,6 @@ def problem_of(
     The search starts from ``start`` (by rules, SI); another gain of the design starts where it is. ``placed``
     are the variables of added elements.
     """
-    from analyses.tuning.placing import allowed_range
 
     variables = []
     for path in (path for path in GAINS if path in set(paths_of(design))):
