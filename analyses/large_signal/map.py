@@ -227,11 +227,11 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
     phase = np.where(unsteady, np.nan, amplitude_map.phase_deg)
     steps = np.arange(FINE * (hz.size - 1) + 1) / FINE
     fine = np.exp(np.interp(steps, np.arange(hz.size), np.log(hz)))
+    whole = linear_steady_state(loops, 2.0 * math.pi * np.array([1e-6 * hz[0], *fine])).output
     with np.errstate(divide="ignore"):  # the mean of a limited jerk has zeros
-        whole = linear_steady_state(loops, 2.0 * math.pi * np.array([1e-6 * hz[0], *fine])).output
         start, *curve = 20.0 * np.log10(np.abs(whole))
     level, fine_db = MINUS_3DB + start, np.array(curve)
-    fine_deg = np.degrees(np.unwrap(np.angle(whole[1:])))
+    fine_deg = np.degrees(np.unwrap(np.angle(linear_steady_state(loops, 2.0 * math.pi * fine).output)))
     linear_db, linear_deg = fine_db[::FINE], fine_deg[::FINE]
 
     def between(values: np.ndarray, linear: np.ndarray) -> np.ndarray:

@@ -64,7 +64,6 @@ Element = Literal["notch", "lowpass", "feedforward"]
 ELEMENTS: tuple[Element, ...] = get_args(Element)
 DEEPEST = 0.01  # of a notch, -40 dB
 END_OF_BAND = 0.9  # of the Nyquist frequency of the velocity loop
-SHALLOW = 0.999  # a notch above this depth does nothing
 
 
 @dataclass(frozen=True)
@@ -168,19 +167,6 @@ def _feedforward(design: Design) -> list[Variable]:
         Variable(f"control.position.{key}", value, 0.0, max(1.2, value), value, linear=True)
         for key, value in result
     ]
-
-
-def idle(design: Design, placed: Placed) -> Design:
-    """The design without placed filters that came out neutral."""
-    velocity = design.controller.velocity
-    if velocity is None:
-        return design
-    added = sum(1 for element in placed.elements if element != "feedforward")
-    if not added:
-        return design
-    kept = velocity.filters[: len(velocity.filters) - added]
-    kept += tuple(f for f in velocity.filters[-added:] if f.kind != "notch" or f.depth < SHALLOW)
-    return replace(design, controller=replace(design.controller, velocity=replace(velocity, filters=kept)))
 
 
 def change(variables: tuple[Variable, ...], values: np.ndarray) -> np.ndarray:
