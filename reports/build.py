@@ -297,5 +297,4 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
 
 
 def design_head(design: Design) -> Tree:
-    """Give what a document says of its design."""
     return {name: getattr(design, name) for name in ("name", "title", "revision", "origin", "axis")}
