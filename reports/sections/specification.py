@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from analyses.specification.manoeuvres import Manoeuvre
 
 from actuator_lti.design.model import Design
 from analyses.specification import Specification
+from analyses.specification.capability import Manoeuvre
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import short, significant
