@@ -8,6 +8,7 @@ break point, as the injected signal of a `Probe`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import pi
 from operator import length_hint
@@ -137,12 +138,9 @@ class Command:
 
 def write(command: Command, row: Floats, place: int, offset: int, length: int) -> None:
     """Write a command into a parameter row; ``offset`` and ``length`` locate its table, if it has one."""
+    numbers = (1.0, 0.0, offset, length) if command.code == at.TABLE else command.numbers
     row[place] = command.code
-    if command.code == at.TABLE:
-        row[place + 1] = 1.0
-        row[place + 3], row[place + 4] = offset, length
-        return
-    row[place + 1 : place + 1 + len(command.numbers)] = command.numbers
+    row[place + 1 : place + 1 + len(numbers)] = numbers
 
 
 def _finite(kind: str, **values: float) -> None:
@@ -170,10 +168,9 @@ def numbers_of(name: str, given: npt.ArrayLike) -> Floats:
 
 def _count(given: object, bound: Bound, name: str = "") -> None:
     """Refuse what says that it is longer than a bound."""
-    try:
-        count: float = length_hint(given)
-    except OverflowError:
-        count = float("inf")
+    count = float("inf")
+    with suppress(OverflowError):
+        count = length_hint(given)
     bound.check(count, name=name)
 
 
@@ -313,10 +310,10 @@ def multisine(
     f = periods / duration_s
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * pi, f.size)
     phases += 2.0 * pi * f * _first_rise(f, phases, duration_s)
-    t = np.arange(round(duration_s / period_s) + 1) * period_s
+    t: Floats = np.arange(round(duration_s / period_s) + 1, dtype=np.float64) * period_s
     values = np.concatenate([_summed(f, phases, part) for part in np.array_split(t, t.size // _ROWS + 1)])
     values *= amplitude_rad / np.abs(values).max()
-    return Command("multisine", at.TABLE, (), float(f.max()), float(t[-1]), np.vstack([t, values]))
+    return _table("multisine", t, values, float(f.max()))
 
 
 def _sampled_at(kind: str, f: Floats, period_s: float) -> Floats:
@@ -367,8 +364,7 @@ def events(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "event 
         As `sampled`, but for holes.
     """
     times, values = _checked(time_s, angle_rad, where)
-    times = times - times[0]
-    return Command("recorded", at.TABLE, (), 0.0, float(times[-1]), np.vstack([times, values]), held=True)
+    return _table("recorded", times - times[0], values, held=True)
 
 
 def sampled(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "record") -> Command:
@@ -382,8 +378,7 @@ def sampled(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "recor
     """
     times, values = _checked(time_s, angle_rad, where)
     _without_holes(times, where)
-    times = times - times[0]
-    return Command("recorded", at.TABLE, (), 0.0, float(times[-1]), np.vstack([times, values]))
+    return _table("recorded", times - times[0], values)
 
 
 def on_its_clock(time_s: npt.ArrayLike, values: npt.ArrayLike, where: str = "series") -> Command:
@@ -398,16 +393,22 @@ def on_its_clock(time_s: npt.ArrayLike, values: npt.ArrayLike, where: str = "ser
     _without_holes(times, where)
     if times[-1] < 0.0:
         raise InputError(f"its last row is at {times[-1]:g} s: must be 0 or later", where)
-    return Command("series", at.TABLE, (), 0.0, float(times[-1]), np.vstack([times, array]))
+    return _table("series", times, array)
+
+
+def _table(
+    kind: str, times: Floats, values: Floats, highest_hz: float = 0.0, *, held: bool = False
+) -> Command:
+    """A tabulated command that is over with its last row."""
+    return Command(kind, at.TABLE, (), highest_hz, float(times[-1]), np.vstack([times, values]), held)
 
 
 def _checked(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str) -> tuple[Floats, Floats]:
     """Rising finite times and as many finite values."""
     times, values = numbers_of("times", time_s), numbers_of("angles", angle_rad)
     if times.size != values.size or times.size < 2:
-        raise InputError(
-            f"{times.size} times and {values.size} angles: equal numbers, at least 2, needed", where
-        )
+        message = f"{times.size} times and {values.size} angles: equal numbers, at least 2, needed"
+        raise InputError(message, where)
     for name, array in (("time", times), ("angle", values)):
         bad = np.flatnonzero(~np.isfinite(array))
         if bad.size:
@@ -415,9 +416,8 @@ def _checked(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str) -> tup
     gaps = np.diff(times)
     if (gaps <= 0.0).any():
         k = int(np.argmax(gaps <= 0.0))
-        raise InputError(
-            f"time in row {k + 2} = {times[k + 1]:g} s: must be later than {times[k]:g} s", where
-        )
+        message = f"time in row {k + 2} = {times[k + 1]:g} s: must be later than {times[k]:g} s"
+        raise InputError(message, where)
     return times, values
 
 
@@ -442,13 +442,10 @@ def recorded(
     """
     from nonlinear.runs.records import read_columns
 
-    scale = {"deg": pi / 180.0, "rad": 1.0, "mm": 1e-3, "m": 1.0, "A": 1.0, "V": 1.0}.get(
-        unit.removesuffix("/s") if unit not in ("A/s", "V/s") else unit
-    )
+    angle = {"deg": pi / 180.0, "rad": 1.0, "mm": 1e-3, "m": 1.0}.get(unit.removesuffix("/s"))
+    scale = 1.0 if unit in ("A", "V") else angle
     if scale is None:
-        raise InputError(
-            f"unit = {unit!r}: must be deg, rad, mm, m, these per second, A or V", where=str(path)
-        )
+        message = f"unit = {unit!r}: must be deg, rad, mm, m, these per second, A or V"
+        raise InputError(message, where=str(path))
     times, angles = read_columns(path, (time_column, angle_column), delimiter)
-    make = events if held else sampled
-    return make(times, angles * scale, where=str(path))
+    return (events if held else sampled)(times, angles * scale, where=str(path))

@@ -23,7 +23,7 @@ from analyses.monte_carlo.asked import Asked as MonteCarloAsked
 from analyses.motion.asked import Asked as MotionAsked
 from analyses.studies.study_asked import Asked as StudyAsked
 from analyses.tuning.asked import Asked as TuningAsked
-from analyses.validation.asked import Asked as ValidationAsked
+from analyses.validation.settings import Asked as ValidationAsked
 from reports.design_files.keys import Asked as KeysAsked
 from reports.design_files.start import Asked as StartAsked
 from reports.exports.asked import AskedC, AskedController, AskedFmu, AskedLinear

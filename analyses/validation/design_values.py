@@ -1,20 +1,24 @@
 """Every number of a design that no small signal sees, confronted once by an exact question.
 
-Friction, breakaway, play and inertias (`torque_values`), limits (`limit_values`), overload and supply
-(`power_values`), profile and counts (`command_values`): the compiled tick starts in a state in which the
-number decides what comes out of one tick, and the prediction is a formula of the model.  Nothing is waited
-for.  Noise, jitter and their seed are left: they are random.
+Friction, breakaway, play and inertias (`torque_values`), limits, overload, supply (`limit_values`), and here
+the profile and feed-forward of a command and counts: the compiled tick starts in a state in which the number
+decides what comes out of one tick, and the prediction is a formula of the model.  Nothing is waited for.
+Noise, jitter and their seed are left: they are random.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+from math import ceil, inf, isfinite
+
 from actuator_lti.design.model import Design
-from analyses.validation.command_values import command_rows
-from analyses.validation.limit_values import limit_rows
-from analyses.validation.power_values import power_rows
+from analyses.validation.limit_values import FAR, limit_rows
 from analyses.validation.row import Row
 from analyses.validation.torque_values import torque_rows
 from analyses.validation.value_pair import Pair
+from nonlinear.bench.loop_setup import every
+from nonlinear.rows import Rows
 
 
 def design_value_rows(design: Design, model: Design | None = None) -> list[Row]:
@@ -35,5 +39,111 @@ def design_value_rows(design: Design, model: Design | None = None) -> list[Row]:
     {'met'}
     """
     pair = Pair(design, design if model is None else model)
-    rows = [*torque_rows(pair.design, pair.model), *limit_rows(pair), *power_rows(pair)]
-    return [*rows, *command_rows(pair)]
+    rows = [*torque_rows(pair.design, pair.model), *limit_rows(pair)]
+    return [*rows, *_profile(pair), *_feedforward(pair), *_counts(pair)]
+
+
+def _profile(pair: Pair) -> Iterator[Row]:
+    """Limits of the command's derivatives, over its first update, and the mean that limits the jerk."""
+    outermost = pair.design.controller.outermost
+    if outermost not in ("position", "velocity"):
+        return
+    model, own = pair.model.command, pair.design.command
+    T = every(pair.design, outermost) * pair.design.controller.period_s
+    angle = "m" if pair.design.axis == "linear" else "rad"
+    keys = ("rate_rad_s", "acceleration_rad_s2", "jerk_rad_s3")
+    columns = ("profile_range", "profile_rate", "profile_acceleration")
+    first = 1 if outermost == "position" else 0
+    rows = pair.rows(command=replace(own, filter_time_s=0.0))
+    for n, key in enumerate(keys[: 3 - first]):
+        limit, there = float(getattr(model, key)), float(getattr(own, key))
+        if not isfinite(min(limit, there)):
+            continue
+        alone = rows.copy()
+        alone["profile_samples"] = 0.0
+        for column in columns:
+            if column != columns[n + first]:
+                alone[column] = inf
+        drive = alone.running()
+        drive.command(FAR * min(limit, there) * T)
+        drive.begin()
+        read = {
+            0: drive.value("PROFILE"),
+            1: drive.value("PROFILE_SPEED"),
+            2: drive.value("PROFILE_SPEED") / T,
+        }
+        unit = f"{angle}/s" + ("", "^2", "^3")[n]
+        name = f"command_{key.split('_')[0]}"
+        yield pair.judged(name, limit, read[n + first], unit, "first update of a large command")
+    if outermost == "position" and isfinite(min(model.jerk_rad_s3, own.jerk_rad_s3)):
+        yield _jerk(pair, rows, T)
+
+
+def _jerk(pair: Pair, rows: Rows, T: float) -> Row:
+    """Samples of the mean: what one update lets through of a command without other limits."""
+    model = pair.model.command
+    for column in ("profile_range", "profile_rate", "profile_acceleration"):
+        rows[column] = inf
+    drive = rows.running()
+    drive.command(1.0)
+    drive.begin()
+    samples = pair.design.total_ratio / drive.value("REFERENCE")
+    wanted = max(ceil(2.0 * model.acceleration_rad_s2 / (model.jerk_rad_s3 * T) - 1e-9), 1)
+    return pair.judged("command_jerk", float(wanted), samples, "1", "samples of the mean that limits it")
+
+
+def _feedforward(pair: Pair) -> Iterator[Row]:
+    """Feed-forward of dry friction, over the first update of a moving command."""
+    model, own = (one.controller.position for one in (pair.model, pair.design))
+    if model is None or own is None or not (model.friction_feedforward or own.friction_feedforward):
+        return
+    wanted = model.friction_feedforward
+    rows = pair.rows()
+    rows["acceleration_feedforward"] = 0.0
+    for side in (1.0, -1.0):
+        drive = rows.running()
+        drive.command(side)
+        drive.begin()
+        unit = "V" if pair.design.controller.current is None else "A"
+        yield pair.judged("friction_feedforward", side * wanted, drive.value("TORQUE_FEEDFORWARD"), unit,
+                          f"command moving {'forward' if side > 0.0 else 'backward'}")  # fmt: skip
+
+
+def _counts(pair: Pair) -> Iterator[Row]:
+    """The size of a count where the controller reads one: one and a half of it are told as one."""
+    design, model, N = pair.design, pair.model, pair.design.total_ratio
+    unit = "m" if design.axis == "linear" else "rad"
+    position, velocity = design.controller.position, design.controller.velocity
+    quantum, own = model.output_quantum_rad, design.output_quantum_rad
+    if position is not None and position.sensor == "output" and quantum is not None and own is not None:
+        drive = _turned(pair.rows(), 1.5 * quantum * N).running()
+        drive.begin()
+        yield pair.judged("output_count", quantum, -drive.value("ERROR") / N, unit, "position loop")
+    if velocity is None or design.encoder.speed == "ideal":
+        return
+    behind = velocity.sensor == "output"
+    quantum, own = (one.output_quantum_rad if behind else one.angle_quantum_rad for one in (model, design))
+    scale = N if behind else 1.0
+    if quantum is None or own is None:
+        return
+    rows = _turned(pair.rows(), 1.5 * quantum * scale)
+    drive = rows.running()
+    name = "output_count" if behind else "count"
+    if design.encoder.speed == "tracking":
+        drive.begin()
+        yield pair.judged(name, quantum, drive.value("TRACKED_ANGLE") / scale, unit, "measured speed")
+        return
+    drive = _turned(rows, 0.5 * quantum * scale).running()
+    if behind and rows.value("elastic_drive"):
+        drive.begin(OUTPUT=1.5 * quantum)
+    else:
+        drive.begin(ANGLE=1.5 * quantum * scale)
+    span = design.encoder.difference_samples * velocity.every * design.controller.period_s
+    seen = drive.value("FILTERED_SPEED") / rows.value("filter_coefficient") * span / scale
+    yield pair.judged(name, quantum, seen, unit, "measured speed")
+
+
+def _turned(rows: Rows, angle_rad: float) -> Rows:
+    """The same from another angle of the motor, the coupling without twist."""
+    rows["angle_start"] = angle_rad
+    return rows

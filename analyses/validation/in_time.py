@@ -42,10 +42,7 @@ SIZES = 10.0 ** -np.arange(1.0, 14.0)  # of a large signal
 
 @dataclass(frozen=True)
 class StepShown:
-    """A small step at a place, simulated and linear, of height 1.
-
-    ``time_s``, ``simulated``, ``linear``, shape (m,).
-    """
+    """A small step at a place, simulated and linear, of height 1; shape (m,)."""
 
     place: str
     time_s: Floats
@@ -74,10 +71,7 @@ class MarginRun:
 
 @dataclass(frozen=True)
 class MarginShown:
-    """Two runs beside a gain margin.
-
-    ``ratio``, ``frequency_hz``: the margin.
-    """
+    """Two runs beside a gain margin of ``ratio`` at ``frequency_hz``."""
 
     place: str
     ratio: float

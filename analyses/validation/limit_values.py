@@ -1,4 +1,4 @@
-"""Limits of a controller and what its integrals do there, each confronted by one update.
+"""Limits, what integrals do there, overload, supply and resolution, each confronted by one update.
 
 A limit is asked for with the others lifted, by a command far beyond it: the state holds what is left.
 """
@@ -6,31 +6,41 @@ A limit is asked for with the others lifted, by a command far beyond it: the sta
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import isfinite
+from math import inf, isfinite
 
-from actuator_lti.design.model import CurrentLoop, Design, VelocityLoop
+from actuator_lti.design.model import CurrentLoop, Design, Instruments, VelocityLoop
 from analyses.validation.row import Row, judged
+from analyses.validation.torque_values import edge
 from analyses.validation.value_pair import WITHIN, Pair, only
-from nonlinear.bench.loop_setup import every, producer, stages_of, target
+from nonlinear.bench.loop_setup import every, stages_of, target
 from nonlinear.rows import Rows
 from nonlinear.runs.running import Running
 
 FAR = 1e6  # times a limit: a command that nothing follows
 OVER = 3.0  # times a limit: what an integral is asked beyond it
+Limit = tuple[str, str, str]
+
+
+# where the state holds each signal that a stage drives; its limit and that of its rate: name, attribute, unit
+LIMITED: dict[str, tuple[str, Limit, Limit | None]] = {
+    "u": ("VOLTAGE_BEFORE", ("voltage_limit", "voltage_V", "V"), None),
+    "i_ref": ("CURRENT_BEFORE", ("current_limit", "peak_current_A", "A"),
+              ("current_rate_limit", "current_rate_A_s", "A/s")),
+    "w_ref": ("SPEED_COMMAND", ("speed_limit", "speed_rad_s", "{speed}"),
+              ("acceleration_limit", "acceleration_rad_s2", "{speed}^2")),
+}  # fmt: skip
 
 
 def limit_rows(pair: Pair) -> Iterator[Row]:
     """All of them."""
-    yield from _clamps(pair)
-    yield from _rates(pair)
+    yield from _limited(pair, rate=False)
+    yield from _limited(pair, rate=True)
     for stage in ("current", "velocity"):
         if stage in stages_of(pair.design):
             yield from _windup(pair, stage)
-
-
-OUTPUT = {"u": "VOLTAGE_BEFORE", "i_ref": "CURRENT_BEFORE", "w_ref": "SPEED_COMMAND"}
-CLAMPED = {"u": ("voltage_limit", "voltage_V", "V"), "i_ref": ("current_limit", "peak_current_A", "A"),
-           "w_ref": ("speed_limit", "speed_rad_s", "")}  # fmt: skip
+    yield from _overload(pair)
+    yield from _supply(pair)
+    yield from _resolution(pair)
 
 
 def _pushed(rows: Rows, pair: Pair, stage: str, size: float) -> Running:
@@ -65,41 +75,23 @@ def _driven(pair: Pair) -> list[tuple[str, str]]:
     return stages if outermost is None else [*stages, ("", outermost)]
 
 
-def _clamps(pair: Pair) -> Iterator[Row]:
-    """Speed, current and voltage limit."""
+def _limited(pair: Pair, *, rate: bool) -> Iterator[Row]:
+    """Speed, current and voltage limit; or the largest change of the speed and of the current command."""
     for stage, signal in _driven(pair):
-        name, attribute, unit = CLAMPED[signal]
+        place, own_limit, own_rate = LIMITED[signal]
+        if rate and (own_rate is None or (signal == "i_ref" and not stage)):
+            continue
+        name, attribute, unit = own_rate if rate and own_rate else own_limit
         limit, own = (float(getattr(one.limits, attribute)) for one in (pair.model, pair.design))
         if not isfinite(min(limit, own)):
             continue
-        rows = pair.rows(only(**{attribute: own}))
-        size = _ask(pair, stage, min(limit, own))
-        found = _pushed(rows, pair, stage, size).value(OUTPUT[signal])
-        words = f"a {stage or 'direct'} command far beyond it"
-        yield pair.judged(name, limit, None if found > 1e3 * limit else found, unit or pair.speed_unit, words)
-
-
-def _rates(pair: Pair) -> Iterator[Row]:
-    """Largest change of the speed and of the current command, over one update."""
-    for stage, signal in _driven(pair):
-        if signal == "u" or (signal == "i_ref" and not stage):
-            continue
-        attribute = "acceleration_rad_s2" if signal == "w_ref" else "current_rate_A_s"
-        limit, own = (float(getattr(one.limits, attribute)) for one in (pair.model, pair.design))
-        if not isfinite(min(limit, own)):
-            continue
-        period = every(pair.design, stage or _producer(pair, signal)) * pair.design.controller.period_s
-        rows = pair.rows(only(**{attribute: own}))
+        updated = stage or (pair.design.controller.outermost if signal == "w_ref" else "")
+        period = every(pair.design, updated) * pair.design.controller.period_s if rate else 1.0
         size = _ask(pair, stage, min(limit, own) * period)
-        found = _pushed(rows, pair, stage, size).value(OUTPUT[signal]) / period
-        unit = f"{pair.speed_unit}^2" if signal == "w_ref" else "A/s"
-        name = "acceleration_limit" if signal == "w_ref" else "current_rate_limit"
-        yield pair.judged(name, limit, None if found > 1e3 * limit else found, unit, "over one update")
-
-
-def _producer(pair: Pair, signal: str) -> str:
-    """The stage at whose rate a command of the drive is taken."""
-    return pair.design.controller.outermost if signal == "w_ref" else producer(pair.design, signal)
+        found = _pushed(pair.rows(only(**{attribute: own})), pair, stage, size).value(place) / period
+        words = "over one update" if rate else f"a {stage or 'direct'} command far beyond it"
+        unit = unit.format(speed=pair.speed_unit)
+        yield pair.judged(name, limit, None if found > 1e3 * limit else found, unit, words)
 
 
 def _loop(design: Design, stage: str) -> tuple[VelocityLoop | CurrentLoop | None, float]:
@@ -137,3 +129,74 @@ def _windup(pair: Pair, stage: str) -> Iterator[Row]:
     yield judged(f"{stage}_anti_windup", "drive", wanted, found, WITHIN * max(limit, abs(wanted)),
                  unit="A" if attribute == "peak_current_A" else "V",
                  condition=f"integral after one update at {OVER:g} times the limit")  # fmt: skip
+
+
+def _overload(pair: Pair) -> Iterator[Row]:
+    """Time constant, limit and release of the overload protection."""
+    limits, own = pair.model.limits, pair.design.limits
+    tau = limits.overload_time_s
+    if tau is None or own.overload_time_s is None:
+        return
+    Ts = pair.design.controller.period_s
+    kept = {name: getattr(own, name) for name in
+            ("peak_current_A", "continuous_current_A", "peak_time_s", "release", "overload")}  # fmt: skip
+    drive = pair.rows(only(**kept)).running()
+    drive.begin(CURRENT=own.continuous_current_A)
+    yield pair.judged("overload_time", float(tau), Ts / drive.value("OVERLOAD"), "s", "continuous current")
+    drive.begin(OVERLOAD=2.0)
+    lasting = min(limits.continuous_current_A, limits.peak_current_A)
+    yield pair.judged("continuous_current", lasting, drive.value("CURRENT_LIMIT"), "A", "overloaded")
+
+    def holds(x: float) -> bool:
+        drive.begin(OVERLOAD=x / (1.0 - Ts / own.overload_time_s), OVERLOADED=1.0)
+        return drive.value("OVERLOADED") > 0.0
+
+    found = edge(holds, limits.release, 1e-7 * limits.release, 2.0 * limits.release)
+    yield pair.judged("overload_release", limits.release, found, "1", "no current, the state falling")
+
+
+def _supply(pair: Pair) -> Iterator[Row]:
+    """Voltage of the bus one tick on, motoring and braking, and where the brake acts (model.md section 6)."""
+    supply, own = pair.model.supply, pair.design.supply
+    if supply is None or own is None:
+        return
+    Ts, U_s = pair.model.controller.period_s, pair.model.limits.voltage_V
+    rows = pair.rows(only(voltage_V=pair.design.limits.voltage_V), supply=own)
+    rows["brake_voltage"] = inf
+    drive = rows.running()
+
+    def bus(current: float) -> float:
+        drive.begin(TICK=1.0, VOLTAGE_LIMIT=U_s, VOLTAGE=U_s, CURRENT=current)
+        return drive.value("VOLTAGE_LIMIT")
+
+    motoring = 0.5 * U_s / supply.resistance_ohm if supply.resistance_ohm else 1.0
+    yield pair.judged("bus_voltage", U_s - supply.resistance_ohm * motoring, bus(motoring), "V",
+                      f"{motoring:.4g} A taken")  # fmt: skip
+    if supply.regenerative:
+        wanted = U_s + supply.resistance_ohm * motoring
+        yield pair.judged("bus_voltage", wanted, bus(-motoring), "V", f"{motoring:.4g} A fed back")
+        return
+    C = supply.capacitance_F or 0.0
+    braking = -0.1 * C * U_s / Ts  # its energy: a tenth of the capacitor's doubled
+    wanted = (U_s**2 - 2.0 * U_s * braking * Ts / C) ** 0.5
+    yield pair.judged("bus_voltage", wanted, bus(braking), "V", f"{-braking:.4g} A fed back")
+    if supply.brake_voltage_V is not None:
+        drive.change("brake_voltage", own.brake_voltage_V or inf)
+        yield pair.judged(
+            "brake_voltage", supply.brake_voltage_V, bus(1e3 * braking), "V", "fed back at once"
+        )
+
+
+def _resolution(pair: Pair) -> Iterator[Row]:
+    """The step of the measured current: one and a half of it, held against no command, is told as two."""
+    wanted, own = (one.instruments.current_resolution_A for one in (pair.model, pair.design))
+    current = pair.design.controller.current
+    if current is None or current.law is not None or not (wanted and own):
+        return
+    rows = pair.rows(instruments=Instruments(current_resolution_A=own))
+    drive = rows.running()
+    drive.begin(CURRENT=1.6 * wanted)
+    gain = rows.value("current_gain") + rows.value("current_integral")
+    yield pair.judged(
+        "current_resolution", wanted, -0.5 * drive.value("VOLTAGE_BEFORE") / gain, "A", "1.6 steps"
+    )

@@ -53,28 +53,20 @@ def judged(
     found: float | None,
     allowed: float,
     *,
-    unit: str = "",
-    because: str = "",
-    condition: str = "",
     resolved: bool = True,
+    **words: str,
 ) -> Row:
     """Judge one number: both there and within ``allowed``, or both absent.
 
-    ``resolved`` says whether the measurement is good enough to tell a wrong prediction.
+    ``resolved`` says whether the measurement is good enough to tell a wrong prediction; ``words`` are unit,
+    reason and condition of the row.
     """
     if predicted is None or found is None:
         error = 0.0 if predicted is found else inf
     else:
         error = abs(found - predicted) if isfinite(found) else inf
+    verdict = Verdict.of(error <= allowed) if resolved else Verdict.NOT_PROVEN
     return Row(
-        name=name,
-        loop=loop,
-        unit=unit,
-        predicted=predicted,
-        found=found,
-        error=error,
-        allowed=allowed,
-        verdict=Verdict.of(error <= allowed) if resolved else Verdict.NOT_PROVEN,
-        because=because,
-        condition=condition,
-    )
+        name=name, loop=loop, predicted=predicted, found=found, error=error, allowed=allowed, verdict=verdict,
+        **words,
+    )  # fmt: skip

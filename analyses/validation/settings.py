@@ -1,9 +1,14 @@
-"""How much a validation does beside its checks, which are always made."""
+"""What is asked of a validation: how much it does beside its checks, which are always made."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
+
+from analyses.request import Option
+
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
 
 Finding = Literal[
     "injected sweep", "margins by amplitude", "motion from rest", "large signals", "friction effects",
@@ -33,3 +38,25 @@ QUICK = Settings(findings=())
 """All that the verdict is made of, without findings."""
 CHECKS = Settings(own=False, findings=())
 """The checks alone."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """Check every prediction against the derivative of the nonlinear simulator, and show where it ends.
+
+    Each row is met, not met or not proven. Exit status 1 if one is not met, or not proven and not waived, if
+    the drive does not come to rest, or if a command within full deflection makes it diverge. The page
+    (--out), --json and --large also show what is large, starts from rest, or is shaken by counts.
+
+    Try: actuator-lti validate joint --quick, or actuator-lti validate fin --out out/fin
+    """
+
+    quick: Annotated[bool, Option("Checks and verdict only, on the page and in JSON, too.")] = False
+    large: Annotated[
+        bool, Option("What is large, starts from rest or is shaken by counts, on the terminal, too.")
+    ] = False
+
+    @classmethod
+    def of(cls, design: Design, *, quick: bool = False, large: bool = False) -> Settings:
+        """The settings of `analyses.validation.validate`."""
+        return Settings() if large and not quick else QUICK

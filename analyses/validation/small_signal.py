@@ -28,7 +28,7 @@ from actuator_lti.systems.resolvent import balanced
 from analyses.linear.loop_figures import LoopFigures
 from analyses.validation.row import Row, judged
 from nonlinear import Tangent
-from nonlinear.bench.lifted import GRID, relative, sized
+from nonlinear.bench.lifted import GRID, eigenvalues, relative, sized
 
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins
@@ -139,7 +139,10 @@ def _marks(place: Place) -> list[float]:
 
 def _poles(place: Place) -> Row:
     """Each predicted pole beside the tangent's nearest eigenvalue, by their rates."""
-    found, errors, rounding = _eigenvalues(place.tangent)
+    t = place.tangent
+    A, scale = balanced(t.A)
+    found, errors, sharp = eigenvalues(A, t.entry_errors[: len(A), : len(A)] / scale[:, None] * scale)
+    rounding = ROUNDING * float(np.linalg.norm(A)) / sharp
     resolved = [
         (pole, k)
         for pole in place.poles[np.abs(place.poles) > 0.0]
@@ -153,7 +156,7 @@ def _poles(place: Place) -> Row:
         if _worse(now, allowed, off, within):
             off, within, worst = now, allowed, complex(pole)
     if worst:
-        words += f"; worst at |z| = {abs(worst):.6g} over {place.tangent.period_s:.3g} s"
+        words += f"; worst at |z| = {abs(worst):.6g} over {t.period_s:.3g} s"
     row = place.judged("poles", 0.0, off, within, 1.0, "1", words)
     return replace(row, predicted=None, found=None, error=off)
 
@@ -163,19 +166,6 @@ def _worse(off: float, within: float, other: float, other_within: float) -> bool
     if off <= within and other <= other_within and max(within, other_within) > RESOLVED:
         return within > other_within
     return off / within > other / other_within
-
-
-def _eigenvalues(t: Tangent) -> tuple[Complexes, Floats, Floats]:
-    """Those of A, what the stated errors of its entries do to each, and what rounding does."""
-    from scipy.linalg import eig
-
-    A, scale = balanced(t.A)
-    entries = t.entry_errors[: len(A), : len(A)] / scale[:, None] * scale
-    found, left, right = eig(A, left=True)
-    sharp = np.abs(np.sum(left.conj() * right, axis=0))  # of unit vectors: 1 over the condition number
-    sharp = np.maximum(sharp, np.finfo(float).tiny)
-    felt = np.einsum("ik,ij,jk->k", np.abs(left), entries, np.abs(right)) / sharp
-    return found, felt, ROUNDING * float(np.linalg.norm(A)) / sharp
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from analyses.large_signal.tones import settling_ticks_of
 from analyses.limit_cycles.counts import Counts, counts_of
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 from analyses.motion.settling import Settling, settlings_of
+from analyses.specification import specification
 from analyses.validation.bench_sweep import bench_sweep
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.in_time import margin_shown, step_shown
@@ -108,29 +109,23 @@ class _Work:
         whole = {*stable, *held} >= {*self.bench.figures} and self.design.controller.position is not None
         if self.design.controller.position is None:
             self.notes.append(NO_POSITION)
-        steps = {name: self._shown("step", step_shown, name) for name in stable}
-        margins = {
-            name: self._shown("runs beside the margin", lambda b, n: margin_shown(b, places[n]), name)
-            for name in stable
-            if name in places
-        }
-        rows += [shown.row for shown in steps.values() if shown is not None]
-        rows += [row for shown in margins.values() if shown is not None for row in shown.rows]
-        rows += self._part("numbers of the design", self._values, [])
+        placed = [name for name in stable if name in places]
+        swept = placed if "injected sweep" in self.settings.findings else []
+        steps = self._each("step", stable, lambda name: step_shown(self.bench, name))
+        margins = self._each("runs beside the margin", placed, lambda n: margin_shown(self.bench, places[n]))
+        rows += [shown.row for shown in steps.values()]
+        rows += [row for shown in margins.values() for row in shown.rows]
+        values = partial(design_value_rows, self.design, self.bench.model)
+        rows += self._part("numbers of the design", values, [])
         self._step()
         return Validation(
             design=self.design,
             rows=tuple(rows),
             figures=self.bench.figures,
             loops=loops,
-            steps={name: shown for name, shown in steps.items() if shown is not None},
-            margins={name: shown for name, shown in margins.items() if shown is not None},
-            sweeps={
-                name: sweep
-                for name in (stable if "injected sweep" in self.settings.findings else ())
-                if name in places
-                and (sweep := self._shown("injected sweep", lambda b, n: bench_sweep(b, places[n]), name))
-            },
+            steps=steps,
+            margins=margins,
+            sweeps=self._each("injected sweep", swept, lambda n: bench_sweep(self.bench, places[n])),
             amplitude_margins=self._asked(
                 "margins by amplitude", bool(stable), lambda: tuple(margins_by_amplitude(self.bench)), ()
             ),
@@ -162,9 +157,10 @@ class _Work:
 
         return attempt(name, refused, otherwise)
 
-    def _shown(self, what: str, work: Callable[[Bench, str], T], name: str) -> T | None:
-        """What is shown of one loop."""
-        return self._part(f"{what} of the {name} loop", lambda: work(self.bench, name), None)
+    def _each(self, what: str, names: list[str], work: Callable[[str], T | None]) -> dict[str, T]:
+        """What is shown of some loops, without those of which there is nothing."""
+        made = {name: self._part(f"{what} of the {name} loop", partial(work, name), None) for name in names}
+        return {name: shown for name, shown in made.items() if shown is not None}
 
     def _asked(self, name: str, possible: bool, work: Callable[[], T], otherwise: U) -> T | U:
         """A finding, or what the drive itself does, if it is asked for."""
@@ -195,9 +191,6 @@ class _Work:
         """What stands in front of each limiter under a command."""
         return [row for place in self.bench.onsets() for row in small_signal(place)]
 
-    def _values(self) -> list[Row]:
-        return design_value_rows(self.design, self.bench.model)
-
     def _held_by_friction(self) -> tuple[str, ...]:
         """Loops that are not stable as they are tested, but are with the friction that is left out there."""
         bench, model = self.bench, on_the_bench(self.bench.model)
@@ -209,20 +202,17 @@ class _Work:
         return tuple(name for name, own in figures.items() if own.stable and not bench.figures[name].stable)
 
     @cached_property
-    def _loops(self) -> Any:
-        return self.bench.commanded
-
-    @cached_property
     def _whole(self) -> Any:
         """The same with the profile and the filter of the command in front."""
-        if self.bench.model.command == self._loops.design.command:
-            return self._loops
+        loops = self.bench.commanded
+        if self.bench.model.command == loops.design.command:
+            return loops
         at = self.bench.setup("command").bias.operating(self.bench.drive)
         return loops_at(replace(self.bench.linear, command=self.bench.model.command), at)
 
     def _settle(self) -> int:
         """Ticks in which the position loop settles."""
-        closed = self._loops.present["position"].plain_closed
+        closed = self.bench.commanded.present["position"].plain_closed
         return settling_ticks_of(closed, self.bench.setup("position").hold_ticks, self.design.name)
 
     @cached_property
@@ -234,10 +224,10 @@ class _Work:
     def _rest(self) -> RestSweep | None:
         """Sines from rest."""
         design, band = self.design, self._commanded.bandwidth
-        if band is None or not self._loops.limiters:
+        if band is None or not self.bench.commanded.limiters:
             return None
         marks = [x for x in (band.minus3db_hz, band.minus90deg_hz) if x]
-        top = HIGHEST / (self._loops.present["position"].period_s or 1.0)
+        top = HIGHEST / (self.bench.commanded.present["position"].period_s or 1.0)
         high = min(2.0 * max(marks, default=top), top)
         asked = np.geomspace(min(marks, default=high) / BELOW, high, self.settings.rest_frequencies)
         near = np.outer(marks, NEAR).ravel()
@@ -247,13 +237,13 @@ class _Work:
 
     @cached_property
     def _settled(self) -> tuple[Settling, ...]:
-        return settlings_of(self.design, self._loops)
+        return settlings_of(self.design, self.bench.commanded)
 
     def _conditional(self) -> Conditional:
-        return conditional_stability(self.design, self._loops, self._settle())
+        return conditional_stability(self.design, self.bench.commanded, self._settle())
 
     def _counts(self) -> tuple[Counts, ...]:
-        return counts_of(self.design, self._loops, self._settle())
+        return counts_of(self.design, self.bench.commanded, self._settle())
 
     def _large(self) -> Any:
         return large_signals(self.design, self._whole, counts=self.settings.map_counts)
@@ -261,12 +251,10 @@ class _Work:
     def _friction(self) -> Any:
         from analyses.friction_effects import friction_effects
 
-        return friction_effects(self.design, self._loops, settlings=self._settled)
+        return friction_effects(self.design, self.bench.commanded, settlings=self._settled)
 
     def _specification(self) -> Any:
-        from analyses.specification import specification
-
-        return specification(self.design, self._loops)
+        return specification(self.design, self.bench.commanded)
 
 
 def _unproven(name: str, notes: list[str]) -> Row:

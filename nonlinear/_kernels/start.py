@@ -6,11 +6,13 @@ import math
 
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
+from nonlinear._kernels.elastic_modes import find_mode
 from nonlinear._kernels.elastic_prepare import prepare_elastic, prepare_elastic_sizes
 from nonlinear._kernels.energy import prepare_forms
+from nonlinear._kernels.motion import put_load
 from nonlinear._kernels.slipping import COMPLEX, describe, transition
 from nonlinear._kernels.smooth import prepare_tanh
-from nonlinear._kernels.tick import init_elastic, init_run, retune_elastic, retune_rigid
+from nonlinear._kernels.tick import init_elastic, init_run, put_direction
 
 
 @kernel
@@ -175,6 +177,7 @@ def init(p, s):
 @kernel
 def retune(p, s):
     """Fit the state to parameters that were changed between two ticks, after `derive`."""
-    retune_rigid(p, s)
+    put_load(p, s, s[layout.S_LOAD], 0.0)
+    put_direction(p, s)
     if p[layout.ELASTIC_DRIVE] > 0.0:
-        retune_elastic(p, s)
+        find_mode(p, s)

@@ -10,7 +10,7 @@ from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.blocks import TRACKING, clamp, counted, fill_ring, settle
 from nonlinear._kernels.control import control
-from nonlinear._kernels.elastic_modes import coupling_torque, elastic_start, find_mode
+from nonlinear._kernels.elastic_modes import coupling_torque, elastic_start
 from nonlinear._kernels.motion import motion, put_load
 from nonlinear._kernels.sense import applied_voltage, seed_streams, sense
 
@@ -79,16 +79,22 @@ def init_lines(p, s):
 
 
 @kernel
+def put_direction(p, s):
+    """Whether and which way the motor slips at its speed; a smooth one knows no rest."""
+    w = s[layout.S_SPEED]
+    s[layout.S_DIRECTION] = -1.0 if w < 0.0 else (1.0 if w > 0.0 else 0.0)
+    if p[layout.SMOOTH] > 0.0 or p[layout.LAW] > 0.0:
+        s[layout.S_DIRECTION] = 1.0
+
+
+@kernel
 def init_run(p, s):
     """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
     for j in range(int(p[layout.STATE_SIZE])):
         s[j] = 0.0
     s[layout.S_CURRENT], s[layout.S_SPEED] = p[layout.CURRENT_START], p[layout.SPEED_START]
     s[layout.S_ANGLE] = p[layout.ANGLE_START]
-    w = p[layout.SPEED_START]
-    s[layout.S_DIRECTION] = -1.0 if w < 0.0 else (1.0 if w > 0.0 else 0.0)
-    if p[layout.SMOOTH] > 0.0 or p[layout.LAW] > 0.0:  # these know no rest
-        s[layout.S_DIRECTION] = 1.0
+    put_direction(p, s)
     put_load(p, s, p[layout.LOAD], 0.0)
     init_controller(p, s)
     init_estimate(p, s)
@@ -103,22 +109,6 @@ def init_elastic(p, s):
     elastic_start(p, s)
     fill_ring(p, s, layout.POINT_OUTPUT, s[layout.S_OUTPUT])
     s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = s[layout.S_OUTPUT]
-
-
-@kernel
-def retune_rigid(p, s):
-    """What parameters changed between two ticks mean for the state: torques, and whether the motor slips."""
-    put_load(p, s, s[layout.S_LOAD], 0.0)
-    w = s[layout.S_SPEED]
-    s[layout.S_DIRECTION] = -1.0 if w < 0.0 else (1.0 if w > 0.0 else 0.0)
-    if p[layout.SMOOTH] > 0.0 or p[layout.LAW] > 0.0:
-        s[layout.S_DIRECTION] = 1.0
-
-
-@kernel
-def retune_elastic(p, s):
-    """The same for an elastic drive train: contact and the load's slip too."""
-    find_mode(p, s)
 
 
 @kernel

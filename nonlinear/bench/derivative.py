@@ -30,7 +30,16 @@ import numpy.typing as npt
 from actuator_lti.design.loader import as_design
 from nonlinear.bench.differences import Differences
 from nonlinear.bench.injection import Watched
-from nonlinear.bench.lifted import Complexes, Floats, even, lifted, response, sensitivities, without_rest
+from nonlinear.bench.lifted import (
+    Complexes,
+    Floats,
+    eigenvalues,
+    even,
+    lifted,
+    response,
+    sensitivities,
+    without_rest,
+)
 from nonlinear.bench.loop_setup import LoopSetup, loop_setup
 
 if TYPE_CHECKING:
@@ -128,17 +137,12 @@ class Tangent:
 
     def poles_at(self, gain: float) -> tuple[Complexes, Floats]:
         """Poles at a gain at the place, but those at rest; the error of each, by those of the entries."""
-        from scipy.linalg import eig
-
         n, factor = len(self.A), self._factor(gain)
         back = np.hstack([np.eye(n), -self.B @ factor])
         seen = np.vstack([np.eye(n), -factor @ self.C])
         errors = np.abs(back) @ self.entry_errors @ np.abs(seen)
-        A, errors = without_rest(self.at_gain(gain), errors, self._at_rest)
-        values, left, right = eig(A, left=True)
-        sharp = np.abs(np.sum(left.conj() * right, axis=0))
-        felt = np.einsum("ik,ij,jk->k", np.abs(left), errors, np.abs(right))
-        return values, felt / np.maximum(sharp, np.finfo(float).tiny)
+        values, felt, _ = eigenvalues(*without_rest(self.at_gain(gain), errors, self._at_rest))
+        return values, felt
 
     def __str__(self) -> str:
         return (

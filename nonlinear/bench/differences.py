@@ -26,6 +26,8 @@ from nonlinear.bench.lifted import GRID, Floats, sensitivities, sized
 from nonlinear.bench.loop_setup import LoopSetup
 
 Parts = tuple[Floats, Floats, Floats, Floats]
+Pair = tuple[Floats, Floats]
+Places = npt.NDArray[np.intp]
 MOST_DECADES = 40  # of steps, where events forbid the larger ones
 TENFOLD = 100.0  # what the truncation of central differences grows by with a step ten times as large
 FAR = 1e8  # times a kick's first motion: the largest step
@@ -39,14 +41,9 @@ FRESH = 4  # periods from when a number is first moved, in which its motion give
 class Differences:
     """One place of a drive that runs by hand.
 
-    A row is a state, and behind it what is injected at each update at the place.
-
-    Attributes
-    ----------
-    hold, updates : int
-        Ticks between two updates at the place; updates in a base period.
-    moved : ndarray of int
-        Places of the numbers of the state that take part.
+    A row is a state, and behind it what is injected at each update at the place. ``hold``, ``updates``: ticks
+    between two of them, their number in a base period. ``moved``, ``names``: places and names of the numbers
+    of the state that take part.
     """
 
     def __init__(self, setup: LoopSetup, place: str, watched: Sequence[Watched | None] = (None,)) -> None:
@@ -63,6 +60,7 @@ class Differences:
         if after[0, at.S_EVENTS] != self.start[at.S_EVENTS]:
             raise NumericalError(f"{self.where}: an event happens on the operating motion itself")
         self.moved, scale, self.kick = self._reached()
+        self.names = names_of(self.moved)
         self.places = np.concatenate([self.moved, self.size + np.arange(self.updates)])
         self.scale = np.concatenate([scale, np.full(self.updates, self.kick)])
 
@@ -79,20 +77,14 @@ class Differences:
         period_s = place.every * setup.design.controller.period_s
         start[[at.S_REFERENCE, at.S_REFERENCE_BEFORE]] = now - speed * period_s * np.array([1.0, 2.0])
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the numbers of the state that take part."""
-        return names_of(self.moved)
-
     def parts(self) -> Iterator[tuple[Parts, Floats, float]]:
         """A, B, C, D; stated errors of A over C beside B over D; the largest of the response, relative.
 
         One after the other for each thing that is read.
         """
-        n = self.moved.size
+        n, readings = self.moved.size, self.injected.readings
         rows = [
             np.concatenate([np.arange(n), n + np.arange(k, self.updates * readings, readings)])
-            for readings in [self.injected.readings]
             for k in range(readings)
         ]
         for columns, (left, right) in self._tried(rows):
@@ -104,22 +96,17 @@ class Differences:
         n = self.moved.size
         return whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:]
 
-    def _felt(self, whole: Floats) -> tuple[Floats, Floats]:
+    def _felt(self, whole: Floats) -> Pair:
         """What errors of the entries do to the response, over its size, see `sensitivities`.
 
         At `GRID`, and behind it where slow poles are.
         """
-        n, slow = self.moved.size, self._slow(whole)
+        n = self.moved.size
+        angles = np.abs(np.linalg.eigvals(balanced(whole[:n, :n])[0] - np.eye(n))) / self.updates
+        slow = angles[(angles > SLOWEST) & (angles < GRID[0])]  # but of those at rest
         left, right = sensitivities(*self._split(whole), np.exp(1j * np.concatenate([GRID, slow])))
         answer = np.einsum("zi,ik,zk->z", left[:, n:], whole[n:], right)
         return np.abs(left) / sized(answer)[:, None], np.abs(right)
-
-    def _slow(self, whole: Floats) -> Floats:
-        """Angles a sample of poles below `GRID`, but of those at rest."""
-        n = self.moved.size
-        poles = np.linalg.eigvals(balanced(whole[:n, :n])[0] - np.eye(n))
-        angles = np.abs(poles) / self.updates
-        return np.asarray(angles[(angles > SLOWEST) & (angles < GRID[0])])
 
     def _runs(self, rows: Floats) -> tuple[Floats, Floats, Floats]:
         """States behind one base period, what is read at each update, and flags on the way."""
@@ -131,7 +118,7 @@ class Differences:
             flags[:, k] = states[:, self.watched]
         return states, back, flags
 
-    def _reached(self) -> tuple[npt.NDArray[np.intp], Floats, float]:
+    def _reached(self) -> tuple[Places, Floats, float]:
         """Which numbers a kick moves, how far each, and the kick: the largest without an event."""
         kick, continuous = self.injected.size, places_of(self.drive.p, CONTINUOUS)
         for _ in range(16):
@@ -140,24 +127,18 @@ class Differences:
                 places = continuous[moved[continuous] > 0.0]
                 return places, moved[places], kick
             kick /= 10.0
-        raise NumericalError(
-            f"{self.where}: every kick at it ends in an event; no operating motion without one"
-        )
-
-    @property
-    def _memory(self) -> int:
-        """Ticks that a change may take through delay line, stored angles and moving average."""
-        p = self.drive.p
-        stored = p[at.DIFFERENCE_SAMPLES] * p[at.EVERY_VELOCITY] + p[at.PROFILE_SAMPLES] * p[at.OUTER_EVERY]
-        return int(p[at.DELAY_LINE] + stored)
+        message = "every kick at it ends in an event; no operating motion without one"
+        raise NumericalError(f"{self.where}: {message}")
 
     def _kicked(self, kick: float) -> Floats | None:
         """How far a kick moves each number soon after it reaches it; None where it ends in an event."""
-        rows = np.stack([self.start, self.start])
+        p, rows = self.drive.p, np.stack([self.start, self.start])
+        stored = p[at.DIFFERENCE_SAMPLES] * p[at.EVERY_VELOCITY] + p[at.PROFILE_SAMPLES] * p[at.OUTER_EVERY]
+        longest = int(p[at.DELAY_LINE] + stored) // self.base + FRESH  # periods that a change may take
         rows[0, self.size] += kick
         moved, since = np.zeros(self.size), np.full(self.size, -1)
         quiet, period = 0, 0
-        while quiet <= self._memory // self.base + FRESH:
+        while quiet <= longest:
             rows[:, : self.size], _, flags = self._runs(rows)
             rows[0, self.size] = self.injected.steady
             if not np.array_equal(*flags):
@@ -207,14 +188,14 @@ class Differences:
                 self.drive.each(states, 1, self.injected.at, injected[:, tick // self.hold])
         return np.fmin(steps, bias.room_rad_s * steps / np.maximum(moved, 1e-250))
 
-    def _tried(self, rows: list[npt.NDArray[np.intp]]) -> list[tuple[_Columns, tuple[Floats, Floats]]]:
+    def _tried(self, rows: list[Places]) -> list[tuple[_Columns, Pair]]:
         """Columns by steps that fall by tens, of the rows of each thing that is read, and what is felt there.
 
         Of each column until it had three without an event, and the last did not bend.  Where events forbid
         the larger ones, they begin with the largest without one, found by halves.
         """
         steps, going, seen = self._largest(), np.ones(self.scale.size, bool), np.zeros(self.scale.size, bool)
-        felt, tried = list[tuple[Floats, Floats]](), list[tuple[Floats, Floats]]()
+        felt, tried = list[Pair](), list[Pair]()
         for tries in range(1, MOST_DECADES + 1):
             values, rounding = self._differences(np.where(going, steps, 0.0))
             free = np.isfinite(values).all(axis=1)
@@ -229,7 +210,7 @@ class Differences:
                 steps = np.fmin(steps, far / np.maximum(moved, 1e-250))
             if tries < LEAST:
                 continue
-            columns = _columns(rows, tried)
+            columns = [_Columns(tried, each) for each in rows]
             going = ~columns[0].free
             if not going.any():
                 felt = felt or [self._felt(each.last) for each in columns]
@@ -237,34 +218,25 @@ class Differences:
                     going = going | one.bend(left, right)
                 if not going.any():
                     return self._grown(rows, tried, felt)
-        raise self._refused(~going)
+        name = (*self.names, *["the injection"] * self.updates)[int(np.argmax(going))]
+        raise NumericalError(f"{self.where}: every step of {name} ends in an event")
 
-    def _grown(
-        self,
-        rows: list[npt.NDArray[np.intp]],
-        tried: list[tuple[Floats, Floats]],
-        felt: list[tuple[Floats, Floats]],
-    ) -> list[tuple[_Columns, tuple[Floats, Floats]]]:
+    def _grown(self, rows: list[Places], tried: list[Pair], felt: list[Pair]) -> list[tuple[_Columns, Pair]]:
         """The same with larger steps of columns that the largest knows best, while they agree better.
 
         A number that hardly moves beside large ones is lost in their rounding at steps by its own motion.
         """
         steps = self._largest()
         for _ in range(GROWN):
-            columns = _columns(rows, tried)
+            columns = [_Columns(tried, each) for each in rows]
             going = np.any([one.grow(*each) for one, each in zip(columns, felt, strict=True)], axis=0)
             if not going.any():
                 break
             steps = np.where(going, 10.0 * steps, 0.0)
             tried.insert(0, self._differences(steps))
-        return list(zip(_columns(rows, tried), felt, strict=True))
+        return [(_Columns(tried, each), seen) for each, seen in zip(rows, felt, strict=True)]
 
-    def _refused(self, free: npt.NDArray[np.bool_]) -> NumericalError:
-        """No step without an event."""
-        name = (*self.names, *["the injection"] * self.updates)[int(np.argmin(free))]
-        return NumericalError(f"{self.where}: every step of {name} ends in an event")
-
-    def _differences(self, steps: Floats) -> tuple[Floats, Floats]:
+    def _differences(self, steps: Floats) -> Pair:
         """Central differences over all numbers, one a row, and what rounding may make of them.
 
         NaN where the step is 0 or lost in the number, and where an event took place.
@@ -284,9 +256,7 @@ class Differences:
         columns[:, asked] = (found[:K] - found[K:]) / width, np.spacing(size) / width
         return columns[0], columns[1]
 
-    def _stepped(
-        self, steps: Floats, numbers: slice | npt.NDArray[np.intp] = slice(None)
-    ) -> tuple[Floats, Floats]:
+    def _stepped(self, steps: Floats, numbers: slice | Places = slice(None)) -> Pair:
         """Rows with numbers of the state one step above, then one below; where these numbers then are."""
         both, places = np.arange(2 * steps.size), np.tile(self.places[numbers], 2)
         rows = np.tile(self.start, (both.size, 1))
@@ -295,57 +265,46 @@ class Differences:
 
 
 class _Columns:
-    """All columns by steps that fall, and what each differs in from that of the next smaller step."""
+    """All columns of one thing that is read, by steps that fall; ``off``: what differs in the next one."""
 
-    def __init__(self, values: Floats, rounding: Floats) -> None:
+    def __init__(self, tried: list[Pair], rows: Places) -> None:
+        values, rounding = (np.stack(each)[:, :, rows] for each in zip(*tried, strict=True))
         self.values = values[:-1]
         self.off = np.maximum(np.abs(np.diff(values, axis=0)), rounding[:-1])
+        self.there = np.isfinite(self.off).all(axis=2)
+        self.smallest = len(self.there) - 1 - np.argmax(self.there[::-1], axis=0)
 
     @property
     def free(self) -> npt.NDArray[np.bool_]:
         """Which have three successive steps without an event."""
-        there = np.asarray(np.isfinite(self.off).all(axis=2))
-        return np.asarray((there[:-1] & there[1:]).any(axis=0))
-
-    @property
-    def _smallest(self) -> npt.NDArray[np.intp]:
-        """The place of each column's smallest step of which the next smaller one is known."""
-        there = np.asarray(np.isfinite(self.off).all(axis=2))
-        return np.asarray(len(there) - 1 - np.argmax(there[::-1], axis=0))
+        return np.asarray((self.there[:-1] & self.there[1:]).any(axis=0))
 
     @property
     def last(self) -> Floats:
         """Each column by its smallest step but one."""
-        return self._taken(self._smallest, self.values)
+        return self._taken(self.smallest, self.values)
 
     def bend(self, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
         """Of which truncation still falls with the smallest step."""
-        felt, last, columns = _felt(self.off, left, right), self._smallest, np.arange(right.shape[1])
+        felt, last, columns = self._felt(left, right), self.smallest, np.arange(right.shape[1])
         return np.asarray(felt[last, columns] * np.sqrt(TENFOLD) < felt[last - 1, columns])
 
     def grow(self, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
         """Which the largest step of all knows best, but not well."""
-        felt = _felt(self.off, left, right)
-        known = np.where(np.isfinite(felt), felt, np.inf)
-        return np.asarray((np.argmin(known, axis=0) == 0) & np.isfinite(felt[0]) & (felt[0] > KNOWN))
+        felt = self._felt(left, right)
+        best = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
+        return np.asarray((best == 0) & np.isfinite(felt[0]) & (felt[0] > KNOWN))
 
-    def best(self, left: Floats, right: Floats) -> tuple[Floats, Floats]:
+    def best(self, left: Floats, right: Floats) -> Pair:
         """Each column by the step whose error does least to the response; and that error."""
-        felt = _felt(self.off, left, right)
+        felt = self._felt(left, right)
         chosen = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
         return self._taken(chosen, self.values), self._taken(chosen, self.off)
 
+    def _felt(self, left: Floats, right: Floats) -> Floats:
+        """What the error of each column by each step does to the response."""
+        return np.asarray(np.max((self.off @ left.T) * right.T, axis=-1))
+
     @staticmethod
-    def _taken(chosen: npt.NDArray[np.intp], values: Floats) -> Floats:
+    def _taken(chosen: Places, values: Floats) -> Floats:
         return values[chosen, np.arange(chosen.size)].T
-
-
-def _columns(rows: list[npt.NDArray[np.intp]], tried: list[tuple[Floats, Floats]]) -> list[_Columns]:
-    """Of the rows of each thing that is read."""
-    whole, off = (np.stack(each) for each in zip(*tried, strict=True))
-    return [_Columns(whole[:, :, each], off[:, :, each]) for each in rows]
-
-
-def _felt(off: Floats, left: Floats, right: Floats) -> Floats:
-    """What the error of each column by each step does to the response."""
-    return np.asarray(np.max((off @ left.T) * right.T, axis=-1))

@@ -23,25 +23,12 @@ HELD = {"velocity_integral": at.S_VELOCITY_INTEGRATOR, "current_integral": at.S_
 
 @dataclass(frozen=True)
 class Watched:
-    """A signal in front of a limiter, at its last update before the next command.
+    """A signal in front of a limiter, at its last update before the next command."""
 
-    Attributes
-    ----------
-    signal : str
-        ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"torque_command"``, ``"i"``, ``"velocity_integral"`` or
-        ``"current_integral"``.
-    kind : {"value", "rate", "rms"}
-        The signal itself; its change over the update, over ``period_s``; the plant's own at the last tick.
-    every : int
-        Ticks between two updates.
-    period_s : float
-        Time of them.
-    """
-
-    signal: str
-    kind: Kind
-    every: int
-    period_s: float
+    signal: str  # "u", "i_ref", "w_ref", "torque_command", "i", "velocity_integral" or "current_integral"
+    kind: Kind  # the signal itself, its change over the update by ``period_s``, the plant's at the last tick
+    every: int  # ticks between two updates
+    period_s: float  # time of them
 
 
 class Injection:

@@ -63,6 +63,15 @@ def _nearest_to_rest(turned: Floats) -> Floats:
     return np.asarray(right[-1] - (off[known] / sizes[known]) @ right[known])
 
 
+def eigenvalues(A: Floats, errors: Floats) -> tuple[Complexes, Floats, Floats]:
+    """Those of A, what errors of its entries do to each, and 1 over the condition number of each."""
+    from scipy.linalg import eig
+
+    found, left, right = eig(A, left=True)
+    sharp = np.maximum(np.abs(np.sum(left.conj() * right, axis=0)), np.finfo(float).tiny)  # of unit vectors
+    return found, np.einsum("ik,ij,jk->k", np.abs(left), errors, np.abs(right)) / sharp, sharp
+
+
 def lifted(A: Floats, B: Floats, C: Floats, D: Floats, points: Complexes) -> Complexes:
     """C (p - A)^-1 B + D at points p = exp(j w period_s), shape (K, M, M).
 

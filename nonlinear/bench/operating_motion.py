@@ -103,7 +103,9 @@ def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
         return standing(design)
     loads = [load_Nm]
     if needs_press(design):
-        whole = full_torque_Nm(design) * design.total_ratio / _felt(design)
+        passed = 1.0 if design.load.path == "back-drivable" else 0.0
+        felt = max(passed + design.friction.load_coefficient * design.total_ratio, 1e-12)
+        whole = full_torque_Nm(design) * design.total_ratio / felt  # by the motor torque that it costs
         loads = [load_Nm - part * whole for part in PRESSED]
     for share in (SHARE, MOST):
         for moment in loads:
@@ -112,11 +114,10 @@ def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
                 return _closed(design, motion)
     least, limits = operating_motion_at(design, SLOWEST * FASTEST_RAD_S, loads[-1]), design.limits
     stuck = least.voltage_V > limits.voltage_V or least.current_A > limits.peak_current_A
-    if stuck or bent_about_rest(design):
-        message = (
-            f"friction takes more than {100 if stuck else 100 * MOST:.0f} % of the current or voltage limit"
-        )
-        raise InputError(f"{message}: no steady motion to test on", where=design.name)
+    if stuck or not may_stand(design):
+        part = f"{100 if stuck else 100 * MOST:.0f} % of the current or voltage limit"
+        message = f"friction takes more than {part}: no steady motion to test on"
+        raise InputError(message, where=design.name)
     return standing(design)
 
 
@@ -126,16 +127,11 @@ def needs_press(design: Design) -> bool:
     return coupling is not None and (coupling.play_rad > 0.0 or design.friction.load_coefficient > 0.0)
 
 
-def bent_about_rest(design: Design) -> bool:
-    """Whether play or friction gives a drive at rest another slope than a moving one has."""
+def may_stand(design: Design) -> bool:
+    """Whether the drive has one slope about rest, of play and friction, once its dry friction is left out."""
     friction = design.friction
     uneven = bool(friction.points) or friction.viscous(1) != friction.viscous(-1)
-    return uneven or needs_press(design)
-
-
-def may_stand(design: Design) -> bool:
-    """Whether the drive has one slope about rest once its dry friction is left out."""
-    return follows_angle(design) or not bent_about_rest(design)
+    return follows_angle(design) or not (uneven or needs_press(design))
 
 
 def on_its_stand(design: Design, like: Design | None = None) -> Design:
@@ -183,15 +179,12 @@ def _closed(design: Design, motion: OperatingMotion) -> OperatingMotion:
         return motion
     more = copysign(_closing_Nm(coupling), pressed) - pressed
     load_Nm = motion.load_Nm - more * design.ratio_behind_coupling
-    held = operating_motion_at(design, motion.speed_rad_s, load_Nm)
-    motor = design.effective_motor
+    held, motor = operating_motion_at(design, motion.speed_rad_s, load_Nm), design.effective_motor
+    extra = (motor.torque_constant_Nm_A or 0.0) * (held.current_A - motion.current_A)
     if motor.source_gain_Nm_V is not None:
         extra = motor.source_gain_Nm_V * (held.voltage_V - motion.voltage_V)
-    else:
-        extra = (motor.torque_constant_Nm_A or 0.0) * (held.current_A - motion.current_A)
-    return replace(
-        motion, load_Nm=load_Nm, twist_rad=held.twist_rad, coupling_Nm=held.coupling_Nm, extra_Nm=extra
-    )
+    twist, torque = held.twist_rad, held.coupling_Nm
+    return replace(motion, load_Nm=load_Nm, twist_rad=twist, coupling_Nm=torque, extra_Nm=extra)
 
 
 def full_torque_Nm(design: Design) -> float:
@@ -212,12 +205,6 @@ def _torque_Nm(design: Design, current_A: float) -> float:
         return motor.source_gain_Nm_V * limits.voltage_V
     short = limits.voltage_V / (motor.resistance_ohm or 1.0)
     return (motor.torque_constant_Nm_A or 0.0) * min(current_A, short)
-
-
-def _felt(design: Design) -> float:
-    """Motor torque that a moment at the output costs, times N."""
-    passed = 1.0 if design.load.path == "back-drivable" else 0.0
-    return max(passed + design.friction.load_coefficient * design.total_ratio, 1e-12)
 
 
 def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | None:
@@ -259,11 +246,9 @@ def _driven(design: Design, torque_Nm: float, speed_rad_s: float) -> tuple[float
     motor = design.effective_motor
     if motor.source_gain_Nm_V is not None:
         return 0.0, torque_Nm / motor.source_gain_Nm_V
-    assert motor.torque_constant_Nm_A is not None
-    assert motor.resistance_ohm is not None
-    assert motor.back_emf_constant_Vs_rad is not None
-    current = torque_Nm / motor.torque_constant_Nm_A
-    return current, motor.resistance_ohm * current + motor.back_emf_constant_Vs_rad * speed_rad_s
+    current = torque_Nm / (motor.torque_constant_Nm_A or 0.0)
+    back_emf = (motor.back_emf_constant_Vs_rad or 0.0) * speed_rad_s
+    return current, (motor.resistance_ohm or 0.0) * current + back_emf
 
 
 def _behind(friction: LoadFriction | None, speed_rad_s: float) -> float:
@@ -291,11 +276,8 @@ def _room(friction: Friction, speed_rad_s: float, sense: int) -> float:
     """How far the speed may move: part of the way to rest, to a bend of the map, to the slope of a tanh."""
     if friction.law == "tanh" and friction.dry_Nm(0.0, sense) > 0.0:
         least = friction.smoothing_speed_rad_s * 14.0  # there the slope of tanh is below FLAT
-        return min(ROOM * speed_rad_s, speed_rad_s - least) if _flat(friction, speed_rad_s) else 0.0
+        x = speed_rad_s / friction.smoothing_speed_rad_s
+        flat = x > 300.0 or cosh(x) ** -2 < FLAT
+        return min(ROOM * speed_rad_s, speed_rad_s - least) if flat else 0.0
     bends = [0.0, *(start for start, _ in segments(friction.map(sense)))] if friction.points else [0.0]
     return ROOM * min(abs(speed_rad_s - bend) for bend in bends)
-
-
-def _flat(friction: Friction, speed_rad_s: float) -> bool:
-    x = speed_rad_s / friction.smoothing_speed_rad_s
-    return x > 300.0 or cosh(x) ** -2 < FLAT

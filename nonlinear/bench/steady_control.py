@@ -89,21 +89,11 @@ def steady_gain(design: Design, place: FilterPlace) -> float:
 
 @dataclass(frozen=True)
 class OwnStart:
-    """Where a law of one's own starts.
+    """Where a law of one's own starts."""
 
-    Attributes
-    ----------
-    states : ndarray, shape (n,)
-        Zero where the motion has no steady state of the law.
-    command : float
-        Command of the stage at the start, motor side.
-    steady : bool
-        Whether the law is in its steady state there: with angles that grow, its states grow evenly.
-    """
-
-    states: npt.NDArray[np.float64]
-    command: float
-    steady: bool
+    states: npt.NDArray[np.float64]  # zero where the motion has no steady state of the law
+    command: float  # of the stage at the start, motor side
+    steady: bool  # whether it is in its steady state: with angles that grow, its states grow evenly
 
 
 def own_start(

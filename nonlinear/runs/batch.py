@@ -28,15 +28,7 @@ from nonlinear.loads import LoadMoment, as_load
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.reduced import BatchResult
 from nonlinear.runs.running import Running
-from nonlinear.runs.setup import (
-    Tables,
-    check_frequency,
-    put_load,
-    put_probes,
-    put_signal,
-    put_state,
-    ticks_of,
-)
+from nonlinear.runs.setup import Tables, put_run
 from nonlinear.runs.trajectory import State
 from nonlinear.runs.watch import watch
 
@@ -79,12 +71,8 @@ class Reducers:
         if self.window_ticks and not 0 < 2 * self.cycles < self.window_ticks:
             message = f"window of {self.window_ticks} ticks: must hold more than two ticks a period"
             raise InputError(f"{message} ({self.cycles} periods asked for)")
-        row[..., at.WINDOW], row[..., at.CYCLES], row[..., at.HARMONICS] = (
-            self.window_ticks,
-            self.cycles,
-            self.harmonics,
-        )
-        row[..., at.WITH_EXTREMES] = self.extremes
+        row[..., at.WINDOW], row[..., at.CYCLES] = self.window_ticks, self.cycles
+        row[..., at.HARMONICS], row[..., at.WITH_EXTREMES] = self.harmonics, self.extremes
         row[..., at.STEP_TARGET], row[..., at.STEP_BAND] = self.step_target_rad, self.step_band
 
 
@@ -106,18 +94,20 @@ class Run:
     def row(self, tables: Tables) -> Floats:
         """The parameter row of this run; time series go into ``tables``."""
         row = design_row(self.design, friction_on=self.friction_on, limits_on=self.limits_on)
-        row[at.TICKS] = ticks_of(self.duration_s, self.design.controller.period_s)
-        for place, signal in ((at.COMMAND, self.command), (at.BIAS, self.bias)):
-            if signal is not None:
-                check_frequency(self.design, signal)
-                put_signal(row, place, signal, tables)
-        put_load(row, as_load(self.load_Nm), tables)
-        put_probes(row, self.probes, tables)
-        put_state(row, self.initial or State())
-        if 2 * self.reducers.window_ticks > row[at.TICKS]:
-            message = (
-                f"window of {self.reducers.window_ticks} ticks: must fit twice into {row[at.TICKS]:.0f} ticks"
-            )
+        load, window = as_load(self.load_Nm), self.reducers.window_ticks
+        put_run(
+            row,
+            self.design,
+            self.duration_s,
+            self.command,
+            self.bias,
+            load,
+            self.probes,
+            self.initial,
+            tables,
+        )
+        if 2 * window > row[at.TICKS]:
+            message = f"window of {window} ticks: must fit twice into {row[at.TICKS]:.0f} ticks"
             raise InputError(message, where=self.design.name)
         self.reducers.write(row)
         return row

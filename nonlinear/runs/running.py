@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.bounds import HISTORY_BYTES
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout
 from nonlinear._kernels import layout as at
@@ -29,21 +30,11 @@ _BEHIND = (
 
 @dataclass(frozen=True)
 class Piece:
-    """Some ticks of a run, one entry every so many.
+    """Some ticks of a run, one entry every so many."""
 
-    Attributes
-    ----------
-    columns : ndarray, shape (columns, entries)
-        As `nonlinear._kernels.layout` orders them.
-    flags : ndarray of uint16
-    events : int
-        Landings, breakaways, reversals and contacts within it.
-    status : str
-    """
-
-    columns: Floats
+    columns: Floats  # (columns, entries), as `nonlinear._kernels.layout` orders them
     flags: npt.NDArray[np.uint16]
-    events: int
+    events: int  # landings, breakaways, reversals and contacts within it
     status: Status
 
 
@@ -174,11 +165,9 @@ class Running:
         """Go on by some ticks from tick 0, and be at tick 0 again."""
         from nonlinear.native import resume
 
-        p, rows = self.p, (ticks + every - 1) // every
+        p = self.p
         p[at.TICKS], p[at.RECORD_EVERY], p[at.WINDOW], p[at.STEP_TARGET] = ticks, every, 0.0, 0.0
-        columns = at.HISTORY_PROBES + 2 * len(self._probing) + int(p[at.RARE_LOAD] > 0.0)
-        columns += at.ELASTIC_COLUMNS * int(p[at.ELASTIC_DRIVE])
-        history, flags, out = np.empty((columns, rows)), np.zeros(rows, np.uint16), np.zeros(at.OUT_SIZE)
+        history, flags, out = self.history()
         before, steps = self.s[at.S_EVENTS], self.s[at.S_STEPS]
         status = resume(p, self.s, self.tables, history, flags, out, np.zeros(2))
         self.s[at.S_TICK] = 0.0
@@ -186,13 +175,24 @@ class Running:
         return Piece(history, flags, int(self.s[at.S_EVENTS] - before), STATUS[status])
 
     @property
-    def _probing(self) -> list[str]:
+    def probing(self) -> list[str]:
         """Break points with an instrument."""
         return [point for k, point in enumerate(at.POINTS) if self.p[at.PROBES + k * at.PROBE_SIZE] > 0.0]
 
+    def history(self) -> tuple[Floats, npt.NDArray[np.uint16], Floats]:
+        """Room for the columns of a run, its flags and its results."""
+        p, every = self.p, int(self.p[at.RECORD_EVERY])
+        rows = (int(p[at.TICKS]) + every - 1) // every
+        columns = at.HISTORY_PROBES + 2 * len(self.probing) + int(p[at.RARE_LOAD] > 0.0)
+        columns += at.ELASTIC_COLUMNS * int(p[at.ELASTIC_DRIVE])
+        if 8 * rows * columns > HISTORY_BYTES.most:
+            message = f"{p[at.TICKS]:.0f} ticks: a history of {rows} rows does not fit into memory"
+            raise InputError(f"{message}; use record_every, or simulate_many with reducers")
+        return np.empty((columns, rows)), np.zeros(rows, np.uint16), np.zeros(at.OUT_SIZE)
+
     def returned(self, piece: Piece, point: str) -> Floats:
         """The signal in front of the instrument at a break point, of a piece."""
-        return piece.columns[at.HISTORY_PROBES + 2 * self._probing.index(point)]
+        return piece.columns[at.HISTORY_PROBES + 2 * self.probing.index(point)]
 
 
 def _place(name: str) -> int:

@@ -55,6 +55,21 @@ class Tables:
         return np.concatenate(self.parts) if self.parts else np.zeros(1)
 
 
+def put_run(
+    row: Floats, design: Design, duration_s: float, command: Command, bias: Command | None,
+    load: LoadMoment, probes: Sequence[Probe], initial: State | None, tables: Tables,
+) -> None:  # fmt: skip
+    """Write what a drive is asked to do in one run: how long, commands, load, probes, and where it begins."""
+    row[at.TICKS] = ticks_of(duration_s, design.controller.period_s)
+    for place, signal in ((at.COMMAND, command), (at.BIAS, bias)):
+        if signal is not None:
+            check_frequency(design, signal)
+            _put_signal(row, place, signal, tables)
+    _put_load(row, load, tables)
+    _put_probes(row, probes, tables)
+    put_state(row, initial or State())
+
+
 def ticks_of(duration_s: float, period_s: float) -> int:
     """Number of ticks in a duration, rounded; refuses a duration without any."""
     finite_number("duration_s", duration_s, "a finite number of seconds")
@@ -65,7 +80,7 @@ def ticks_of(duration_s: float, period_s: float) -> int:
     return ticks
 
 
-def put_signal(row: Floats, place: int, command: Command, tables: Tables) -> None:
+def _put_signal(row: Floats, place: int, command: Command, tables: Tables) -> None:
     """Write a command at a place of the row, its table beside the others."""
     table = command.table(float(row[at.PERIOD]), int(row[at.TICKS]))
     offset, length = (0, 0) if table is None else tables.add(table)
@@ -84,19 +99,18 @@ def check_frequency(design: Design, command: Command) -> None:
     control = design.controller
     loop = {"position": control.position, "velocity": control.velocity}.get(control.outermost)
     nyquist = 0.5 / (control.period_s * (1 if loop is None else loop.every))
+    stage = "the drive" if loop is None else f"the {control.outermost} loop"
     if command.highest_hz >= nyquist:
         message = f"command {command.kind}: {command.highest_hz:g} Hz: must be below the Nyquist frequency"
-        stage = "the drive" if loop is None else f"the {control.outermost} loop"
         raise InputError(f"{message} of {stage}, {nyquist:g} Hz", where=design.name)
     content = 0.0 if command.held else command.highest_content(nyquist)
     if content > CONTENT:
-        stage = "the drive" if loop is None else f"the {control.outermost} loop"
         words = f"a line of {100.0 * content:.2g} % of its range lies above the Nyquist frequency of {stage}"
         message = f"command {command.kind}: {words}, {nyquist:g} Hz"
         raise InputError(f"{message}: it would come back at a lower one; filter it first", where=design.name)
 
 
-def put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
+def _put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
     """Write the load torque."""
     row[at.LOAD] = load.constant_Nm
     row[at.LOAD_SLOPE] += load.slope_Nm_rad
@@ -128,7 +142,7 @@ def put_supply(row: Floats, design: Design, supply: Command, scales: bool, table
     row[at.SUPPLY], row[at.SUPPLY_VOLTAGE] = at.SUPPLY_SCALES if scales else at.SUPPLY_LIMITS, nominal
 
 
-def put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
+def _put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
     """Write the probes, at most one a point."""
     if not isinstance(probes, Sequence) or not all(isinstance(probe, Probe) for probe in probes):
         raise InputError(f"probes = {shown(probes)}: allowed: a sequence of Probe")
@@ -137,20 +151,18 @@ def put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
         if probe.point in seen:
             raise InputError(f"two probes at {probe.point}: one a point is allowed")
         seen.add(probe.point)
-        _check_point(row, probe.point)
+        stage = {"w_ref": at.HAS_VELOCITY, "i_ref": at.HAS_CURRENT, "output": at.HAS_POSITION}.get(
+            probe.point
+        )
+        if stage is not None and not row[stage]:
+            raise InputError(f"probe point = {probe.point!r}: this design has no such stage")
         place = write_probe(probe, row)
         if isinstance(probe.injection, Command):
-            put_signal(row, place, probe.injection, tables)
+            _put_signal(row, place, probe.injection, tables)
         elif probe.injection is not None:
             offset, length = tables.add(numbers_of("injection", probe.injection))
             row[place], row[place + 1] = at.TABLE, 1.0
             row[place + 3], row[place + 4] = offset, length
-
-
-def _check_point(row: Floats, point: str) -> None:
-    stages = {"w_ref": at.HAS_VELOCITY, "i_ref": at.HAS_CURRENT, "output": at.HAS_POSITION}
-    if point in stages and not row[stages[point]]:
-        raise InputError(f"probe point = {point!r}: this design has no such stage")
 
 
 def put_state(row: Floats, state: State) -> None:
@@ -166,9 +178,8 @@ def put_state(row: Floats, state: State) -> None:
         behind = row[at.RATIO] / row[at.RATIO_TO_COUPLING]
         if state.output_angle_rad is not None:
             row[at.TWIST_START] = behind * (angle - state.output_angle_rad)
-        row[at.LOAD_SPEED_START] = behind * (
-            speed if state.output_speed_rad_s is None else state.output_speed_rad_s
-        )
+        output_speed = speed if state.output_speed_rad_s is None else state.output_speed_rad_s
+        row[at.LOAD_SPEED_START] = behind * output_speed
     row[at.CURRENT_START] = 0.0 if row[at.SOURCE] else state.current_A
     row[at.CURRENT_INTEGRATOR_START] = state.current_integral_V
     row[at.VELOCITY_INTEGRATOR_START] = state.velocity_integral

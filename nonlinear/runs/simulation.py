@@ -11,27 +11,16 @@ from threading import Thread
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.bounds import HISTORY_BYTES
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, NumericalError, finite_number, whole_number
+from actuator_lti.errors import NumericalError, finite_number, whole_number
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe
 from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment, as_load
 from nonlinear.row.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE, design_row
 from nonlinear.runs.running import Running
-from nonlinear.runs.setup import (
-    Tables,
-    check_frequency,
-    put_load,
-    put_probes,
-    put_signal,
-    put_state,
-    put_supply,
-    put_torque,
-    ticks_of,
-)
+from nonlinear.runs.setup import Tables, put_run, put_supply, put_torque
 from nonlinear.runs.trajectory import STATUS, LimitUse, State, Trajectory
 from nonlinear.runs.watch import watch
 from nonlinear.runs.wrap import wrap
@@ -135,24 +124,17 @@ def simulate(
     """
     design = as_design(design)
     row = design_row(design, friction_on=friction_on, limits_on=limits_on)
-    row[at.TICKS] = ticks_of(duration_s, design.controller.period_s)
+    tables = Tables()
+    put_run(row, design, duration_s, command, bias, as_load(load_Nm), probes, initial, tables)
     row[at.WITH_ENERGY] = energy
     row[at.TANH_TOLERANCE] = finite_number("tanh_tolerance", tanh_tolerance)
     row[at.MAX_EVENTS] = min(whole_number("max_events", max_events), 2**53)
     record_every = min(whole_number("record_every", record_every), 2**53)
     row[at.RECORD_EVERY] = record_every
-    tables = Tables()
-    for place, signal in ((at.COMMAND, command), (at.BIAS, bias)):
-        if signal is not None:
-            check_frequency(design, signal)
-            put_signal(row, place, signal, tables)
-    put_load(row, as_load(load_Nm), tables)
     if disturbance_Nm is not None:
         put_torque(row, disturbance_Nm, tables)
     if supply is not None:
         put_supply(row, design, supply, supply_scales, tables)
-    put_probes(row, probes, tables)
-    put_state(row, initial or State())
     trajectory = run_row(design, row, tables.joined(), progress)
     if raise_on_failure and trajectory.status != "ok":
         reached = trajectory.period_s * float(np.isfinite(trajectory.output_angle_rad).sum()) * record_every
@@ -164,24 +146,16 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     """Run one row of parameters with its history."""
     from nonlinear.native import parameters
 
-    ticks, every = int(row[at.TICKS]), int(row[at.RECORD_EVERY])
-    probing = [p for k, p in enumerate(at.POINTS) if row[at.PROBES + k * at.PROBE_SIZE] > 0.0]
-    rows, columns = (ticks + every - 1) // every, at.HISTORY_PROBES + 2 * len(probing)
-    columns += at.ELASTIC_COLUMNS * int(row[at.ELASTIC_DRIVE]) + int(row[at.VARYING_LOAD].any())
-    if 8 * rows * columns > HISTORY_BYTES.most:
-        message = f"{ticks} ticks: a history of {rows} rows does not fit into memory"
-        raise InputError(f"{message}; use record_every, or simulate_many with reducers")
-    history, flags = np.empty((columns, rows)), np.zeros(rows, np.uint16)
-    out = np.zeros(at.OUT_SIZE)
-    p, s = parameters(row)
-    begun = Running(p.copy(), s.copy(), tables)
-    status = _call(p, s, tables, history, flags, out, progress)
+    every, drive = int(row[at.RECORD_EVERY]), Running(*parameters(row), tables)
+    history, flags, out = drive.history()
+    begun = drive.copy()
+    status = _call(drive, history, flags, out, progress)
     done = (int(out[at.OUT_TICKS]) + every - 1) // every
     history[:, done:] = np.nan
     digest = hashlib.sha256(row.tobytes() + tables.tobytes()).hexdigest()
-    run = wrap(design, row, history, flags, out, STATUS[status], probing, digest)
-    left = Running(p, s, tables) if begun.held() is None else begun
-    return replace(run, load_Nm=_load(row, history), limits=_named_limits(run), running=left)
+    run = wrap(design, row, history, flags, out, STATUS[status], drive.probing, digest)
+    left = drive if begun.held() is None else begun
+    return replace(run, limits=_named_limits(run), running=left)
 
 
 def _named_limits(run: Trajectory) -> Mapping[str, LimitUse]:
@@ -194,28 +168,20 @@ def _named_limits(run: Trajectory) -> Mapping[str, LimitUse]:
     return {**run.limits, "current": own}
 
 
-def _load(row: Floats, history: Floats) -> Floats | None:
-    """The moment on the output shaft at the recorded ticks; ``None`` where there is none in the whole run."""
-    if not row[at.LOAD : at.TORQUE_TABLE].any():
-        return None
-    return history[-1] if row[at.VARYING_LOAD].any() else np.broadcast_to(row[at.LOAD], history.shape[1])
-
-
-def _call(
-    p: Floats, s: Floats, tables: Floats, history: Floats, flags: np.ndarray, out: Floats,
-    progress: Progress | None,
-) -> int:  # fmt: skip
+def _call(drive: Running, history: Floats, flags: np.ndarray, out: Floats, progress: Progress | None) -> int:
     """Call the kernel; with ``progress``, in a thread that is watched and can be interrupted."""
     from nonlinear.native import resume
 
-    shared = np.zeros(2)
-    look = watch()
+    shared, look, result = np.zeros(2), watch(), list[int]()
+
+    def call() -> None:
+        result.append(resume(drive.p, drive.s, drive.tables, history, flags, out, shared))
+
     if progress is None and look is None:
-        return resume(p, s, tables, history, flags, out, shared)
-    result: list[int] = []
-    thread = Thread(target=lambda: result.append(resume(p, s, tables, history, flags, out, shared)))
+        call()
+        return result[0]
+    thread, total = Thread(target=call), int(drive.p[at.TICKS])
     thread.start()
-    total = int(p[at.TICKS])
     try:
         while thread.is_alive():
             thread.join(0.1)

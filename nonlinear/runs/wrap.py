@@ -25,15 +25,12 @@ def wrap(
 ) -> Trajectory:  # fmt: skip
     """Name the columns and the results of one run."""
     period, s = float(row[at.PERIOD]), out[at.OUT_STATE :]
-    probes = {
-        point: ProbeRecord(
-            point=point,
-            before=history[at.HISTORY_PROBES + 2 * k],
-            after=history[at.HISTORY_PROBES + 2 * k + 1],
-        )
-        for k, point in enumerate(probing)
-    }
     behind = at.HISTORY_PROBES + 2 * len(probing)
+    sides = history[at.HISTORY_PROBES : behind]
+    probes = {
+        point: ProbeRecord(point=point, before=before, after=after)
+        for point, before, after in zip(probing, sides[::2], sides[1::2], strict=True)
+    }
     elastic = list(history[behind:]) if row[at.ELASTIC_DRIVE] else [None] * at.ELASTIC_COLUMNS
     return Trajectory(
         design_name=design.name,
@@ -54,10 +51,18 @@ def wrap(
         output_speed_rad_s=elastic[0],
         twist_rad=elastic[1],
         coupling_torque_Nm=elastic[2],
+        load_Nm=_load(row, history),
         parameters_hash=digest,
         stage=design.controller.outermost,
         ratio=float(row[at.RATIO]),
     )
+
+
+def _load(row: Floats, history: Floats) -> Floats | None:
+    """The moment on the output shaft at the recorded ticks; ``None`` where there is none in the whole run."""
+    if not row[at.LOAD : at.TORQUE_TABLE].any():
+        return None
+    return history[-1] if row[at.VARYING_LOAD].any() else np.broadcast_to(row[at.LOAD], history.shape[1])
 
 
 def limit_uses(row: Floats, out: Floats, axis: Axis = "rotary") -> dict[str, LimitUse]:

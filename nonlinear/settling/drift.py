@@ -71,15 +71,7 @@ def overload(p: Floats, s: Floats, current_A: float, ticks: int) -> float:
 
 
 class Scales:
-    """Largest values so far.
-
-    Attributes
-    ----------
-    signals : ndarray
-        Of each column of a piece.
-    states : ndarray
-        Of each number of the state.
-    """
+    """Largest values so far: ``signals`` of each column of a piece, ``states`` of each of the state."""
 
     def __init__(self, drive: Running, window_s: float) -> None:
         self.signals, self.states = np.zeros(at.HISTORY_PROBES), np.abs(drive.s)
@@ -153,18 +145,9 @@ def leap(drive: Running, places: Places, step: Floats, before: Floats, scale: Fl
     Rounding of the change adds up until numbers no longer fit each other.  So behind each leap a window is
     run, in which they find each other again, and the change is taken anew over the whole way.
 
-    Parameters
-    ----------
-    step, before : ndarray
-        Change of the state at ``places`` in the last window, and in the one before it; next to nothing that
-        differs between them is rounding, which does not add up.
-    scale : ndarray
-        Largest values at ``places``.
-
-    Returns
-    -------
-    int
-        How far, 0 where the drive moves.
+    ``step``, ``before``: change at ``places`` in the last window and in the one before it; next to nothing
+    that differs between them is rounding, which does not add up.  ``scale``: largest values at ``places``.
+    Returns how far, 0 where the drive moves.
     """
     angles = (places == at.S_ANGLE) | (places == at.S_OUTPUT)
     if (angles & ~small(step, scale)).any():

@@ -352,8 +352,7 @@ class _Watch:
         """The swings of the last half of the entries, of whatever moves most."""
         times, seen = np.concatenate(self.times), np.concatenate(self.seen, axis=1)
         half = slice(times.size // 2, None)
-        spans = np.ptp(seen[1:, half], axis=1)
-        return _swing_of(times[half], seen[1 + int(np.argmax(spans)), half])
+        return _swing_of(times[half], seen[1 + int(np.argmax(np.ptp(seen[1:, half], axis=1))), half])
 
     def _rest(self, verdict: Verdict, swing: _Swing | None = None, since: int | None = None) -> Rest:
         """What is known by now; of the last half of the entries, or of the pieces ``since`` one."""
@@ -362,21 +361,16 @@ class _Watch:
         still, p = verdict == "at rest", self.drive.p
         acted = self._late()[: 1 if still else None]
         end = followed[-1] if still else 0.5 * (followed.max() + followed.min())
-        ordered = (
-            max(p[at.HAS_POSITION], p[at.HAS_VELOCITY], p[at.HAS_CURRENT]) > 0.0
-        )  # a voltage orders nothing
+        orders = max(p[at.HAS_POSITION], p[at.HAS_VELOCITY], p[at.HAS_CURRENT]) > 0.0  # a voltage: nothing
+        limits = zip(at.LIMITERS, at.LIMITER_BITS, strict=True)
         return Rest(
             verdict=verdict,
-            error=float(command[-1] - end) if ordered else 0.0,
+            error=float(command[-1] - end) if orders else 0.0,
             amplitude=0.0 if still else 0.5 * float(np.ptp(followed)),
             motor_amplitude=0.0 if still else 0.5 * float(np.ptp(motor)),
             frequency_hz=swing.frequency_hz if swing is not None and verdict == "limit cycle" else None,
             periods=0 if swing is None else swing.periods,
-            limited=tuple(
-                name
-                for name, bit in zip(at.LIMITERS, at.LIMITER_BITS, strict=True)
-                if any(flags & bit for _, flags, _ in acted)
-            ),
+            limited=tuple(name for name, bit in limits if any(flags & bit for _, flags, _ in acted)),
             after_s=self.periods * self.period_s,
             work=self.drive.work,
         )

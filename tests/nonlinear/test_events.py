@@ -1,4 +1,4 @@
-"""Stick, slip, breakaway, contact: against scipy.integrate.solve_ivp with event functions."""
+"""Stick, slip, breakaway, contact against solve_ivp with event functions; guards are looked at where near."""
 
 from dataclasses import replace
 from math import exp
@@ -8,8 +8,9 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.design.model import Design, Friction, Limits, Motor
-from nonlinear import Probe, State, Trajectory, commands, simulate
+from nonlinear import Probe, Rows, State, Trajectory, commands, simulate
 from nonlinear._kernels import layout
+from nonlinear.runs.running import Running
 from tests.nonlinear.elastic_drive import random_drive, run_plant, stribeck, two_mass
 from tests.nonlinear.elastic_reference import reference
 
@@ -216,3 +217,37 @@ def assert_close(states: np.ndarray, expected: np.ndarray) -> None:
     """To 1e-9 of the largest value of each state."""
     scale = np.abs(expected).max(axis=0)
     assert np.all(np.abs(states - expected) <= 1e-9 * scale)
+
+
+SINES = ((0.3, 2.0), (0.02, 15.0), (1e-3, 70.0))  # rad, Hz
+PIECE_TICKS, PIECES = 100, 10
+
+
+def drive_of(design: Design, size_rad: float, frequency_Hz: float) -> Running:
+    rows = Rows.of(design)
+    rows.sine("command", size_rad, frequency_Hz)
+    return rows.running()
+
+
+def events_of_agreeing(design: Design) -> float:
+    """Events of runs in one go, after they had the bits of runs tick by tick, which look at every guard."""
+    events = 0.0
+    for sine in SINES:
+        at_once, by_ticks = drive_of(design, *sine), drive_of(design, *sine)
+        for _ in range(PIECES):
+            at_once.run(PIECE_TICKS)
+            for _ in range(PIECE_TICKS):
+                by_ticks.run(1)
+            assert at_once.s[at_once.matter].tolist() == by_ticks.s[by_ticks.matter].tolist()
+            assert at_once.happened == by_ticks.happened
+        events += at_once.happened[0]
+    return events
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber-compliant", "joint", "ballscrew", "fin"])
+def test_guards_of_shipped_drives(name: str) -> None:
+    assert events_of_agreeing(load_design(name)) > 0
+
+
+def test_guards_of_random_drives() -> None:
+    assert sum(events_of_agreeing(random_drive(seed)[0]) for seed in range(40)) > 10_000

@@ -10,15 +10,24 @@ Run as a script it validates a number of them and prints a line for each::
 Every drive has to keep the bound of processor time; the last line is the table of all.
 """
 
+import sys
+import time
+import traceback
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, pi
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import model
+from actuator_lti.design.checks import check_design
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.loops import assemble_loops
+from actuator_lti.margins import stability_margins
+from analyses.isolation import isolated
 from analyses.validation.settings import CHECKS, Settings
 
 DAMPED = 80_000  # seeds from here on have damping of the load as well
@@ -43,6 +52,17 @@ class Dice:
         return values[int(self.rng.integers(len(values)))]
 
 
+def _full_torque(motor: model.Motor, limits: model.Limits) -> float:
+    """What the motor reaches at its limits, at standstill."""
+    short = limits.voltage_V / (motor.resistance_ohm or 1.0)
+    return (motor.torque_constant_Nm_A or 1.0) * min(limits.peak_current_A, short)
+
+
+def _with(design: model.Design, part: str, **values: Any) -> model.Design:
+    """A design with some numbers of one of its parts changed."""
+    return replace(design, **{part: replace(getattr(design, part), **values)})
+
+
 def _rigid_drive(dice: Dice, seed: int) -> model.Design:
     """A rigid cascade."""
     period = dice.decades(2e-6 if dice.chance(0.1) else 2e-5, 1e-3)
@@ -54,14 +74,9 @@ def _rigid_drive(dice: Dice, seed: int) -> model.Design:
     limits = _limits(dice, motor, control)
     ratio = float(np.prod([gear.ratio for gear in gears]))
     speed = min(limits.speed_rad_s, limits.voltage_V / (motor.back_emf_constant_Vs_rad or 1.0))
-    full = (
-        dice.decades(0.03, 3.0)
-        * speed
-        / (ratio * control.position_loop.gain * (1.0 if with_velocity else 3.0))
-    )
-    torque = (motor.torque_constant_Nm_A or 0.0) * min(
-        limits.peak_current_A, limits.voltage_V / (motor.resistance_ohm or 1.0)
-    )
+    slower = 1.0 if with_velocity else 3.0
+    full = dice.decades(0.03, 3.0) * speed / (ratio * control.position_loop.gain * slower)
+    torque = _full_torque(motor, limits)
     design = model.Design(
         name=f"random-{seed}",
         title=f"Random drive {seed}",
@@ -77,7 +92,7 @@ def _rigid_drive(dice: Dice, seed: int) -> model.Design:
     )
     if dice.chance(0.2):
         slope = -dice.decades(0.01, 1.0) * torque * ratio / design.validation.full_deflection_rad
-        design = replace(design, load=replace(load, path="back-drivable", moment_slope_Nm_rad=slope))
+        return _with(design, "load", path="back-drivable", moment_slope_Nm_rad=slope)
     return design
 
 
@@ -203,7 +218,7 @@ def _damped(dice: Dice, design: model.Design) -> model.Design:
     own = design.inertia_kgm2 * design.total_ratio**2  # refused above J/Ts
     damping = dice.decades(1e-5, 1e-2) * own / design.controller.period_s
     path = "back-drivable" if dice.chance(0.7) else design.load.path
-    return replace(design, load=replace(design.load, moment_damping_Nms_rad=damping, path=path))
+    return _with(design, "load", moment_damping_Nms_rad=damping, path=path)
 
 
 def _elastic(dice: Dice, design: model.Design) -> model.Design:
@@ -216,10 +231,7 @@ def _elastic(dice: Dice, design: model.Design) -> model.Design:
     stiffness = omega**2 * design.inertia_kgm2 * 0.2 * design.total_ratio**2
     friction = None
     if dice.chance(0.3):
-        limits, motor = design.limits, design.motor
-        torque = (motor.torque_constant_Nm_A or 1.0) * min(
-            limits.peak_current_A, limits.voltage_V / (motor.resistance_ohm or 1.0)
-        )
+        torque = _full_torque(design.motor, design.limits)
         friction = model.LoadFriction(dry_torque_Nm=torque * design.total_ratio * dice.decades(1e-3, 0.03))
     coupling = model.Coupling(
         stiffness_Nm_rad=stiffness,
@@ -231,12 +243,8 @@ def _elastic(dice: Dice, design: model.Design) -> model.Design:
         coefficient = 1.3 / design.total_ratio
     elif path == "self-locking":
         path = "back-drivable"
-    return replace(
-        design,
-        coupling=coupling,
-        load=replace(design.load, friction=friction, path=path),
-        friction=replace(design.friction, load_coefficient=coefficient),
-    )
+    design = _with(design, "load", friction=friction, path=path)
+    return replace(_with(design, "friction", load_coefficient=coefficient), coupling=coupling)
 
 
 def _frictions(dice: Dice, design: model.Design) -> model.Design:
@@ -244,30 +252,20 @@ def _frictions(dice: Dice, design: model.Design) -> model.Design:
     friction, kind = design.friction, dice.one_of(("", "", "", "asymmetric", "offset", "map", "load"))
     dry = friction.dry_torque_Nm
     if kind == "asymmetric":
-        return replace(
-            design,
-            friction=replace(
-                friction,
-                dry_torque_reverse_Nm=1.4 * dry,
-                viscous_reverse_Nms_rad=0.6 * friction.viscous_Nms_rad,
-            ),
-        )
+        viscous = 0.6 * friction.viscous_Nms_rad
+        return _with(design, "friction", dry_torque_reverse_Nm=1.4 * dry, viscous_reverse_Nms_rad=viscous)
     if kind == "offset":
-        return replace(design, friction=replace(friction, offset_torque_Nm=0.3 * dry))
+        return _with(design, "friction", offset_torque_Nm=0.3 * dry)
     if kind == "map" and dry > 0.0 and friction.law == "coulomb":
-        fast = 0.3 * min(
-            design.limits.speed_rad_s,
-            design.limits.voltage_V / (design.motor.back_emf_constant_Vs_rad or 1.0),
-        )
+        free = design.limits.voltage_V / (design.motor.back_emf_constant_Vs_rad or 1.0)
+        fast = 0.3 * min(design.limits.speed_rad_s, free)
         points = tuple(
             model.FrictionPoint(speed_rad_s=speed * fast, torque_Nm=dry * torque)
             for speed, torque in ((0.0, 1.0), (0.02, 0.7), (0.2, 0.75), (1.0, 1.2))
         )
-        return replace(
-            design, friction=replace(friction, dry_torque_Nm=0.0, viscous_Nms_rad=0.0, points=points)
-        )
+        return _with(design, "friction", dry_torque_Nm=0.0, viscous_Nms_rad=0.0, points=points)
     if kind == "load":
-        return replace(design, friction=replace(friction, load_coefficient=2.0 / design.total_ratio))
+        return _with(design, "friction", load_coefficient=2.0 / design.total_ratio)
     return design
 
 
@@ -275,14 +273,9 @@ def _loads(dice: Dice, design: model.Design) -> model.Design:
     """Gravity on a rotary output."""
     if not dice.chance(0.15) or design.axis == "linear":
         return design
-    motor, limits = design.motor, design.limits
-    torque = (motor.torque_constant_Nm_A or 1.0) * min(
-        limits.peak_current_A, limits.voltage_V / (motor.resistance_ohm or 1.0)
-    )
-    peak = dice.decades(0.01, 0.2) * torque * design.total_ratio
+    peak = dice.decades(0.01, 0.2) * _full_torque(design.motor, design.limits) * design.total_ratio
     gravity = model.Gravity(mass_kg=peak / 9.80665, arm_m=1.0, offset_rad=dice.one_of((0.0, 0.5, pi)))
-    load = replace(design.load, gravity=gravity, path="back-drivable", moment_slope_Nm_rad=0.0)
-    return replace(design, load=load)
+    return _with(design, "load", gravity=gravity, path="back-drivable", moment_slope_Nm_rad=0.0)
 
 
 def _motor_data(dice: Dice, design: model.Design) -> model.Design:
@@ -296,9 +289,8 @@ def _motor_data(dice: Dice, design: model.Design) -> model.Design:
             name: getattr(motor, name) / getattr(same, name)
             for name in ("resistance_ohm", "inductance_H", "torque_constant_Nm_A", "back_emf_constant_Vs_rad")
         }
-        return replace(
-            design, motor=replace(ac, **{name: getattr(motor, name) * x for name, x in factors.items()})
-        )
+        return _with(design, "motor", constants=constants,
+                     **{name: getattr(motor, name) * x for name, x in factors.items()})  # fmt: skip
     if kind == "warm":
         return replace(design, temperature=model.Temperature(winding_degC=90.0, magnet_degC=70.0))
     return design
@@ -368,19 +360,11 @@ def _commanded(dice: Dice, design: model.Design) -> model.Design:
     kind = dice.one_of(("", "", "", "filter", "profile"))
     gain, full = design.controller.position_loop.gain, design.validation.full_deflection_rad
     if kind == "filter":
-        return replace(
-            design, command=model.Command(filter_time_s=0.2 / gain, filter_order=dice.one_of((1, 2)))
-        )
+        return _with(design, "command", filter_time_s=0.2 / gain, filter_order=dice.one_of((1, 2)))
     if kind == "profile" and design.controller.velocity is not None:
         rate = 0.2 * full * gain
-        return replace(
-            design,
-            command=model.Command(
-                rate_rad_s=rate,
-                acceleration_rad_s2=rate * gain,
-                jerk_rad_s3=dice.one_of((inf, rate * gain**2)),
-            ),
-        )
+        jerk = dice.one_of((inf, rate * gain**2))
+        return _with(design, "command", rate_rad_s=rate, acceleration_rad_s2=rate * gain, jerk_rad_s3=jerk)
     return design
 
 
@@ -392,10 +376,8 @@ def _supplied(dice: Dice, design: model.Design) -> model.Design:
         return replace(design, supply=model.Supply(resistance_ohm=0.1 * R))
     if kind == "capacitor":
         farad = 200.0 * design.controller.period_s / R
-        supply = model.Supply(
-            resistance_ohm=0.05 * R, regenerative=False, capacitance_F=farad, brake_voltage_V=1.2 * volts
-        )
-        return replace(design, supply=supply)
+        taken = {"regenerative": False, "capacitance_F": farad, "brake_voltage_V": 1.2 * volts}
+        return replace(design, supply=model.Supply(resistance_ohm=0.05 * R, **taken))
     return design
 
 
@@ -404,15 +386,8 @@ def _protected(dice: Dice, design: model.Design) -> model.Design:
     limits = design.limits
     if limits.peak_current_A == inf or not dice.chance(0.3):
         return design
-    return replace(
-        design,
-        limits=replace(
-            limits,
-            continuous_current_A=0.4 * limits.peak_current_A,
-            peak_time_s=1.0,
-            overload=dice.one_of(("thermal", "excess")),
-        ),
-    )
+    lasting, kind = 0.4 * limits.peak_current_A, dice.one_of(("thermal", "excess"))
+    return _with(design, "limits", continuous_current_A=lasting, peak_time_s=1.0, overload=kind)
 
 
 def _instrumented(dice: Dice, design: model.Design) -> model.Design:
@@ -420,15 +395,11 @@ def _instrumented(dice: Dice, design: model.Design) -> model.Design:
     if not dice.chance(0.15):
         return design
     quantum = 1e-4 * design.validation.full_deflection_rad
-    return replace(
-        design,
-        instruments=model.Instruments(
-            current_resolution_A=1e-3 * design.limits.voltage_V / (design.motor.resistance_ohm or 1.0),
-            angle_noise_rad=quantum * design.total_ratio,
-            jitter_s=0.01 * design.controller.period_s,
-            seed=1,
-        ),
-    )
+    return _with(
+        design, "instruments", seed=1, angle_noise_rad=quantum * design.total_ratio,
+        current_resolution_A=1e-3 * design.limits.voltage_V / (design.motor.resistance_ohm or 1.0),
+        jitter_s=0.01 * design.controller.period_s,
+    )  # fmt: skip
 
 
 def _outermost(dice: Dice, design: model.Design) -> model.Design:
@@ -457,10 +428,6 @@ def stable_drives(first: int, count: int) -> Iterator[model.Design]:
 
 def is_stable(design: model.Design) -> bool:
     """Whether every loop is stable, inner ones too."""
-    from actuator_lti.design.checks import check_design
-    from actuator_lti.loops import assemble_loops
-    from actuator_lti.margins import stability_margins
-
     try:
         check_design(design, design.name)
         loops = assemble_loops(design)
@@ -471,82 +438,46 @@ def is_stable(design: model.Design) -> bool:
         return False
 
 
-@dataclass
-class Tried:
-    """What some validations came to."""
-
-    drives: int = 0
-    rows: int = 0
-    not_met: int = 0
-    not_proven: int = 0
-    tracebacks: int = 0
-    refused: int = 0
-    large_commands: int = 0
-    hunting: int = 0
-    unstable: int = 0
-    last: str = ""
-
-    def __str__(self) -> str:
-        words = ", ".join(f"{name} {value}" for name, value in vars(self).items())
-        return f"TABLE {words}"
-
-
-def main(first: int, count: int, everything: bool, until_s: float = inf) -> Tried:
+def main(first: int, count: int, everything: bool, until_s: float = inf) -> Counter[str]:
     """Validate and print a line for each, and at the end what they came to."""
-    import time
-
-    began, tried = time.monotonic(), Tried()
+    began, tried = time.monotonic(), Counter[str]()
     for design in stable_drives(first, count):
         if time.monotonic() - began > until_s:
             break
-        validate_one(design, Settings() if everything else CHECKS, tried)
-        tried.last = design.name
-        if tried.drives % 10 == 0:
-            print(tried, flush=True)
-    print(tried, flush=True)
+        tried.update(drives=1)
+        tried.update(validated(design, Settings() if everything else CHECKS))
+        print(f"TABLE {dict(tried)}, last {design.name}", flush=True)
     return tried
 
 
-def validate_one(design: model.Design, settings: Settings, tried: Tried) -> None:
-    """Validate one drive and print what it came to."""
-    import time
-    import traceback
-
-    from actuator_lti.asked.verdict import Verdict
-    from analyses.isolation import isolated
+def validated(design: model.Design, settings: Settings) -> dict[str, int]:
+    """Validate one drive and print what it came to; counted."""
     from analyses.validation import validate
 
     started = time.process_time()
-    tried.drives += 1
     try:
         with isolated() as missing:
             found = validate(design, settings)
     except InputError as error:
-        tried.refused += 1
         print(f"{design.name}  refused: {error}", flush=True)
-        return
+        return {"refused": 1}
     except Exception:
-        tried.tracebacks += 1
         print(f"{design.name}  TRACEBACK {traceback.format_exc()}", flush=True)
-        return
+        return {"tracebacks": 1}
     print(f"{found}; {time.process_time() - started:.1f} s", flush=True)
-    tally = found.tally
-    tried.rows += tally.total
-    tried.not_met += tally.not_met
-    tried.not_proven += tally.not_proven
-    tried.tracebacks += len(missing)
-    tried.large_commands += found.conditional is not None and found.conditional.diverges
-    tried.hunting += found.hunting is not None
-    tried.unstable += bool(found.unstable)
     for item in missing:
         print(f"    MISSING {item.part}: {item.why} | {' / '.join(item.traceback.splitlines()[-5:])}")
     for row in found.rows:
         if row.verdict is not Verdict.MET:
             print(f"    {row}: {row.because} [{row.condition}]")
+    return {
+        "rows": found.tally.total, "not met": found.tally.not_met, "not proven": found.tally.not_proven,
+        "tracebacks": len(missing), "unstable": int(bool(found.unstable)),
+        "hunting": int(found.hunting is not None),
+        "large commands": int(found.conditional is not None and found.conditional.diverges),
+    }  # fmt: skip
 
 
 if __name__ == "__main__":
-    import sys
-
     numbers = [float(each) for each in sys.argv[1:] if each != "all"]
     main(int(numbers[0]), int(numbers[1]), "all" in sys.argv, numbers[2] if len(numbers) > 2 else inf)
