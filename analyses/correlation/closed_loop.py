@@ -13,14 +13,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
 from analyses.correlation.compare import SignalComparison, compare_signals
-from analyses.correlation.driving import (
-    LOADS,
-    at_ticks,
-    first_states,
-    load_of,
-    needed_command,
-    supply_of,
-)
+from analyses.correlation.driving import LOADS, at_ticks, first_states, load_of, needed_command, supply_of
 from analyses.estimation.arrays import FloatArray
 from analyses.records.consistency import Finding, check_record
 from analyses.records.differentiation import filtered_motion
@@ -28,7 +21,7 @@ from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
 
 if TYPE_CHECKING:
-    from nonlinear import Trajectory
+    from nonlinear import State, Trajectory
 
 
 UNITS = {
@@ -115,7 +108,7 @@ def correlate_record(
     notes = list(record.notes)
     findings = check_record(design, record)
     measured = measured_signals(design, record, True, notes)
-    measured = {name: values for name, values in measured.items() if name != command}
+    measured.pop(command or "", None)
     if not measured:
         known = ", ".join(AXIS_SIGNALS[design.axis])
         raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
@@ -141,13 +134,10 @@ def correlate_record(
 def _used(
     design: Design, record: Record, measured: Mapping[str, FloatArray], command: str | None
 ) -> dict[str, str]:
-    used = {name: "compared" for name in measured if name in record.signals}
     driven = needed_command(design, record, command)
-    used[driven.signal] = (
-        "command" if driven.stage == design.controller.outermost else f"{driven.stage} command"
-    )
-    used |= {name: "load" for name in (LOADS[design.axis],) if name in record.signals}
-    used["enable"] = "enabled part"
+    used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
+    outermost = driven.stage == design.controller.outermost
+    used[driven.signal] = "command" if outermost else f"{driven.stage} command"
     if design.effective_motor.source_gain_Nm_V is None:
         used["supply"] = "supply"
     if "force" in measured and "force" not in record.signals:
@@ -163,18 +153,15 @@ def measured_signals(
     A signal that is zero throughout is left out.
     """
     notes = [] if notes is None else notes
-    result = {name: record[name] for name in AXIS_SIGNALS[design.axis] if name in record.signals}
-    for name in [name for name, values in result.items() if not np.any(values)]:
-        del result[name]
-        notes.append(f"{name} is zero throughout: not compared")
-    gain = design.effective_motor.source_gain_Nm_V
-    if design.axis == "linear":
-        place, rate = "position", "velocity"
-        if "force" not in result and "voltage" in result and gain is not None:
-            result["force"] = gain * result["voltage"]
-            notes.append(f"measured force: {gain:g} N/V times the recorded voltage")
-    else:
+    there = {name: record[name] for name in AXIS_SIGNALS[design.axis] if name in record.signals}
+    result = {name: values for name, values in there.items() if np.any(values)}
+    notes += [f"{name} is zero throughout: not compared" for name in there if name not in result]
+    gain, place, rate = design.effective_motor.source_gain_Nm_V, "position", "velocity"
+    if design.axis == "rotary":
         place, rate = ("angle" if "angle" in result else "output_angle"), "speed"
+    elif "force" not in result and "voltage" in result and gain is not None:
+        result["force"] = gain * result["voltage"]
+        notes.append(f"measured force: {gain:g} N/V times the recorded voltage")
     if derive and rate not in result and place in result:
         cutoff = min(VELOCITY_CUTOFF_HZ, 0.2 / record.period_s)
         motion = filtered_motion(result[place], record.period_s, cutoff_hz=cutoff, order=4)
@@ -220,13 +207,13 @@ def model_signals(
     )
     initial, moving = first_states(driven, record, measured)
     if moving is not initial:
-        part = time[: min(FIRST_ROWS, len(time))]
-        beginning = {name: values[: len(part)] for name, values in measured.items()}
-        off = [
-            _difference(beginning, part, _series(model, go(float(part[-1]) + 2.0 * period, initial=state)))
-            for state in (initial, moving)
-        ]
-        if off[1] < off[0]:
+        part = time[:FIRST_ROWS]
+
+        def off(state: State) -> float:
+            series = _series(model, go(float(part[-1]) + 2.0 * period, initial=state))
+            return _difference(measured, part, series)
+
+        if off(moving) < off(initial):
             initial = moving
             notes.append("the record begins in motion or under load, and so does the model")
     run = go(duration, initial=initial, progress=progress)
@@ -240,11 +227,11 @@ def model_signals(
 def _difference(
     measured: Mapping[str, FloatArray], time: FloatArray, series: Mapping[str, FloatArray]
 ) -> float:
-    """Sum over the signals of the squared relative difference."""
+    """Sum over the signals of the squared relative difference over their first rows."""
     total = 0.0
     for name, values in measured.items():
-        size = float(values @ values)
-        rest = np.interp(time, series["time"], series[name]) - values
+        first = values[: len(time)]
+        size, rest = float(first @ first), np.interp(time, series["time"], series[name]) - first
         total += float(rest @ rest) / size if size > 0.0 else 0.0
     return total
 

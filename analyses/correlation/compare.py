@@ -100,9 +100,7 @@ def delay_between(time_s: FloatArray, measured: FloatArray, modelled: FloatArray
     period = float(np.median(np.diff(time_s)))
     grid = np.arange(time_s[0], time_s[-1] + 0.5 * period, period)
     a, b = np.interp(grid, time_s, measured), np.interp(grid, time_s, modelled)
-    if np.ptp(a) <= 1e-12 * np.max(np.abs(a), initial=0.0) or np.ptp(b) <= 1e-12 * np.max(
-        np.abs(b), initial=0.0
-    ):
+    if any(np.ptp(one) <= 1e-12 * np.max(np.abs(one), initial=0.0) for one in (a, b)):
         return None
     lag = best_lag(a - a.mean(), b - b.mean())
     if abs(lag) >= len(grid) // 4:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_lti.design.model import Command as CommandShape
-from actuator_lti.design.model import Controller, Design
+from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import BoolArray, FloatArray
@@ -57,8 +57,7 @@ class Driven:
 
 def command_names(design: Design) -> dict[str, str]:
     """Every signal that may command a design's drive, and its stage; the outermost first."""
-    loops = design.controller.stages
-    stages = [stage for stage in STAGES if stage in loops or stage == "voltage"]
+    stages = [stage for stage in STAGES if stage in (*design.controller.stages, "voltage")]
     return {name: stage for stage in stages for name in COMMANDS[design.axis, stage]}
 
 
@@ -102,16 +101,11 @@ def _driven(design: Design, record: Record, signal: str, stage: str) -> Driven:
         notes.append(f"command: {signal.replace('_', ' ')} over kM = {constant:g}")
     if stage != outermost:
         notes.append(f"command: {signal.replace('_', ' ')}; the loops outside the {stage} do not act")
-        design = replace(design, controller=_from(design.controller, stage), command=CommandShape())
-    return Driven(
-        signal=signal, stage=stage, values=np.asarray(values, float), design=design, notes=tuple(notes)
-    )
-
-
-def _from(controller: Controller, stage: str) -> Controller:
-    """The cascade from a stage on."""
-    outside = STAGES[: STAGES.index(stage)]
-    return replace(controller, **dict.fromkeys(outside))  # type: ignore[arg-type]
+        outside = STAGES[: STAGES.index(stage)]
+        cascade = replace(design.controller, **dict.fromkeys(outside))  # type: ignore[arg-type]
+        design = replace(design, controller=cascade, command=CommandShape())
+    values = np.asarray(values, float)
+    return Driven(signal=signal, stage=stage, values=values, design=design, notes=tuple(notes))
 
 
 def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
@@ -225,22 +219,22 @@ def first_states(driven: Driven, record: Record, measured: Mapping[str, FloatArr
 
     design = driven.design
     ratio, motor = design.total_ratio, design.effective_motor
-    place = 0.0
-    for name in ("angle", "output_angle", "position"):
-        if name in measured:
-            place = float(measured[name][0]) * (1.0 if name == "angle" else ratio)
-            break
-    rest, speed = State(motor_angle_rad=place), _first_speed(design, measured)
-    current = float(np.median(record["current"][:FIRST_ROWS])) if "current" in record.signals else 0.0
-    if motor.source_gain_Nm_V is not None or (speed == 0.0 and not _holds(record)):
+    place = next((name for name in ("angle", "output_angle", "position") if name in measured), None)
+    first = float(measured[place][0]) if place else 0.0
+    rest = State(motor_angle_rad=first if place == "angle" else ratio * first)
+    speed = _first_speed(design, measured)
+    values = record.signals.get("current", np.zeros(1))
+    current = float(np.median(values[:FIRST_ROWS]))
+    holds = float(np.median(np.abs(values[:FIRST_ROWS]))) > 0.1 * float(np.max(np.abs(values)))
+    if motor.source_gain_Nm_V is not None or (speed == 0.0 and not holds):
         current = 0.0
     if speed == 0.0 and current == 0.0:
         return rest, rest
     volts = 0.0 if motor.source_gain_Nm_V is not None else steady_voltage_V(design, current, speed)
     cascaded = design.controller.current is not None
     first = float(driven.values[0])
-    return rest, State(
-        motor_angle_rad=place,
+    return rest, replace(
+        rest,
         motor_speed_rad_s=speed,
         current_A=current,
         current_integral_V=volts if cascaded else 0.0,
@@ -259,11 +253,3 @@ def _first_speed(design: Design, measured: Mapping[str, FloatArray]) -> float:
             first = float(np.median(values[:FIRST_ROWS]))
             return factor * first if abs(first) > IN_MOTION * float(np.max(np.abs(values))) else 0.0
     return 0.0
-
-
-def _holds(record: Record) -> bool:
-    """Whether a current flows in the first rows: above a tenth of the largest."""
-    if "current" not in record.signals:
-        return False
-    values = np.abs(record["current"])
-    return bool(np.median(values[:FIRST_ROWS]) > 0.1 * float(np.max(values)))

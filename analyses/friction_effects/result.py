@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import dry_torque
-from actuator_lti.loops import assemble_loops
+from actuator_lti.loops import Loops, assemble_loops
 from analyses.friction_effects.breakaway import Hysteresis, Threshold, hysteresis, threshold
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.limit_cycles.describing import at_load, cycles_of_friction, dry_Nm
@@ -21,9 +20,6 @@ from analyses.motion.settling import Settling, noticed, settlings_of
 from analyses.specification.capability import drive_figures
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import quiet
-
-if TYPE_CHECKING:
-    from actuator_lti.loops import Loops
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,19 +10,24 @@ from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.driving import command_of
+from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
+from analyses.identification import verdict
 from analyses.identification.asked import Settings, fixed_values, held_by_name
-from analyses.identification.design_values import DesignValue, design_values
-from analyses.identification.diagnosis import diagnosed
-from analyses.identification.drive_constant import given_constant, with_given_constant
+from analyses.identification.design_values import (
+    DesignValue,
+    design_values,
+    given_constant,
+    with_given_constant,
+)
+from analyses.identification.diagnosis import Diagnosed, Fitted, diagnosed
 from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
 from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
-from analyses.identification.joint_model import NAMES, JointModel, Recipe
-from analyses.identification.output_error import OutputErrorResult
+from analyses.identification.joint_model import NAMES, JointModel
+from analyses.identification.output_error import OutputErrorResult, Resimulated, refine_records, resimulate
 from analyses.identification.own_bias import without_bias
 from analyses.identification.residuals import ResidualTest, residual_tests
-from analyses.identification.resimulation import Resimulated, refine_records, resimulate
 from analyses.identification.rows import is_loaded, recipe_for
 from analyses.identification.to_design import (
     INERTIAS,
@@ -31,27 +36,13 @@ from analyses.identification.to_design import (
     with_fixed,
     with_structure,
 )
-from analyses.identification.verdict import (
-    Identified,
-    Item,
-    following_item,
-    held_out_item,
-    inputs_item,
-    kept_items,
-    offset_item,
-    residual_item,
-    rows_item,
-    sampling_item,
-    simulated_item,
-    size_item,
-)
 from analyses.records.consistency import Finding, check_record
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
 
 
 @dataclass(frozen=True, kw_only=True)
-class BenchResult(Identified):
+class BenchResult(verdict.Identified):
     """Everything that the records told: the fit, the design that would be written, and whether it may be."""
 
     records: tuple[Record, ...]
@@ -93,43 +84,29 @@ def identify_bench(
         If a record lacks a signal, a key cannot be fixed, or no design can be made of the result.
     """
     settings = Settings() if settings is None else settings
-    fixed, limit = fixed_values(design, settings.fix), settings.residual_limit / 100.0
-    used = tuple(prepared(record) for record in records)
-    unseen = tuple(prepared(record) for record in validation)
-    start, electrical = with_fixed(design, fixed), None
+    used, unseen = (tuple(prepared(record) for record in these) for these in (records, validation))
+    names = ", ".join(record.name for record in records)
+    start, electrical = with_fixed(design, fixed_values(design, settings.fix)), None
     if settings.electrical:
         electrical = fit_electrical(start, used)
-        told = f"voltage equation of {', '.join(record.name for record in records)}"
-        start = design_with_fit(start, electrical_values(start, electrical), told)
+        start = design_with_fit(start, electrical_values(start, electrical), f"voltage equation of {names}")
     judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
     findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
-    laws: tuple[LawChoice, ...] = ()
-
-    def fit(records: Sequence[Record]) -> tuple[JointModel, tuple[Record, ...]]:
-        nonlocal laws
-        model, laws = _fitted(start, records, settings, fixed)
-        return _unbiased(start, _with_commands(start, model, records), records, settings)
-
-    recipe = _recipe(used[0], settings)
-    right = diagnosed(design, start, used, fit, recipe)
-    used = right.records
-    model = right.model if electrical else with_given_constant(start, right.model, used, recipe)
+    fits = _Fits(design, start, used, settings)
+    right = diagnosed(design, start, used, fits, fits.recipe)
+    used, model = right.records, right.model
+    if electrical is None:
+        model = with_given_constant(start, model, used, fits.recipe)
     findings |= {name: (*findings[name], *more) for name, more in right.findings.items()}
-    source = f"identified from {', '.join(record.name for record in records)}"
-    given = given_constant(model)
+    source, given = f"identified from {names}", given_constant(model)
     if given is not None:
         source += f" at {parameter(given).key} = {model[given]:g} {parameter(given).unit}"
-    sampled = tuple(item for record in used if (item := sampling_item(record)) is not None)
-    lags = [following_item(name, one) for name, one in right.followed.items()]
     compared = design_values(design, model, used, start)
-    size = size_item(
-        design, compared, kept_constants=electrical is None, loaded=any(is_loaded(record) for record in used)
-    )
-    kept = kept_items(model, _held(start, fixed, settings.friction), design.axis)
-    offset = [item for item in (offset_item(design, model),) if item is not None]
-    items = (*_fit_items(findings, size, model, limit), *offset, *kept, *sampled, *lags)
+    loaded = any(is_loaded(record) for record in used)
+    size = verdict.size_item(design, compared, kept_constants=electrical is None, loaded=loaded)
+    items = list(_items(design, findings, size, right, model, fits))
     try:
-        values = joint_values(start, model, inertia_to=settings.inertia_to)
+        values = fits.values(model)
         _refuse_settings(used, values.names)
         made = design_with_fit(with_structure(start, model), values, source)
     except InputError as error:
@@ -141,6 +118,10 @@ def identify_bench(
         made = design_with_fit(made, refined, f"{source}, refined by simulation")
     text = write_design(made)
     again = resimulate(read_design_text(text), (*used, *unseen), model.form)
+    for record in unseen:
+        residual = held_out_residual(start, model, record)
+        items.append(verdict.held_out_item(record.name, residual, model.relative_residual, fits.limit))
+    items += [verdict.simulated_item(one.record, one.relative_error, fits.limit, one.how) for one in again]
     return BenchResult(
         records=used,
         validation=unseen,
@@ -150,16 +131,54 @@ def identify_bench(
         design=made,
         text=text,
         resimulated=again,
-        items=(
-            *items,
-            *_held_out(start, model, unseen, limit),
-            *(simulated_item(one.record, one.relative_error, limit, one.how) for one in again),
-        ),
+        items=tuple(items),
         settings=settings,
         design_values=compared,
-        laws=laws,
+        laws=fits.laws,
         electrical=electrical,
     )
+
+
+class _Fits:
+    """Fits records as the settings ask: the joint model less its own bias, and the simulated records.
+
+    ``laws`` are the friction laws that the last fit tried.
+    """
+
+    def __init__(self, design: Design, start: Design, used: Sequence[Record], settings: Settings) -> None:
+        self.start, self.settings = start, settings
+        self.limit = settings.residual_limit / 100.0
+        self.laws: tuple[LawChoice, ...] = ()
+        cutoff, decimation = settings.cutoff_hz, settings.decimation
+        usual = cutoff is None and decimation is None
+        self.recipe = None if usual else recipe_for(used[0], cutoff, decimation)
+        form = "per-direction" if settings.friction == "per-direction" else "symmetric"
+        fixed = fixed_values(design, settings.fix)
+        self.held = held_by_name(
+            fixed, (*NAMES[form], "load_coefficient"), dict.fromkeys(INERTIAS, "inertia")
+        )
+        if "inertia" in self.held:  # a fixed rotor or load inertia fixes the whole
+            self.held["inertia"] = start.inertia_kgm2
+
+    def __call__(self, records: Sequence[Record]) -> Fitted:
+        """The model of records, and these as the design that comes of it simulates them."""
+        start, form, recipe, held = self.start, self.settings.friction, self.recipe, self.held
+        gravity = self.settings.gravity or start.load.gravity is not None
+        if form == "map":
+            fit = fit_map(start, records, recipe=recipe, fixed=held, gravity=gravity)
+            model, self.laws = fit.model, fit.laws
+        else:
+            model = fit_records(start, records, form=form, recipe=recipe, fixed=held, gravity=gravity)
+        model = _with_commands(start, model, records)
+        return without_bias(start, self.design, model, records, recipe)
+
+    def values(self, model: JointModel) -> Fit:
+        """The values of a model for the keys of a design."""
+        return joint_values(self.start, model, inertia_to=self.settings.inertia_to)
+
+    def design(self, model: JointModel) -> Design:
+        """The design that comes of a model."""
+        return design_with_fit(with_structure(self.start, model), self.values(model), "")
 
 
 def _refuse_settings(records: Sequence[Record], looked_for: Sequence[str]) -> None:
@@ -168,19 +187,6 @@ def _refuse_settings(records: Sequence[Record], looked_for: Sequence[str]) -> No
         for key in record.settings.keys() & set(looked_for):
             told = f"settings.{key}: is found from all records; allowed: any other key, or --fix {key}=VALUE"
             raise InputError(told, where=record.name)
-
-
-def _fitted(
-    start: Design, used: Sequence[Record], settings: Settings, asked: Mapping[str, float]
-) -> tuple[JointModel, tuple[LawChoice, ...]]:
-    """The joint model, and the friction laws that were tried."""
-    recipe, fixed = _recipe(used[0], settings), _held(start, asked, settings.friction)
-    gravity = settings.gravity or start.load.gravity is not None
-    if settings.friction == "map":
-        fit = fit_map(start, used, recipe=recipe, fixed=fixed, gravity=gravity)
-        return fit.model, fit.laws
-    model = fit_records(start, used, form=settings.friction, recipe=recipe, fixed=fixed, gravity=gravity)
-    return model, ()
 
 
 def _with_commands(start: Design, model: JointModel, used: Sequence[Record]) -> JointModel:
@@ -193,44 +199,23 @@ def _with_commands(start: Design, model: JointModel, used: Sequence[Record]) -> 
     return replace(model, records=tuple(parts))
 
 
-def _unbiased(
-    start: Design, model: JointModel, used: Sequence[Record], settings: Settings
-) -> tuple[JointModel, tuple[Record, ...]]:
-    """The model less its own bias, where a design can be made of it and simulated; the simulated records."""
-
-    def make(model: JointModel) -> Design:
-        values = joint_values(start, model, inertia_to=settings.inertia_to)
-        return design_with_fit(with_structure(start, model), values, "")
-
-    return without_bias(start, make, model, used, _recipe(used[0], settings))
-
-
-def _recipe(record: Record, settings: Settings) -> Recipe | None:
-    if settings.cutoff_hz is None and settings.decimation is None:
-        return None
-    return recipe_for(record, settings.cutoff_hz, settings.decimation)
-
-
-def _held(design: Design, asked: Mapping[str, float], form: str) -> dict[str, float]:
-    """Fixed keys by the model's names; a fixed rotor or load inertia fixes the whole."""
-    names = (*NAMES["per-direction" if form == "per-direction" else "symmetric"], "load_coefficient")
-    held = held_by_name(asked, names, dict.fromkeys(INERTIAS, "inertia"))
-    return held | ({"inertia": design.inertia_kgm2} if "inertia" in held else {})
-
-
-def _fit_items(
-    findings: Mapping[str, tuple[Finding, ...]], size: Item, model: JointModel, limit: float
-) -> tuple[Item, ...]:
-    return (
-        *(inputs_item(name, result) for name, result in findings.items()),
-        size,
-        rows_item(model.rows_used, len(model.names)),
-        residual_item(model.relative_residual, limit),
-    )
-
-
-def _held_out(start: Design, model: JointModel, unseen: Sequence[Record], limit: float) -> tuple[Item, ...]:
-    fit = model.relative_residual
-    return tuple(
-        held_out_item(record.name, held_out_residual(start, model, record), fit, limit) for record in unseen
-    )
+def _items(
+    design: Design,
+    findings: Mapping[str, tuple[Finding, ...]],
+    size: verdict.Item,
+    right: Diagnosed,
+    model: JointModel,
+    fits: _Fits,
+) -> Iterator[verdict.Item]:
+    """What must hold before a design is made, and what is kept of the old one."""
+    for name, result in findings.items():
+        yield verdict.inputs_item(name, result)
+    yield size
+    yield verdict.rows_item(model.rows_used, len(model.names))
+    yield verdict.residual_item(model.relative_residual, fits.limit)
+    yield from verdict.offset_items(design, model)
+    yield from verdict.kept_items(model, fits.held, design.axis)
+    for record in right.records:
+        yield from verdict.sampling_items(record)
+    for name, one in right.followed.items():
+        yield verdict.following_item(name, one)

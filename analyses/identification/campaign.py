@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.estimation.fit import Fit
-from analyses.identification.design_values import design_value
+from analyses.identification.design_values import DesignValue, design_value
 from analyses.identification.richer import RicherLaws, compare_laws
 from analyses.identification.steady import SteadyCriterion, SteadyPoint, steady_points
-from analyses.identification.surface import fit_surface
-from analyses.identification.surface_fit import NAMES, SurfaceFit
+from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
 from analyses.identification.verdict import Item, residual_item, simulated_item, size_item
 from analyses.records.campaign_file import Instruments
 from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetAside
@@ -94,9 +92,8 @@ def identify_campaign(
     """
     constant = design.effective_motor.torque_constant_Nm_A
     if constant is None:
-        raise InputError(
-            "motor.torque_constant: the design has none, so currents cannot become torques", design.name
-        )
+        told = "motor.torque_constant: the design has none, so currents cannot become torques"
+        raise InputError(told, design.name)
     points, restless = steady_points(imported.runs, constant)
     used, contradicting, findings = check_runs(design, imported.runs, points, imported.campaign.instruments)
     aside = (*imported.set_aside, *restless, *contradicting)
@@ -111,9 +108,8 @@ def identify_campaign(
         )
     except InputError as error:
         told = "; ".join(f"{run.id}: {run.reason}" for run in aside[:3])
-        raise InputError(
-            f"{error.message} ({told})" if told else error.message, imported.campaign.origin
-        ) from None
+        message = f"{error.message} ({told})" if told else error.message
+        raise InputError(message, imported.campaign.origin) from None
     laws = compare_laws(fit) if richer and not fixed and len(fit.points) >= 5 else None
     return CampaignResult(
         imported=imported,
@@ -135,63 +131,52 @@ def check_runs(
 ) -> tuple[list[SteadyPoint], list[SetAside], dict[str, tuple[Finding, ...]]]:
     """The points that agree with what is said of their runs, those runs that do not, and all findings.
 
-    Each is held against its set speed and load, itself, and the design's limits.
-
-    The speed may be off by 5 % of its setting, the load by 10 % and twice the sensor's accuracy.
+    Each is held against its set speed and load, itself, and the design's limits. The speed may be off by 5 %
+    of its setting, the load by 10 % and twice the sensor's accuracy.
     """
     by_id = {run.id: run for run in runs}
-    shared = _shared_files(runs)
     good, bad, findings = [], [], {}
     for point in points:
         run = by_id[point.run]
-        result = (*_settings(run, point, instruments), *check_record(design, run.record))
-        if run.id in shared:
-            text = f"the sensor's file is that of run {shared[run.id]} as well"
-            result = (*result, Finding(subject="sensor file", passed=False, text=text))
-        findings[run.id] = result
-        wrong = [one for one in result if one.passed is False]
+        result = [*_settings(run, point, instruments), *check_record(design, run.record)]
+        result += [_same_file(other) for other in runs if _share_a_file(run, other)][:1]
+        findings[run.id] = tuple(result)
+        wrong = [f"{one.subject}: {one.text}" for one in result if one.passed is False]
         if wrong:
-            bad.append(SetAside(id=run.id, reason="; ".join(f"{w.subject}: {w.text}" for w in wrong)))
+            bad.append(SetAside(id=run.id, reason="; ".join(wrong)))
         else:
             good.append(point)
     return good, bad, findings
 
 
-def _shared_files(runs: Sequence[ImportedRun]) -> dict[str, str]:
-    """Runs whose sensor's file is that of another run, and that other run."""
-    seen: dict[str, str] = {}
-    out: dict[str, str] = {}
-    for run in runs:
-        if not run.sensor_sha256 or run.load_is_zero:
-            continue
-        if run.sensor_sha256 in seen:
-            out[run.id] = seen[run.sensor_sha256]
-            out[seen[run.sensor_sha256]] = run.id
-        seen.setdefault(run.sensor_sha256, run.id)
-    return out
+def _share_a_file(run: ImportedRun, other: ImportedRun) -> bool:
+    """Whether the file of the load sensor of one run is that of another as well."""
+    files = [None if one.load_is_zero or one.sensor is None else one.sensor.sha256 for one in (run, other)]
+    return run is not other and bool(files[0]) and files[0] == files[1]
 
 
-def _settings(run: ImportedRun, point: SteadyPoint, instruments: Instruments) -> tuple[Finding, ...]:
-    result = []
-    if run.speed_rad_s:
-        result.append(
-            _against("set speed", "speed", "rad/s", point.speed_rad_s, abs(run.speed_rad_s), SPEED_TOLERANCE)
-        )
-    if run.load_Nm and not run.load_is_zero:
-        sensor = 2.0 * instruments.torque_accuracy * instruments.torque_full_scale_Nm / abs(run.load_Nm)
-        allowed = LOAD_TOLERANCE + sensor
-        result.append(_against("set load", "load", "N m", point.load_Nm, abs(run.load_Nm), allowed))
-    return tuple(result)
+def _same_file(other: ImportedRun) -> Finding:
+    text = f"the sensor's file is that of run {other.id} as well"
+    return Finding(subject="sensor file", passed=False, text=text)
 
 
-def _against(subject: str, what: str, unit: str, measured: float, wanted: float, allowed: float) -> Finding:
+def _settings(run: ImportedRun, point: SteadyPoint, instruments: Instruments) -> Iterator[Finding]:
+    speed, load = abs(run.entry.speed_rad_s or 0.0), abs(run.entry.load_Nm or 0.0)
+    if speed:
+        yield _against("speed", "rad/s", point.speed_rad_s, speed, SPEED_TOLERANCE)
+    if load:
+        sensor = 2.0 * instruments.torque_accuracy * instruments.torque_full_scale_Nm / load
+        yield _against("load", "N m", point.load_Nm, load, LOAD_TOLERANCE + sensor)
+
+
+def _against(what: str, unit: str, measured: float, wanted: float, allowed: float) -> Finding:
     ratio = measured / wanted
     text = f"{what} {measured:.4g} {unit}, set {wanted:.4g} {unit}"
-    if abs(ratio - 1.0) <= allowed:
-        return Finding(subject=subject, passed=True, text=text)
-    factor = named_factor(ratio)
-    told = f": {ratio:.4g} times" + (f", factor {factor}" if factor else "")
-    return Finding(subject=subject, passed=False, text=text + told)
+    passed = abs(ratio - 1.0) <= allowed
+    if not passed:
+        factor = named_factor(ratio)
+        text += f": {ratio:.4g} times" + (f", factor {factor}" if factor else "")
+    return Finding(subject=f"set {what}", passed=passed, text=text)
 
 
 def _values_of(design: Design) -> dict[str, float]:
@@ -206,15 +191,12 @@ def campaign_items(
 ) -> tuple[Item, ...]:
     """The verdict on a campaign: runs, residual, size, and the written design simulated again."""
     fit, wrong = result.fit, result.contradicting
+    why = "; ".join(f"run {run.id}: {run.reason}" for run in wrong[:3])
+    why += f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
+    label = "Runs agree with their set speed and load, themselves and the design"
     items = [
-        Item(
-            id="runs",
-            label="Runs agree with their set speed and load, themselves and the design",
-            passed=not wrong,
-            reason="; ".join(f"run {run.id}: {run.reason}" for run in wrong[:3])
-            + (f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""),
-        ),
-        _size_item(design, fit),
+        Item(id="runs", label=label, passed=not wrong, reason=why),
+        size_item(design, _compared(design, fit), kept_constants=False, loaded=True),
         residual_item(fit.relative_residual, limit),
     ]
     if simulated is not None:
@@ -222,11 +204,11 @@ def campaign_items(
     return tuple(items)
 
 
-def _size_item(design: Design, fit: SurfaceFit) -> Item:
+def _compared(design: Design, fit: SurfaceFit) -> list[DesignValue]:
     names, before = ("dry", "viscous", "load_coefficient"), _values_of(design)
-    found = Fit(names=names, values=fit.values, covariance=fit.covariance)
+    found = fit.renamed(dict(zip(NAMES, names, strict=True)))
     values = (design_value(design, found, names[k], before[NAMES[k]]) for k in fit.told)
-    return size_item(design, [one for one in values if one], kept_constants=False, loaded=True)
+    return [one for one in values if one]
 
 
 def steady_current_error(

@@ -11,7 +11,7 @@ from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import FloatArray
-from analyses.identification.surface_fit import PATHS, SurfaceFit
+from analyses.identification.surface import PATHS, SurfaceFit
 
 LOOPS = ("velocity", "position")
 STEP = 0.02
@@ -76,14 +76,13 @@ def suggest_runs(
     """
     if criterion not in ("margins", "D"):
         raise InputError(f'criterion = "{criterion}": "margins" or "D"')
-    speeds, loads = _ranges(fit)
     fitted = with_values(design, dict(zip(PATHS, (float(v) for v in fit.values), strict=True)))
     margins = margin_spreads(fitted, fit, progress=progress)
     slopes = np.array([m.slopes / m.std for m in margins if m.std > 0.0])
     if criterion == "margins" and not len(slopes):
         raise InputError("no margin depends on the friction: use the criterion D")
     weight = slopes.T @ slopes / max(len(slopes), 1)
-    runs = _greedy(fit, speeds, loads, count, weight, criterion)
+    runs = _greedy(fit, count, None if criterion == "D" else weight)
     shared = {name: float(shift @ weight @ shift) / 3.0 for name, shift in fit.shared_shifts.items()}
     whole = float(np.sum(weight * fit.covariance))
     return CampaignSuggestion(
@@ -99,35 +98,25 @@ def margin_spreads(
     design: Design, fit: SurfaceFit, *, progress: Callable[[int, int], None] | None = None
 ) -> tuple[MarginSpread, ...]:
     """Margins, their slopes to C0, Cv, CM (central differences), and their spread from a fit's covariance."""
-    steps = STEP * np.abs(fit.values)
     middle = _margins(design)
     slopes = {key: np.zeros(3) for key in middle}
     for k, path in enumerate(PATHS):
-        sides = [
-            _margins(with_values(design, {path: float(fit.values[k] + s * steps[k])}, check=False))
-            for s in (-1, 1)
-        ]
-        for key in middle:
-            if all(key in side for side in sides):
-                slopes[key][k] = (sides[1][key] - sides[0][key]) / (2.0 * steps[k])
+        step = STEP * abs(fit.values[k])
+        moved = (with_values(design, {path: float(fit.values[k] + s * step)}, check=False) for s in (-1, 1))
+        low, high = map(_margins, moved)
+        for key in middle.keys() & low.keys() & high.keys():
+            slopes[key][k] = (high[key] - low[key]) / (2.0 * step)
         if progress is not None:
             progress(k + 1, 3)
-    shared = fit.covariance - fit.random_covariance
-    return tuple(
-        MarginSpread(
-            label=label,
-            unit=unit,
-            value=middle[label, unit],
-            slopes=s,
-            std=_root(s, fit.covariance),
-            floor_std=_root(s, shared),
+    made = []
+    for (label, unit), s in slopes.items():
+        std, floor = (
+            float(np.sqrt(np.maximum(s @ covariance @ s, 0.0)))
+            for covariance in (fit.covariance, fit.covariance - fit.random_covariance)
         )
-        for (label, unit), s in slopes.items()
-    )
-
-
-def _root(slopes: FloatArray, covariance: FloatArray) -> float:
-    return float(np.sqrt(np.maximum(slopes @ covariance @ slopes, 0.0)))
+        value = middle[label, unit]
+        made.append(MarginSpread(label=label, unit=unit, value=value, slopes=s, std=std, floor_std=floor))
+    return tuple(made)
 
 
 def _margins(design: Design) -> dict[tuple[str, str], float]:
@@ -145,34 +134,34 @@ def _margins(design: Design) -> dict[tuple[str, str], float]:
             if loop is None:
                 continue
             margins = stability_margins(loop.plain_open)
-            for what, unit, value in (
-                ("gain margin", "dB", margins.gain_margin_db),
-                ("phase margin", "deg", margins.phase_margin_deg),
-            ):
+            gain, phase = margins.gain_margin_db, margins.phase_margin_deg
+            for what, unit, value in (("gain margin", "dB", gain), ("phase margin", "deg", phase)):
                 if value is not None and np.isfinite(value):
                     result[f"{name} {what}, {load:g} N m", unit] = float(value)
     return result
 
 
-def _ranges(fit: SurfaceFit) -> tuple[FloatArray, FloatArray]:
-    had = np.array([[p.speed_rad_s, p.load_Nm] for p in fit.points])
-    loaded = had[had[:, 1] > 0.0, 1]
+def _candidates(fit: SurfaceFit) -> FloatArray:
+    """Rows 1, speed, load over the range of the runs so far, and at no load."""
+    speed, load = np.array([[p.speed_rad_s, p.load_Nm] for p in fit.points]).T
+    loaded = load[load > 0.0]
     levels = np.linspace(loaded.min(), loaded.max(), 8) if len(loaded) else np.zeros(0)
-    return np.linspace(had[:, 0].min(), had[:, 0].max(), 9), np.concatenate([[0.0], levels])
+    speeds = np.linspace(speed.min(), speed.max(), 9)
+    return np.array([[1.0, w, m] for m in (0.0, *levels) for w in speeds])
 
 
-def _greedy(
-    fit: SurfaceFit, speeds: FloatArray, loads: FloatArray, count: int, weight: FloatArray, criterion: str
-) -> tuple[SuggestedRun, ...]:
-    """Add the best run again and again; a run's own variance is the median of those made."""
+def _greedy(fit: SurfaceFit, count: int, weight: FloatArray | None) -> tuple[SuggestedRun, ...]:
+    """Add the best run again and again; a run's own variance is the median of those made.
+
+    The best has the least weighed sum of the covariance or, without a weight, its least determinant.
+    """
     own = float(np.median(fit.residual_stds_Nm**2))
     rows = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in fit.points]) / fit.residual_stds_Nm[:, None]
-    information = rows.T @ rows
-    candidates = np.array([[1.0, w, m] for m in loads for w in speeds])
+    information, candidates = rows.T @ rows, _candidates(fit)
 
     def spread(matrix: FloatArray) -> float:
         covariance = np.linalg.inv(matrix)
-        return float(np.linalg.det(covariance)) if criterion == "D" else float(np.sum(weight * covariance))
+        return float(np.linalg.det(covariance) if weight is None else np.sum(weight * covariance))
 
     start = spread(information)
     runs = []
@@ -181,9 +170,6 @@ def _greedy(
         best = int(np.argmin(tried))
         x = candidates[best]
         information = information + np.outer(x, x) / own
-        runs.append(
-            SuggestedRun(
-                order=order, speed_rad_s=float(x[1]), load_Nm=float(x[2]), remaining=tried[best] / start
-            )
-        )
+        left = tried[best] / start
+        runs.append(SuggestedRun(order=order, speed_rad_s=float(x[1]), load_Nm=float(x[2]), remaining=left))
     return tuple(runs)

@@ -1,10 +1,11 @@
-"""Every number of the design against the fit, and the one cause that explains what is off."""
+"""Every number of the design against the fit, the one cause of what is off, the constant that all hang on."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import exp, log
+from dataclasses import dataclass, replace
+from math import exp, inf, log
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -12,10 +13,12 @@ from scipy.stats import chi2
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import FloatArray
-from analyses.estimation.fit import Fit
+from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import own_share, parameter
 from analyses.identification.electrical import fit_electrical
-from analyses.identification.joint_model import JointModel, default_value
+from analyses.identification.joint_model import JointModel, Recipe, default_value
+from analyses.identification.rows import drive_of, rows_under
+from analyses.records.consistency import SURE, electrical_parts
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
 
@@ -75,20 +78,17 @@ def design_values(
     ``start`` is the design with what was found of its motor first; its constants made torques of currents.
     """
     behind = friction_behind(design)
+    looked_at = (name for name in model.names if not name.startswith(("offset", "map_", "gravity")))
     found = [
         design_value(
             design, model, name, default_value(design, name), behind.get(name.partition("_")[0], 0.0)
         )
-        for name in model.names
-        if name != "offset" and not name.startswith(("map_", "gravity"))
+        for name in looked_at
     ]
-    electrical = _electrical(start, records)
-    motor = design.effective_motor
+    electrical, motor = _electrical(start, records), design.effective_motor
     if electrical is not None:
-        found += [
-            design_value(design, electrical, "resistance", motor.resistance_ohm or 0.0),
-            design_value(design, electrical, "back_emf", motor.back_emf_constant_Vs_rad or 0.0),
-        ]
+        own = {"resistance": motor.resistance_ohm, "back_emf": motor.back_emf_constant_Vs_rad}
+        found += [design_value(design, electrical, name, value or 0.0) for name, value in own.items()]
     return tuple(one for one in found if one is not None)
 
 
@@ -156,24 +156,18 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
         told = [one for one, power in zip(values, g, strict=True) if power]
         if len(told) < 2 or not np.any(g):
             continue
-        factor, rest = _along(x, g, close)
+        a, b = g / close, x / close
+        factor = float(a @ b) / float(a @ a)
         if len(told) < LEAST_VALUES and abs(factor) < log(FEW):
             continue
-        level = float(chi2.sf(rest, len(x) - 1))
+        level = float(chi2.sf(float(np.sum((b - factor * a) ** 2)), len(x) - 1))
         if level > EXPLAINED:
-            fitting.append((level, words, factor, float(1.0 / np.linalg.norm(g / close))))
+            fitting.append((level, words, factor, float(1.0 / np.linalg.norm(a))))
     if not fitting:
         return None
     level, _, factor, error = max(fitting)
     alike = " or ".join(words for other, words, *_ in fitting if other > level - 1e-9)
     return alike, exp(factor), error * exp(factor)
-
-
-def _along(x: FloatArray, g: FloatArray, std: FloatArray) -> tuple[float, float]:
-    """The logarithm of a factor that moves ``x`` by ``g`` times it, and the chi-square of what is left."""
-    a, b = g / std, x / std
-    factor = float(a @ b) / float(a @ a)
-    return factor, float(np.sum((b - factor * a) ** 2))
 
 
 def told(words: str, factor: float, error: float) -> str:
@@ -182,3 +176,70 @@ def told(words: str, factor: float, error: float) -> str:
     known = f": factor {named}" if named else ""
     found = f"a factor {factor:.3g} (standard error {error:.1g})"
     return f"identified values are off as by {found} in {words}{known}"
+
+
+STEP = 0.1
+CONSTANTS = {"torque_constant": "torque_constant_Nm_A", "source_gain": "source_gain_Nm_V"}
+"""What makes torques of a current or a voltage: fields of a motor, by the names of the parameters."""
+
+
+def given_constant(model: JointModel) -> str | None:
+    """The constant of the design that the values of a model hang on, by name."""
+    return next((name for name in CONSTANTS if name in model.fixed), None)
+
+
+def with_given_constant(
+    start: Design, model: JointModel, records: Sequence[Record], recipe: Recipe | None
+) -> JointModel:
+    """The model and, among what is kept, the design's constant that all its values hang on; none if told.
+
+    A motion and a current tell ratios to kM alone: with another kM, or a current of another scale, the same
+    record has other values. Values and intervals are then those at the design's constant, and ``moves`` says
+    by how much an error of it moves each of them, with known loads and held values where there are such.
+    """
+    names = {_constant(start, record) for record in records}
+    name = names.pop() if len(names) == 1 else None
+    if name is None:
+        return model
+    value = float(getattr(start.motor, CONSTANTS[name]))
+    changed: dict[str, Any] = {CONSTANTS[name]: (1.0 + STEP) * value}
+    more = replace(start, motor=replace(start.motor, **changed))
+    share = _shares(start, more, model, records, recipe)
+    each = [f"{100.0 * STEP * part:+.2g} %" for part in share]
+    words = f"{each[0]} of every value"
+    if len(set(each)) > 1:
+        words = " and ".join(f"{part} of {one}" for part, one in zip(each, model.names, strict=True))
+    scale = "" if name == "source_gain" else ", nor the scale of the current (rms read as DC: 0.82 times)"
+    kept = Fixed(
+        value=value,
+        reason=f"these records do not tell it{scale}: values and intervals are those at the design's; "
+        f"{100.0 * STEP:+.2g} % of it is {words}",
+        moves={n: -part * model[n] / value for n, part in zip(model.names, share.tolist(), strict=True)},
+    )
+    return replace(model, fixed={**model.fixed, name: kept})
+
+
+def _constant(design: Design, record: Record) -> str | None:
+    """What makes a torque of this record's drive signal, where nothing else in the record tells it."""
+    if {"force", "force_reference", "torque_reference"} & record.signals.keys():
+        return None
+    if drive_of(design, record)[1].startswith("voltage"):
+        return None if design.effective_motor.source_gain_Nm_V is None else "source_gain"
+    low, high = electrical_parts(record.drive(design), record).get("kE w", (-inf, inf))
+    closely = 0.5 * (high - low) <= SURE * own_share(design, "motor.back_emf_constant")
+    return None if closely else "torque_constant"
+
+
+def _shares(
+    start: Design, more: Design, model: JointModel, records: Sequence[Record], recipe: Recipe | None
+) -> FloatArray:
+    """Relative change of each fitted value over that of the constant; exact, as the fit is linear in it."""
+    tables, targets = [], []
+    for weight, record in zip(model.weights, records, strict=True):
+        one, other = (rows_under(design, record, model, recipe) for design in (start, more))
+        tables.append(weight * one.columns(model.names))
+        targets.append(weight * np.column_stack([one.y - model.kept(one), (other.y - one.y) / STEP]))
+    table = np.concatenate(tables)
+    size = np.linalg.norm(table, axis=0)
+    value, change = np.linalg.lstsq(table / size, np.concatenate(targets), rcond=None)[0].T
+    return np.divide(change, value, out=np.zeros_like(change), where=value != 0.0)

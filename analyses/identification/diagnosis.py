@@ -9,20 +9,63 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.estimation.arrays import BoolArray, FloatArray, stretches
-from analyses.estimation.least_squares import covariance_of, told_apart
+from analyses.estimation.arrays import BoolArray, FloatArray, picked, stretches
+from analyses.estimation.least_squares import covariance_of, solve, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
-from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows
-from analyses.identification.simultaneous import Followed, Lag, followed, lag_of, shifted
-from analyses.records.consistency import SURE, Finding, clock_doubt, resistance_doubt
+from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
+from analyses.records.consistency import RATE_TOLERANCE, SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.record import Record
 
 LEAST_RUN = 3
 """Samples in a row at the largest or smallest value of all: a flat top."""
+ROUNDS = 8
+SETTLED = 0.1
+LARGEST_STEP_S = 0.01
 
 Fitted = tuple[JointModel, tuple[Record, ...]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lag:
+    """How much later than the motion a record's drive signal is, with its standard error, s."""
+
+    seconds: float
+    standard_error: float
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is there."""
+        return abs(self.seconds) > SURE * self.standard_error
+
+
+@dataclass(frozen=True, kw_only=True)
+class Followed:
+    """The recorded following error over the simulated one, and the scale of the recorded position.
+
+    The scale is what the position has too much of the motion that was asked for, as a share.
+    """
+
+    ratio: float
+    ratio_error: float
+    scale: float = 0.0
+    scale_error: float = 0.0
+
+    @property
+    def clock(self) -> float:
+        """The share by which a clock is off, 0 where chance explains it."""
+        return self.ratio - 1.0 if abs(self.ratio - 1.0) > SURE * self.ratio_error else 0.0
+
+    @property
+    def off(self) -> float:
+        """The share by which the scale is off, 0 where chance explains it."""
+        return self.scale if abs(self.scale) > SURE * self.scale_error else 0.0
+
+    @property
+    def fails(self) -> bool:
+        """Whether they are off by more than an interval can hold."""
+        return max(abs(self.clock), abs(self.off)) > RATE_TOLERANCE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,60 +90,63 @@ def diagnosed(
     ``start`` is the design with what the voltage equation gave; ``fit`` gives the model of records, and
     these as the design that comes of it simulates them (none: it cannot).
     """
-    found: dict[str, list[Finding]] = {record.name: [] for record in records}
-    used = tuple(_without_flat_tops(start, record, recipe, found[record.name]) for record in records)
+    whole = [_without_flat_tops(start, record, recipe) for record in records]
+    used = tuple(record for record, _ in whole)
+    found = {record.name: clipped for record, clipped in whole}
     model, simulated = fit(used)
-    lags = [_lag(start, *pair, model, recipe) for pair in zip(used, simulated, strict=bool(simulated))]
-    for record, lag in zip(used, lags, strict=False):
-        if lag is not None:
+    lags: dict[str, Lag] = {}
+    for record, like in zip(used, simulated, strict=bool(simulated)):
+        own, other = (lag_of(start, one, like, model, recipe) for one in (record, like))
+        if (
+            own is not None and other is not None
+        ):  # the simulation has none, but what the analysis finds in it
+            error = float(np.hypot(own.standard_error, other.standard_error))
+            lag = Lag(seconds=own.seconds - other.seconds, standard_error=error)
             found[record.name].append(_of_lag(drive_of(start, record)[1], lag))
-    sure = [lag for lag in lags if lag is not None and lag.is_sure]
-    if sure:
-        pairs = zip(used, lags, strict=True)
+            lags |= {record.name: lag} if lag.is_sure else {}
+    if lags:
         used = tuple(
-            shifted(start, record, lag.seconds) if lag is not None and lag.is_sure else record
-            for record, lag in pairs
+            shifted(start, record, lags[record.name].seconds) if record.name in lags else record
+            for record in used
         )
         before = model
         model, simulated = fit(used)
-        model = _with_error_of(sure, before, model)
-    seen = {
-        one.name: followed(start, one, like)
-        for one, like in zip(used, simulated, strict=bool(simulated))
-        if not is_benchmark(one)
-    }
-    follow = {name: one for name, one in seen.items() if one is not None}
+        if before.names == model.names:
+            share = np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in lags.values()])
+            model = _widened(model, np.sqrt(share) * (model.values - before.values))
+    pairs = zip(used, simulated, strict=bool(simulated))
+    seen = {record.name: followed(start, record, like) for record, like in pairs}
     for record, part in zip(used, model.records, strict=True):
-        one = follow.get(record.name)
-        clock, off = (0.0, 0.0) if one is None or one.fails else (one.clock, one.off)
-        if one is None or record.signals.keys() & {"speed", "velocity"}:
-            clock = max(clock, clock_doubt(start, record), key=abs)
-        for share, powers in (
-            (clock, {"inertia": 2.0, "viscous": 1.0}),
-            (off, {"inertia": 1.0, "viscous": 1.0}),
-            (resistance_doubt(design, record), {"": 1.0}),
-        ):
-            model = _stretched(model, share, powers)
+        model = _with_doubts(design, start, record, seen.get(record.name), model)
         drift = None if is_benchmark(record) else _drift(part, model)
         if drift is not None:
-            found[record.name].append(drift[0])
-            model = replace(model, covariance=model.covariance + drift[1])
+            finding, added = drift
+            found[record.name].append(finding)
+            model = replace(model, covariance=model.covariance + added)
     return Diagnosed(
         model=model,
         records=used,
-        followed=follow,
+        followed={name: one for name, one in seen.items() if one is not None},
         findings={name: tuple(each) for name, each in found.items()},
     )
 
 
-def _lag(
-    start: Design, record: Record, simulated: Record, model: JointModel, recipe: Recipe | None
-) -> Lag | None:
-    """The lag of a record, less what the same analysis finds in its simulation, which has none."""
-    if is_benchmark(record):
-        return None
-    lag, own = (lag_of(start, one, simulated, model, recipe) for one in (record, simulated))
-    return None if lag is None or own is None else lag.less(own)
+def _widened(model: JointModel, moved: FloatArray) -> JointModel:
+    """The model with what an error moves all its values by, once its standard deviation."""
+    return replace(model, covariance=model.covariance + np.outer(moved, moved))
+
+
+def _with_doubts(
+    design: Design, start: Design, record: Record, follow: Followed | None, model: JointModel
+) -> JointModel:
+    """The model with what clock and scales of a record may be off by: each value by a power of that."""
+    clock, off = (0.0, 0.0) if follow is None or follow.fails else (follow.clock, follow.off)
+    if follow is None or record.signals.keys() & {"speed", "velocity"}:
+        clock = max(clock, clock_doubt(start, record), key=abs)
+    kinds = [name.partition("_")[0] for name in model.names]
+    for share, powers in ((clock, {"inertia": 2.0, "viscous": 1.0}), (off, {"inertia": 1.0, "viscous": 1.0})):
+        model = _widened(model, share * np.array([powers.get(kind, 0.0) for kind in kinds]) * model.values)
+    return _widened(model, resistance_doubt(design, record) * model.values)
 
 
 def _of_lag(signal: str, lag: Lag) -> Finding:
@@ -114,22 +160,6 @@ def _of_lag(signal: str, lag: Lag) -> Finding:
     return Finding(subject=subject, passed=None, text=f"{text}: taken back by as much before the fit")
 
 
-def _with_error_of(lags: Sequence[Lag], before: JointModel, model: JointModel) -> JointModel:
-    """The model with what the error of the lags adds to its covariance."""
-    if before.names != model.names:
-        return model
-    moved = model.values - before.values
-    share = float(np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in lags]))
-    return replace(model, covariance=model.covariance + share * np.outer(moved, moved))
-
-
-def _stretched(model: JointModel, share: float, powers: Mapping[str, float]) -> JointModel:
-    """The model with what a clock or a scale off by a share moves: each value by that power of it."""
-    power = np.array([powers.get(name.partition("_")[0], powers.get("", 0.0)) for name in model.names])
-    moved = share * power * model.values
-    return replace(model, covariance=model.covariance + np.outer(moved, moved))
-
-
 def _drift(part: RecordFit, model: JointModel) -> tuple[Finding, FloatArray] | None:
     """Whether all torques change their scale along a record, and what that adds to the covariance.
 
@@ -139,25 +169,26 @@ def _drift(part: RecordFit, model: JointModel) -> tuple[Finding, FloatArray] | N
     """
     time, w = np.linspace(-1.0, 1.0, len(part.keep))[part.keep][part.compared], part.w[part.compared]
     table = np.column_stack([w, time * (w @ model.values), time])
-    size = np.linalg.norm(table, axis=0)
     names = (*model.names, "scale", "shift")
     if len(told_apart(table, names)[0]) < len(names):
         return None
+    size = np.linalg.norm(table, axis=0)
     found = np.linalg.lstsq(table / size, part.noise, rcond=None)[0] / size
-    rest = part.noise - table @ found
-    errors = np.sqrt(np.diag(covariance_of([(table / size, rest)]))) / size
-    scale, shift = found[-2:]
+    errors = np.sqrt(np.diag(covariance_of([(table / size, part.noise - table @ found)]))) / size
+    (scale, shift), told = found[-2:], []
     sure = np.abs(found[-2:]) > SURE * errors[-2:]
-    if not np.any(sure):
-        return None
-    moved = sure[0] * np.outer(model.values, model.values) * scale**2 / 3.0
-    text = f"all torques change by {200.0 * scale:+.2g} % from begin to end" if sure[0] else ""
+    moved = np.zeros_like(model.covariance)
+    if sure[0]:
+        told.append(f"all torques change by {200.0 * scale:+.2g} % from begin to end")
+        moved = np.outer(model.values, model.values) * scale**2 / 3.0
     if sure[1]:
-        text += f"{' and ' if text else ''}the offset by {2.0 * shift:+.2g}"
+        told.append(f"the offset by {2.0 * shift:+.2g}")
         if "offset" in model.names:
             moved[model.names.index("offset"), model.names.index("offset")] += shift**2 / 3.0
-    finding = Finding(subject="drift along the record", passed=None, text=f"{text}: the intervals hold it")
-    return finding, moved
+    if not told:
+        return None
+    text = f"{' and '.join(told)}: the intervals hold it"
+    return Finding(subject="drift along the record", passed=None, text=text), moved
 
 
 def flat_tops(values: FloatArray) -> BoolArray:
@@ -170,18 +201,17 @@ def flat_tops(values: FloatArray) -> BoolArray:
     """
     out = np.zeros(len(values), dtype=bool)
     for level in (np.max(values), np.min(values)):
-        at = np.abs(values - level) <= 1e-9 * np.ptp(values)
-        for start, stop in stretches(at):
+        for start, stop in stretches(np.abs(values - level) <= 1e-9 * np.ptp(values)):
             out[start:stop] |= stop - start >= LEAST_RUN
     return out
 
 
-def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None, found: list[Finding]) -> Record:
+def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> tuple[Record, list[Finding]]:
     """The record without the rows of a flat top, where all others say that the drive signal was larger."""
     name = drive_of(start, record)[1]
     flat = flat_tops(record[name])
     if is_benchmark(record) or not np.any(flat) or np.all(flat):
-        return record
+        return record, []
     reach = 2 * (recipe or recipe_for(record)).decimation  # of the filter before the decimation
     near = np.convolve(flat, np.ones(2 * reach + 1), mode="same") > 0.5
     without = replace(record, left_out=near)
@@ -189,21 +219,116 @@ def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None, fou
         fit = fit_records(start, [without], recipe=recipe)
         whole = record_rows(start, record, "symmetric", recipe)
     except (InputError, NumericalError):
-        return record
+        return record, []
     rows = (whole.keep & ~fit.records[0].keep)[whole.keep]
     if not np.any(rows):
-        return record
-    modelled = whole.w[rows] @ np.array([fit[name] for name in whole.names])
-    more = np.sign(whole.y[rows]) * (modelled - whole.y[rows])
+        return record, []
+    more = np.sign(whole.y) * (whole.explained(fit, whole.names) - whole.y)
     rest = fit.residual
-    error = float(np.std(rest)) * np.sqrt(correlation_time(rest) / len(more))
-    subject = f"{name} without flat tops"
+    error = float(np.std(rest)) * np.sqrt(correlation_time(rest) / np.count_nonzero(rows))
+    if not float(np.mean(more[rows])) > SURE * error:
+        return record, []
     share = 100.0 * np.count_nonzero(flat) / len(flat)
-    if not float(np.mean(more)) > SURE * error:
-        return record
     text = (
         f"{share:.2g} % of its samples stand at the largest value, {np.max(np.abs(record[name])):.4g}, where "
         "the other rows say that it was larger: clipped; these rows are left out"
     )
-    found.append(Finding(subject=subject, passed=None, text=text))
-    return without
+    return without, [Finding(subject=f"{name} without flat tops", passed=None, text=text)]
+
+
+def shifted(design: Design, record: Record, seconds: float) -> Record:
+    """A record with its drive signal taken ``seconds`` later in the file, as if it came so much earlier."""
+    name = drive_of(design, record)[1]
+    moved = np.interp(record.time_s + seconds, record.time_s, record[name])
+    return replace(record, signals={**record.signals, name: moved})
+
+
+def lag_of(
+    design: Design, record: Record, simulated: Record, model: JointModel, recipe: Recipe | None
+) -> Lag | None:
+    """The lag with which the inverse model leaves the least, the model's values being found anew.
+
+    Gauss-Newton on the shift of the drive signal, its derivative by a difference over the record's period.
+    The rows of the simulated record are the instruments (IDIM-IV; Janot, Vandanjon, Gautier, 2014), so that
+    noise of motion and current does not bias the steps. None where the motion does not tell a lag from
+    inertia and friction, and for the record of the EMPS benchmark.
+    """
+
+    def slopes(record: Record) -> FloatArray:
+        """Columns of the model, and by how much the drive of each row falls with a shift, N m/s."""
+        half = 0.5 * record.period_s
+        late, early = (rows_under(design, shifted(design, record, s), model, recipe) for s in (half, -half))
+        return np.column_stack([late.columns(model.names), (early.y - late.y) / (2.0 * half)])
+
+    if is_benchmark(record):
+        return None
+    try:
+        own, other = (rows_under(design, one, model, recipe) for one in (record, simulated))
+        if len(other.keep) > len(own.keep):
+            return None
+        both = own.keep[: len(other.keep)] & other.keep
+        z = picked(slopes(simulated), other.keep, both)
+        if len(z) <= z.shape[1] or len(told_apart(z, (*model.names, "lag"))[0]) < z.shape[1]:
+            return None
+        lag, error = 0.0, np.inf
+        for _ in range(ROUNDS):
+            late = shifted(design, record, lag)
+            y = rows_under(design, late, model, recipe).y - model.kept(own)
+            table = picked(slopes(late), own.keep, both)
+            step, error = _step(z, table, picked(y, own.keep, both))
+            lag += float(np.clip(step, -LARGEST_STEP_S, LARGEST_STEP_S))
+            if abs(step) < SETTLED * error:
+                break
+        turned = [picked(model.turned(rows), rows.keep, both) for rows in (own, other)]
+        feigned = _step(z, table, turned[0] - turned[1])[0]
+    except (InputError, NumericalError, np.linalg.LinAlgError):
+        return None
+    return Lag(seconds=lag, standard_error=float(np.hypot(error, feigned)))
+
+
+def _step(z: FloatArray, table: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """The last value of ``z' (y - table p) = 0``, and its standard error."""
+    size = np.linalg.norm(z, axis=0)
+    z, table = z / size, table / size
+    slopes = z.T @ table
+    found = np.linalg.solve(slopes, z.T @ y)
+    # with rows z and the noise of the residual, the covariance of z'e, turned back by the slopes
+    gram, back = z.T @ z, np.linalg.inv(slopes)
+    noise = gram @ covariance_of([(z, y - table @ found)]) @ gram
+    return float(found[-1] / size[-1]), float(np.sqrt((back @ noise @ back.T)[-1, -1]) / size[-1])
+
+
+def followed(design: Design, record: Record, simulated: Record) -> Followed | None:
+    """The following error as a clock: the loops' gains are per second, whatever the drive's torque.
+
+    Inertia, friction and gravity of a record whose clock runs wrong agree with each other, as its torque is
+    right and its motion only stretched. But a position loop over a velocity loop lags by ``(v + i/Kp)/Kv``
+    (without the second term where the velocity loop has an integral), whatever the motor: a clock off by a
+    factor shows as about the same factor between the recorded following error and the simulated one, a
+    scale of the position as a part of the motion in it. Both are regressed together; noise is in the
+    recorded position alone. None where the drive has no such loops, or the motion does not tell, and for the
+    record of the EMPS benchmark.
+    """
+    design = record.drive(design)
+    control = design.controller
+    if control.position is None or control.velocity is None or is_benchmark(record):
+        return None
+    command, place = "position_reference", "position"
+    if design.axis == "rotary":
+        command, place = "reference", "angle" if control.position.sensor == "motor" else "output_angle"
+    if not {command, place} <= set(record.signals) or place not in simulated.signals:
+        return None
+    factor = design.total_ratio if place == "angle" else 1.0
+    record = record.slice(0, len(simulated))  # of a long one the first part is simulated
+    columns = (factor * record[command], record[place], simulated[place])
+    wanted, own, model = (values - values.mean() for values in columns)
+    table = np.column_stack([wanted - model, model])
+    kept, _ = told_apart(table, ("following error", "motion"))
+    if 0 not in kept or not np.any(wanted - own):
+        return None
+    size = np.linalg.norm(table[:, kept], axis=0)
+    solved = solve(table[:, kept] / size, wanted - own)
+    ratio, *more = (solved.values / size).tolist()
+    ratio_error, *error = (np.sqrt(np.diag(solved.correlated)) / size).tolist()
+    scale, scale_error = (-more[0], error[0]) if more else (0.0, 0.0)
+    return Followed(ratio=ratio, ratio_error=ratio_error, scale=scale, scale_error=scale_error)

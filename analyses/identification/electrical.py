@@ -66,9 +66,8 @@ def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...] = NAMES) -> Elec
     kept, left = told_apart(w, only)
     for one in left:
         if one.name in ("resistance", "back_emf"):
-            told = f"{parameter(one.name).key}: {one}; vary speed and load, not together only"
-            raise InputError(told)
-    result = solve(w[:, list(kept)], u, ends)
+            raise InputError(f"{parameter(one.name).key}: {one}; vary speed and load, not together only")
+    result = solve(w[:, kept], u, ends)
     return ElectricalFit(
         names=tuple(only[k] for k in kept),
         values=result.values,
@@ -84,8 +83,7 @@ def _rows(design: Design, record: Record, late_s: float) -> FloatArray:
     for name in ("voltage", "current"):
         if name not in record.signals:
             raise InputError(f"no {name}: voltage, current and motion are needed", record.name)
-    recipe = recipe_for(record)
-    period = period_of(record)
+    recipe, period = recipe_for(record), period_of(record)
     motion, _ = motion_of(record.drive(design), record, recipe)
     b, a = butter(recipe.filter_order, 2.0 * recipe.cutoff_hz * period)
     current, voltage = (np.asarray(filtfilt(b, a, record[name])) for name in ("current", "voltage"))

@@ -47,16 +47,12 @@ def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Li
     """
     samples = round(period_s / record.period_s)
     if samples < 8 or abs(samples * record.period_s - period_s) > 1e-3 * record.period_s:
-        raise InputError(
-            f"period {period_s:g} s: must be a whole number (8 or more) of samples of {record.period_s:g} s",
-            where=record.name,
-        )
+        told = f"must be a whole number (8 or more) of samples of {record.period_s:g} s"
+        raise InputError(f"period {period_s:g} s: {told}", where=record.name)
     periods = len(record) // samples - 1
     if periods < MIN_PERIODS:
-        raise InputError(
-            f"{periods} periods of {period_s:g} s after the first: at least {MIN_PERIODS}",
-            where=record.name,
-        )
+        told = f"{periods} periods of {period_s:g} s after the first: at least {MIN_PERIODS}"
+        raise InputError(told, where=record.name)
     start = len(record) - periods * samples
     spectra = np.array([_spectrum(record[name][start:], periods, samples) for name in names])
     means, noise, freedom = _lines(spectra, periods)
@@ -124,11 +120,8 @@ def period_of_excitation(record: Record, name: str) -> float:
     fallen = int(np.argmax(alike < 0.5))
     peaks = np.flatnonzero(alike[fallen:] > 0.98) + fallen
     if not len(alike) or not fallen or not len(peaks):
-        raise InputError(
-            f"{name} does not repeat itself {MIN_PERIODS + 1} times: give the period of the excitation",
-            where=record.name,
-        )
-    first = peaks[0]
-    group = peaks[peaks <= first * 1.02 + 2]
+        told = f"{name} does not repeat itself {MIN_PERIODS + 1} times: give the period of the excitation"
+        raise InputError(told, where=record.name)
+    group = peaks[peaks <= peaks[0] * 1.02 + 2]
     best = group[int(np.argmax(alike[group]))]
     return float(lags[best] * record.period_s)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -16,12 +16,7 @@ from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import own_std, parameter
 from analyses.identification.asked import held_by_name
-from analyses.identification.frequency import (
-    Lines,
-    excited_lines,
-    period_of_excitation,
-    response,
-)
+from analyses.identification.frequency import Lines, excited_lines, period_of_excitation, response
 from analyses.identification.play import Play, find_play
 from analyses.identification.rows import drive_of
 from analyses.identification.sampled_current import held_voltage
@@ -65,9 +60,8 @@ class FrequencyResult(Identified):
     def found(self) -> Fit:
         """Everything that was found: the parameters, both resonances, the play."""
         fit, play = self.fit, self.play
-        found = fit.beside("antiresonance", *fit.antiresonance_rad_s).beside(
-            "resonance", *fit.resonance_rad_s
-        )
+        found = fit.beside("antiresonance", *fit.antiresonance_rad_s)
+        found = found.beside("resonance", *fit.resonance_rad_s)
         return found.beside("play", 2.0 * play.half_rad, 2.0 * play.half_std_rad) if play else found
 
     @property
@@ -104,15 +98,14 @@ def identify_frequency(
     if "output_angle" in record.signals:
         names.append("load_angle")
         used["output_angle"] = "load's angle"
-    used = {**used, "angle": "motor angle", command: used.get(command, "its period")}
+    used |= {"angle": "motor angle", command: used.get(command, "its period")}
     lines = _between_ticks(design, record, excited_lines(with_torque, tuple(names), period))
     held = _held(design, dict(fixed or {}))
-    fit = _fitted(lines, reduction, names, held, _reaction(design, with_torque))
+    fit = _fitted(lines, reduction, held, _reaction(design, with_torque))
     play = None if play_record is None else _play_of(design, play_record, fit)
     made = _made(design, fit, play, record.name, behind)
     text = write_design(made)
-    records = [record] if play_record is None else [record, play_record]
-    findings = {one.name: check_record(design, one) for one in records}
+    findings = {one.name: check_record(design, one) for one in (record, play_record) if one is not None}
     items = [inputs_item(name, result) for name, result in findings.items()]
     items += [_misfit_item(fit), _written_item(read_design_text(text), lines, record.name, fit.reaction)]
     return FrequencyResult(
@@ -175,17 +168,15 @@ def _reaction(design: Design, record: Record) -> float:
     return float(1.0 / design.ratio_to_coupling + side * own)
 
 
-def _fitted(
-    lines: Lines, reduction: float, names: Sequence[str], held: Mapping[str, float], reaction: float
-) -> TwoMass:
+def _fitted(lines: Lines, reduction: float, held: Mapping[str, float], reaction: float) -> TwoMass:
     """The fit; a damping or friction that comes out negative is held at zero, the errors stay those without.
 
     One that is merely small against its error stays: held at zero, its part would go into the others, beyond
     their errors.
     """
-    start = {**start_of(lines, reduction, torque=names[0]), **held}
-    load = "load_angle" if "load_angle" in names else None
-    go = partial(fit_two_mass, lines, reduction=reduction, torque=names[0], load=load, reaction=reaction)
+    torque, load = lines.names[0], "load_angle" if "load_angle" in lines.names else None
+    start = {**start_of(lines, reduction, torque=torque), **held}
+    go = partial(fit_two_mass, lines, reduction=reduction, torque=torque, load=load, reaction=reaction)
     fit = go(start, fixed=held)
     if fit.misfit > MISFIT_DOUBTED:
         for other in other_starts(start, lines, reduction):
@@ -203,18 +194,13 @@ def _held_at_zero(fit: TwoMass) -> TwoMass:
     if not below:
         return fit
     gone = [fit.names.index(name) for name in below]
-    rest = [k for k in range(len(fit.names)) if k not in gone]
-    gain = np.linalg.solve(fit.covariance[np.ix_(gone, gone)], fit.covariance[np.ix_(gone, rest)])
-    values = fit.values[rest] - fit.values[gone] @ gain
-    fixed = dict.fromkeys(below, Fixed(value=0.0, reason="would come out negative"))
-    again = replace(
-        fit,
-        names=tuple(fit.names[k] for k in rest),
-        values=values,
-        covariance=fit.covariance[np.ix_(rest, rest)],
-        fixed={**fit.fixed, **fixed},
+    rest = fit.renamed({name: name for name in fit.names if name not in below})
+    beside = fit.covariance[gone][:, [fit.names.index(name) for name in rest.names]]
+    values = rest.values - fit.values[gone] @ np.linalg.solve(fit.covariance[np.ix_(gone, gone)], beside)
+    fixed = {**fit.fixed, **dict.fromkeys(below, Fixed(value=0.0, reason="would come out negative"))}
+    return _held_at_zero(
+        replace(fit, names=rest.names, values=values, covariance=rest.covariance, fixed=fixed)
     )
-    return _held_at_zero(again)
 
 
 def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
@@ -237,19 +223,17 @@ def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
     dry_std = own_std(design, "load.friction.dry_torque")
     own = {**{name: fit[name] for name in OF_THE_LOAD}, "load_dry": dry}
     play = _play_at(design, record, fit, own)
-    names = [name for name in OF_THE_LOAD if name in fit.names]
-    rows = [fit.names.index(name) for name in names]
-    slopes = []
-    for name in names:
-        step = fit.std(name)
-        moved = _play_at(design, record, fit, {**own, name: own[name] + step})
-        slopes.append((moved.half_rad - play.half_rad) / step if step > 0.0 else 0.0)
-    g = np.array(slopes)
-    passed_on = float(np.sqrt(max(g @ fit.covariance[np.ix_(rows, rows)] @ g, 0.0)))
-    if dry_std > 0.0:
-        moved = _play_at(design, record, fit, {**own, "load_dry": dry + dry_std})
-        passed_on = float(np.hypot(passed_on, moved.half_rad - play.half_rad))
-    return replace(play, half_std_rad=float(np.hypot(play.half_std_rad, passed_on)))
+
+    def moved(name: str, step: float) -> float:
+        """By how much one standard error of a value moves the play."""
+        return _play_at(design, record, fit, {**own, name: own[name] + step}).half_rad - play.half_rad
+
+    used = fit.renamed({name: name for name in OF_THE_LOAD if name in fit.names})
+    g = np.array([moved(name, used.std(name)) if used.std(name) > 0.0 else 0.0 for name in used.names])
+    passed_on = max(float(g @ used.correlation @ g), 0.0)
+    of_dry = moved("load_dry", dry_std) if dry_std > 0.0 else 0.0
+    whole = np.sqrt(play.half_std_rad**2 + passed_on + of_dry**2)
+    return replace(play, half_std_rad=float(whole))
 
 
 def _play_at(design: Design, record: Record, fit: TwoMass, values: Mapping[str, float]) -> Play:
@@ -293,14 +277,11 @@ def _resolution(values: FloatArray) -> float:
 
 
 def _misfit_item(fit: TwoMass) -> Item:
-    good = fit.misfit <= MISFIT_LIMIT
     result = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
-    return Item(
-        id="misfit",
-        label=f"The two-mass model explains the lines ({result})",
-        passed=good,
-        reason="" if good else "play, friction or another resonance: excite on one flank, in motion",
-    )
+    why = "play, friction or another resonance: excite on one flank, in motion"
+    reason = "" if fit.misfit <= MISFIT_LIMIT else why
+    label = f"The two-mass model explains the lines ({result})"
+    return Item(id="misfit", label=label, passed=not reason, reason=reason)
 
 
 def _written_item(written: Design, lines: Lines, record: str, reaction: float) -> Item:
@@ -337,11 +318,11 @@ def _made(design: Design, fit: TwoMass, play: Play | None, record: str, behind: 
     own_load = base.load_side_inertia_kgm2 - base.load.inertia_kgm2 / behind**2
     shift = {"motor_inertia": -others, "load_inertia": -own_load}
     scale = {"load_inertia": behind**2}
-    names = {name: parameter(name).key for name in fit.names if fit[name] > 0.0}
-    made = fit.mapped(
-        {key: {name: scale.get(name, 1.0)} for name, key in names.items()},
-        {key: scale.get(name, 1.0) * (fit[name] + shift.get(name, 0.0)) for name, key in names.items()},
-    )
+    slopes, values = {}, {}
+    for name in (name for name in fit.names if fit[name] > 0.0):
+        key, slope = parameter(name).key, scale.get(name, 1.0)
+        slopes[key], values[key] = {name: slope}, slope * (fit[name] + shift.get(name, 0.0))
+    made = fit.mapped(slopes, values)
     if play is not None and play.told:
         made = made.beside("coupling.play", 2.0 * play.half_rad, 2.0 * play.half_std_rad)
     return design_with_fit(base, made, f"frequency response of {record}")

@@ -12,8 +12,8 @@ from actuator_lti.design.model import Design
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
-from analyses.identification.joint_model import JointModel, Recipe, linear_basis
-from analyses.identification.rows import Rows, record_rows
+from analyses.identification.joint_model import JointModel, Recipe, Rows, linear_basis
+from analyses.identification.rows import record_rows
 from analyses.records.record import Record
 
 MOST_BREAKS = 4
@@ -114,14 +114,13 @@ def _plain_residual(rows: Sequence[Rows], plain: JointModel) -> tuple[FloatArray
     """
     speeds, rests = [], []
     for block in rows:
-        other = [k for k, name in enumerate(block.names) if name not in ("viscous", "dry")]
-        values = np.array([plain[block.names[k]] for k in other])
-        speed = block.w[:, block.names.index("viscous")]
+        other = [name for name in block.names if name not in ("viscous", "dry")]
+        speed = block.columns(["viscous"])[:, 0]
         turns = np.concatenate([[False], np.sign(speed[1:]) != np.sign(speed[:-1]), [False]])
         clear = ~(turns[1:] | turns[:-1])
         clear[1:-1] &= clear[2:] & clear[:-2]
         speeds.append(speed[clear])
-        rests.append((block.y - block.w[:, other] @ values)[clear])
+        rests.append((block.y - block.explained(plain, other))[clear])
     return np.concatenate(speeds), np.concatenate(rests)
 
 

@@ -43,12 +43,8 @@ class Recipe:
     points: int = 3
 
     def __post_init__(self) -> None:
-        for name, low in (
-            ("filter_order", 1),
-            ("skip_samples", 0),
-            ("skip_end_samples", 0),
-            ("decimation", 1),
-        ):
+        least = {"filter_order": 1, "skip_samples": 0, "skip_end_samples": 0, "decimation": 1}
+        for name, low in least.items():
             if getattr(self, name) < low:
                 raise InputError(f"{name} = {getattr(self, name)}: must be {low} or more")
 
@@ -59,15 +55,20 @@ class Recipe:
         )
 
 
-def base_columns(motion: Motion, form: FrictionForm) -> FloatArray:
-    """Columns of inertia and friction for a motion, in the order of ``NAMES[form]``."""
-    velocity, direction = motion.velocity, np.sign(motion.velocity)
-    if form == "symmetric":
-        return np.column_stack([motion.acceleration, velocity, direction, np.ones_like(velocity)])
-    ahead, back = velocity > 0.0, velocity < 0.0
-    return np.column_stack(
-        [motion.acceleration, velocity * ahead, direction * ahead, velocity * back, direction * back]
-    )
+def friction_columns(
+    motion: Motion, form: FrictionForm, knots_rad_s: Sequence[float] | None
+) -> tuple[list[str], FloatArray]:
+    """Names and columns of inertia, friction (of a form, or a map over the speed) and offset."""
+    velocity, side = motion.velocity, np.sign(motion.velocity)
+    if knots_rad_s is not None:
+        names = ["inertia", *(f"map_{k}" for k in range(len(knots_rad_s))), "offset"]
+        own = [*(linear_basis(np.abs(velocity), knots_rad_s) * side[:, None]).T, np.ones_like(side)]
+    elif form == "symmetric":
+        names, own = list(NAMES[form]), [velocity, side, np.ones_like(side)]
+    else:
+        names = list(NAMES[form])
+        own = [values * (turn * side > 0.0) for turn in (1.0, -1.0) for values in (velocity, side)]
+    return names, np.column_stack([motion.acceleration, *own])
 
 
 def linear_basis(speed: FloatArray, knots: Sequence[float]) -> FloatArray:
@@ -81,47 +82,78 @@ def linear_basis(speed: FloatArray, knots: Sequence[float]) -> FloatArray:
     v = np.asarray(knots, dtype=float)
     k = np.clip(np.searchsorted(v, speed, side="right") - 1, 0, len(v) - 2)
     share = (speed - v[k]) / (v[k + 1] - v[k])
-    out = np.zeros((len(speed), len(v)))
-    rows = np.arange(len(speed))
-    out[rows, k] = 1.0 - share
-    out[rows, k + 1] = share
+    out, rows = np.zeros((len(speed), len(v))), np.arange(len(speed))
+    out[rows, k], out[rows, k + 1] = 1.0 - share, share
     return out
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecordFit:
-    """One record's part: rows, its relative residual under the joint model, what was used and noted.
+class Rows:
+    """Regressors ``w`` by ``names`` and drive ``y`` of one record after decimation, rows at rest left out.
 
-    ``w`` (columns of the fitted names), ``residual``, ``speed``, ``acceleration``, ``drive`` and ``friction``
-    (the drive less all but the friction) are of the rows used, ``keep`` marks these among all, ``step_s``
-    apart.
-    ``own_residual`` is that of the record fitted alone: what is left of it has no scatter between records.
-    ``noise`` is what the simulated record does not explain of that, at the rows ``compared`` of those used.
+    ``sine`` and ``cosine`` of the output angle keep all rows, of which ``keep`` marks those used. ``speed``
+    and ``acceleration`` are the motor's, ``step_s`` the time from row to row; ``used`` tells what each signal
+    was used for.
     """
 
     name: str
     rows_in: int
-    rows_used: int
-    rows_at_rest: int
-    relative_residual: float
     used: Mapping[str, str]
     notes: tuple[str, ...]
+    names: tuple[str, ...] = field(repr=False)
     w: FloatArray = field(repr=False)
-    residual: FloatArray = field(repr=False)
-    own_residual: FloatArray = field(repr=False)
-    keep: BoolArray = field(repr=False)
+    y: FloatArray = field(repr=False)
+    sine: FloatArray = field(repr=False)
+    cosine: FloatArray = field(repr=False)
     speed: FloatArray = field(repr=False)
     acceleration: FloatArray = field(repr=False)
-    drive: FloatArray = field(repr=False)
-    friction: FloatArray = field(repr=False)
     step_s: float = field(repr=False)
+    keep: BoolArray = field(repr=False)
+    recipe: Recipe = field(repr=False)
+
+    @property
+    def rows_used(self) -> int:
+        """Rows of the regression."""
+        return len(self.y)
+
+    @property
+    def rows_at_rest(self) -> int:
+        """Rows that were left out."""
+        return int(np.count_nonzero(~self.keep))
+
+    def columns(self, names: Sequence[str]) -> FloatArray:
+        """The regressors of some names."""
+        return self.w[:, [self.names.index(name) for name in names]]
+
+    def explained(self, values: Mapping[str, float] | Fit, names: Sequence[str]) -> FloatArray:
+        """What some names explain of the drive."""
+        return np.asarray(self.columns(names) @ np.array([values[name] for name in names]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordFit(Rows):
+    """One record's part of a joint model: its rows, ``w`` those of the fitted names.
+
+    ``friction`` is the drive less all but the friction. ``own_residual`` is that of the record fitted alone:
+    what is left of it has no scatter between records. ``noise`` is what the simulated record does not explain
+    of that, at the rows ``compared`` of those used.
+    """
+
+    residual: FloatArray = field(repr=False)
+    own_residual: FloatArray = field(repr=False)
+    friction: FloatArray = field(repr=False)
     noise: FloatArray = field(repr=False)
     compared: BoolArray = field(repr=False)
 
     @property
+    def relative_residual(self) -> float:
+        """Norm of the residual under the joint model over that of the drive signal."""
+        return float(np.linalg.norm(self.residual) / np.linalg.norm(self.y))
+
+    @property
     def fit_percent(self) -> float:
         """``100 (1 - norm of the residual / norm of the drive signal about its mean)``."""
-        about_mean = float(np.linalg.norm(self.drive - self.drive.mean()))
+        about_mean = float(np.linalg.norm(self.y - self.y.mean()))
         return 100.0 * (1.0 - float(np.linalg.norm(self.residual)) / about_mean)
 
 
@@ -153,13 +185,17 @@ class JointModel(Fit):
     bias: Mapping[str, float] = field(default_factory=dict)
     bias_told: str = ""
 
-    def turned(self, w: FloatArray, names: Sequence[str]) -> FloatArray:
-        """What turns with the direction of the motion, of rows by ``names``.
+    def kept(self, rows: Rows) -> FloatArray:
+        """What the values that were not found explain of rows."""
+        return rows.explained(self, [name for name in rows.names if name not in self.names])
+
+    def turned(self, rows: Rows) -> FloatArray:
+        """What turns with the direction of the motion, of rows.
 
         A drive that stands still turns its friction at no time that the motion tells.
         """
-        dry = [k for k, name in enumerate(names) if name.startswith(("dry", "map_", "load_coefficient"))]
-        return np.asarray(w[:, dry] @ np.array([self[names[k]] for k in dry]))
+        dry = ("dry", "map_", "load_coefficient")
+        return rows.explained(self, [name for name in rows.names if name.startswith(dry)])
 
     @property
     def residual(self) -> FloatArray:
@@ -184,21 +220,19 @@ class JointModel(Fit):
 
 def default_value(design: Design, name: str) -> float:
     """The design's own value of a parameter of the model, at the motor."""
-    friction = design.friction
+    friction, gravity = design.friction, design.load.gravity
+    if name == "inertia":
+        return design.inertia_kgm2
+    if name.startswith("map_"):
+        return dict(enumerate(point.torque_Nm for point in friction.map(1))).get(int(name[4:]), 0.0)
+    if name.startswith("gravity_") and gravity is not None:
+        part = np.cos if name == "gravity_sin" else np.sin
+        return gravity.peak_Nm * float(part(gravity.offset_rad))
+    side = -1 if name.endswith("_reverse") else 1
     own = {
-        "inertia": design.inertia_kgm2,
-        "viscous": friction.viscous(1),
-        "dry": friction.dry_Nm(0.0, 1),
+        "viscous": friction.viscous(side),
+        "dry": friction.dry_Nm(0.0, side),
         "offset": friction.offset_torque_Nm,
-        "viscous_forward": friction.viscous(1),
-        "dry_forward": friction.dry_Nm(0.0, 1),
-        "viscous_reverse": friction.viscous(-1),
-        "dry_reverse": friction.dry_Nm(0.0, -1),
-        "load_coefficient": friction.load_coefficient,
+        "load": friction.load_coefficient,
     }
-    gravity = design.load.gravity
-    if gravity is not None:
-        own["gravity_sin"] = gravity.peak_Nm * float(np.cos(gravity.offset_rad))
-        own["gravity_cos"] = gravity.peak_Nm * float(np.sin(gravity.offset_rad))
-    own |= {f"map_{k}": point.torque_Nm for k, point in enumerate(friction.map(1))}
-    return own.get(name, 0.0)
+    return own.get(name.partition("_")[0], 0.0)

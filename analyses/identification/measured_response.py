@@ -134,14 +134,12 @@ def _model(
     """The response of a design's loop at the measured frequencies."""
     wired = wire(design, Operating())
     name = loop or wired.outermost
-    if name not in (*wired.stages, *wired.points):
-        allowed = ", ".join((*wired.stages, *wired.points))
-        raise InputError(f'--loop "{name}": allowed: {allowed}', where=design.name)
-    top = 0.5 / _seen(design, name, of).dt
-    if not measured.frequency_hz[-1] < top:
-        raise InputError(
-            f"{measured.frequency_hz[-1]:g} Hz: the loop is sampled; allowed: below {top:g} Hz", measured.name
-        )
+    there = (*wired.stages, *wired.points)
+    if name not in there:
+        raise InputError(f'--loop "{name}": allowed: {", ".join(there)}', where=design.name)
+    top, last = 0.5 / _seen(design, name, of).dt, measured.frequency_hz[-1]
+    if not last < top:
+        raise InputError(f"{last:g} Hz: the loop is sampled; allowed: below {top:g} Hz", measured.name)
 
     def response(tried: Design) -> ComplexArray:
         system = _seen(tried, name, of)
@@ -181,48 +179,36 @@ def _determined(
             left |= {one.name: str(one) for one in like}
             names = tuple(names[k] for k in kept)
             continue
-        covariance, misfit = _covariance(found, known)
-        share = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(found.values), 1e-300)
+        fit = _fit(names, found, known)
+        share = fit.standard_errors / np.maximum(np.abs(fit.values), 1e-300)
         worst = int(np.argmax(share))
         if share[worst] <= 1.0:
-            return _fit(start, names, found, covariance, misfit, left), found.rest
+            break
         left[names[worst]] = "its standard error is larger than the value"
         names = tuple(name for name in names if name != names[worst])
-    raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)
+    else:
+        raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)
+    fixed = {}
+    for key, why in left.items():
+        reason = f"{why}: not determined, the design's value kept"
+        fixed[key] = Fixed(value=parameter_value(start, key), reason=reason)
+    return replace(fit, fixed=fixed), found.rest
 
 
-def _fit(
-    start: Design,
-    names: tuple[str, ...],
-    found: Moved,
-    covariance: FloatArray,
-    misfit: float | None,
-    left: Mapping[str, str],
-) -> ResponseFit:
-    fixed = {
-        key: Fixed(
-            value=parameter_value(start, key), reason=f"{why}: not determined, the design's value kept"
-        )
-        for key, why in left.items()
-    }
-    return ResponseFit(
-        names=names,
-        values=found.values,
-        covariance=covariance,
-        fixed=fixed,
-        misfit=misfit,
-        at_bound=found.at_bound,
-    )
-
-
-def _covariance(found: Moved, known: bool) -> tuple[FloatArray, float | None]:
-    """Of the values, by residuals of unit deviation or by their own scatter; and the misfit."""
+def _fit(names: tuple[str, ...], found: Moved, known: bool) -> ResponseFit:
+    """The values with errors by residuals of unit deviation or by their own scatter; and the misfit."""
     size = np.linalg.norm(found.slopes, axis=0)
     unit = found.slopes / size
     variance = float(found.rest @ found.rest) / max(len(found.rest) - len(size), 1)
     scale = max(variance, 1.0) if known else variance
     inverse = np.linalg.inv(unit.T @ unit) / np.outer(size, size)
-    return np.asarray(scale * inverse), float(np.sqrt(variance)) if known else None
+    return ResponseFit(
+        names=names,
+        values=found.values,
+        covariance=np.asarray(scale * inverse),
+        misfit=float(np.sqrt(variance)) if known else None,
+        at_bound=found.at_bound,
+    )
 
 
 def _noise_items(fit: ResponseFit, rest: FloatArray) -> list[Item]:
@@ -231,9 +217,8 @@ def _noise_items(fit: ResponseFit, rest: FloatArray) -> list[Item]:
         return []
     level = float(chi2.sf(float(rest @ rest), len(rest) - len(fit.names)))
     label = f"The measured deviations explain what is left (misfit {fit.misfit:.3g})"
-    reason = f"by chance with a probability of {level:.1g}: another drive, or at another operating point"
-    passed = level > LEVEL
-    return [Item(id="misfit", label=label, passed=passed, reason="" if passed else reason)]
+    why = f"by chance with a probability of {level:.1g}: another drive, or at another operating point"
+    return [Item(id="misfit", label=label, passed=level > LEVEL, reason="" if level > LEVEL else why)]
 
 
 def _bound_item(key: str) -> Item:

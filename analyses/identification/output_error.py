@@ -1,9 +1,9 @@
-"""Refinement by simulation: the parameters with which the closed loop moves as the record did."""
+"""Records simulated: values with which the drive moves as they did, and the written design against them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -12,13 +12,21 @@ from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from analyses.correlation.closed_loop import correlate_record, measured_signals, model_signals
+from analyses.correlation.driving import command_of
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import correlated_covariance
+from analyses.identification.joint_model import FrictionForm, default_value
+from analyses.identification.rows import record_rows
+from analyses.records.record import Record
 
 STEP = 1e-3
 TOLERANCE = 1e-6
 ITERATIONS = 24
+MOST_TICKS = 2_000_000
+DRIVE_SIGNALS = ("force", "current", "voltage")
+MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +55,16 @@ class Moved:
     first: FloatArray
     iterations: int
     at_bound: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Resimulated:
+    """The relative error of one record's signal under the written design, and how it was found."""
+
+    record: str
+    signal: str
+    relative_error: float
+    how: str
 
 
 def fit_output(
@@ -83,16 +101,9 @@ def fit_output(
 
     begin = np.ones(len(paths))
     first = residual(begin)
-    found = least_squares(
-        residual,
-        begin,
-        jac="3-point",
-        bounds=1.0 + (ends - start) / scale,
-        method="dogbox",
-        diff_step=STEP,
-        xtol=TOLERANCE,
-        max_nfev=ITERATIONS,
-    )
+    box = 1.0 + (ends - start) / scale
+    options = {"method": "dogbox", "diff_step": STEP, "xtol": TOLERANCE, "max_nfev": ITERATIONS}
+    found = least_squares(residual, begin, jac="3-point", bounds=box, **options)
     dead = np.flatnonzero(np.linalg.norm(found.jac, axis=0) <= 1e-12 * np.linalg.norm(found.fun))
     if len(dead):
         raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
@@ -104,6 +115,24 @@ def fit_output(
         iterations=int(found.njev),
         at_bound=tuple(path for path, side in zip(paths, found.active_mask, strict=True) if side),
     )
+
+
+def _scale(design: Design, path: str, start: float) -> float:
+    """What a parameter is measured by: its start, or where that is zero a part of a like one."""
+    if start != 0.0:
+        return abs(start)
+    period, friction = design.controller.period_s, design.friction
+    stiffness = 0.0 if design.coupling is None else design.coupling.stiffness_Nm_rad
+    like = {
+        "friction.offset_torque": 0.1 * friction.dry_torque_Nm,
+        "friction.dry_torque": 0.01 * abs(friction.offset_torque_Nm),
+        "friction.viscous": 0.1 * design.inertia_kgm2,
+        "coupling.damping": stiffness * period,
+        "control.computing_delay": period,
+    }.get(path, 0.0)
+    if like == 0.0:
+        raise InputError(f"{path} = 0: a fit needs a start that is not zero")
+    return like
 
 
 def refine_by_output_error(
@@ -134,19 +163,85 @@ def refine_by_output_error(
     )
 
 
-def _scale(design: Design, path: str, start: float) -> float:
-    """What a parameter is measured by: its start, or where that is zero a part of a like one."""
-    if start != 0.0:
-        return abs(start)
-    period, friction = design.controller.period_s, design.friction
-    stiffness = 0.0 if design.coupling is None else design.coupling.stiffness_Nm_rad
-    like = {
-        "friction.offset_torque": 0.1 * friction.dry_torque_Nm,
-        "friction.dry_torque": 0.01 * abs(friction.offset_torque_Nm),
-        "friction.viscous": 0.1 * design.inertia_kgm2,
-        "coupling.damping": stiffness * period,
-        "control.computing_delay": period,
-    }.get(path, 0.0)
-    if like == 0.0:
-        raise InputError(f"{path} = 0: a fit needs a start that is not zero")
-    return like
+def output_name(design: Design, record: Record) -> str:
+    """The signal that says most about the drive: the drive signal of a closed loop, else the motion.
+
+    Under a command of the position or the speed the loop holds the motion, and the drive signal tells; a
+    commanded current or voltage is held itself, and the motion tells.
+    """
+    command = command_of(design, record)
+    if command is None:
+        raise InputError("no command: a refinement by simulation needs it", where=record.name)
+    there = measured_signals(design, record)
+    closed = command.stage not in ("current", "voltage")
+    order = (*DRIVE_SIGNALS, *MOTION_SIGNALS) if closed else (*MOTION_SIGNALS, *DRIVE_SIGNALS)
+    for name in order:
+        if name in there and np.any(there[name]):
+            return name
+    raise InputError("nothing recorded that a simulation could be fitted to", where=record.name)
+
+
+def refine_records(
+    design: Design,
+    records: Sequence[Record],
+    paths: tuple[str, ...],
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> OutputErrorResult:
+    """Refine values by simulating every record with its own command, load and supply.
+
+    Each record's output is divided by its size, so that all count alike.
+    """
+    seen = []
+    for record in records:
+        name, measured = output_name(design, record), measured_signals(design, record, derive=True)
+        seen.append((record, name, measured, float(np.sqrt(np.mean(measured[name] ** 2)))))
+    wanted = np.concatenate([measured[name] / size for _, name, measured, size in seen])
+
+    def output(tried: Design) -> FloatArray:
+        parts = [model_signals(tried, one, measured)[0][name] / size for one, name, measured, size in seen]
+        return np.concatenate(parts)
+
+    ends = np.cumsum([len(record) for record in records]).tolist()
+    return refine_by_output_error(design, paths, output, wanted, ends=ends, progress=progress)
+
+
+def resimulate(design: Design, records: Sequence[Record], form: FrictionForm) -> tuple[Resimulated, ...]:
+    """Simulate a design with each record's own command, and compare the signal that tells most.
+
+    A record without a command is held against the torque that the design's own inertia and friction need for
+    its motion.
+    """
+    return tuple(_one(design, record, form) for record in records)
+
+
+def _one(design: Design, record: Record, form: FrictionForm) -> Resimulated:
+    if command_of(design, record) is None:
+        return _needed(design, record, form)
+    try:
+        return _simulated(design, record)
+    except InputError as error:  # a part that the simulator does not have
+        result = _needed(design, record, form)
+        return replace(result, how=f"{result.how} ({error.message})")
+
+
+def simulated_part(design: Design, record: Record) -> Record:
+    """The record; of a long one the first part."""
+    return record.slice(0, max(int(MOST_TICKS * design.controller.period_s / record.period_s), 2))
+
+
+def _simulated(design: Design, record: Record) -> Resimulated:
+    name, part = output_name(design, record), simulated_part(design, record)
+    rows = "" if len(part) == len(record) else f"its first {len(part)} rows "
+    error = correlate_record(design, part)[name].relative_error
+    how = f"{name}, {rows}simulated"
+    return Resimulated(record=record.name, signal=name, relative_error=error, how=how)
+
+
+def _needed(design: Design, record: Record, form: FrictionForm) -> Resimulated:
+    knots = [point.speed_rad_s for point in design.friction.map(1)] or None
+    rows = record_rows(design, record, form, None, knots_rad_s=knots)
+    rest = rows.y - rows.explained({name: default_value(design, name) for name in rows.names}, rows.names)
+    error = float(np.linalg.norm(rest) / np.linalg.norm(rows.y))
+    how = "torque needed for its motion"
+    return Resimulated(record=record.name, signal="drive", relative_error=error, how=how)

@@ -17,7 +17,7 @@ from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of
 from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit, default_value
-from analyses.identification.resimulation import simulated_part
+from analyses.identification.output_error import simulated_part
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
 from analyses.records.record import Record
 
@@ -117,9 +117,9 @@ def _by_direction(model: JointModel, again: JointModel) -> FloatArray:
     tables, turned = [], []
     for weight, own, other in zip(model.weights, model.records, again.records, strict=True):
         both = own.keep[: len(other.keep)] & other.keep[: len(own.keep)]
-        w, like = (picked(part.w, part.keep, both) for part in (own, other))
-        tables.append(weight * w)
-        turned.append(weight * (model.turned(w, model.names) - model.turned(like, again.names)))
+        tables.append(weight * picked(own.w, own.keep, both))
+        here, there = (picked(model.turned(part), part.keep, both) for part in (own, other))
+        turned.append(weight * (here - there))
     table = np.concatenate(tables)
     size = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
     return np.asarray(np.linalg.lstsq(table / size, np.concatenate(turned), rcond=None)[0] / size)

@@ -14,8 +14,8 @@ from analyses.correlation.closed_loop import model_signals
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import COVERAGE, Fit
 from analyses.estimation.least_squares import Information, information_of, joint_covariance, told_apart
-from analyses.identification.joint_model import JointModel, default_value
-from analyses.identification.rows import Rows, record_rows
+from analyses.identification.joint_model import JointModel, Rows, default_value
+from analyses.identification.rows import record_rows
 from analyses.records.record import Record, RowCounts
 
 SEGMENT_S = 4.0
@@ -159,13 +159,13 @@ def _largest(design: Design, shape: str, cycles: int) -> tuple[FloatArray, Recor
     wave = wave / np.max(np.abs(wave))
     rate = float(np.max(np.abs(np.gradient(wave, PERIOD_S)))) * design.total_ratio
     amplitude = USED * min(design.validation.full_deflection_rad, design.limits.speed_rad_s / rate)
-    own = design.limits
+    own, name = design.limits, _drive(design)
     for _ in range(24):
         record, limits = _simulated(design, time, amplitude * wave)
-        drive = record[_drive(design)]
+        drive = record[name]
         cool = float(np.sqrt(np.mean(drive**2))) <= USED * own.continuous_current_A
         small = float(np.max(np.abs(drive))) <= USED * own.peak_current_A
-        if (_drive(design) != "current" or (cool and small)) and not any(limits.values()):
+        if (name != "current" or (cool and small)) and not any(limits.values()):
             return amplitude * wave, record
         amplitude *= USED
     raise InputError(f"no motion of {cycles / SEGMENT_S:g} Hz stays off the drive's limits", design.name)
@@ -204,5 +204,5 @@ def _information(
 def _of_measured(model: JointModel, names: Sequence[str]) -> list[Information]:
     """What measured records tell of the values of the plan."""
     place = [model.names.index(name) if name in model.names else -1 for name in names]
-    wide = (np.column_stack([part.w, np.zeros(len(part.w))]) for part in model.records)
-    return [information_of(w[:, place], part.noise) for w, part in zip(wide, model.records, strict=True)]
+    wide = [np.column_stack([part.w, np.zeros(len(part.w))])[:, place] for part in model.records]
+    return [information_of(w, part.noise) for w, part in zip(wide, model.records, strict=True)]

@@ -75,31 +75,24 @@ def find_play(
     friction = np.column_stack([load_speed_rad_s, np.sign(load_speed_rad_s)])
     names = ("middle", "play", "viscous", "dry")
     own = {"viscous": viscous_Nms_rad, "dry": 0.0}
-    std = np.zeros(1)
-    touching = np.zeros(len(twist_rad), dtype=bool)
-    told: tuple[str, ...] = ()
-    values: dict[str, float] = {}
     middle, half = _first_gap(twist_rad, inertial_Nm, k)
     for _ in range(ROUNDS):
         torque = inertial_Nm + friction @ np.array([own["viscous"], own["dry"]])
         touching = _in_contact(torque, twist_rad - middle, half, guard_samples)
         w = np.column_stack([np.ones_like(torque), np.sign(torque), friction / k])[touching]
-        y = (twist_rad - inertial_Nm / k)[touching]
         kept, _ = told_apart(w, names)
-        told = tuple(names[j] for j in kept)
-        result = solve(w[:, list(kept)], y)
-        values = dict(zip(told, result.values.tolist(), strict=True))
-        std = np.sqrt(np.diag(result.correlated))
+        result = solve(w[:, kept], (twist_rad - inertial_Nm / k)[touching])
+        values = dict(zip((names[j] for j in kept), result.values.tolist(), strict=True))
         middle, half = values["middle"], values["play"]
         new = {name: max(values.get(name, own[name]), 0.0) for name in own}
         if all(abs(new[name] - own[name]) <= 1e-9 * abs(new[name]) for name in own):
             break
         own = new
-    coarse = _coarse(resolution_rad, touching, smooth_samples)
+    std = np.sqrt(result.correlated[kept.index(1), kept.index(1)])
     return Play(
-        half_rad=values["play"],
-        half_std_rad=float(np.hypot(std[told.index("play")], coarse)),
-        middle_rad=values["middle"],
+        half_rad=half,
+        half_std_rad=float(np.hypot(std, _coarse(resolution_rad, touching, smooth_samples))),
+        middle_rad=middle,
         viscous_Nms_rad=values.get("viscous"),
         dry_Nm=values.get("dry"),
         rows=int(np.count_nonzero(touching)),

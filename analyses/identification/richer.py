@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import nan
 
 import numpy as np
 
-from analyses.estimation.arrays import BoolArray, FloatArray, IntArray
+from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.identification.shared_errors import with_shared
-from analyses.identification.surface_fit import SurfaceFit
-
-Terms = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+from analyses.identification.surface import SurfaceFit
 
 FOLDS = 9
 STRIBECK_SPEEDS = 12
@@ -53,100 +50,60 @@ def compare_laws(fit: SurfaceFit) -> RicherLaws:
     The runs are ordered by load and speed and dealt to nine folds; each law is fitted to eight of them, with
     the weights of the fit, and predicts the ninth. The speed of the Stribeck term is chosen inside each fit.
     """
-    points = fit.points
-    speed = np.array([p.speed_rad_s for p in points])
-    load = np.array([p.load_Nm for p in points])
-    side = np.array([float(p.direction) for p in points])
-    torque = np.array([p.torque_Nm for p in points])
-    weight = 1.0 / fit.residual_stds_Nm
-    folds = _folds(speed, load, side)
-    data = _Data(speed, load, side, torque, weight, fit.shared_effects * weight[:, None])
-    unit = 1.0 / float(np.sqrt(np.mean(weight**2)))
-    base = unit * _errors(data, folds, _plain(data))
+    points, weight = fit.points, 1.0 / fit.residual_stds_Nm
+    w, m, s = np.array([(p.speed_rad_s, p.load_Nm, float(p.direction)) for p in points]).T
+    torque = weight * np.array([p.torque_Nm for p in points])
+    shared = fit.shared_effects * weight[:, None]
+    count = min(FOLDS, len(points))
+    fold = np.empty(len(points), dtype=np.int64)  # neighbours in load and speed fall into different ones
+    fold[np.lexsort((w, np.round(m, 1), s))] = (np.arange(len(w)) + np.arange(len(w)) // count) % count
+    plain = np.column_stack([np.ones_like(w), w, m])
+
+    def errors(*terms: FloatArray) -> FloatArray:
+        """Weighted prediction error of each run by the law that has not seen it, the best of its terms."""
+        tables = [weight[:, None] * np.column_stack([plain, term]) for term in terms]
+        out = np.empty(len(w))
+        for k in range(count):
+            tried = [_predicted(table, shared, torque, fold != k) for table in tables]
+            out[fold == k] = min(tried, key=lambda one: one[1])[0]
+        return out / float(np.sqrt(np.mean(weight**2)))
+
+    stribeck = [np.exp(-w / speed) for speed in np.geomspace(0.2 * w.min(), w.max(), STRIBECK_SPEEDS)]
+    laws = (
+        ("quadratic", "+ C2 w^2", 4, [w**2]),
+        ("load-dependent viscous", "+ CvM w |M|", 4, [w * m]),
+        ("load squared", "+ CM2 M^2", 4, [m**2]),
+        ("per direction", "+ s (CS0 + CS1 w)", 5, [np.column_stack([s, s * w])]),
+        ("Stribeck", "+ CS exp(-w/ws)", 5, stribeck),
+    )
+    base = errors(np.empty((len(w), 0)))
     scores = [_score("plain", "C0 + Cv w + CM |M|", 3, base, base)]
-    for name, formula, terms in _LAWS:
-        extra = terms(speed, load, side)
-        if name == "per direction" and len(set(side)) < 2:
-            scores.append(_impossible(name, formula, "one direction only"))
-        elif len(points) < 2 * (3 + extra.shape[1]):
-            scores.append(_impossible(name, formula, "too few runs"))
+    for name, formula, parameters, terms in laws:
+        one_way = name == "per direction" and len(set(s)) < 2
+        if one_way or (len(points) < 2 * parameters and name != "Stribeck"):
+            reason = "one direction only" if one_way else "too few runs"
+            scores.append(LawScore(name=name, formula=formula, possible=False, reason=reason))
         else:
-            table = np.column_stack([_plain(data), extra])
-            errors = unit * _errors(data, folds, table)
-            scores.append(_score(name, formula, table.shape[1], base, errors))
-    scores.append(_score("Stribeck", "+ CS exp(-w/ws)", 5, base, unit * _stribeck_errors(data, folds)))
+            scores.append(_score(name, formula, parameters, base, errors(*terms)))
     good = [score for score in scores if score.warranted]
     best = min(good, key=lambda score: score.error_Nm).name if good else "plain"
-    return RicherLaws(scores=tuple(scores), best=best, folds=int(folds.max()) + 1)
-
-
-_LAWS: tuple[tuple[str, str, Terms], ...] = (
-    ("quadratic", "+ C2 w^2", lambda w, m, s: (w**2)[:, None]),
-    ("load-dependent viscous", "+ CvM w |M|", lambda w, m, s: (w * m)[:, None]),
-    ("load squared", "+ CM2 M^2", lambda w, m, s: (m**2)[:, None]),
-    ("per direction", "+ s (CS0 + CS1 w)", lambda w, m, s: np.column_stack([s, s * w])),
-)
-
-
-@dataclass(frozen=True)
-class _Data:
-    speed: FloatArray
-    load: FloatArray
-    side: FloatArray
-    torque: FloatArray
-    weight: FloatArray
-    shared: FloatArray
-
-
-def _plain(data: _Data) -> FloatArray:
-    return np.column_stack([np.ones_like(data.speed), data.speed, data.load])
-
-
-def _folds(speed: FloatArray, load: FloatArray, side: FloatArray) -> IntArray:
-    """Fold of each run; neighbours in load and speed fall into different folds."""
-    count = min(FOLDS, len(speed))
-    order = np.lexsort((speed, np.round(load, 1), side))
-    folds = np.empty(len(speed), dtype=np.int64)
-    folds[order] = (np.arange(len(speed)) + np.arange(len(speed)) // count) % count
-    return folds
-
-
-def _errors(data: _Data, folds: IntArray, table: FloatArray) -> FloatArray:
-    """Weighted prediction error of each run by the law that has not seen it."""
-    out = np.empty(len(folds))
-    for fold in range(int(folds.max()) + 1):
-        seen, unseen = folds != fold, folds == fold
-        out[unseen] = _predicted(data, table, seen, unseen)[0]
-    return out
+    return RicherLaws(scores=tuple(scores), best=best, folds=int(fold.max()) + 1)
 
 
 def _predicted(
-    data: _Data, table: FloatArray, seen: BoolArray, unseen: BoolArray
+    rows: FloatArray, shared: FloatArray, torque: FloatArray, seen: BoolArray
 ) -> tuple[FloatArray, float]:
     """Weighted errors at the unseen runs of a law fitted to the seen ones, and what is left at those.
 
     The shared errors are estimated along, within their bounds: a law must not be credited with what an
     instrument may have done.
     """
-    rows = table * data.weight[:, None]
-    torque = data.torque * data.weight
-    scale = np.maximum(np.linalg.norm(rows[seen], axis=0), 1e-300)
-    a = with_shared(rows[seen] / scale, data.shared[seen])
-    b = np.concatenate([torque[seen], np.zeros(data.shared.shape[1])])
+    rows = rows / np.maximum(np.linalg.norm(rows[seen], axis=0), 1e-300)
+    a = with_shared(rows[seen], shared[seen])
+    b = np.concatenate([torque[seen], np.zeros(shared.shape[1])])
     result = np.linalg.lstsq(a, b, rcond=None)[0]
-    errors = torque[unseen] - np.column_stack([rows[unseen] / scale, data.shared[unseen]]) @ result
+    errors = torque[~seen] - np.column_stack([rows[~seen], shared[~seen]]) @ result
     return errors, float(np.sum((b - a @ result) ** 2))
-
-
-def _stribeck_errors(data: _Data, folds: IntArray) -> FloatArray:
-    speeds = np.geomspace(0.2 * data.speed.min(), data.speed.max(), STRIBECK_SPEEDS)
-    tables = [np.column_stack([_plain(data), np.exp(-data.speed / ws)]) for ws in speeds]
-    out = np.empty(len(folds))
-    for fold in range(int(folds.max()) + 1):
-        seen, unseen = folds != fold, folds == fold
-        tried = [_predicted(data, table, seen, unseen) for table in tables]
-        out[unseen] = min(tried, key=lambda one: one[1])[0]
-    return out
 
 
 def _score(name: str, formula: str, parameters: int, base: FloatArray, errors: FloatArray) -> LawScore:
@@ -162,7 +119,3 @@ def _score(name: str, formula: str, parameters: int, base: FloatArray, errors: F
         gain_std=std,
         warranted=gain > max(2.0 * std, 0.05),
     )
-
-
-def _impossible(name: str, formula: str, reason: str) -> LawScore:
-    return LawScore(name=name, formula=formula, possible=False, reason=reason)

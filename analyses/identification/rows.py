@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,13 +11,12 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import BoolArray, FloatArray, stretches
 from analyses.identification.joint_model import (
-    NAMES,
     FrictionForm,
     JointModel,
     Recipe,
-    base_columns,
+    Rows,
     default_value,
-    linear_basis,
+    friction_columns,
 )
 from analyses.identification.load_side import TwoSides, two_sides
 from analyses.identification.sampled_current import mean_current
@@ -29,29 +28,6 @@ REST_SHARE = 0.005
 REST_TIME_S = 0.03
 END_SHARE = 0.02
 SHORTEST_S = 0.2
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rows:
-    """Regressors ``w`` by ``names`` and drive ``y`` after decimation, rows at rest left out.
-
-    ``sine`` and ``cosine`` of the output angle keep all rows, of which ``keep`` marks those used. ``speed``
-    is the motor's, ``step_s`` the time from row to row; ``used`` tells what each signal was used for.
-    """
-
-    record: str
-    names: tuple[str, ...]
-    w: FloatArray
-    y: FloatArray
-    sine: FloatArray
-    cosine: FloatArray
-    speed: FloatArray
-    step_s: float
-    keep: BoolArray
-    rows_in: int
-    recipe: Recipe
-    used: Mapping[str, str]
-    notes: tuple[str, ...]
 
 
 def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int | None = None) -> Recipe:
@@ -95,16 +71,14 @@ def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool
     if name in signals:
         return record[name], name, f"{name.replace('_reference', '')} as commanded", False
     for name in ("voltage", "voltage_reference"):
+        words = name.replace("_", " ")
         if name in signals and gain is not None:
-            told = f"source gain {gain:g} times the {name.replace('_', ' ')}"
-            return np.asarray(gain * record[name]), name, told, False
+            return np.asarray(gain * record[name]), name, f"source gain {gain:g} times the {words}", False
         if name in signals and constant is not None and ohm is not None:
-            told = f"kM (u - kE w)/R of the {name.replace('_', ' ')}, without the inductance"
+            told = f"kM (u - kE w)/R of the {words}, without the inductance"
             return np.asarray(constant / ohm * record[name]), name, told, True
-    raise InputError(
-        "no drive signal: force, current (with kM), torque or voltage (with a source gain, or kM and R)",
-        where=record.name,
-    )
+    told = "no drive signal: force, current (with kM), torque or voltage (with a source gain, or kM and R)"
+    raise InputError(told, where=record.name)
 
 
 def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, str]:
@@ -122,14 +96,6 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
     return Motion(position=whole, velocity=made.position, acceleration=made.velocity), rate
 
 
-def _late_s(design: Design, record: Record) -> float:
-    """How much later a recorded voltage acts: the computing delay, and half of what it is held for."""
-    control = design.controller
-    stage = control.current or control.velocity or control.position
-    held = control.period_s * getattr(stage, "every", 1)
-    return control.computing_delay_s + 0.5 * min(held, period_of(record))
-
-
 def moment_of(
     design: Design, record: Record, output_angle: FloatArray, *, gravity: bool = True
 ) -> tuple[FloatArray, str]:
@@ -144,18 +110,6 @@ def moment_of(
     load = design.load if gravity else replace(design.load, gravity=None)
     rate = np.gradient(output_angle, period_of(record))
     return np.asarray(load.moment_Nm(output_angle, rate)), ""
-
-
-def _friction_columns(
-    motion: Motion, form: FrictionForm, knots_rad_s: Sequence[float] | None
-) -> tuple[list[str], FloatArray]:
-    """Names and columns of inertia, friction and offset."""
-    if knots_rad_s is None:
-        return list(NAMES[form]), base_columns(motion, form)
-    side = np.sign(motion.velocity)
-    table = linear_basis(np.abs(motion.velocity), knots_rad_s) * side[:, None]
-    names = ["inertia", *(f"map_{k}" for k in range(len(knots_rad_s))), "offset"]
-    return names, np.column_stack([motion.acceleration, table, np.ones_like(side)])
 
 
 def record_rows(
@@ -176,36 +130,14 @@ def record_rows(
     """
     record, shared = prepared(record), design
     design = record.drive(shared)
-    lasts = len(record) * period_of(record)
-    if lasts < SHORTEST_S and not is_benchmark(record):
-        told = f"lasts {lasts:.3g} s in {len(record)} rows: {SHORTEST_S:g} s and more are needed"
-        raise InputError(f"{told}; is the unit of the time right?", where=record.name)
+    period, free = period_of(record), design.load.path == "back-drivable"
+    _check(record, gravity and not free)
     recipe = recipe_for(record) if recipe is None else recipe
     motion, place = motion_of(design, record, recipe)
-    drive, driven_by, told, back_emf = drive_of(design, record)
-    if driven_by.startswith("voltage") and not is_benchmark(record):
-        drive = np.interp(record.time_s - _late_s(design, record), record.time_s, drive)
+    sides, motion, angle = _sides(design, record, place, motion, recipe)
+    drive, driven_by, told = _torque(design, record, motion)
+    known, source = moment_of(design, record, angle, gravity=not gravity)
     used = {place: "motion", driven_by: f"drive: {told}"}
-    free = design.load.path == "back-drivable"
-    if gravity and not free:
-        raise InputError(
-            'load.path = "self-locking": gravity does not turn the motor; "back-drivable" is meant'
-        )
-    angle = motion.position / design.total_ratio
-    sides = None
-    if design.coupling is not None:
-        known, _ = moment_of(design, record, np.asarray(angle))
-        sides = two_sides(design, record, place, motion, known, recipe)
-        motion, angle = sides.motor, sides.load.position / design.ratio_behind_coupling
-        told = f"{told}, {sides.told}"
-    if driven_by == "current":
-        constant = design.effective_motor.torque_constant_Nm_A
-        assert constant is not None  # drive_of has used it
-        drive = constant * mean_current(design, record, record["current"], motion.acceleration)
-    names, columns = _friction_columns(motion, form, knots_rad_s)
-    if back_emf:
-        drive = drive - _damping(design) * motion.velocity
-    known, source = moment_of(design, record, np.asarray(angle), gravity=not gravity)
     if source:
         used[source] = "load" + (", its friction and its torque M/N" if free else ", its friction")
     if free:
@@ -213,41 +145,85 @@ def record_rows(
     if sides is not None:
         known = known - design.ratio_behind_coupling * sides.torque
         drive = drive - (_reaction(design, sides) if free else 0.0)
-    sines = np.column_stack([np.sin(angle), np.cos(angle)])
-    table = np.column_stack([columns, sines, motion.velocity, np.sign(motion.velocity), known, drive])
-    moving = ~_at_rest(motion.velocity, period_of(record))
-    if record.left_out is not None:
-        moving &= ~record.left_out
-    used_part = slice(recipe.skip_samples, len(drive) - _end_skip(motion, recipe))
-    table, moving = table[used_part], moving[used_part]
-    rows = decimated(table, recipe.decimation)
-    keep = _kept_rows(moving, recipe.decimation)
-    width = columns.shape[1]
-    sine, cosine, speed, side, known, y = rows[:, width:].T
-    whole = known if moment is None else known + moment
-    w = np.column_stack([rows[:, :width], np.abs(whole) * side])
+        told = f"{told}, {sides.told}"
+    names, columns = friction_columns(motion, form, knots_rad_s)
+    others = [np.sin(angle), np.cos(angle), motion.velocity, np.sign(motion.velocity), known, drive]
+    part = slice(recipe.skip_samples, len(drive) - _end_skip(motion, recipe))
+    rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
+    sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
+    w = [*rows[:, : columns.shape[1]].T, np.abs(known if moment is None else known + moment) * side]
     names.append("load_coefficient")
     if gravity:
         names += ["gravity_sin", "gravity_cos"]
         share = -1.0 / design.total_ratio if free else 0.0
-        w = np.column_stack([w, share * sine, share * cosine])
+        w += [share * sine, share * cosine]
+    table = np.column_stack(w)
     if record.settings:  # the values looked for are those of the shared design
-        y = y - w @ [default_value(design, name) - default_value(shared, name) for name in names]
+        y = y - table @ [default_value(design, name) - default_value(shared, name) for name in names]
+    moving = ~_at_rest(motion.velocity, period)
+    if record.left_out is not None:
+        moving &= ~record.left_out
+    keep = _kept_rows(moving[part], recipe.decimation)
     return Rows(
-        record=record.name,
+        name=record.name,
+        rows_in=len(record),
+        used=used,
+        notes=(*record.notes, f"{place} and {told}"),
         names=tuple(names),
-        w=w[keep],
+        w=table[keep],
         y=y[keep],
         sine=sine,
         cosine=cosine,
         speed=speed[keep],
-        step_s=period_of(record) * recipe.decimation,
-        rows_in=len(record),
+        acceleration=rows[keep, 0],
+        step_s=period * recipe.decimation,
         keep=keep,
         recipe=recipe,
-        used=used,
-        notes=(*record.notes, f"{place} and {told}"),
     )
+
+
+def _check(record: Record, locked: bool) -> None:
+    lasts = len(record) * period_of(record)
+    if lasts < SHORTEST_S and not is_benchmark(record):
+        told = f"lasts {lasts:.3g} s in {len(record)} rows: {SHORTEST_S:g} s and more are needed"
+        raise InputError(f"{told}; is the unit of the time right?", where=record.name)
+    if locked:
+        told = 'load.path = "self-locking": gravity does not turn the motor; "back-drivable" is meant'
+        raise InputError(told)
+
+
+def _sides(
+    design: Design, record: Record, place: str, motion: Motion, recipe: Recipe
+) -> tuple[TwoSides | None, Motion, FloatArray]:
+    """Both sides of a coupling, the motion at the motor, and the output's angle."""
+    angle = np.asarray(motion.position / design.total_ratio)
+    if design.coupling is None:
+        return None, motion, angle
+    sides = two_sides(design, record, place, motion, moment_of(design, record, angle)[0], recipe)
+    return sides, sides.motor, np.asarray(sides.load.position / design.ratio_behind_coupling)
+
+
+def _torque(design: Design, record: Record, motion: Motion) -> tuple[FloatArray, str, str]:
+    """The drive torque as it acts between the samples, its signal and words."""
+    motor = design.effective_motor
+    constant = motor.torque_constant_Nm_A or 0.0
+    drive, driven_by, told, back_emf = drive_of(design, record)
+    if driven_by.startswith("voltage") and not is_benchmark(record):
+        drive = np.interp(record.time_s - _late_s(design, record), record.time_s, drive)
+    if driven_by == "current":
+        drive = constant * mean_current(design, record, record["current"], motion.acceleration)
+    if back_emf and motor.resistance_ohm is not None:
+        back = constant if motor.back_emf_constant_Vs_rad is None else motor.back_emf_constant_Vs_rad
+        drive = drive - constant * back / motor.resistance_ohm * motion.velocity
+    return drive, driven_by, told
+
+
+def _late_s(design: Design, record: Record) -> float:
+    """How much later a recorded voltage acts: the computing delay, and half of what it is held for."""
+    control = design.controller
+    stage = control.current or control.velocity or control.position
+    held = control.period_s * getattr(stage, "every", 1)
+    return control.computing_delay_s + 0.5 * min(held, period_of(record))
 
 
 def rows_under(design: Design, record: Record, model: JointModel, recipe: Recipe | None = None) -> Rows:
@@ -274,32 +250,20 @@ def _reaction(design: Design, sides: TwoSides) -> FloatArray:
     return np.asarray(sides.torque / ratio - inertia * sides.motor.acceleration / ratio)
 
 
-def _damping(design: Design) -> float:
-    """What the back-EMF of a motor on a voltage adds to the viscous friction, kM kE / R."""
-    motor = design.effective_motor
-    constant, back, ohm = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad, motor.resistance_ohm
-    assert constant is not None
-    assert ohm is not None
-    return constant * (constant if back is None else back) / ohm
-
-
 def _at_rest(velocity: FloatArray, period_s: float) -> BoolArray:
-    """Stretches of 30 ms or more below 0.5 % of the largest speed: there the friction is not that of
-    sliding."""
+    """Stretches of 30 ms or more below 0.5 % of the largest speed: the friction is not that of sliding."""
     slow = np.abs(velocity) < REST_SHARE * float(np.max(np.abs(velocity), initial=0.0))
     out = np.zeros(len(velocity), dtype=bool)
     least = max(round(REST_TIME_S / period_s), 6)
     for start, stop in stretches(slow):
-        if stop - start >= least:
-            out[start:stop] = True
+        out[start:stop] = stop - start >= least
     return out
 
 
 def _kept_rows(moving: BoolArray, factor: int) -> BoolArray:
     """Rows after decimation that no sample at rest lies close to."""
     count = -(-len(moving) // factor)
-    first = len(moving) - factor * (count - 1) - 1
-    ends = first + factor * np.arange(count)
+    ends = len(moving) - 1 - factor * np.arange(count)[::-1]
     rest = np.concatenate([[0], np.cumsum(~moving)])
     low, high = np.clip(ends - factor, 0, len(moving)), np.clip(ends + factor + 1, 0, len(moving))
     return np.asarray(rest[high] == rest[low])

@@ -21,7 +21,7 @@ from analyses.identification.campaign_design import CampaignSuggestion, suggest_
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
 from analyses.identification.measured_response import ResponseResult, identify_response
 from analyses.identification.plan import Plan, plan_motions
-from analyses.identification.surface_fit import NAMES, Contribution, contributions
+from analyses.identification.surface import NAMES, Contribution, contributions
 from analyses.identification.to_design import design_with_fit, with_fixed
 from analyses.identification.verdict import Identified
 from analyses.records.campaign_file import load_campaign

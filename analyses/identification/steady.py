@@ -70,10 +70,8 @@ def find_steady_window(
     start, stop = start + half + trim, stop + half - trim
     if stop - start < max(criterion.least_duration_s / period, 8.0):
         calmest = float(np.min(np.abs(slope[moving]), initial=np.inf))
-        raise InputError(
-            f"no steady part of {criterion.least_duration_s:g} s: the smallest acceleration is "
-            f"{calmest:.3g} rad/s2, the limit {limit:.3g} rad/s2"
-        )
+        told = f"the smallest acceleration is {calmest:.3g} rad/s2, the limit {limit:.3g} rad/s2"
+        raise InputError(f"no steady part of {criterion.least_duration_s:g} s: {told}")
     return SteadyWindow(
         start=start,
         stop=stop,
@@ -97,8 +95,7 @@ def moving_slope(time_s: FloatArray, values: FloatArray, samples: int) -> FloatA
     t = time_s - time_s.mean()
     x = values - values.mean()
     st, sx, stx, stt = (_moving_sum(part, samples) for part in (t, x, t * x, t * t))
-    slope: FloatArray = (samples * stx - st * sx) / (samples * stt - st * st)
-    return slope
+    return np.asarray((samples * stx - st * sx) / (samples * stt - st * st))
 
 
 def _moving_sum(values: FloatArray, samples: int) -> FloatArray:
@@ -143,22 +140,20 @@ def steady_point(run: ImportedRun, torque_constant_Nm_A: float) -> SteadyPoint:
     direction = 1 if speed.mean() > 0.0 else -1
     load = np.zeros(len(speed)) if run.load_is_zero else record["torque"][part]
     side = 1.0 if load.mean() >= 0.0 else -1.0
-    columns = np.column_stack(
-        [direction * torque_constant_Nm_A * record["current"][part], direction * speed, side * load]
-    )
-    means = correlated_means(columns)
-    torque, mean_speed, mean_load = (float(value) for value in means.values)
-    taus = means.correlation_samples
+    torque = direction * torque_constant_Nm_A * record["current"][part]
+    means = correlated_means(np.column_stack([torque, direction * speed, side * load]))
+    mean_torque, mean_speed, mean_load = means.values.tolist()
+    a, b, c = means.correlation_samples.tolist()
     return SteadyPoint(
         run=run.id,
         direction=direction,
-        torque_Nm=torque,
+        torque_Nm=mean_torque,
         speed_rad_s=mean_speed,
         load_Nm=mean_load,
         covariance=means.covariance,
         window=window,
         samples=means.samples,
-        correlation_samples=(float(taus[0]), float(taus[1]), float(taus[2])),
+        correlation_samples=(a, b, c),
         load_is_zero=run.load_is_zero,
     )
 

@@ -3,26 +3,87 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import brentq
 
 from actuator_lti.errors import InputError, NumericalError
 from analyses.estimation.arrays import FloatArray
-from analyses.estimation.fit import Fixed
+from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import told_apart
-from analyses.identification.shared_errors import (
-    SharedError,
-    effects_of,
-    find_outliers,
-    half_widths,
-    shared_errors,
-)
+from analyses.estimation.parameters import parameter
+from analyses.identification.shared_errors import effects_of, half_widths, shared_errors, standardised
 from analyses.identification.steady import SteadyPoint
-from analyses.identification.surface_fit import NAMES, Outlier, SurfaceFit
 from analyses.records.campaign_file import Instruments
 
+NAMES = ("C0", "Cv", "CM")
+PATHS = tuple(parameter(name).key for name in NAMES)
 ITERATIONS = 6
+PAPER_LOAD_NM = 8.0
+PAPER_SPEED_RAD_S = 942.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outlier:
+    """A run whose residual is too large: in units of its standard deviation, with the limit."""
+
+    run: str
+    standardised: float
+    limit: float
+    set_aside: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceFit(Fit):
+    """The coefficients C0 (N m), Cv (N m s/rad), CM, and how sure they are.
+
+    ``covariance`` holds everything: ``random_covariance`` from the runs' scatter and the instruments' shared
+    errors, whose bounds move the coefficients by ``shared_shifts[name]`` and the torques of the runs by the
+    columns of ``shared_effects``. ``half_widths`` are those of the 95 % intervals, from propagated
+    distributions. ``residuals_Nm`` (``own_residuals_Nm``: less the most likely shared errors) and
+    ``residual_stds_Nm`` are those of the runs used, in the order of ``points``. ``run_scatter_Nm`` is the
+    scatter between runs that their own noise does not explain, ``birge_ratio`` the ratio of the two (1:
+    explained). ``fixed`` holds the coefficients that were not fitted, with the reason; their errors are zero.
+    """
+
+    points: tuple[SteadyPoint, ...]
+    random_covariance: FloatArray
+    shared_shifts: dict[str, FloatArray]
+    half_widths: FloatArray
+    shared_effects: FloatArray = field(repr=False)
+    residuals_Nm: FloatArray
+    own_residuals_Nm: FloatArray
+    residual_stds_Nm: FloatArray
+    run_scatter_Nm: float
+    birge_ratio: float
+    outliers: tuple[Outlier, ...]
+    freedom: int
+
+    @property
+    def told(self) -> tuple[int, ...]:
+        """Positions of the coefficients that were fitted."""
+        return tuple(k for k, name in enumerate(NAMES) if name not in self.fixed)
+
+    @property
+    def relative_residual(self) -> float:
+        """Norm of the residuals over norm of the torques."""
+        torque = np.array([p.torque_Nm for p in self.points])
+        return float(np.linalg.norm(self.residuals_Nm) / np.linalg.norm(torque))
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """95 % interval of one coefficient."""
+        half = float(self.half_widths[NAMES.index(name)])
+        return self[name] - half, self[name] + half
+
+    def by_key(self) -> Fit:
+        """Those of the coefficients that were fitted, by the keys of a design."""
+        return self.renamed({name: parameter(name).key for name in NAMES if name not in self.fixed})
+
+    def predict_Nm(self, speed_rad_s: FloatArray, load_Nm: FloatArray) -> FloatArray:
+        """Friction torque at speeds and loads."""
+        return np.asarray(self["C0"] + self["Cv"] * speed_rad_s + self["CM"] * np.abs(load_Nm))
 
 
 def fit_surface(
@@ -43,143 +104,140 @@ def fit_surface(
     coefficients are held, ``kept`` are values that those keep which the runs do not tell apart (without
     them: an error).
     """
-    used = tuple(points)
-    held = _held(used, dict(fixed or {}), kept)
-    names = tuple(point.run for point in used)
-    x, y = _table(used)
-    start = _ordinary(x, y, held)
-    errors = shared_errors(used, instruments, start[2], torque_constant_Nm_A)
-    free, rest = _free(x, y, held)
-    result = find_outliers(free, rest, _own_variance(used, start), effects_of(errors, len(y)))
+    runs = _Runs(tuple(points), fixed or {}, kept)
+    start = runs.ordinary()
+    effects = effects_of(shared_errors(runs.points, instruments, start[2], torque_constant_Nm_A), len(runs.y))
+    size, limit = standardised(runs.free, runs.rest, runs.own_variance(start), effects)
+    aside = outliers == "set-aside"
     named = tuple(
-        Outlier(
-            run=names[k], standardised=float(value), limit=result.limit, set_aside=outliers == "set-aside"
-        )
-        for k, value in zip(result.rows, result.standardised, strict=True)
+        Outlier(run=point.run, standardised=float(value), limit=limit, set_aside=aside)
+        for point, value in zip(runs.points, size, strict=True)
+        if abs(value) > limit
     )
-    if outliers == "set-aside" and named:
-        used = tuple(point for k, point in enumerate(used) if k not in set(result.rows))
-        held = _held(used, dict(fixed or {}), kept)
-    return _fitted(used, instruments, torque_constant_Nm_A, named, held)
+    if aside and named:
+        good = tuple(point for point, value in zip(runs.points, size, strict=True) if abs(value) <= limit)
+        runs = _Runs(good, fixed or {}, kept)
+    return _fitted(runs, instruments, torque_constant_Nm_A, named)
+
+
+@dataclass(frozen=True)
+class _Runs:
+    """The points as a linear problem, and what of it is not fitted."""
+
+    points: tuple[SteadyPoint, ...]
+    fixed: Mapping[str, float]
+    kept: Mapping[str, float] | None
+
+    @cached_property
+    def x(self) -> FloatArray:
+        return np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in self.points])
+
+    @cached_property
+    def y(self) -> FloatArray:
+        return np.array([p.torque_Nm for p in self.points])
+
+    @cached_property
+    def held(self) -> dict[str, Fixed]:
+        """What was asked for, and what the runs do not tell apart."""
+        held = {name: Fixed(value=value, reason="fixed as asked") for name, value in self.fixed.items()}
+        names = [name for name in NAMES if name not in held]
+        if not names:
+            raise InputError("C0, Cv and CM are all fixed: nothing is left to identify")
+        if self.kept is None or not self.points:
+            self._check_count(len(names))
+        _, left = told_apart(self.x[:, [NAMES.index(name) for name in names]], names)
+        for one in left:
+            if self.kept is None:
+                told = "the runs do not tell C0, Cv and CM apart: vary speed and load, not together only"
+                raise NumericalError(told)
+            why = "no run is loaded" if one.name == "CM" and not one.like else str(one)
+            held[one.name] = Fixed(value=self.kept[one.name], reason=f"{why}: the design's value kept")
+        self._check_count(len(NAMES) - len(held))
+        return held
+
+    def _check_count(self, coefficients: int) -> None:
+        """Two runs more than coefficients."""
+        words = {3: "three coefficients", 2: "two coefficients", 1: "one coefficient"}[coefficients]
+        least = coefficients + 2
+        if len(self.points) < least:
+            raise InputError(f"{len(self.points)} usable runs: at least {least} are needed for {words}")
+
+    @cached_property
+    def told(self) -> list[int]:
+        return [k for k, name in enumerate(NAMES) if name not in self.held]
+
+    @cached_property
+    def free(self) -> FloatArray:
+        """The columns that are fitted."""
+        return self.x[:, self.told]
+
+    @cached_property
+    def rest(self) -> FloatArray:
+        """The torques less what is held."""
+        values = np.array([self.held[name].value if name in self.held else 0.0 for name in NAMES])
+        return np.asarray(self.y - self.x @ values)
+
+    def ordinary(self) -> FloatArray:
+        """All coefficients, by ordinary least squares."""
+        theta = np.array([self.held[name].value if name in self.held else 0.0 for name in NAMES])
+        theta[self.told] = np.linalg.lstsq(self.free, self.rest, rcond=None)[0]
+        return theta
+
+    def own_variance(self, theta: FloatArray) -> FloatArray:
+        """Variance of each residual from the run's own noise: that of its means along (1, -Cv, -CM)."""
+        along = np.array([1.0, -theta[1], -theta[2]])
+        own = np.array([along @ p.covariance @ along for p in self.points])
+        return np.maximum(own, 1e-8 * float(np.median(own)) + 1e-30)
 
 
 def _fitted(
-    points: tuple[SteadyPoint, ...],
-    instruments: Instruments,
-    torque_constant: float,
-    named: tuple[Outlier, ...],
-    held: Mapping[str, Fixed],
+    runs: _Runs, instruments: Instruments, torque_constant: float, named: tuple[Outlier, ...]
 ) -> SurfaceFit:
-    x, y = _table(points)
-    free, rest = _free(x, y, held)
-    told = [k for k, name in enumerate(NAMES) if name not in held]
-    theta, scatter, birge = _ordinary(x, y, held), 0.0, 1.0
-    shared: tuple[SharedError, ...] = ()
+    count, theta = len(runs.y), runs.ordinary()
     for _ in range(ITERATIONS):
-        own = _own_variance(points, theta)
-        shared = shared_errors(points, instruments, theta[2], torque_constant)
-        scatter, birge = _run_scatter(free, rest, own, shared)
-        gain = np.zeros((len(NAMES), len(y)))
-        gain[told] = gain_matrix(free, torque_covariance(own + scatter, shared))
-        change = np.zeros(len(NAMES))
-        change[told] = gain[told] @ rest - theta[told]
+        own = runs.own_variance(theta)
+        shared = shared_errors(runs.points, instruments, theta[2], torque_constant)
+        effects = effects_of(shared, count)
+        scatter, birge = _run_scatter(runs, own, effects)
+        gain, change = np.zeros((len(NAMES), count)), np.zeros(len(NAMES))
+        gain[runs.told] = gain_matrix(runs.free, torque_covariance(own + scatter, effects))
+        change[runs.told] = gain[runs.told] @ runs.rest - theta[runs.told]
         theta = theta + change
         if np.all(np.abs(change) <= 1e-12 * np.abs(theta)):
             break
-    variance = own + scatter
-    freedom = len(y) - len(told)
+    variance, residual = own + scatter, runs.y - runs.x @ theta
     random_covariance = (gain * variance) @ gain.T
-    shifts = {error.name: gain @ error.effect for error in shared}
-    moved = np.array(list(shifts.values())).reshape(len(shifts), len(theta))
+    moved = (gain @ effects).T
+    freedom = count - len(runs.told)
     return SurfaceFit(
-        points=points,
+        points=runs.points,
         names=NAMES,
         values=theta,
         covariance=random_covariance + moved.T @ moved / 3.0,
         random_covariance=random_covariance,
-        shared_shifts=shifts,
+        shared_shifts=dict(zip(shared, moved, strict=True)),
         half_widths=half_widths(random_covariance, moved, freedom),
-        shared_effects=effects_of(shared, len(y)),
-        residuals_Nm=y - x @ theta,
-        own_residuals_Nm=_own_residuals(y - x @ theta, variance, effects_of(shared, len(y))),
+        shared_effects=effects,
+        residuals_Nm=residual,
+        own_residuals_Nm=_own_residuals(residual, variance, effects),
         residual_stds_Nm=np.sqrt(variance),
         run_scatter_Nm=float(np.sqrt(scatter)),
         birge_ratio=birge,
         outliers=named,
         freedom=freedom,
-        fixed=dict(held),
+        fixed=runs.held,
     )
-
-
-def _table(points: tuple[SteadyPoint, ...]) -> tuple[FloatArray, FloatArray]:
-    x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in points])
-    return x, np.array([p.torque_Nm for p in points])
-
-
-def _held(
-    points: tuple[SteadyPoint, ...], fixed: Mapping[str, float], kept: Mapping[str, float] | None
-) -> dict[str, Fixed]:
-    """What is not fitted: what was asked for, and what the runs do not tell apart."""
-    held = {name: Fixed(value=value, reason="fixed as asked") for name, value in fixed.items()}
-    names = [name for name in NAMES if name not in held]
-    if not names:
-        raise InputError("C0, Cv and CM are all fixed: nothing is left to identify")
-    if kept is None or not points:
-        _check_count(points, len(names))
-    x, _ = _table(points)
-    _, left = told_apart(x[:, [NAMES.index(name) for name in names]], names)
-    if left and kept is None:
-        raise NumericalError(
-            "the runs do not tell C0, Cv and CM apart: vary speed and load, not together only"
-        )
-    for one in left:
-        why = "no run is loaded" if one.name == "CM" and not one.like else str(one)
-        held[one.name] = Fixed(value=(kept or {})[one.name], reason=f"{why}: the design's value kept")
-    _check_count(points, len(NAMES) - len(held))
-    return held
-
-
-def _check_count(points: tuple[SteadyPoint, ...], coefficients: int) -> None:
-    """Two runs more than coefficients."""
-    words = {3: "three coefficients", 2: "two coefficients", 1: "one coefficient"}[coefficients]
-    if len(points) < coefficients + 2:
-        raise InputError(f"{len(points)} usable runs: at least {coefficients + 2} are needed for {words}")
-
-
-def _free(x: FloatArray, y: FloatArray, held: Mapping[str, Fixed]) -> tuple[FloatArray, FloatArray]:
-    """The columns that are fitted, and the torques less what is held."""
-    told = [k for k, name in enumerate(NAMES) if name not in held]
-    rest = y - sum((one.value * x[:, NAMES.index(name)] for name, one in held.items()), np.zeros(len(y)))
-    return x[:, told], np.asarray(rest)
-
-
-def _ordinary(x: FloatArray, y: FloatArray, held: Mapping[str, Fixed]) -> FloatArray:
-    free, rest = _free(x, y, held)
-    theta = np.array([held[name].value if name in held else 0.0 for name in NAMES])
-    told = [k for k, name in enumerate(NAMES) if name not in held]
-    theta[told] = np.linalg.lstsq(free, rest, rcond=None)[0]
-    return theta
-
-
-def _own_variance(points: tuple[SteadyPoint, ...], theta: FloatArray) -> FloatArray:
-    """Variance of each run's residual from its own noise: the covariance of its means along (1, -Cv, -CM)."""
-    along = np.array([1.0, -theta[1], -theta[2]])
-    own = np.array([along @ p.covariance @ along for p in points])
-    return np.maximum(own, 1e-8 * float(np.median(own)) + 1e-30)
 
 
 def _own_residuals(rest: FloatArray, variance: FloatArray, effects: FloatArray) -> FloatArray:
     """Residuals less the most likely shared errors, which bend them together (best linear prediction)."""
-    if not effects.shape[1]:
-        return rest
     scaled = effects / variance[:, None]
     likely = np.linalg.solve(3.0 * np.eye(effects.shape[1]) + effects.T @ scaled, scaled.T @ rest)
     return np.asarray(rest - effects @ likely)
 
 
-def torque_covariance(variance: FloatArray, shared: tuple[SharedError, ...]) -> FloatArray:
+def torque_covariance(variance: FloatArray, effects: FloatArray) -> FloatArray:
     """Covariance of the torques: each run's own, and the shared errors (a third of the bound squared)."""
-    effects = effects_of(shared, len(variance))
     return np.asarray(np.diag(variance) + effects @ effects.T / 3.0)
 
 
@@ -189,20 +247,60 @@ def gain_matrix(x: FloatArray, covariance: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.solve(x.T @ whitened, whitened.T))
 
 
-def _run_scatter(
-    x: FloatArray, y: FloatArray, own: FloatArray, shared: tuple[SharedError, ...]
-) -> tuple[float, float]:
+def _run_scatter(runs: _Runs, own: FloatArray, effects: FloatArray) -> tuple[float, float]:
     """Variance between runs that makes chi-square equal its freedom, and the Birge ratio without it."""
+    x, y = runs.free, runs.rest
     freedom = len(y) - x.shape[1]
 
-    def chi_square(extra: float) -> float:
-        covariance = torque_covariance(own + extra, shared)
+    def excess(extra: float) -> float:
+        covariance = torque_covariance(own + extra, effects)
         rest = y - x @ (gain_matrix(x, covariance) @ y)
-        return float(rest @ np.linalg.solve(covariance, rest))
+        return float(rest @ np.linalg.solve(covariance, rest)) - freedom
 
-    first = chi_square(0.0)
-    birge = float(np.sqrt(first / freedom))
-    if first <= freedom:
+    first = excess(0.0)
+    birge = float(np.sqrt(first / freedom + 1.0))
+    if first <= 0.0:
         return 0.0, birge
     most = 10.0 * float(np.var(y - x @ np.linalg.lstsq(x, y, rcond=None)[0])) + float(np.max(own))
-    return float(brentq(lambda extra: chi_square(extra) - freedom, 0.0, most, xtol=1e-9 * most)), birge
+    return float(brentq(excess, 0.0, most, xtol=1e-9 * most)), birge
+
+
+@dataclass(frozen=True, kw_only=True)
+class Contribution:
+    """One term: its torque in N m, its share of the whole, and the standard error of the share."""
+
+    name: str
+    torque_Nm: float
+    share: float
+    share_std: float
+
+
+def contributions(
+    values: FloatArray,
+    covariance: FloatArray | None = None,
+    *,
+    load_Nm: float = PAPER_LOAD_NM,
+    speed_rad_s: float = PAPER_SPEED_RAD_S,
+) -> tuple[Contribution, ...]:
+    """Shares of C0, Cv w and CM |M_ext| in the friction torque, with first-order standard errors.
+
+    By default at the paper's largest load and speed; ``values`` are C0 (N m), Cv (N m s/rad), CM.
+
+    Examples
+    --------
+    >>> table = contributions(np.array([2.25e-3, 5.25e-6, 1.34e-3]))
+    >>> [round(100.0 * term.share, 1) for term in table]
+    [12.6, 27.6, 59.8]
+    """
+    point = np.array([1.0, abs(speed_rad_s), abs(load_Nm)])
+    terms = np.asarray(values) * point
+    total = float(terms.sum())
+    if not total > 0.0:
+        raise InputError(f"the friction torque at {load_Nm} N m and {speed_rad_s} rad/s is {total:.3g} N m")
+    share = terms / total
+    gradient = (np.eye(3) - share[:, None]) * point[None, :] / total
+    spread = np.zeros((3, 3)) if covariance is None else gradient @ covariance @ gradient.T
+    return tuple(
+        Contribution(name=name, torque_Nm=float(t), share=float(s), share_std=float(np.sqrt(v)))
+        for name, t, s, v in zip(NAMES, terms, share, np.diag(spread), strict=True)
+    )

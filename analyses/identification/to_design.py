@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 
@@ -79,9 +80,14 @@ def with_structure(design: Design, model: JointModel) -> Design:
         load = replace(load, gravity=Gravity(mass_kg=1.0, arm_m=1.0))
     if friction is design.friction and load is design.load:
         return design
+    return _without(replace(design, friction=friction, load=load), gone)
+
+
+def _without(design: Design, gone: Collection[str]) -> Design:
+    """The design without the records of some keys, and their correlations."""
     kept = {path: one for path, one in design.parameters.items() if path not in gone}
     pairs = tuple(c for c in design.correlations if not {c.first, c.second} & set(gone))
-    return replace(design, friction=friction, load=load, parameters=FrozenMap(kept), correlations=pairs)
+    return replace(design, parameters=FrozenMap(kept), correlations=pairs)
 
 
 def inertia_share(design: Design, total_kgm2: float, key: str) -> tuple[float, float]:
@@ -134,7 +140,7 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
     return replace(
         changed,
         parameters=FrozenMap(parameters),
-        correlations=(*kept, *_correlations(fit.names, fit.covariance)),
+        correlations=(*kept, *_correlations(fit.names, fit.correlation)),
     )
 
 
@@ -144,9 +150,7 @@ def _one_law(design: Design, paths: Sequence[str]) -> Design:
     if "friction.viscous" not in paths or set(reverse) & set(paths):
         return design
     friction = replace(design.friction, dry_torque_reverse_Nm=None, viscous_reverse_Nms_rad=None)
-    parameters = {path: one for path, one in design.parameters.items() if path not in reverse}
-    kept = tuple(c for c in design.correlations if not {c.first, c.second} & set(reverse))
-    return replace(design, friction=friction, parameters=FrozenMap(parameters), correlations=kept)
+    return _without(replace(design, friction=friction), reverse)
 
 
 def _tolerance(path: str, value: float, std: float) -> Tolerance | None:
@@ -161,22 +165,17 @@ def _tolerance(path: str, value: float, std: float) -> Tolerance | None:
     return Tolerance(kind="truncated-normal", std=std, lower=lower, upper=upper)
 
 
-def _correlations(paths: Sequence[str], covariance: FloatArray) -> list[Correlation]:
-    std = np.sqrt(np.diag(covariance))
-    matrix = np.eye(len(paths))
-    for i in range(len(paths)):
-        for j in range(i):
-            size = std[i] * std[j]
-            c = float(np.clip(covariance[i, j] / size, -1.0, 1.0)) if size > 0.0 else 0.0
-            matrix[i, j] = matrix[j, i] = round(c, 6) if abs(c) >= LEAST_CORRELATION else 0.0
+def _correlations(paths: Sequence[str], correlation: FloatArray) -> list[Correlation]:
+    matrix = np.clip(correlation, -1.0, 1.0)
+    matrix = np.where(np.abs(matrix) < LEAST_CORRELATION, 0.0, np.round(matrix, 6))
+    np.fill_diagonal(matrix, 1.0)
     lowest = float(np.linalg.eigvalsh(matrix)[0])
     if lowest < 0.0:  # rounding and leaving out may have made it indefinite by as much
         keep = 1.0 / (1.0 - 1.01 * lowest + 1e-9)
         matrix = np.where(np.eye(len(paths)) > 0.0, 1.0, keep * matrix)
     return [
         Correlation(first=paths[i], second=paths[j], coefficient=float(matrix[i, j]))
-        for i in range(len(paths))
-        for j in range(i + 1, len(paths))
+        for i, j in combinations(range(len(paths)), 2)
         if matrix[i, j] != 0.0
     ]
 

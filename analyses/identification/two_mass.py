@@ -48,11 +48,8 @@ class TwoMass(Fit):
     def _derived(self, of: Callable[[dict[str, float]], float]) -> tuple[float, float]:
         own = {name: self[name] for name in NAMES}
         middle = of(own)
-        slopes = []
-        for name in self.names:
-            step = 1e-6 * max(abs(own[name]), 1e-300)
-            slopes.append((of({**own, name: own[name] + step}) - middle) / step)
-        g = np.array(slopes)
+        steps = {name: 1e-6 * max(abs(own[name]), 1e-300) for name in self.names}
+        g = np.array([(of({**own, name: own[name] + step}) - middle) / step for name, step in steps.items()])
         return middle, float(np.sqrt(max(g @ self.covariance @ g, 0.0)))
 
 
@@ -97,7 +94,7 @@ def fit_two_mass(
     held = dict(fixed or {})
     names = tuple(name for name in NAMES if name not in held)
     scale = _scales(start, names)
-    outputs = [(motor, 0)] + ([(load, 1)] if load is not None else [])
+    outputs = [motor] if load is None else [motor, load]
 
     def unpacked(q: FloatArray) -> dict[str, float]:
         own = dict(zip(names, (q * scale).tolist(), strict=True))
@@ -105,7 +102,7 @@ def fit_two_mass(
 
     def residual(q: FloatArray) -> FloatArray:
         g = angle_responses(lines.omega_rad_s, unpacked(q), reduction, reaction)
-        both = _whitened(lines, [output for output, _ in outputs], torque, [g[k] for _, k in outputs])
+        both = _whitened(lines, outputs, torque, g[: len(outputs)])
         return np.concatenate([both.real, both.imag]) * np.sqrt(2.0)
 
     begin = np.array([max(abs(start.get(name, 0.0)), scale[k]) for k, name in enumerate(names)]) / scale
@@ -167,11 +164,9 @@ def _whitened(
     """
     j = lines.names.index(by)
     rows = [lines.names.index(output) for output in outputs]
-    count = len(lines.omega_rad_s)
-    mix = np.zeros((count, len(rows), len(lines.names)), dtype=complex)
-    for r, (k, g) in enumerate(zip(rows, responses, strict=True)):
-        mix[:, r, k] = 1.0
-        mix[:, r, j] -= g
+    mix = np.zeros((len(lines.omega_rad_s), len(rows), len(lines.names)), dtype=complex)
+    mix[:, range(len(rows)), rows] = 1.0
+    mix[:, :, j] -= np.array(responses).T
     rest = np.einsum("krs,sk->kr", mix, lines.means)
     covariance = np.einsum("krs,kst,kqt->krq", mix, lines.noise, mix.conj())
     floor = 1e-24 * np.array([np.abs(lines.means[k]) ** 2 for k in rows]).T
@@ -186,18 +181,14 @@ def start_of(lines: Lines, reduction: float, *, torque: str = "torque") -> dict[
     Below the antiresonance the whole inertia moves, above the resonance the motor's alone.
     """
     k, j = lines.names.index("angle"), lines.names.index(torque)
-    inertia = np.abs(lines.means[j] / (lines.omega_rad_s**2 * lines.means[k]))
-    order = np.argsort(lines.omega_rad_s)
-    inertia, omega = inertia[order], lines.omega_rad_s[order]
+    omega = lines.omega_rad_s
+    inertia = np.abs(lines.means[j] / (omega**2 * lines.means[k]))
     third = max(len(omega) // 8, 2)
     whole, own = float(np.median(inertia[:third])), float(np.median(inertia[-third:]))
     valley = float(omega[int(np.argmax(inertia))])
     behind = max(whole - own, 0.05 * whole) * reduction**2
-    return {
-        "motor_inertia": min(own, 0.95 * whole),
-        "load_inertia": behind,
-        "stiffness": behind * valley**2,
-    }
+    motor = min(own, 0.95 * whole)
+    return {"motor_inertia": motor, "load_inertia": behind, "stiffness": behind * valley**2}
 
 
 def other_starts(start: Mapping[str, float], lines: Lines, reduction: float) -> list[dict[str, float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,7 +12,7 @@ from actuator_lti.design.model import Design
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
 from analyses.identification.design_values import NO_CHANCE, DesignValue, cause, told
-from analyses.identification.simultaneous import Followed
+from analyses.identification.diagnosis import Followed
 from analyses.records.consistency import RATE_TOLERANCE, Finding
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
@@ -58,22 +58,17 @@ class Identified:
 
 def inputs_item(record: str, findings: Sequence[Finding]) -> Item:
     """Whether a record agrees with itself and with the design's limits."""
-    wrong = [one for one in findings if one.passed is False]
-    reason = "; ".join(f"{one.subject}: {one.text}" for one in wrong)
-    return Item(
-        id=f"inputs-{record}",
-        label=f"{record} agrees with itself and the design",
-        passed=not wrong if findings else None,
-        reason=reason or ("" if findings else "nothing to hold it against"),
-    )
+    label = f"{record} agrees with itself and the design"
+    if not findings:
+        return Item(id=f"inputs-{record}", label=label, passed=None, reason="nothing to hold it against")
+    wrong = [f"{one.subject}: {one.text}" for one in findings if one.passed is False]
+    return Item(id=f"inputs-{record}", label=label, passed=not wrong, reason="; ".join(wrong))
 
 
 def share_item(id: str, label: str, value: float, limit: float, otherwise: str) -> Item:
     """A share of the drive signal against its limit, and what it means beyond."""
-    passed = value <= limit
-    return Item(
-        id=id, label=label, passed=passed, value=value, limit=limit, reason="" if passed else otherwise
-    )
+    reason = "" if value <= limit else otherwise
+    return Item(id=id, label=label, passed=not reason, value=value, limit=limit, reason=reason)
 
 
 def residual_item(residual: float, limit: float) -> Item:
@@ -82,31 +77,27 @@ def residual_item(residual: float, limit: float) -> Item:
     return share_item("residual", "Relative residual of the fit", residual, limit, why)
 
 
-def sampling_item(record: Record) -> Item | None:
+def sampling_items(record: Record) -> Iterator[Item]:
     """Whether the current is sampled fast enough for its mean between the samples to be known."""
-    if "current" not in record.signals:
-        return None
-    x = record["current"]
-    size = float(np.sqrt(np.mean(x**2)))
-    if len(x) < 3 or size == 0.0:
-        return None
-    off = float(np.sqrt(np.mean((x[1:-1] - 0.5 * (x[:-2] + x[2:])) ** 2))) / size
-    slow = off > LARGEST_LINE_ERROR
+    x = record.signals.get("current", np.zeros(0))
+    if len(x) < 3 or not np.any(x):
+        return
+    line = x[1:-1] - 0.5 * (x[:-2] + x[2:])
+    off = float(np.sqrt(np.mean(line**2)) / np.sqrt(np.mean(x**2)))
     reason = (
         f"the current leaves the line between its neighbours by {100.0 * off:.0f} % of its rms: "
         "sampled too slowly, or noise; the inertia cannot be trusted"
     )
-    label = f"{record.name}: current sampled fast enough"
-    return Item(id=f"sampling-{record.name}", label=label, passed=not slow, reason=reason if slow else "")
+    slow, label = off > LARGEST_LINE_ERROR, f"{record.name}: current sampled fast enough"
+    yield Item(id=f"sampling-{record.name}", label=label, passed=not slow, reason=reason if slow else "")
 
 
-def kept_items(fit: Fit, held: Collection[str], axis: str) -> tuple[Item, ...]:
+def kept_items(fit: Fit, held: Collection[str], axis: str) -> Iterator[Item]:
     """The design's own values that these records neither confirm nor deny, whatever they are."""
-    return tuple(
-        Item(id=f"kept-{name}", label=parameter(name, axis).label, passed=None, reason=one.reason)
-        for name, one in fit.fixed.items()
-        if one.value and name not in held
-    )
+    for name, one in fit.fixed.items():
+        if one.value and name not in held:
+            label = parameter(name, axis).label
+            yield Item(id=f"kept-{name}", label=label, passed=None, reason=one.reason)
 
 
 def rows_item(rows: int, parameters: int) -> Item:
@@ -154,29 +145,25 @@ def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: 
         elif kind == "dry" and one.ratio > (MOST_DRY_UNLOADED if feels else LARGEST_FACTOR):
             load = (one.found - one.design) / max(design.friction.load_coefficient, 1e-300)
             reasons.append(off + (f": as under a load of {load:.3g} N m, not recorded" if feels else ""))
-    return Item(
-        id="size",
-        label="Identified values are of the design's size",
-        passed=not reasons if values else None,
-        reason=next(iter(reasons), ""),
-    )
+    label, passed = "Identified values are of the design's size", not reasons if values else None
+    return Item(id="size", label=label, passed=passed, reason=next(iter(reasons), ""))
 
 
-def offset_item(design: Design, fit: Fit) -> Item | None:
+def offset_items(design: Design, fit: Fit) -> Iterator[Item]:
     """A constant torque that is not the design's, beyond chance with both errors; the values hold."""
     key = "friction.offset_torque"
     if "offset" not in fit.names:
-        return None
+        return
     own = design.friction.offset_torque_Nm
     more, allowed = fit["offset"] - own, own_std(design, key) or UNSTATED * abs(own)
     std = float(np.hypot(fit.std("offset"), allowed))
     if chi2.sf((more / max(std, 1e-300)) ** 2, 1) > NO_CHANCE:
-        return None
+        return
     unit, stated = parameter("offset", design.axis).unit, key in design.parameters
     beside = f"beside the design's {own:.3g} {unit}" if stated else "that the design does not state"
     told = f"{more:+.3g} {unit} {beside}: a load not recorded, or an offset of the current"
     label = "Constant torque is the design's" if design.axis == "rotary" else "Constant force is the design's"
-    return Item(id="offset", label=label, passed=None, reason=told)
+    yield Item(id="offset", label=label, passed=None, reason=told)
 
 
 def following_item(record: str, followed: Followed) -> Item:

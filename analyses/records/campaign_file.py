@@ -130,8 +130,8 @@ def load_campaign(path: str | Path) -> Campaign:
     head = root.table("campaign")
     campaign = head.read(
         Campaign,
-        drive=_spec(root.table("drive")),
-        sensor=_spec(root.table("sensor")) if "sensor" in root else None,
+        drive=record_spec(root.table("drive")),
+        sensor=record_spec(root.table("sensor")) if "sensor" in root else None,
         join=root.table("join").read(Join),
         instruments=_instruments(root.table("instruments")),
         runs=tuple(_run(table, path.parent) for table in root.tables("run")),
@@ -174,8 +174,8 @@ def _instruments(table: Table) -> Instruments:
         raise InputError(error.message, where=table.origin) from None
 
 
-def _spec(table: Table) -> RecordSpec:
-    """A recorder's description, ``[drive]`` or ``[sensor]``."""
+def record_spec(table: Table) -> RecordSpec:
+    """A recorder's description: ``[drive]`` or ``[sensor]`` of a campaign, or a record file."""
     layout, parts = ({key_of(one.name) for one in fields(kind)} for kind in (CsvFormat, RecordSpec))
     try:
         return table.read(
@@ -189,11 +189,6 @@ def _spec(table: Table) -> RecordSpec:
         if error.where is not None:
             raise
         raise InputError(table.key(error.message), where=table.origin) from None
-
-
-def record_spec(data: object, origin: str, path: str = "record") -> RecordSpec:
-    """A recorder's description from a table of a TOML file."""
-    return _spec(Table(data, path, origin))  # type: ignore[arg-type]
 
 
 def _time(table: Table) -> TimeColumn:

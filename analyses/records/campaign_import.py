@@ -12,7 +12,7 @@ from analyses.records.campaign_file import Campaign, RunEntry
 from analyses.records.clocks import ClockJoin, join_records
 from analyses.records.inputs import InputUse, account
 from analyses.records.readers import read_record
-from analyses.records.record import InputColumn, Record, RowCounts
+from analyses.records.record import Record, RowCounts
 
 USED = {"current": "torque kM i", "speed": "steady speed", "torque": "load", "angle": "check of the speed"}
 """What a campaign uses its signals for."""
@@ -20,21 +20,22 @@ USED = {"current": "torque kM i", "speed": "steady speed", "torque": "load", "an
 
 @dataclass(frozen=True, kw_only=True)
 class ImportedRun:
-    """One run, on one clock, with the account of its files.
+    """One run, on one clock, with the sensor's own record where there is one."""
 
-    ``load_is_zero`` is true for a disconnected clutch: the load torque is then exactly zero, and no torque
-    is needed.
-    """
-
-    id: str
+    entry: RunEntry
     record: Record
-    join: ClockJoin | None
-    load_is_zero: bool
-    speed_rad_s: float | None
-    load_Nm: float | None
-    sensor_counts: RowCounts | None = None
-    sensor_inputs: tuple[InputColumn, ...] = ()
-    sensor_sha256: str = ""
+    join: ClockJoin | None = None
+    sensor: Record | None = None
+
+    @property
+    def id(self) -> str:
+        """As the campaign lists it."""
+        return self.entry.id
+
+    @property
+    def load_is_zero(self) -> bool:
+        """Whether the clutch is disconnected: the load torque is exactly zero, and none is needed."""
+        return self.entry.load_Nm == 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,8 +69,8 @@ class ImportedCampaign:
         """The columns of the runs' files, their ranges over all runs."""
         whole: dict[tuple[str, str], InputUse] = {}
         for run in self.runs:
-            for file, inputs in (("drive", run.record.inputs), ("sensor", run.sensor_inputs)):
-                for one in account(replace(run.record, inputs=inputs), USED):
+            for file, read in (("drive", run.record), ("sensor", run.sensor)):
+                for one in account(replace(run.record, inputs=read.inputs), USED) if read else ():
                     if file == "sensor" and one.use == "time":
                         one = InputUse(column=one.column, meaning="time, on a clock of its own", use="time")
                     key = (file, one.column)
@@ -77,8 +78,7 @@ class ImportedCampaign:
         return tuple(whole.values())
 
     def _counts(self) -> list[RowCounts]:
-        drive = [run.record.counts for run in self.runs]
-        return drive + [run.sensor_counts for run in self.runs if run.sensor_counts is not None]
+        return [read.counts for run in self.runs for read in (run.record, run.sensor) if read is not None]
 
 
 def _over(one: InputUse, known: InputUse | None) -> InputUse:
@@ -132,16 +132,13 @@ def import_run(campaign: Campaign, entry: RunEntry) -> ImportedRun:
 
 def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Record | None) -> ImportedRun:
     """One run of records that are read already: joined, or with its load known to be zero."""
-    zero = entry.load_Nm == 0.0
-    join = None
-    if zero:
+    record, join = drive, None
+    if entry.load_Nm == 0.0:
         note = "clutch disconnected: the load torque is zero, the torque record is not needed"
         record = replace(drive, notes=(*drive.notes, note))
-    elif "torque" in drive.signals:
-        record = drive
-    elif sensor is None:
-        raise InputError(f"run {entry.id}: no torque signal and no sensor file", where=campaign.origin)
-    else:
+    elif "torque" not in drive.signals:
+        if sensor is None:
+            raise InputError(f"run {entry.id}: no torque signal and no sensor file", where=campaign.origin)
         record, join = join_records(
             drive,
             sensor,
@@ -152,14 +149,4 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
         )
     if not np.any(record["speed"]):
         raise InputError("the speed is zero throughout", where=drive.name)
-    return ImportedRun(
-        id=entry.id,
-        record=record,
-        join=join,
-        load_is_zero=zero,
-        speed_rad_s=entry.speed_rad_s,
-        load_Nm=entry.load_Nm,
-        sensor_counts=None if sensor is None else sensor.counts,
-        sensor_inputs=() if sensor is None else sensor.inputs,
-        sensor_sha256="" if sensor is None else sensor.sha256,
-    )
+    return ImportedRun(entry=entry, record=record, join=join, sensor=sensor)

@@ -4,39 +4,59 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import FloatArray
+from analyses.estimation.means import best_lag, correlation_time
 from analyses.records.campaign_file import Method
-from analyses.records.correlate_clocks import Fit, fit_by_correlation
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
 
 RATE_SPREAD = 0.01
 """Two clocks are taken to differ by less than 1 % in rate; anything else is no clock error."""
+GRID = 4000
+MIN_QUALITY = 0.5
+RATE_STD_MAX = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClockJoin(Fit):
-    """How the second recorder's time was put on the first one's, by which of their signals."""
+class ClockJoin:
+    """How the second recorder's time was put on the first one's, by which of their signals.
 
-    method: str
-    first_signal: str
-    second_signal: str
+    ``t_first = offset_s + rate * t_second``, with standard deviations and the correlation reached.
+    ``rate`` is 1 and ``rate_std`` None where the records do not tell it (a single event). ``offset_std_s`` is
+    that of the offset at the middle of the second record.
+    """
+
+    offset_s: float
+    offset_std_s: float = 0.0
+    rate: float = 1.0
+    rate_std: float | None = None
+    quality: float = 1.0
+    method: str = "given"
+    first_signal: str = ""
+    second_signal: str = ""
 
     def __str__(self) -> str:
         if self.method == "given":
             return f"second clock by the given offset {self.offset_s:.6g} s"
-        if self.rate_std is None:
-            rate = "rate not estimable, taken as 1"
-        else:
+        rate = "rate not estimable, taken as 1"
+        if self.rate_std is not None:
             rate = f"rate {(self.rate - 1.0) * 1e6:+.1f} ppm (std {self.rate_std * 1e6:.1f})"
         return (
             f"second clock by {self.method} of {self.first_signal} and {self.second_signal}: offset "
             f"{self.offset_s:.6f} s (std {self.offset_std_s:.1g}), {rate}, correlation {self.quality:.4f}"
         )
+
+
+class Series(NamedTuple):
+    """The magnitude of a signal over its recorder's time."""
+
+    time_s: FloatArray
+    values: FloatArray
 
 
 def join_records(
@@ -63,34 +83,33 @@ def join_records(
         The first record with the second one's signals added (linear interpolation), cut to the time both
         cover; and how it was done.
     """
+    finders = {"event": _by_event, "correlation": _by_correlation}
     if method == "given":
         if offset_s is None:
             raise InputError('join method "given": needs an offset', where=second.name)
-        fit = Fit(offset_s, 0.0, 1.0, None, 1.0)
-    elif method in ("event", "correlation"):
-        a, b = np.abs(first[first_signal]), np.abs(second[second_signal])
-        find = _by_event if method == "event" else fit_by_correlation
+        join = ClockJoin(offset_s=offset_s)
+    elif method in finders:
+        a = Series(first.time_s, np.abs(first[first_signal]))
+        b = Series(second.time_s, np.abs(second[second_signal]))
         where = f"{first.name} with {second.name}"
-        _check_durations(first.time_s, a, second.time_s, b, where)
-        fit = find(first.time_s, a, second.time_s, b, where)
+        _check_durations(a, b, where)
+        join = replace(finders[method](a, b, where), method=method)
     else:
         raise InputError(f'join method "{method}": "event", "correlation" or "given"')
-    join = ClockJoin(method=method, first_signal=first_signal, second_signal=second_signal, **vars(fit))
+    join = replace(join, first_signal=first_signal, second_signal=second_signal)
     return _joined(first, second, join), join
 
 
 def _joined(first: Record, second: Record, join: ClockJoin) -> Record:
     time = join.offset_s + join.rate * second.time_s
-    start, stop = np.searchsorted(first.time_s, [time[0], time[-1]], side="left")
-    stop = (
-        min(int(stop) + 1, len(first)) if stop < len(first) and first.time_s[stop] == time[-1] else int(stop)
-    )
-    if stop - int(start) < 2:
+    start = int(np.searchsorted(first.time_s, time[0]))
+    stop = int(np.searchsorted(first.time_s, time[-1], side="right"))
+    if stop - start < 2:
         raise InputError(f"the two records do not overlap in time ({join})", where=second.name)
     clash = set(first.signals) & set(second.signals)
     if clash:
         raise InputError(f'both records hold a signal "{min(clash)}"', where=second.name)
-    cut = first.slice(int(start), stop)
+    cut = first.slice(start, stop)
     added = {name: np.interp(cut.time_s, time, values) for name, values in second.signals.items()}
     return replace(
         cut,
@@ -100,50 +119,17 @@ def _joined(first: Record, second: Record, join: ClockJoin) -> Record:
     )
 
 
-def _check_durations(t_a: FloatArray, a: FloatArray, t_b: FloatArray, b: FloatArray, where: str) -> None:
-    """Refuse two records in which one motion lasts differently long: no clock is off by so much."""
-    events_a, events_b = motion_events(t_a, a), motion_events(t_b, b)
-    if events_a is None or events_b is None or events_a.stop_s is None or events_b.stop_s is None:
-        return
-    span_a, span_b = events_a.stop_s - events_a.start_s, events_b.stop_s - events_b.start_s
-    if not (span_a > 0.0 and span_b > 0.0):
-        return
-    ratio = span_a / span_b
-    step = max(float(np.median(np.diff(t_a))) / span_a, float(np.median(np.diff(t_b))) / span_b)
-    if abs(ratio - 1.0) > RATE_SPREAD + 3.0 * step:
-        factor = named_factor(ratio)
-        told = f"factor {factor}" if factor else "a clock is off, or the records are of two runs"
-        raise InputError(
-            f"the motion lasts {span_a:.4g} s in one record and {span_b:.4g} s in the other, "
-            f"{ratio:.4f} times as long: {told}",
-            where=where,
-        )
-
-
-def _by_event(t_a: FloatArray, a: FloatArray, t_b: FloatArray, b: FloatArray, where: str) -> Fit:
-    events_a, events_b = motion_events(t_a, a), motion_events(t_b, b)
-    if events_a is None or events_b is None:
-        raise InputError(
-            "no event: neither signal may be flat, and each must start below half of its plateau", where=where
-        )
-    step = np.hypot(np.median(np.diff(t_a)), np.median(np.diff(t_b))) / np.sqrt(12.0)
-    rate, rate_std, std = 1.0, None, float(step)
-    if events_a.stop_s is not None and events_b.stop_s is not None:
-        span = events_b.stop_s - events_b.start_s
-        estimate = (events_a.stop_s - events_a.start_s) / span
-        if step / span < RATE_SPREAD / 10.0:
-            rate, rate_std = estimate, float(np.sqrt(2.0) * step / span)
-    offset = events_a.start_s - rate * events_b.start_s
-    moved = np.interp(t_a, offset + rate * t_b, b)
-    return Fit(offset, std, rate, rate_std, float(np.corrcoef(a, moved)[0, 1]))
-
-
 @dataclass(frozen=True)
 class MotionEvents:
     """Start of a motion, and its end where the record shows it."""
 
     start_s: float
     stop_s: float | None
+
+    @property
+    def span_s(self) -> float:
+        """What the motion lasts; 0 where its end is not shown."""
+        return 0.0 if self.stop_s is None else self.stop_s - self.start_s
 
 
 def motion_events(time_s: FloatArray, magnitude: FloatArray) -> MotionEvents | None:
@@ -163,18 +149,146 @@ def motion_events(time_s: FloatArray, magnitude: FloatArray) -> MotionEvents | N
     floor, plateau = np.quantile(magnitude, [0.01, 0.95])
     level = 0.5 * (floor + plateau)
     noise = 1.4826 * float(np.median(np.abs(np.diff(magnitude)))) / np.sqrt(2.0)
-    if plateau - floor <= max(6.0 * noise, 1e-12 * abs(plateau)):
+    up = np.flatnonzero(magnitude >= level)
+    if plateau - floor <= max(6.0 * noise, 1e-12 * abs(plateau)) or up[0] == 0:
         return None
-    up = magnitude >= level
-    if up[0]:
-        return None
-    rise = int(np.argmax(up))
-    fall = len(up) - 1 - int(np.argmax(up[::-1]))
-    start = _crossing(time_s, magnitude, rise - 1, level)
-    stop = None if fall == len(up) - 1 else _crossing(time_s, magnitude, fall, level)
-    return MotionEvents(start, stop)
+
+    def crossing(k: int) -> float:
+        share = (level - magnitude[k]) / (magnitude[k + 1] - magnitude[k])
+        return float(time_s[k] + share * (time_s[k + 1] - time_s[k]))
+
+    stop = None if up[-1] == len(magnitude) - 1 else crossing(int(up[-1]))
+    return MotionEvents(crossing(int(up[0]) - 1), stop)
 
 
-def _crossing(time_s: FloatArray, values: FloatArray, k: int, level: float) -> float:
-    share = (level - values[k]) / (values[k + 1] - values[k])
-    return float(time_s[k] + share * (time_s[k + 1] - time_s[k]))
+def _check_durations(a: Series, b: Series, where: str) -> None:
+    """Refuse two records in which one motion lasts differently long: no clock is off by so much."""
+    events = motion_events(*a), motion_events(*b)
+    span_a, span_b = (0.0 if one is None else one.span_s for one in events)
+    if not (span_a > 0.0 and span_b > 0.0):
+        return
+    ratio = span_a / span_b
+    step = max(float(np.median(np.diff(a.time_s))) / span_a, float(np.median(np.diff(b.time_s))) / span_b)
+    if abs(ratio - 1.0) <= RATE_SPREAD + 3.0 * step:
+        return
+    factor = named_factor(ratio)
+    told = f"factor {factor}" if factor else "a clock is off, or the records are of two runs"
+    raise InputError(
+        f"the motion lasts {span_a:.4g} s in one record and {span_b:.4g} s in the other, "
+        f"{ratio:.4f} times as long: {told}",
+        where=where,
+    )
+
+
+def _by_event(a: Series, b: Series, where: str) -> ClockJoin:
+    first, second = motion_events(*a), motion_events(*b)
+    if first is None or second is None:
+        told = "no event: neither signal may be flat, and each must start below half of its plateau"
+        raise InputError(told, where=where)
+    step = np.hypot(np.median(np.diff(a.time_s)), np.median(np.diff(b.time_s))) / np.sqrt(12.0)
+    rate, rate_std = 1.0, None
+    if first.span_s and second.span_s and step / second.span_s < RATE_SPREAD / 10.0:
+        rate, rate_std = first.span_s / second.span_s, float(np.sqrt(2.0) * step / second.span_s)
+    offset = first.start_s - rate * second.start_s
+    moved = np.interp(a.time_s, offset + rate * b.time_s, b.values)
+    quality = float(np.corrcoef(a.values, moved)[0, 1])
+    return ClockJoin(offset_s=offset, offset_std_s=float(step), rate=rate, rate_std=rate_std, quality=quality)
+
+
+def _by_correlation(a: Series, b: Series, where: str) -> ClockJoin:
+    """The best offset on a common grid by FFT, then offset and rate by least squares.
+
+    The rate is kept only where its standard deviation is below 1e-3: a steady signal with one edge does not
+    tell it.
+    """
+    step = max(np.ptp(a.time_s), np.ptp(b.time_s)) / GRID
+    a, b = _gridded(a, step), _gridded(b, step)
+    if any(np.std(one.values) <= 1e-12 * np.max(np.abs(one.values)) for one in (a, b)):
+        raise InputError("a flat signal cannot be aligned by correlation", where=where)
+    lag = best_lag(a.values - a.values.mean(), b.values - b.values.mean())
+    pair = _Pair(a, b, a.time_s[0] - b.time_s[0] + step * lag, step)
+    p, covariance = _gauss_newton(pair, 2)
+    rate_std = float(np.sqrt(covariance[1, 1]) * step / pair.half)
+    estimable = 0.0 < rate_std < RATE_STD_MAX and abs(p[1] * step / pair.half) < 0.01
+    if not estimable:
+        p, covariance = _gauss_newton(pair, 1)
+    rate, quality = pair.rate(p), pair.quality(p)
+    if not quality >= MIN_QUALITY:
+        told = f"the two records are not alike: correlation {quality:.2f}, {MIN_QUALITY} wanted"
+        raise InputError(told, where=where)
+    return ClockJoin(
+        offset_s=float(pair.start + p[0] * step + pair.middle - rate * pair.middle),
+        offset_std_s=float(np.sqrt(covariance[0, 0]) * step),
+        rate=rate,
+        rate_std=rate_std if estimable else None,
+        quality=quality,
+    )
+
+
+def _gridded(one: Series, step: float) -> Series:
+    """Means over bins of one step, at the mean time of each bin; empty bins by interpolation."""
+    time, values = one
+    place = np.floor((time - time[0]) / step).astype(np.int64)
+    counts = np.bincount(place)
+    centres = time[0] + (np.arange(len(counts)) + 0.5) * step
+    filled = counts > 0
+    means, times = (np.bincount(place, column)[filled] / counts[filled] for column in (values, time))
+    return Series(centres, np.interp(centres, times, means))
+
+
+class _Pair:
+    """Both gridded signals, and how well they fit for a shift and a stretch (in grid steps at the ends)."""
+
+    def __init__(self, a: Series, b: Series, start: float, step: float) -> None:
+        self.a, self.b, self.start, self.step = a, b, start, step
+        self.middle = 0.5 * (b.time_s[0] + b.time_s[-1])
+        self.half = 0.5 * (b.time_s[-1] - b.time_s[0])
+
+    def rate(self, p: FloatArray) -> float:
+        """That of the clocks; 1 where no stretch is among the parameters."""
+        return 1.0 + float(p[1]) * self.step / self.half if len(p) > 1 else 1.0
+
+    def both(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The samples of the first signal inside the second, and the second there."""
+        ga, gb = self.a.time_s, self.b.time_s
+        moved = self.start + p[0] * self.step + self.middle + self.rate(p) * (gb - self.middle)
+        inside = (ga >= moved[0]) & (ga <= moved[-1])
+        return self.a.values[inside], np.interp(ga[inside], moved, self.b.values)
+
+    def residual(self, p: FloatArray) -> FloatArray:
+        """What a straight line from the second to the first leaves, zero outside the overlap."""
+        x, y = self.both(p)
+        out = np.zeros(len(self.a.values))
+        if len(x) < 10 or np.ptp(y) <= 0.0:
+            return out + np.std(self.a.values)
+        dy = y - y.mean()
+        out[: len(x)] = x - x.mean() - dy * (dy @ x) / (dy @ dy)
+        return out
+
+    def quality(self, p: FloatArray) -> float:
+        """Correlation coefficient over the overlap."""
+        x, y = self.both(p)
+        alike = len(x) >= 10 and np.std(y) > 0.0 and np.std(x) > 0.0
+        return float(np.corrcoef(x, y)[0, 1]) if alike else 0.0
+
+
+def _gauss_newton(pair: _Pair, parameters: int) -> tuple[FloatArray, FloatArray]:
+    """Parameters and covariance; differences over half a grid step, past the kinks of interpolation.
+
+    To the noise is added how far apart in time the edges remain on the mean: two instruments do not
+    see the same happening in quite the same shape, and no fit can tell that from a shift.
+    """
+    p = np.zeros(parameters)
+    for _ in range(5):
+        steps = 0.5 * np.eye(parameters)
+        jac = np.column_stack([pair.residual(p + h) - pair.residual(p - h) for h in steps])
+        change = np.linalg.lstsq(jac, pair.residual(p), rcond=None)[0]
+        p = p - np.clip(change, -5.0, 5.0)
+        if np.max(np.abs(change)) < 1e-4:
+            break
+    rest = pair.residual(p)
+    variance = float(rest @ rest) / max(len(rest) - 2 - parameters, 1) * correlation_time(rest)
+    covariance = np.asarray(variance * np.linalg.pinv(jac.T @ jac))
+    steep = np.abs(jac[:, 0]) > 0.05 * np.max(np.abs(jac[:, 0]))
+    apart = float(np.sum(np.abs(rest[steep])) / max(np.sum(np.abs(jac[steep, 0])), 1e-300))
+    return p, covariance + apart**2 * np.eye(parameters)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf, isfinite
 
@@ -33,6 +33,18 @@ WINDING_K = (-75.0, 160.0)
 """From 20 deg C, the coldest and hottest winding: -55 to 180 deg C, class H."""
 
 
+FOLLOWED = (
+    ("position_reference", "position"),
+    ("reference", "output_angle"),
+    ("reference", "angle"),
+    ("output_speed_reference", "speed"),
+    ("speed_reference", "speed"),
+    ("velocity_reference", "velocity"),
+    ("current_reference", "current"),
+    ("voltage_reference", "voltage"),
+)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Finding:
     """One thing that was looked at: what, whether it agrees (None: not determined), and in words."""
@@ -50,15 +62,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     followed it, and current, speed, voltage, supply and load against the design's limits. A ratio that a
     known factor explains is named.
     """
-    checks: tuple[Callable[[Design, Record], Finding | None], ...] = (
-        _rate,
-        _clock,
-        _steps,
-        _reduction,
-        _electrical,
-        _command,
-        _supply,
-    )
+    checks = (_rate, _clock, _steps, _reduction, _electrical, _command, _supply)
     design = record.drive(design)
     found = (*(check(design, record) for check in checks), *_limits(design, record))
     return tuple(result for result in found if result is not None)
@@ -75,6 +79,10 @@ def place_of(design: Design, record: Record) -> tuple[str, FloatArray] | None:
     return None
 
 
+def _rate_name(design: Design) -> str:
+    return "velocity" if design.axis == "linear" else "speed"
+
+
 def _smooth(record: Record, values: FloatArray) -> FloatArray:
     """A signal without its fast part, no phase; the same filter for all signals that are compared."""
     from scipy.signal import butter, sosfiltfilt
@@ -82,7 +90,7 @@ def _smooth(record: Record, values: FloatArray) -> FloatArray:
     share = 2.0 * SMOOTH_HZ * record.period_s
     if share >= 0.5 or len(values) < 60:
         return values
-    return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values, padtype="even"), dtype=np.float64)
+    return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values, padtype="even"))
 
 
 def _moving(*signals: FloatArray) -> BoolArray:
@@ -127,8 +135,7 @@ class RateRatio:
 
 def rate_ratio(design: Design, record: Record) -> RateRatio | None:
     """Speed against the rate of the position; None where one of them is not recorded, or nothing moves."""
-    place = place_of(design, record)
-    name = "velocity" if design.axis == "linear" else "speed"
+    place, name = place_of(design, record), _rate_name(design)
     if place is None or name not in record.signals:
         return None
     # over each interval the same filter on both, the slope first: they agree up to the ends, and a motion
@@ -160,29 +167,26 @@ def _bounds(y: FloatArray, x: FloatArray, beside_x: FloatArray, beside_y: FloatA
 
     Another signal stands beside the regressor: its own slope takes up a delay between the two.
     """
-    a, a_error = _regressed(y, x, beside_x)
-    b, b_error = _regressed(x, y, beside_y)
-    if abs(b) <= SURE * b_error:
+
+    def ends(of: FloatArray, over: FloatArray, beside: FloatArray) -> tuple[float, float]:
+        w = np.column_stack([over, beside])
+        size = np.linalg.norm(w, axis=0)
+        result = solve(w / size, of)
+        slope, error = result.values[0] / size[0], np.sqrt(result.correlated[0, 0]) / size[0]
+        return float(slope - SURE * error), float(slope + SURE * error)
+
+    low, high = ends(x, y, beside_y)
+    if low <= 0.0 <= high:
         return -inf, inf
-    ends = [a + side * a_error for side in (-SURE, SURE)]
-    ends += [1.0 / (b + side * b_error) for side in (-SURE, SURE)]
-    return min(ends), max(ends)
-
-
-def _regressed(y: FloatArray, x: FloatArray, beside: FloatArray) -> tuple[float, float]:
-    """Slope of y over x and its error."""
-    w = np.column_stack([x, beside])
-    size = np.linalg.norm(w, axis=0)
-    result = solve(w / size, y)
-    return float(result.values[0] / size[0]), float(np.sqrt(result.correlated[0, 0]) / size[0])
+    all_ends = (*ends(y, x, beside_x), 1.0 / low, 1.0 / high)
+    return min(all_ends), max(all_ends)
 
 
 def _rate(design: Design, record: Record) -> Finding | None:
-    ratio = rate_ratio(design, record)
-    place = place_of(design, record)
+    ratio, place = rate_ratio(design, record), place_of(design, record)
     if ratio is None or place is None:
         return None
-    name = "velocity" if design.axis == "linear" else "speed"
+    name = _rate_name(design)
     subject = f"{name} against the rate of the {place[0]}"
     if abs(ratio.alike) < ALIKE:
         other = _other(record, name, ratio.rate, ratio.moves)
@@ -211,8 +215,7 @@ def clock_doubt(design: Design, record: Record) -> float:
 
 def _clock(design: Design, record: Record) -> Finding | None:
     """Where no speed is recorded beside the position, only the tick tells of a clock that is off."""
-    rate = "velocity" if design.axis == "linear" else "speed"
-    if place_of(design, record) is not None and rate in record.signals:
+    if place_of(design, record) is not None and _rate_name(design) in record.signals:
         return None
     ticks = record.period_s / design.controller.period_s
     if ticks < 1.0 - TICK_TOLERANCE or record.averaged > 1:
@@ -282,14 +285,13 @@ def _reduction(design: Design, record: Record) -> Finding | None:
         return None
     a, b = (record[name] - record[name].mean() for name in ("angle", "output_angle"))
     ratio, alike = _ratio(a, design.total_ratio * b)
+    subject = "angle against output angle"
     if abs(alike) < ALIKE:
-        return Finding(subject="angle against output angle", passed=False, text="they are not alike")
+        return Finding(subject=subject, passed=False, text="they are not alike")
     passed = abs(ratio - 1.0) <= RATE_TOLERANCE + _twist_share(design, record)
     factor = None if passed else named_factor(ratio, {design.total_ratio: "the reduction, counted twice"})
-    text = f"the motor angle is {ratio:.4g} times the output angle and the reduction" + (
-        f": factor {factor}" if factor else ""
-    )
-    return Finding(subject="angle against output angle", passed=passed, text=text)
+    text = f"the motor angle is {ratio:.4g} times the output angle and the reduction"
+    return Finding(subject=subject, passed=passed, text=text + (f": factor {factor}" if factor else ""))
 
 
 def _twist_share(design: Design, record: Record) -> float:
@@ -373,9 +375,8 @@ def _counted(design: Design, name: str, low: float, high: float) -> tuple[bool |
     kelvin, factor = (ratio - 1.0) / COPPER_1_K, named_factor(1.0 / ratio) if ratio else None
     warm = name == "R i" and WINDING_K[0] < kelvin < WINDING_K[1]
     if warm:
-        text += (
-            f": a winding {kelvin:+.0f} K from the design's, or a current {1.0 / ratio:.3g} times the real"
-        )
+        text += f": a winding {kelvin:+.0f} K from the design's"
+        text += f", or a current {1.0 / ratio:.3g} times the real"
     return (None if warm else False), text + (f": factor {factor}" if factor else "")
 
 
@@ -384,18 +385,8 @@ def _command(design: Design, record: Record) -> Finding | None:
 
     Whether it is followed as the design's loops follow it, the simulation of the record tells.
     """
-    followed = (
-        ("position_reference", "position"),
-        ("reference", "output_angle"),
-        ("reference", "angle"),
-        ("output_speed_reference", "speed"),
-        ("speed_reference", "speed"),
-        ("velocity_reference", "velocity"),
-        ("current_reference", "current"),
-        ("voltage_reference", "voltage"),
-    )
-    for command, answer in followed:
-        if command not in record.signals or answer not in record.signals:
+    for command, answer in FOLLOWED:
+        if not {command, answer} <= record.signals.keys():
             continue
         values = record[answer]
         if (command, answer) in (("reference", "angle"), ("output_speed_reference", "speed")):
@@ -404,14 +395,13 @@ def _command(design: Design, record: Record) -> Finding | None:
         if not np.any(b):  # a step that begins with the record tells no ratio
             continue
         ratio, alike = _ratio(a, b)
+        subject = f"{answer} against its command"
         if abs(alike) < 0.7:
-            return Finding(
-                subject=f"{answer} against its command", passed=None, text=f"cosine {alike:.2f}: not followed"
-            )
+            return Finding(subject=subject, passed=None, text=f"cosine {alike:.2f}: not followed")
         factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
         wrong = factor is not None and not 0.5 < ratio < 1.5
         text = f"{answer} is {ratio:.4g} times {command}" + (f": factor {factor}" if wrong else "")
-        return Finding(subject=f"{answer} against its command", passed=not wrong, text=text)
+        return Finding(subject=subject, passed=not wrong, text=text)
     return None
 
 
@@ -424,8 +414,7 @@ def _within(subject: str, record: Record, what: str, limit: float, unit: str) ->
     text = f"{subject.partition(' ')[0]} up to {result:.4g} {unit}, the design's limit is {limit:.4g} {unit}"
     if not passed:
         factor = explaining(result / limit, unit)
-        times = f", {result / limit:.3g} times"
-        text += times + (f": factor {factor}" if factor else "; is the unit right?")
+        text += f", {result / limit:.3g} times" + (f": factor {factor}" if factor else "; is the unit right?")
     return Finding(subject=subject, passed=passed, text=text)
 
 

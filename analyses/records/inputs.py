@@ -42,24 +42,16 @@ def account(record: Record, used: Mapping[str, str]) -> tuple[InputUse, ...]:
 def _use(record: Record, one: InputColumn, used: Mapping[str, str]) -> InputUse:
     unit, note = one.unit or "–", f" ({one.note})" if one.note else ""
     if one.signal == "time":
-        every, si = f"time, every {1e3 * record.period_s:.6g} ms", "s"
+        meaning, si = f"time, every {1e3 * record.period_s:.6g} ms", "s"
         values, use = record.time_s, "time"
     elif one.signal in record.signals:
-        every, si = MEANINGS.get(one.signal, one.signal), record.units.get(one.signal, "")
+        meaning, si = MEANINGS.get(one.signal, one.signal), record.units.get(one.signal, "")
         values, use = record[one.signal], used.get(one.signal, f"no: {NOT_USED}")
     else:
-        return InputUse(
-            column=one.column, unit=unit, use=f"no: {one.note or NOT_USED}" + note * bool(one.signal)
-        )
-    return InputUse(
-        column=one.column,
-        meaning=every,
-        unit=unit,
-        low=float(np.min(values)),
-        high=float(np.max(values)),
-        si=si,
-        use=use + note,
-    )
+        why = f"no: {one.note or NOT_USED}" + note * bool(one.signal)
+        return InputUse(column=one.column, unit=unit, use=why)
+    low, high = float(np.min(values)), float(np.max(values))
+    return InputUse(column=one.column, meaning=meaning, unit=unit, low=low, high=high, si=si, use=use + note)
 
 
 def inputs_of(spec: RecordSpec, columns: Sequence[str]) -> tuple[InputColumn, ...]:
@@ -69,13 +61,12 @@ def inputs_of(spec: RecordSpec, columns: Sequence[str]) -> tuple[InputColumn, ..
         return columns[column - 1] if isinstance(column, int) and column <= len(columns) else str(column)
 
     time = spec.time
-    result = []
-    if time.column is not None:
-        unit = f"ticks of {time.tick_s:g} s" if time.tick_s else time.unit
-        result.append(InputColumn(column=name(time.column), signal="time", unit=unit))
-    result += [
+    result = [
         InputColumn(column=name(s.column), signal=s.name, unit=s.unit, note=s.note) for s in spec.signals
     ]
+    if time.column is not None:
+        unit = f"ticks of {time.tick_s:g} s" if time.tick_s else time.unit
+        result.insert(0, InputColumn(column=name(time.column), signal="time", unit=unit))
     read = {name(column) for column in spec.columns(columns)}
     return (*result, *(InputColumn(column=c, note=NO_SIGNAL) for c in columns if c not in read))
 
@@ -87,40 +78,35 @@ def spec_of_names(
 
     None without a time or without any signal that is known; and for each column that is not read: why.
     """
-    layout = CsvFormat() if layout is None else layout
-    time: str | None = None
+    times: list[str] = []
     signals: dict[str, SignalColumn] = {}
     why: dict[str, str] = {}
-    own = {column: _own_name(column) for column in columns}
     for column in columns:
-        if is_time(own[column]):
-            if time is None:
-                time = column
-            else:
-                why[column] = f"the time is read from {time}"
+        name = _own_name(column)
+        if is_time(name):
+            times.append(column)
             continue
-        result = _signal(column, own[column], why)
-        if result is not None and result.name in signals and _at_the_output(column, result, signals):
-            before = signals[result.name].column
-            why[str(before)] = f"{MEANINGS[result.name]} is read from {column}"
-            signals[result.name] = result
-        elif result is not None and result.name in signals:
-            why[column] = f"{MEANINGS[result.name]} is read from {signals[result.name].column}"
-        elif result is not None:
-            signals[result.name] = result
-    if time is None or not signals:
+        found = _signal(column, name)
+        if isinstance(found, str):
+            why[column] = found
+            continue
+        before = signals.get(found.name)
+        taken = found if before is None or _at_the_output(found, before) else before
+        if before is not None:
+            other = before if taken is found else found
+            why[str(other.column)] = f"{MEANINGS[found.name]} is read from {taken.column}"
+        signals[found.name] = taken
+    why |= dict.fromkeys(times[1:], f"the time is read from {times[0]}")
+    if not times or not signals:
         return None, why
-    unit = taken_apart(own[time]).unit or "s"
-    read = TimeColumn(column=time, unit=unit)
-    return RecordSpec(format=layout, time=read, signals=tuple(signals.values())), why
+    time = TimeColumn(column=times[0], unit=taken_apart(_own_name(times[0])).unit or "s")
+    return RecordSpec(format=layout or CsvFormat(), time=time, signals=tuple(signals.values())), why
 
 
-def _at_the_output(column: str, result: SignalColumn, signals: Mapping[str, SignalColumn]) -> bool:
+def _at_the_output(found: SignalColumn, before: SignalColumn) -> bool:
     """Whether a column is the output's, where the motor's was taken: behind a coupling they differ."""
-    before = signals[result.name].column
-    if not isinstance(before, str):
-        return False
-    return taken_apart(column).base.startswith("output_") and taken_apart(before).base.startswith("motor_")
+    new, old = (taken_apart(str(one.column)).base for one in (found, before))
+    return new.startswith("output_") and old.startswith("motor_")
 
 
 def _own_name(column: str) -> str:
@@ -134,18 +120,15 @@ def _is_known(name: str) -> bool:
     return is_time(name) or (parts.unit is not None and signal_of(parts.base, parts.unit) is not None)
 
 
-def _signal(column: str, name: str, why: dict[str, str]) -> SignalColumn | None:
-    """The signal of one column by its name; where there is none, the reason is noted."""
+def _signal(column: str, name: str) -> SignalColumn | str:
+    """The signal of one column by its name or, where there is none, the reason."""
     parts = taken_apart(name)
     if parts.unit is None:
         known = parts.base in MEANINGS or any(signal_of(parts.base, u) for u in ("rad", "A", "V", "N*m"))
-        why[column] = "has no unit in its name" if known else "no name that is known"
-        return None
+        return "has no unit in its name" if known else "no name that is known"
     if NOT_NEEDED.get(parts.base) == parts.unit:
-        why[column] = "the position once more"
-        return None
+        return "the position once more"
     signal = signal_of(parts.base, parts.unit)
     if signal is None:
-        why[column] = "no name and unit that are known together"
-        return None
+        return "no name and unit that are known together"
     return SignalColumn(name=signal.name, column=column, unit=parts.unit, value="rms" if parts.rms else "dc")

@@ -12,7 +12,7 @@ from typing import Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import MatContent
-from actuator_lti.files.reading import as_path, open_regular, read_campaign_toml, shown_path
+from actuator_lti.files.reading import as_path, open_regular, read_campaign_toml
 from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
 from analyses.records.csv_rows import STAMP
 from analyses.records.inputs import spec_of_names
@@ -85,10 +85,11 @@ def open_records(path: str | Path) -> list[Record]:
         raise InputError("is empty; allowed: a line of names, then rows of numbers", where=str(path))
     spec, why = _spec_of_file(path, suffix)
     record = read_record(path, spec)
+    notes = ("" if one.signal else why.get(one.column, "") for one in record.inputs)
     inputs = tuple(
-        one if one.signal else replace(one, note=why.get(one.column, one.note)) for one in record.inputs
+        replace(one, note=note or one.note) for one, note in zip(record.inputs, notes, strict=True)
     )
-    return [replace(_with_gain(record), name=shown_path(path.name), inputs=inputs)]
+    return [replace(_with_gain(record), inputs=inputs)]
 
 
 def _described(path: Path) -> list[Record]:
@@ -97,7 +98,7 @@ def _described(path: Path) -> list[Record]:
     if not {"file", "record"} & set(root):
         raise InputError(f"a TOML file, and no record; allowed: {RECORDS}", where=str(path))
     shared = {key: value for key, value in root.data.items() if key != "record"}
-    result = []
+    result: list[Record] = []
     for one in root.tables("record") if "record" in root else [Table({}, "", str(path))]:
         signals = {**root.table("signals").data, **one.table("signals").data}
         own = Table({**shared, **one.data, "signals": signals}, one.path, one.origin)
@@ -106,13 +107,11 @@ def _described(path: Path) -> list[Record]:
         names: list[Any] = files if isinstance(files, list) and files else [files]
         if not all(isinstance(name, str) for name in names):
             raise own.fail("file", "a text, or a list of texts, is wanted")
-        spec = record_spec(
-            {k: v for k, v in own.data.items() if k not in ("file", "settings")}, own.origin, own.path
-        )
-        for file in (path.parent / name for name in names):
-            record = read_record(file, spec)
-            notes = (*record.notes, *(f"set: {key} = {value}" for key, value in settings.items()))
-            result.append(replace(record, name=shown_path(file.name), settings=settings, notes=notes))
+        rest = {key: value for key, value in own.data.items() if key not in ("file", "settings")}
+        spec = record_spec(Table(rest, own.path, own.origin))
+        told = tuple(f"set: {key} = {value}" for key, value in settings.items())
+        read = (read_record(path.parent / name, spec) for name in names)
+        result += [replace(one, settings=settings, notes=(*one.notes, *told)) for one in read]
     return result
 
 
@@ -130,29 +129,25 @@ def _settings(table: Table) -> dict[str, str | float]:
 
 
 def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str]]:
-    """The layout of a file from the names in it."""
+    """The layout of a file from the names in it; for each column that is not read: why."""
     if suffix == ".mat":
-        return _spec_of_mat(path)
-    if suffix in TABLES:
+        spec, why = _spec_of_mat(path)
+    elif suffix in TABLES:
         spec, why = spec_of_names(tuple(TABLES[suffix](path)[0]))
     else:
-        head = _head(path)
+        with open_regular(path, "record") as stream:
+            head = stream.read(HEAD_BYTES).decode("utf-8-sig", errors="replace")
         if head.startswith("%Motor characterization data"):
             return ODRIVE_SPEC, {}
         columns, layout = _columns_of_csv(head)
         spec, why = spec_of_names(columns, layout)
     if spec is None:
-        raise InputError(_told(UNKNOWN, why), where=str(path))
+        first = "; ".join(f'"{column}": {reason}' for column, reason in list(why.items())[:4])
+        raise InputError(f"{UNKNOWN} ({first})" if first else UNKNOWN, where=str(path))
     return spec, why
 
 
-def _told(message: str, why: Mapping[str, str]) -> str:
-    """A refusal with the first columns and why they are not understood."""
-    first = "; ".join(f'"{column}": {reason}' for column, reason in list(why.items())[:4])
-    return f"{message} ({first})" if first else message
-
-
-def _spec_of_mat(path: Path) -> tuple[RecordSpec, Mapping[str, str]]:
+def _spec_of_mat(path: Path) -> tuple[RecordSpec | None, Mapping[str, str]]:
     content, _ = load_mat(path)
     if set(content.arrays) >= EMPS_COLUMNS:
         return EMPS_SPEC, {}
@@ -161,7 +156,7 @@ def _spec_of_mat(path: Path) -> tuple[RecordSpec, Mapping[str, str]]:
         spec, why = spec_of_names(tuple(columns_of(content, layout, path)), layout)
         if spec is not None:
             return spec, why
-    raise InputError(_told(UNKNOWN, why), where=str(path))
+    return None, why
 
 
 def _layouts(content: MatContent) -> list[CsvFormat]:
@@ -178,11 +173,6 @@ def _with_gain(record: Record) -> Record:
         return record
     signals = {**record.signals, "force": gain * record["voltage"]}
     return replace(record, signals=signals, units={**record.units, "force": "N"})
-
-
-def _head(path: Path) -> str:
-    with open_regular(path, "record") as stream:
-        return stream.read(HEAD_BYTES).decode("utf-8-sig", errors="replace")
 
 
 def _columns_of_csv(head: str) -> tuple[tuple[str, ...], CsvFormat]:

@@ -38,14 +38,13 @@ def load_parquet(path: Path) -> tuple[Mapping[str, FloatArray], str]:
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:  # the last of names of columns
         raise InputError(f"is no Parquet file: {error}", where=where) from None
     result = {}
-    for field in table.schema:
-        if pa.types.is_integer(field.type) or pa.types.is_floating(field.type):
-            column = table.column(field.name).cast(pa.float64(), safe=False)
-            result[field.name] = np.asarray(column.to_numpy(), dtype=np.float64)
-        elif pa.types.is_timestamp(field.type):
-            stamps = table.column(field.name).cast(pa.timestamp("ns")).to_numpy()
+    for name, column in zip(table.column_names, table.columns, strict=True):
+        if pa.types.is_integer(column.type) or pa.types.is_floating(column.type):
+            result[name] = np.asarray(column.cast(pa.float64(), safe=False), dtype=np.float64)
+        elif pa.types.is_timestamp(column.type):
+            stamps = column.cast(pa.timestamp("ns")).to_numpy()
             since = (stamps - stamps[:1]) / np.timedelta64(1, "ns")
-            result[f"{field.name} [s]"] = 1e-9 * np.asarray(since, dtype=np.float64)
+            result[f"{name} [s]"] = 1e-9 * np.asarray(since, dtype=np.float64)
     return result, hashlib.sha256(data).hexdigest()
 
 
@@ -79,9 +78,8 @@ def read_mat_record(path: str | Path, spec: RecordSpec) -> Record:
     """
     path = Path(path)
     content, digest = load_mat(path)
-    vectors = columns_of(content, spec.format, path)
     constants = {k: float(v.ravel()[0]) for k, v in content.arrays.items() if v.size == 1}
-    return record_of_columns(vectors, spec, path, digest, constants=constants)
+    return record_of_columns(columns_of(content, spec.format, path), spec, path, digest, constants)
 
 
 def load_mat(path: Path) -> tuple[MatContent, str]:
@@ -105,18 +103,13 @@ def columns_of(content: MatContent, layout: CsvFormat, path: Path) -> Mapping[st
         return {key: value for key, value in content.arrays.items() if value.size > 1}
     matrix = content.arrays.get(layout.matrix)
     if matrix is None or matrix.ndim != 2:
-        there = ", ".join(f'"{k}" {"x".join(map(str, v.shape))}' for k, v in content.arrays.items())
-        raise InputError(
-            f'matrix = "{layout.matrix}": no such matrix; there are: {there or "none"}', where=str(path)
-        )
-    names = layout.names or names_in(content, matrix.shape[1])
-    if len(names) != matrix.shape[1]:
-        raise InputError(
-            f'matrix "{layout.matrix}" has {matrix.shape[1]} columns, {len(names)} names are given: '
-            "names = [...] must name each",
-            where=str(path),
-        )
-    return {name: matrix[:, k] for k, name in enumerate(names)}
+        there = ", ".join(f'"{k}" {"x".join(map(str, v.shape))}' for k, v in content.arrays.items()) or "none"
+        raise InputError(f'matrix = "{layout.matrix}": no such matrix; there are: {there}', where=str(path))
+    names, count = layout.names or names_in(content, matrix.shape[1]), matrix.shape[1]
+    if len(names) != count:
+        told = f"has {count} columns, {len(names)} names are given: names = [...] must name each"
+        raise InputError(f'matrix "{layout.matrix}" {told}', where=str(path))
+    return dict(zip(names, matrix.T, strict=True))
 
 
 def names_in(content: MatContent, count: int) -> tuple[str, ...]:
@@ -130,10 +123,11 @@ TABLES = {".parquet": load_parquet, ".pq": load_parquet, ".json": load_json}
 
 
 def read_record(path: Path, spec: RecordSpec) -> Record:
-    """A record of either kind, by the file's ending."""
-    if path.suffix.lower() == ".mat":
+    """A record of any kind, by the file's ending."""
+    suffix = path.suffix.lower()
+    if suffix == ".mat":
         return read_mat_record(path, spec)
-    if (load := TABLES.get(path.suffix.lower())) is not None:
-        vectors, digest = load(path)
+    if suffix in TABLES:
+        vectors, digest = TABLES[suffix](path)
         return record_of_columns(vectors, spec, path, digest)
     return read_csv_record(path, spec)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime
+from itertools import chain, count
 from types import MappingProxyType
 from typing import Any
 
@@ -17,11 +19,12 @@ RESAMPLE_TOLERANCE = 0.05
 """Largest error of a resampled signal that is accepted without being told to, as a share of its range."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True)
 class RowCounts:
-    """Rows in and out; ``rows_in == rows_out + sum(dropped.values())`` always holds.
+    """Lines and rows of a file; once it is read ``rows_in == rows_out + sum(dropped.values())``.
 
-    ``first_dropped`` names for each reason the first place where it happened.
+    ``first_dropped`` names for each reason the first place where it happened; ``columns`` are those of the
+    file, ``first_stamp`` that which its times count from.
     """
 
     lines: int = 0
@@ -30,18 +33,20 @@ class RowCounts:
     header: int = 0
     rows_in: int = 0
     rows_out: int = 0
-    dropped: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
-    first_dropped: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    dropped: dict[str, int] = field(default_factory=dict)
+    first_dropped: dict[str, str] = field(default_factory=dict)
+    columns: tuple[str, ...] = field(default=(), repr=False)
+    first_stamp: datetime | None = field(default=None, repr=False)
+
+    def drop(self, reason: str, where: str, count: int = 1) -> None:
+        """Count rows that are left out, and where the first of them was."""
+        self.dropped[reason] = self.dropped.get(reason, 0) + count
+        self.first_dropped.setdefault(reason, where)
 
     def __str__(self) -> str:
+        parts = [f"{count} {why} (first: {self.first_dropped[why]})" for why, count in self.dropped.items()]
         text = f"{self.rows_in} rows in, {self.rows_out} out"
-        if self.dropped:
-            parts = (
-                f"{count} {reason} (first: {self.first_dropped[reason]})"
-                for reason, count in self.dropped.items()
-            )
-            text += "; dropped: " + ", ".join(parts)
-        return text
+        return f"{text}; dropped: {', '.join(parts)}" if parts else text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,9 +101,9 @@ class Record:
 
     def __getitem__(self, name: str) -> FloatArray:
         """The named signal; an unknown name is an InputError that lists those there are."""
-        if name not in self.signals:
-            raise InputError(f'no signal "{name}"; there are: {", ".join(self.signals)}', where=self.name)
-        return self.signals[name]
+        if name in self.signals:
+            return self.signals[name]
+        raise InputError(f'no signal "{name}"; there are: {", ".join(self.signals)}', where=self.name)
 
     @property
     def period_s(self) -> float:
@@ -124,12 +129,11 @@ class Record:
         longest gap holds is from the samples between (95 % of all places), a quarter of that for a grid
         that is only out of step. Above ``resample_tolerance`` of the range of a signal it is refused.
         """
-        period = self.period_s
+        period, steps = self.period_s, np.diff(self.time_s)
         grid = np.arange(self.time_s[0], self.time_s[-1] + 1e-6 * period, period)
         cut = {name: np.interp(grid, self.time_s, values) for name, values in self.signals.items()}
-        steps = np.diff(self.time_s)
         longest = int(np.argmax(steps))
-        gap = float(steps[longest] / self.period_s)
+        gap = float(steps[longest] / period)
         errors = {name: line_error(self.time_s, values, gap) for name, values in self.signals.items()}
         worst = max(errors, key=lambda name: errors[name])
         note = (
@@ -158,14 +162,12 @@ def line_error(time_s: FloatArray, values: FloatArray, gap: float) -> float:
 
 def named_apart(records: Sequence[Record], taken: Sequence[str] = ()) -> list[Record]:
     """Records with names of their own, where files of one name lie in several folders."""
-    seen: list[str] = list(taken)
-    out = []
+    out: list[Record] = []
     for record in records:
-        name, k = record.name, 2
-        while name in seen:
-            name, k = f"{record.name} ({k})", k + 1
-        seen.append(name)
-        out.append(record if name == record.name else replace(record, name=name))
+        seen = {*taken, *(one.name for one in out)}
+        others = (f"{record.name} ({k})" for k in count(2))
+        name = next(name for name in chain([record.name], others) if name not in seen)
+        out.append(replace(record, name=name))
     return out
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from typing import Annotated, Literal
 
 from actuator_lti.design.units import compatible, parse_unit
@@ -166,10 +167,29 @@ class RecordSpec:
         if twice:
             raise InputError(f"signals.{twice[0]}: given twice")
 
+    def positions(self, header: Sequence[str], where: str) -> tuple[int, ...]:
+        """Where the wanted columns stand (from 0): the time's first, then the signals'."""
+        return tuple(_position(column, header, where) for column in self.columns(header))
+
     def columns(self, there: Collection[str]) -> tuple[str | int, ...]:
         """The columns to be read of a file that has those: the time's first, then those of each signal."""
         time = () if self.time.column is None else (self.time.column,)
         return (*time, *(column for one in self.signals for _, column in one.terms(there)))
+
+
+def _position(column: str | int, header: Sequence[str], where: str) -> int:
+    if isinstance(column, int):
+        if not 1 <= column <= len(header):
+            raise InputError(f"column {column}: the columns are numbered 1 to {len(header)}", where=where)
+        return column - 1
+    if column not in header:
+        near = get_close_matches(column, header, 1)
+        hint = f'; did you mean "{near[0]}"?' if near else ""
+        there = ", ".join(f'"{name}"' for name in header[:20])
+        raise InputError(f'no column "{column}"{hint} There are: {there}', where=where)
+    if header.count(column) > 1:
+        raise InputError(f'column "{column}" is there {header.count(column)} times; give its number', where)
+    return header.index(column)
 
 
 @dataclass(frozen=True)

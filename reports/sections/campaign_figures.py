@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from analyses.identification.campaign import CampaignResult
-from analyses.identification.surface_fit import SurfaceFit
+from analyses.identification.surface import SurfaceFit
 from analyses.records.record import Record
 from reports import document as doc
 from reports.charts import style

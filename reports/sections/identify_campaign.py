@@ -10,7 +10,7 @@ from analyses.identification.campaign import CampaignResult
 from analyses.identification.campaign_design import CampaignSuggestion
 from analyses.identification.richer import LawScore, RicherLaws
 from analyses.identification.run import CampaignAnswer
-from analyses.identification.surface_fit import SurfaceFit
+from analyses.identification.surface import SurfaceFit
 from reports import document as doc
 from reports.sections.campaign_figures import (
     NAMES,

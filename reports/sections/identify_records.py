@@ -8,8 +8,7 @@ import numpy as np
 
 from analyses.estimation.parameters import parameter
 from analyses.identification.bench import BenchResult
-from analyses.identification.design_values import DesignValue
-from analyses.identification.drive_constant import given_constant
+from analyses.identification.design_values import DesignValue, given_constant
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.residuals import ResidualTest

@@ -17,8 +17,7 @@ from analyses.identification.campaign_design import SuggestedRun, suggest_runs
 from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import refine_by_output_error
 from analyses.identification.steady import SteadyPoint, SteadyWindow
-from analyses.identification.surface import fit_surface
-from analyses.identification.surface_fit import SurfaceFit
+from analyses.identification.surface import SurfaceFit, fit_surface
 from analyses.identification.to_design import design_with_fit, joint_values
 from analyses.records.campaign_file import Instruments
 from analyses.records.open_record import open_record

@@ -20,7 +20,7 @@ def _tests(rest: np.ndarray) -> dict[str, ResidualTest]:
     force = 5.0 * RATE + 2.0 * SPEED + 3.0 * np.sign(SPEED) + rest
     model = fit_records(load_design("emps"), [record_of(TIME, position=PLACE, force=force)])
     part = model.records[0]
-    about_mean = np.linalg.norm(part.drive - part.drive.mean())
+    about_mean = np.linalg.norm(part.y - part.y.mean())
     assert part.fit_percent == pytest.approx(100.0 * (1.0 - np.linalg.norm(part.residual) / about_mean))
     return {test.input or test.name: test for test in residual_tests(model)}
 

@@ -9,8 +9,7 @@ import pytest
 from actuator_lti.design import load_design, read_design_text, write_design
 from actuator_lti.design.model import Design
 from analyses.identification.campaign import CampaignResult, identify_campaign
-from analyses.identification.surface import fit_surface
-from analyses.identification.surface_fit import PATHS, contributions
+from analyses.identification.surface import PATHS, contributions, fit_surface
 from analyses.identification.to_design import design_with_fit
 from analyses.records.campaign_file import Campaign, Join, RunEntry, load_campaign
 from analyses.records.campaign_import import ImportedCampaign, assemble_run, import_campaign

@@ -13,8 +13,7 @@ from actuator_lti.drive.steady import motor_torque_Nm
 from analyses.friction_effects import friction_effects
 from analyses.large_signal import large_signals
 from analyses.specification import Specification, specification
-from analyses.specification.capability import drive_figures
-from analyses.specification.manoeuvres import thermal_duty, torque_speed_plane
+from analyses.specification.capability import drive_figures, thermal_duty, torque_speed_plane
 from nonlinear import commands, simulate
 from nonlinear.bench.operating_motion import on_the_bench
 from reports import document as doc
