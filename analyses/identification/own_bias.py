@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -49,9 +50,16 @@ def without_bias(
     less = model
     simulated: tuple[Record, ...] = ()
     driven: tuple[Record, ...] = ()
-    like = {"form": model.form, "recipe": recipe, "gravity": "gravity_sin" in model}
-    like |= {"knots_rad_s": model.knots_rad_s, "weights": model.weights}
-    fixed = {name: one.value for name, one in model.fixed.items()}
+    fit = partial(
+        fit_records,
+        start,
+        form=model.form,
+        recipe=recipe,
+        fixed={name: one.value for name, one in model.fixed.items()},
+        gravity="gravity_sin" in model,
+        knots_rad_s=model.knots_rad_s,
+        weights=model.weights,
+    )
     for _ in range(ROUNDS):
         try:
             made = make(less)
@@ -60,7 +68,7 @@ def without_bias(
                 return replace(model, bias_told=reason), ()
             driven = driven or tuple(_driven(made, record) for record in records)
             simulated = tuple(_with_model_signals(made, record) for record in driven)
-            again = fit_records(start, simulated, fixed=fixed, **like)
+            again = fit(simulated)
         except (InputError, NumericalError) as error:
             return replace(less, bias_told=f"not taken off: {error}"), simulated
         before, less = less.values, _corrected(start, made, model, again)
@@ -173,4 +181,5 @@ def _sizes(model: JointModel) -> np.ndarray:
     gravity = math.hypot(model.get("gravity_sin", 0.0), model.get("gravity_cos", 0.0))
     dry = next((abs(model[n]) for n in ("dry", "dry_forward", "map_0") if n in model), 0.0)
     like = [gravity if n.startswith("gravity") else dry if n == "offset" else 0.0 for n in model.names]
-    return np.maximum.reduce([np.abs(model.values), like, model.standard_errors / LARGEST_BIAS])
+    errors = model.standard_errors / LARGEST_BIAS
+    return np.maximum(np.maximum(np.abs(model.values), like), errors)
