@@ -14,8 +14,10 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import as_path
 from actuator_lti.files.tree import Tree
+from actuator_lti.loops import assemble_loops
 from analyses.corners.run import corners
 from analyses.isolation import attempt, isolated
+from analyses.specification.requirements import evaluate_requirements
 from reports import document as doc
 from reports.analyses import BY_NAME, FURTHER, Analysis
 from reports.document_schema import Document
@@ -107,7 +109,6 @@ def report(
 
 
 def _measured(design: Design, response: Any, place: str, averages: int | None) -> list[doc.Section]:
-    from actuator_lti.loops import assemble_loops
     from analyses.margins.measured import measured_if_asked
     from reports.sections import measured
 
@@ -205,7 +206,6 @@ def _loops(
 ) -> tuple[Mapping[str, LoopFigures], list[doc.Section], LoopSurvey | None]:
     """Compute the linear loops and make their sections; none where the loops themselves fail."""
     from analyses.linear.loop_survey import survey_loops
-    from analyses.specification.requirements import evaluate_requirements
 
     survey = attempt("linear loops", lambda: survey_loops(design, progress), None)
     if survey is None:
@@ -297,5 +297,4 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
 
 
 def design_head(design: Design) -> Tree:
-    """Give what a document says of its design."""
     return {name: getattr(design, name) for name in ("name", "title", "revision", "origin", "axis")}

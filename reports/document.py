@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from functools import partial
+from functools import partial, reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -50,12 +51,13 @@ if TYPE_CHECKING:
     from reports.charts.chart import Chart
 
 T = TypeVar("T")
+_compact = partial(json.dumps, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 Shown = tuple[Column, Callable[[Any], Any]]
 
 __all__ = [
     "Block", "Cell", "Column", "Counts", "Document", "Finding", "Row", "Section", "State",
     "VerdictItem", "certain", "check", "column", "details", "document", "dumps", "fact",
-    "facts", "figure", "figures", "listing", "load", "loads", "of", "plain", "rounded", "section",
+    "facts", "figure", "figures", "listing", "load", "loads", "of", "plain", "section",
     "table", "text", "validate", "verdict", "verdicts", "waived", "walk", "with_columns",
 ]  # fmt: skip
 
@@ -86,12 +88,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, Iterable):
         return [plain(item) for item in value]
     raise TypeError(f"a report cannot hold a {type(value).__name__}")
-
-
-def rounded(values: Any, digits: int = 5) -> list[float | None]:
-    """Give a curve as plain numbers of so many significant digits, which is all that a figure shows."""
-    array = np.asarray(values, dtype=float)
-    return [float(f"{item:.{digits}g}") if math.isfinite(item) else None for item in array.tolist()]
 
 
 def column(
@@ -141,17 +137,16 @@ def of(
     >>> read(2.0 + 3.0j), read(None)
     (0.0, None)
     """
-    value = partial(_field, read.split(".")) if isinstance(read, str) else read
     made = column(key, label, unit, **look)
+
+    def value(item: Any) -> Any:
+        if not isinstance(read, str):
+            return read(item)
+        return reduce(lambda of, name: None if of is None else getattr(of, name), read.split("."), item)
+
     if scale == 1.0:
         return made, value
     return made, lambda item: None if (found := value(item)) is None else scale * found
-
-
-def _field(names: Sequence[str], item: Any) -> Any:
-    for name in names:
-        item = None if item is None else getattr(item, name)
-    return item
 
 
 def listing(
@@ -204,7 +199,6 @@ def with_columns(block: Block, keys: Collection[str]) -> Block:
 
 
 def text(content: str) -> Block:
-    """Make a paragraph."""
     return {"kind": "text", "text": prose(content)}
 
 
@@ -228,7 +222,6 @@ def fact(label: str, value: Any, unit: str = "", *, better: int = 0) -> FactItem
 
 
 def facts(items: Iterable[FactItem]) -> Block:
-    """Make a list of labelled values."""
     return {"kind": "facts", "items": [plain(item) for item in items]}
 
 
@@ -287,12 +280,10 @@ def verdicts(items: Iterable[VerdictItem], what: str = "requirements") -> Block:
 
 
 def judged(blocks: Iterable[Block]) -> list[VerdictItem]:
-    """Every verdict of some blocks."""
     return [item for block in blocks if block["kind"] == "verdicts" for item in block["items"]]
 
 
 def details(title: str, blocks: Sequence[Block]) -> Block:
-    """Make a part that opens on demand."""
     return {"kind": "details", "title": title, "blocks": list(blocks)}
 
 
@@ -370,7 +361,6 @@ def _seen(value: Any) -> Any:
 
 
 def figures(made: Mapping[str, Any]) -> list[Block]:
-    """Give every figure block of a document, in order."""
     return [block for part in made["sections"] for block in walk(part) if block["kind"] == "figure"]
 
 
@@ -422,13 +412,6 @@ def check(made: Any, origin: str | None = None) -> None:
         Naming the place, and what is wrong with it.
     """
     validate(made, origin)
-    seen: set[str] = set()
-    for part in made["sections"]:
-        if part["id"] in seen:
-            raise InputError(f"section {shown(part['id'])} occurs twice", where=origin)
-        seen.add(part["id"])
-
-
-def _compact(value: Any) -> str:
-    """Write JSON without needless blanks, and never with NaN."""
-    return json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for id, count in Counter(part["id"] for part in made["sections"]).items():
+        if count > 1:
+            raise InputError(f"section {shown(id)} occurs twice", where=origin)

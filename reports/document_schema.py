@@ -38,8 +38,6 @@ Format = Annotated[str, Field(pattern=r"^(text|yesno|int|(fix|gain):1?[0-9]|(sig
 
 
 class Mark(TypedDict):
-    """A cell with a state."""
-
     text: Scalar
     status: Status | Literal[""] | None
 
@@ -80,8 +78,6 @@ class Column(TypedDict):
 
 
 class TableBlock(TypedDict):
-    """A table."""
-
     kind: Literal["table"]
     caption: str
     columns: list[Column]
@@ -101,15 +97,11 @@ class FigureBlock(TypedDict):
 
 
 class TextBlock(TypedDict):
-    """Paragraphs."""
-
     kind: Literal["text"]
     text: str
 
 
 class FactItem(TypedDict):
-    """A labelled value."""
-
     label: str
     value: Scalar
     unit: str
@@ -117,8 +109,6 @@ class FactItem(TypedDict):
 
 
 class FactsBlock(TypedDict):
-    """Labelled values."""
-
     kind: Literal["facts"]
     items: list[FactItem]
 
@@ -146,16 +136,12 @@ class VerdictItem(TypedDict):
 
 
 class VerdictsBlock(TypedDict):
-    """Verdicts of one kind."""
-
     kind: Literal["verdicts"]
     items: list[VerdictItem]
     what: NotRequired[str]
 
 
 class DetailsBlock(TypedDict):
-    """Blocks that open on demand."""
-
     kind: Literal["details"]
     title: str
     blocks: list[Block]
@@ -176,8 +162,6 @@ class GlanceFigure(TypedDict):
 
 
 class GlanceLoop(TypedDict):
-    """One loop on the first screen."""
-
     loop: str
     anchor: str
     stable: State
@@ -215,8 +199,6 @@ class Bar(TypedDict):
 
 
 class GlanceBlock(TypedDict):
-    """The first screen."""
-
     kind: Literal["glance"]
     loops: list[GlanceLoop]
     weakest: Weakest | None
@@ -235,8 +217,6 @@ Block = Annotated[
 
 
 class Section(TypedDict):
-    """A section."""
-
     id: Annotated[str, Field(min_length=1)]
     title: str
     result: NotRequired[str]
@@ -248,8 +228,6 @@ class Section(TypedDict):
 
 
 class Counts(TypedDict):
-    """Verdicts of one kind, counted."""
-
     met: int
     not_met: int
     not_proven: int
@@ -277,8 +255,6 @@ class Provenance(TypedDict):
 
 @with_config(ConfigDict(strict=True, extra="allow", allow_inf_nan=False))  # no NaN; more keys may stand
 class Document(TypedDict):
-    """A whole report.json."""
-
     schema: Literal["actuator-lti/report"]
     version: Literal[2]
     kind: str

@@ -153,7 +153,6 @@ def security_policy(*scripts: str, wasm: bool = False) -> str:
 
 
 def show_signed(value: float | None, digits: int = 3) -> str:
-    """Write a difference with its sign."""
     if value is None:
         return MISSING
     return ("+" if value > 0 else "") + significant(value, digits)

@@ -37,7 +37,6 @@ def model_png(design: Design) -> bytes | None:
 
 
 def model_svg(design: Design) -> str:
-    """The picture as SVG."""
     parts = [
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="{COLOURS["paper"]}"/>',
         _words(WIDTH / 2, 28, design.name, 17, bold=True),

@@ -41,7 +41,6 @@ def show(value: Any, format: str = "text") -> str:
 
 
 def fixed(value: float, decimals: int) -> str:
-    """Write a number with so many decimals."""
     text = f"{value:.{decimals}f}"
     return to_minus(text.lstrip("-") if float(text) == 0 else text)
 
@@ -58,7 +57,6 @@ def gain_margin(decibel: float, decimals: int) -> str:
 
 
 def short(value: float, digits: int = 4) -> str:
-    """Write a number with so many significant digits, without trailing zeros."""
     head, cross, power = significant(value, digits).partition("×")
     return (head.rstrip("0").rstrip(".") if "." in head else head) + cross + power
 
@@ -139,7 +137,6 @@ def hertz(value: float) -> str:
 
 
 def capital(words: str) -> str:
-    """Begin with a capital; the rest stays."""
     return words[:1].upper() + words[1:]
 
 
@@ -164,5 +161,4 @@ def _plain(power: re.Match[str]) -> str:
 
 
 def to_minus(text: str) -> str:
-    """Use the minus sign of typography."""
     return text.replace("-", "−")

@@ -22,7 +22,6 @@ _SAFE = (
 
 
 def package_version(name: str = "actuator-lti", otherwise: str = "not installed") -> str:
-    """Give the version of an installed distribution."""
     try:
         return version(name)
     except PackageNotFoundError:

@@ -118,7 +118,6 @@ def table(block: Mapping[str, Any], wrapped: int, *, narrow: bool = False) -> Ta
 
 
 def fact_table(block: Mapping[str, Any]) -> Table:
-    """Lay labelled values out, a line each."""
     made = Table.grid(padding=(0, 2))
     for item in block["items"]:
         made.add_row(Text(item["label"]), Text(f"{show(item['value'])} {item['unit']}".rstrip()))
@@ -192,7 +191,6 @@ def _label(column: Mapping[str, Any]) -> str:
 
 
 def verdict_table(block: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Verdicts as a table block."""
     columns = [doc.column("label", "Requirement"), doc.column("word", "Verdict")]
     columns += [doc.column(key, key.capitalize(), align="right") for key in ("found", "limit", "distance")]
     rows = []
@@ -224,7 +222,6 @@ def _empty(caption: str) -> Table:
 
 
 def _cell(value: Any, format: str) -> Text:
-    """Write a cell; one with a status has its colour."""
     if isinstance(value, Mapping):
         return Text(show(value["text"], format), style=COLOURS.get(value.get("status") or "", ""))
     return Text(show(value, format))

@@ -24,19 +24,17 @@ _SECTIONS: tuple[tuple[str, str, Role], ...] = (
 
 
 def tally(items: Iterable[Mapping[str, Any]]) -> Tally:
-    """Count items of `reports.document.verdicts`."""
-    return sum((_counted(item) for item in items), Tally())
-
-
-def _counted(item: Mapping[str, Any]) -> Tally:
-    """One item, or the checks that it gathers."""
-    if (gathered := item.get("gathers")) is not None:
-        return Tally(**gathered)
-    return Tally.of([Verdict(item["verdict"])], [bool(item["waiver"])])
+    """Count items of `reports.document.verdicts`, of some the checks that they gather."""
+    counts = (
+        Tally.of([Verdict(item["verdict"])], [bool(item["waiver"])])
+        if (gathered := item.get("gathers")) is None
+        else Tally(**gathered)
+        for item in items
+    )
+    return sum(counts, Tally())
 
 
 def role(item: Mapping[str, Any]) -> Role:
-    """The colour of one item."""
     return Verdict(item["verdict"]).role(waived=bool(item["waiver"]))
 
 
@@ -59,11 +57,15 @@ def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Overall:
 
     Such a section says that a loop is unstable, say, or that its stability is not known.
     """
+
+    def missed(part: Mapping[str, Any]) -> int:
+        return sum(count.not_met for count in counted(walk(part)).values())
+
     report = kind == "report"
     parts = {"requirements": Tally()} if report else {}
     parts |= counted(block for part in sections for block in walk(part))
     whole = sum(parts.values(), Tally())
-    silent = [part for part in sections if report and part["status"] == "fail" and not _missed(part)]
+    silent = [part for part in sections if report and part["status"] == "fail" and not missed(part)]
     first = [part["title"] for part in silent if part["id"] == "answer"]  # it gathers what the others say
     failed = [part["title"] for part in silent if part["id"] != "answer"]
     if not failed and not whole.not_met:
@@ -77,10 +79,6 @@ def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Overall:
     }
     more = {"failed_sections": failed, "unproven_sections": open_ones}
     return cast(Overall, {**made, **{key: titles for key, titles in more.items() if titles}})
-
-
-def _missed(part: Mapping[str, Any]) -> int:
-    return sum(count.not_met for count in counted(walk(part)).values())
 
 
 def walk(part: Mapping[str, Any]) -> Iterable[Block]:

@@ -32,7 +32,6 @@ class Axis:
     seen: list[float] = field(default_factory=list)
 
     def limits(self, low: float | None = None, high: float | None = None) -> None:
-        """Set one or both ends."""
         self.low = self.low if low is None else float(low)
         self.high = self.high if high is None else float(high)
 
@@ -127,7 +126,6 @@ def log_ticks(low: float, high: float, room: int = 6) -> list[tuple[float, str]]
 
 
 def minor_ticks(axis: Axis) -> list[float]:
-    """Give the unnamed ticks of a logarithmic axis."""
     low, high = axis.span()
     if not axis.log or axis.ticks is not None or math.log10(high / low) > 5.5:
         return []

@@ -7,7 +7,8 @@ A column is a picture of its own, so that columns stack where the screen is narr
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import partialmethod
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -21,13 +22,9 @@ Values = Sequence[float | None] | Sequence[float] | np.ndarray
 
 
 def numbers(values: Values) -> np.ndarray:
-    """Turn plain values into floats; None is NaN."""
-    return np.asarray(values, dtype=float)
-
-
-def _read_numbers(values: Any) -> np.ndarray:
+    """Turn plain values into floats; None is NaN, and what is none a ValueError."""
     try:
-        return numbers(values)
+        return np.asarray(values, dtype=float)
     except TypeError as error:
         raise ValueError(str(error)) from None
 
@@ -38,10 +35,11 @@ def _read_colour(name: str) -> str:
     return name
 
 
-Numbers = Annotated[np.ndarray, PlainValidator(_read_numbers)]
+Numbers = Annotated[np.ndarray, PlainValidator(numbers)]
 Colour = Annotated[str, AfterValidator(_read_colour)]  # a pen writes it as it stands
 Length = Annotated[float, Field(gt=0.0, le=10_000.0)]  # ticks are as many as have room
 Share = Annotated[float, Field(gt=0.0, le=1000.0)]
+Way = Literal["x", "y"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +90,7 @@ class Rule:
 
     kind: Literal["rule"] = "rule"
     at: float
-    across: Literal["x", "y"]
+    across: Way
     look: Look
     words: str = ""
     label: str = ""
@@ -105,7 +103,7 @@ class Band:
     kind: Literal["band"] = "band"
     low: float
     high: float
-    across: Literal["x", "y"]
+    across: Way
     look: Look
     label: str = ""
 
@@ -143,41 +141,37 @@ class Panel:
 
     def curve(self, x: Values, y: Values, label: str = "", **options: Any) -> Curve:
         """Draw a line; options are those of `Curve` and `Look`."""
-        own = {key: options.pop(key) for key in ("line", "stairs", "every", "read", "id") if key in options}
-        parameter = options.pop("parameter", None)
-        made = Curve(
-            x=numbers(x), y=numbers(y), look=Look(**options), label=label,
-            parameter=None if parameter is None else numbers(parameter), **own,
-        )  # fmt: skip
+        own = {each.name: options.pop(each.name) for each in fields(Curve) if each.name in options}
+        if own.get("parameter") is not None:
+            own["parameter"] = numbers(own["parameter"])
+        made = Curve(x=numbers(x), y=numbers(y), look=Look(**options), label=label, **own)
         self.x.see(made.x[np.isfinite(made.y)])
         self.y.see(made.y)
         self.items.append(made)
         return made
 
     def points(self, x: Values, y: Values, label: str = "", **options: Any) -> Curve:
-        """Draw points only."""
         return self.curve(x, y, label, **{"marker": "o", "line": False, **options})
 
-    def rule_x(self, at: float, words: str = "", label: str = "", *, seen: bool = False, **look: Any) -> None:
-        """Draw an upright line; ``seen``: the axis reaches it."""
-        self.x.see([at] if seen else [])
-        self.items.append(Rule(at=float(at), across="x", look=_thin(look), words=words, label=label))
+    def _rule(
+        self, across: Way, at: float, words: str = "", label: str = "", *, seen: bool = False, **look: Any
+    ) -> None:
+        """Draw a line at an x or at a y; ``seen``: the axis reaches it."""
+        getattr(self, across).see([at] if seen else [])
+        painted = Look(**{"colour": "muted", "width": 1.0, **look})
+        self.items.append(Rule(at=float(at), across=across, look=painted, words=words, label=label))
 
-    def rule_y(self, at: float, words: str = "", label: str = "", *, seen: bool = False, **look: Any) -> None:
-        """Draw a level; ``seen``: the axis reaches it."""
-        self.y.see([at] if seen else [])
-        self.items.append(Rule(at=float(at), across="y", look=_thin(look), words=words, label=label))
+    rule_x = partialmethod(_rule, "x")
+    rule_y = partialmethod(_rule, "y")
 
-    def band_x(self, low: float, high: float, label: str = "", **look: Any) -> None:
-        """Shade a stretch of x."""
-        self.items.append(Band(low=low, high=high, across="x", look=_shade(look), label=label))
+    def _band(self, across: Way, low: float, high: float, label: str = "", **look: Any) -> None:
+        """Shade a stretch of x or of y."""
+        self.items.append(Band(low=low, high=high, across=across, look=_shade(look), label=label))
 
-    def band_y(self, low: float, high: float, **look: Any) -> None:
-        """Shade a stretch of y."""
-        self.items.append(Band(low=low, high=high, across="y", look=_shade(look)))
+    band_x = partialmethod(_band, "x")
+    band_y = partialmethod(_band, "y")
 
     def shape(self, rings: Sequence[tuple[Values, Values]], label: str = "", **look: Any) -> None:
-        """Fill outlines."""
         made = [(numbers(x), numbers(y)) for x, y in rings]
         self.items.append(Shape(rings=made, look=_shade(look), label=label))
 
@@ -240,18 +234,11 @@ class Chart:
         return made
 
     def labels(self) -> list[tuple[str, Item]]:
-        """Give every legend entry once, in the order drawn."""
         result: dict[str, Item] = {}
-        for column in self.columns:
-            for panel in column.panels:
-                for item in panel.items:
-                    if not isinstance(item, Note) and item.label:
-                        result.setdefault(item.label, item)
+        for item in (one for column in self.columns for panel in column.panels for one in panel.items):
+            if not isinstance(item, Note) and item.label:
+                result.setdefault(item.label, item)
         return list(result.items())
-
-
-def _thin(look: Mapping[str, Any]) -> Look:
-    return Look(**{"colour": "muted", "width": 1.0, **look})
 
 
 def _shade(look: Mapping[str, Any]) -> Look:

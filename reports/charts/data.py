@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
-from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -19,6 +18,7 @@ from reports.charts.axis import Axis
 from reports.charts.chart import Chart, Column
 
 DIGITS = 6
+_READER = TypeAdapter(Chart)
 
 
 def chart_data(chart: Chart) -> Tree:
@@ -32,8 +32,7 @@ def chart_data(chart: Chart) -> Tree:
     >>> again.width, again.columns[0].panels[0].items[0].label
     (300.0, 'y')
     """
-    made: Tree = _plain(chart)
-    return made
+    return cast(Tree, _plain(chart))
 
 
 def chart_of(data: Mapping[str, Any]) -> Chart:
@@ -45,7 +44,7 @@ def chart_of(data: Mapping[str, Any]) -> Chart:
         For what is no chart: the first place that is wrong.
     """
     try:
-        chart = _reader().validate_python(data)
+        chart = _READER.validate_python(data)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"]))
@@ -58,11 +57,6 @@ def chart_of(data: Mapping[str, Any]) -> Chart:
             for panel in column.panels:
                 panel.x = column.panels[-1].x
     return chart
-
-
-@cache
-def _reader() -> TypeAdapter[Chart]:
-    return TypeAdapter(Chart)
 
 
 def _plain(value: Any) -> Any:

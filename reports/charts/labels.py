@@ -30,7 +30,6 @@ def text_width(words: str, size: float) -> float:
 
 
 def text_box(words: str, size: float) -> tuple[float, float]:
-    """Give width and height of one or several lines."""
     lines = words.split("\n")
     return max(text_width(line, size) for line in lines), LINE_EM * size * len(lines)
 
@@ -49,7 +48,8 @@ class Room:
         points = np.column_stack([x, y])
         pairs = good[1:] & good[:-1]
         start, stop = points[:-1][pairs], points[1:][pairs]
-        near = _clipped(start, stop, self.frame)
+        low, high = np.minimum(start, stop), np.maximum(start, stop)
+        near = (high >= self.frame[:2]).all(axis=1) & (low <= self.frame[2:]).all(axis=1)  # roughly
         start, stop = start[near], stop[near]
         if len(start):
             longest = float(np.max(np.abs(stop - start)))
@@ -93,17 +93,10 @@ class Room:
         left, top, right, bottom = self.frame
         outside = max(left - x0, 0) + max(x1 - right, 0) + max(top - y0, 0) + max(y1 - bottom, 0)
         cost = 1e4 + 100.0 * outside if outside > 0.5 else 0.0
-        for a0, b0, a1, b1 in self.boxes:
-            if x0 < a1 and a0 < x1 and y0 < b1 and b0 < y1:
-                cost += COVERED
-        return cost + CROSSED * self._crossed(box)
-
-    def _crossed(self, box: Box) -> int:
-        x0, y0, x1, y1 = box
-        points = self._points()
-        inside = (points[:, 0] > x0 - PAD) & (points[:, 0] < x1 + PAD)
-        inside &= (points[:, 1] > y0 - PAD) & (points[:, 1] < y1 + PAD)
-        return int(inside.sum())
+        cost += COVERED * sum(x0 < a1 and a0 < x1 and y0 < b1 and b0 < y1 for a0, b0, a1, b1 in self.boxes)
+        x, y = self._points().T
+        crossed = (x > x0 - PAD) & (x < x1 + PAD) & (y > y0 - PAD) & (y < y1 + PAD)
+        return cost + CROSSED * int(crossed.sum())
 
     def _points(self) -> np.ndarray:
         if len(self.ink) != 1:
@@ -130,10 +123,3 @@ def distance(box: Box, at: tuple[float, float]) -> float:
     dx = max(box[0] - at[0], 0.0, at[0] - box[2])
     dy = max(box[1] - at[1], 0.0, at[1] - box[3])
     return math.hypot(dx, dy)
-
-
-def _clipped(start: np.ndarray, stop: np.ndarray, frame: Box) -> np.ndarray:
-    """Tell which pieces of a line touch the frame, roughly."""
-    low, high = np.minimum(start, stop), np.maximum(start, stop)
-    inside = (high[:, 0] >= frame[0]) & (low[:, 0] <= frame[2])
-    return np.asarray(inside & (high[:, 1] >= frame[1]) & (low[:, 1] <= frame[3]))

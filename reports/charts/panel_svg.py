@@ -18,7 +18,6 @@ RULE_LENGTH = 3000  # of rules; longer ones cost a browser dear where they are d
 
 
 def panel_svg(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
-    """Write a panel with its axes."""
     room = Room((frame.left + 2, frame.top + 2, frame.right - 2, frame.bottom - 2))
     world, marks = [], []
     for k, item in enumerate(panel.items):
@@ -124,7 +123,7 @@ def _curve(item: Curve, panel: Panel, frame: Frame, pen: Pen, room: Room, key: s
     x, y = frame.x(panel.x, item.x), frame.y(panel.y, item.y)
     drawn, dots = "", ""
     if item.line:
-        px, py = _stairs(x, y) if item.stairs else (x, y)
+        px, py = (np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]) if item.stairs else (x, y)
         more = f' class="curve{"" if item.read else " mute"}"{key}'
         more += ' data-stairs="1"' if item.stairs else ""
         more += f' data-id="{escape(item.id)}"' if item.id else ""
@@ -165,11 +164,6 @@ def _rule(item: Rule, panel: Panel, frame: Frame, pen: Pen, room: Room, key: str
         path, ends = f"M-{RULE_LENGTH} {at:.2f}H{RULE_LENGTH}", ([frame.left, frame.right], [at, at])
     room.add_line(np.array(ends[0]), np.array(ends[1]))
     return pen.line(path, item.look, f' class="rule"{key}' if pen.page else "")
-
-
-def _stairs(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Hold each value until the next."""
-    return np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
 
 
 def _path(x: np.ndarray, y: np.ndarray) -> str:

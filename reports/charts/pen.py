@@ -27,20 +27,16 @@ class Frame:
 
     @property
     def width(self) -> float:
-        """Width."""
         return self.right - self.left
 
     @property
     def height(self) -> float:
-        """Height."""
         return self.bottom - self.top
 
     def x(self, axis: Axis, values: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Give pixels of values along x."""
         return np.clip(self.left + self.width * axis.place(values), -FAR, FAR)
 
     def y(self, axis: Axis, values: Sequence[float] | np.ndarray) -> np.ndarray:
-        """Give pixels of values along y."""
         return np.clip(self.bottom - self.height * axis.place(values), -FAR, FAR)
 
 
@@ -68,7 +64,6 @@ class Pen:
         return " ".join(f'{key}="{value}"' for key, value in resolved.items())
 
     def stroke(self, look: Look) -> str:
-        """Give the style of a line."""
         return self.style(
             fill="none", stroke=look.colour, stroke_width=f"{look.width:g}",
             stroke_dasharray=DASHES[look.dash % len(DASHES)],
@@ -76,7 +71,6 @@ class Pen:
         )  # fmt: skip
 
     def line(self, path: str, look: Look, more: str = "") -> str:
-        """Write a line."""
         return f'<path{more} d="{path}" {self.stroke(look)}/>'
 
     def filled(self, path: str, look: Look, more: str = "") -> str:
@@ -99,7 +93,6 @@ class Pen:
         return f'{body}{pattern}<path{more} d="{path}" fill="url(#{name})"/>'
 
     def marker(self, look: Look, x: float, y: float) -> str:
-        """Write one marker."""
         place = f"translate({x:.2f} {y:.2f}) scale({look.size / 2:g})"
         return f'<path d="{MARKER_PATHS[look.marker]}" transform="{place}" {self.marker_style(look)}/>'
 

@@ -22,22 +22,18 @@ Style = dict[str, Any]  # how an item is drawn: fields of `reports.charts.chart.
 
 
 def series(k: int) -> Style:
-    """Give colour and dash of the k-th series."""
     return {"colour": SERIES[k % 7], "dash": k % 7}
 
 
 def marked(k: int, size: float = 6.0) -> Style:
-    """Give colour and marker of the k-th series."""
     return {"colour": SERIES[k % 7], "marker": "os^Dv<>"[k % 7], "size": size}
 
 
 def known(values: Iterable[float | None]) -> list[float]:
-    """Give the values that are there."""
     return [value for value in values if value is not None and math.isfinite(value)]
 
 
 def frequency(panel: Panel, ends: Sequence[float] | np.ndarray | None = None) -> None:
-    """Make x a logarithmic frequency."""
     panel.x.log, panel.x.label = True, "frequency, Hz"
     if ends is not None:
         panel.x.limits(ends[0], ends[-1])
@@ -61,7 +57,6 @@ def phase_axis(panel: Panel, values: Iterable[float | None], *, span: float = 90
 
 
 def multiples(step: float, low: float, high: float) -> list[tuple[float, str]]:
-    """Give a tick at every multiple of a step."""
     levels = [step * k for k in range(math.ceil(low / step), math.floor(high / step) + 1)]
     return [(level, to_minus(f"{level:.0f}")) for level in levels]
 

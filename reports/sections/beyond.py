@@ -30,15 +30,13 @@ def large_commands(conditional: Conditional, axis: str = "rotary") -> doc.Sectio
         "large commands, although every linear margin is sufficient. Steps are simulated with dry friction."
     )
     status: doc.Status = "fail" if conditional.diverges else "pass"
-    findings = findings_of(conditional, axis)
     return doc.section(
         "conditional", "Large commands and conditional stability", blocks, result=result, intro=intro,
-        status=status, findings=findings,
+        status=status, findings=findings_of(conditional, axis),
     )  # fmt: skip
 
 
 def findings_of(conditional: Conditional, axis: str = "rotary") -> list[doc.Finding]:
-    """What a reader must know of large commands."""
     if not conditional.diverges:
         return []
     text = _words(conditional, *output_unit(axis))[0]
@@ -62,9 +60,8 @@ def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
             f"At the threshold the output nears a limit cycle of {size} at "
             f"{conditional.oscillation_hz:.3g} Hz."
         )
-        free = [one for one in conditional.predictions if not one.antiwindup]
-        if free:
-            best = free[0]
+        best = next((one for one in conditional.predictions if not one.antiwindup), None)
+        if best is not None:
             made.append(
                 f"The describing function of the {best.limiter} limit predicts "
                 f"{best.output_rad * scale:.3g} {unit} at {best.frequency_hz:.3g} Hz."
@@ -75,15 +72,13 @@ def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
 def _ending(conditional: Conditional, scale: float, unit: str) -> str:
     """Say what the smallest step that does not settle ends in, and which limit acts."""
     swing = f"{(conditional.end_rad or 0.0) * scale:.3g} {unit}"
-    sizes = {
+    words = {
         "diverges": "the output diverges",
         "keeps oscillating": f"the output keeps oscillating with {swing}",
         "is held by a limit": "the drive stops short of the command",
-    }
-    words = sizes[conditional.ending]
-    if conditional.limiter:
-        words += f"; the {conditional.limiter} limit acts {100 * conditional.limiter_share:.0f} % of the time"
-    return words
+    }[conditional.ending]
+    share = f"; the {conditional.limiter} limit acts {100 * conditional.limiter_share:.0f} % of the time"
+    return words + share * bool(conditional.limiter)
 
 
 def _large_facts(conditional: Conditional, scale: float, unit: str) -> doc.Block:
@@ -127,20 +122,16 @@ def counts(found: Sequence[Counts], axis: str = "rotary") -> doc.Section:
         "large amplitudes its gain tends to 1. The motor's counts are seen in the speed made of them, the "
         "output's in its position."
     )
-    blocks: list[doc.Block] = [doc.facts(_facts(one, axis)) for one in found]
     cycles = [(one, cycle) for one in found for cycle in one.cycles]
-    if cycles:
-        blocks.append(_cycles(cycles, axis))
+    blocks: list[doc.Block] = [doc.facts(_facts(one, axis)) for one in found]
+    blocks += [_cycles(cycles, axis)] if cycles else []
     words = [sentence(one, axis) for one in found]
     findings = [doc.Finding(severity="info", text=text, where="counts") for text in words]
-    return doc.section(
-        "counts", "Counts of the encoders", blocks, result=" ".join(words), intro=intro, status="info",
-        findings=findings,
-    )  # fmt: skip
+    title = "Counts of the encoders"
+    return doc.section("counts", title, blocks, result=" ".join(words), intro=intro, findings=findings)
 
 
 def sentence(one: Counts, axis: str) -> str:
-    """Say in one sentence what the counts do."""
     scale, unit, speed = _units(axis)
     side = "" if axis == "linear" else " (motor side)"
     words = [f"{one.ripple_rad_s:.2g} {speed} of ripple at {one.ripple_at_rad_s:.3g} {speed}{side}"]
@@ -155,9 +146,8 @@ def _facts(one: Counts, axis: str) -> list[FactItem]:
     scale, unit, speed = _units(axis)
     name = NAMES[one.sensor]
     standing, seen = one.standing_rad * scale, one.standing_seen_rad * scale
-    linear = (
-        f"Linear within {100 * WITHIN:.0f} % from this amplitude at the sensor on, by describing function"
-    )
+    within = f"Linear within {100 * WITHIN:.0f} %"
+    linear = f"{within} from this amplitude at the sensor on, by describing function"
     items = [
         doc.fact(f"{name}: one count", one.quantum_rad * scale, unit),
         doc.fact("Ripple of the motor's speed, largest", one.ripple_rad_s, speed),

@@ -42,11 +42,10 @@ def section(comparison: Comparison) -> list[doc.Section]:
     best = compare_best.section(shown)
     best["intro"] = f"{best['intro']} {compare_best.shown_words(shown)}".strip()
     made = [best, verdicts(shown), figures(shown), differences(shown)]
-    return [*made, *ledger(shown), *compare_figures.sections(shown)]
+    return [*made, *ledger(shown), compare_figures.overlays(shown), compare_figures.tornadoes(shown)]
 
 
 def text(comparison: Comparison | str) -> str | None:
-    """The example of a study file."""
     return comparison if isinstance(comparison, str) else None
 
 
@@ -61,13 +60,11 @@ def brief(comparison: Comparison) -> Brief:
 
 
 def data(comparison: Comparison) -> Tree:
-    """The result by its names."""
     kept = ("study", "names", "base", "variants", "sensitivities", "refused", "verdict")
     return {name: as_json(getattr(comparison, name)) for name in kept}
 
 
 def write(comparison: Comparison, folder: Path | None) -> list[str]:
-    """Write every figure of every design as a table."""
     if folder is None:
         return []
     write_text(folder / compare_best.TABLE, compare_best.table_text(comparison))
@@ -92,7 +89,6 @@ def _first_of(what: str, names: Sequence[str]) -> str:
 
 
 def verdicts(comparison: Comparison) -> doc.Section:
-    """Verdicts of every design: a row a requirement, a column a design."""
     wanted = comparison.base.verdicts
     blocks: list[doc.Block] = compare_best.worst(comparison)
     if wanted:
@@ -103,15 +99,12 @@ def verdicts(comparison: Comparison) -> doc.Section:
         ]
         title = "Requirements of every design"
         blocks += _side_by_side(title, wanted, heads, batches(comparison), _verdict_cell, note)
-    blocks += [
-        doc.details(f"Verdicts of {one.variant.name}", [doc.verdicts(_named(one))])
-        for one in comparison.all
-        if one.verdicts
-    ]
-    for variant in comparison.refused[: compare_best.MANY]:
-        blocks.append(doc.text(f"{variant.name}: no design. {variant.error}"))
-    if len(comparison.refused) > compare_best.MANY:
-        blocks.append(doc.text(f"{len(comparison.refused) - compare_best.MANY} more have no design."))
+    for one in comparison.all:
+        named: list[doc.VerdictItem] = [{**item(v), "id": f"{one.variant.slug}/{v.id}"} for v in one.verdicts]
+        blocks += [doc.details(f"Verdicts of {one.variant.name}", [doc.verdicts(named)])] if named else []
+    refused, more = comparison.refused, len(comparison.refused) - compare_best.MANY
+    blocks += [doc.text(f"{one.name}: no design. {one.error}") for one in refused[: compare_best.MANY]]
+    blocks += [doc.text(f"{more} more have no design.")] if more > 0 else []
     status: doc.Status = "fail" if comparison.refused else comparison.tally.role
     words = result(comparison)
     return doc.section("verdicts", "Requirements side by side", blocks, result=words, status=status)
@@ -131,17 +124,11 @@ def _side_by_side(
     """Tables with a row an item and a column a design; ``cell`` is what a design has of an item."""
     blocks = []
     for part, designs in enumerate(batches, 1):
-        own = [
-            doc.of(partial(cell, one), f"d{k}", one.variant.name, align="right")
-            for k, one in enumerate(designs)
-        ]
+        each = enumerate(designs)
+        own = [doc.of(partial(cell, one), f"d{k}", one.variant.name, align="right") for k, one in each]
         heading = title if part == 1 else f"{title}, part {part}"
         blocks.append(doc.listing(heading, items, [*heads, *own], note if part == 1 else ""))
     return blocks
-
-
-def _named(one: Compared) -> list[doc.VerdictItem]:
-    return [{**item(verdict), "id": f"{one.variant.slug}/{verdict.id}"} for verdict in one.verdicts]
 
 
 def _verdict_cell(one: Compared, wanted: RequirementVerdict) -> doc.Cell:
@@ -210,18 +197,19 @@ def differences(comparison: Comparison) -> doc.Section:
     """What changed in each variant, and which key moved which figure."""
     blocks: list[doc.Block] = []
     for one in comparison.variants:
-        if not one.changed and not one.differences:
-            blocks.append(doc.text(f"{one.variant.name}: equal to the base."))
-            continue
         keys = "; ".join(f"{c.path}: {c.base} → {c.text}" for c in one.changed)
-        blocks.append(doc.details(f"{one.variant.name}: {keys}"[:400], [_moved_table(one, comparison)]))
+        if one.changed or one.differences:
+            blocks.append(doc.details(f"{one.variant.name}: {keys}"[:400], [_moved_table(one, comparison)]))
+        else:
+            blocks.append(doc.text(f"{one.variant.name}: equal to the base."))
     intro = (
         "Each changed key is applied alone to the base, over the exact sampled loops. What the keys do not "
         "explain is their interaction. Large-signal figures are not taken apart."
     )
     variants = comparison.everything.variants
-    changed = sum(bool(one.changed) for one in variants)
-    result = f"{changed} of {len(variants)} variants change a key of the base."
+    result = (
+        f"{sum(bool(one.changed) for one in variants)} of {len(variants)} variants change a key of the base."
+    )
     return doc.section("differences", "Cause of each change", blocks, result=result, intro=intro)
 
 
@@ -260,7 +248,6 @@ ROUNDING = 1e-9  # of a value
 
 
 def ledger(comparison: Comparison) -> list[doc.Section]:
-    """Make the section; nothing where no design was validated."""
     tested = [one for one in comparison.all if one.checks or one.untested]
     if not tested:
         return []

@@ -7,7 +7,7 @@ and figure, those with the most and the least room.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from actuator_lti.asked.quantities import reserve
@@ -80,12 +80,17 @@ def designs(comparison: Comparison, note: str = _NOTE) -> doc.Block:
     """One row a design: what it meets and misses, its weakest point, gains and losses against the base."""
     base = comparison.base
     open_ones = any(_those(one, Verdict.NOT_PROVEN) for one in comparison.all)
+
+    def nearest(one: Compared) -> str:
+        near, verdict = weakest(one)
+        return "" if verdict is None else f"{label(verdict)}, {_percent(near)}"
+
     columns = [
         doc.of("variant.name", "design", "Design"),
         doc.of(lambda o: f"{tally(o.verdicts).met} of {len(o.verdicts)}", "met", "Met"),
         doc.of(lambda o: _those(o, Verdict.NOT_MET), "missed", "Not met"),
         *([doc.of(lambda o: _those(o, Verdict.NOT_PROVEN), "unproven", "Not proven")] if open_ones else []),
-        doc.of(_weakest_words, "weakest", "Nearest to its limit"),
+        doc.of(nearest, "weakest", "Nearest to its limit"),
         doc.of(lambda o: "the base" if o is base else _changes(o, comparison, 1), "gains", "Gains most"),
         doc.of(lambda o: "" if o is base else _changes(o, comparison, -1), "gives", "Gives up most"),
     ]
@@ -94,11 +99,6 @@ def designs(comparison: Comparison, note: str = _NOTE) -> doc.Block:
 
 def _those(one: Compared, word: Verdict) -> str:
     return ", ".join(v.id for v in one.verdicts if v.verdict == word)
-
-
-def _weakest_words(one: Compared) -> str:
-    near, verdict = weakest(one)
-    return "" if verdict is None else f"{label(verdict)}, {_percent(near)}"
 
 
 def _changes(one: Compared, comparison: Comparison, sign: int) -> str:
@@ -111,13 +111,10 @@ def _changes(one: Compared, comparison: Comparison, sign: int) -> str:
         and (before := base.get(v.id)) is not None
         and sign * (near - before) > SEEN
     ]
-    return _words(sorted(moved, key=lambda pair: -abs(pair[1])))
-
-
-def _words(moved: Sequence[tuple[str, float]]) -> str:
-    shown = "; ".join(f"{name} {_percent(change, signed=True)}" for name, change in moved[:_MOST])
-    more = len(moved) - _MOST
-    return (shown + (f"; {more} more" if more > 0 else "")) or "nothing"
+    moved.sort(key=lambda pair: -abs(pair[1]))
+    words = [f"{name} {_percent(change, signed=True)}" for name, change in moved[:_MOST]]
+    words += [f"{len(moved) - _MOST} more"] if len(moved) > _MOST else []
+    return "; ".join(words) or "nothing"
 
 
 def _percent(part: float, *, signed: bool = False) -> str:
@@ -137,12 +134,8 @@ def _best(comparison: Comparison) -> doc.Block:
     ]
     rows = []
     for wanted in comparison.base.verdicts:
-        ranked = [
-            (near, one.variant.name, v)
-            for one in comparison.all
-            for v in one.verdicts
-            if v.id == wanted.id and (near := nearness(v)) is not None
-        ]
+        found = [(nearness(v), one.variant.name, v) for one, v in _judged(comparison, wanted)]
+        ranked = [(near, name, v) for near, name, v in found if near is not None]
         row = {"what": label(wanted), "limit": limit_words(wanted.requirement), "base": number(wanted.value)}
         if ranked:
             high, low = max(ranked, key=lambda r: r[0]), min(ranked, key=lambda r: r[0])
@@ -150,7 +143,7 @@ def _best(comparison: Comparison) -> doc.Block:
             same = high[0] - low[0] <= seen
             alike = [name for near, name, _ in ranked if high[0] - near <= seen]  # the base is first
             row |= {
-                "best": "all alike" if same else _first(alike),
+                "best": "all alike" if same else alike[0] + f"; {len(alike) - 1} alike" * (len(alike) > 1),
                 "value": number(high[2].value),
                 "worst": "" if same else f"{low[1]}: {number(low[2].value)}",
             }
@@ -158,9 +151,9 @@ def _best(comparison: Comparison) -> doc.Block:
     return doc.table("Best design of each requirement", columns, rows)
 
 
-def _first(names: Sequence[str]) -> str:
-    """Name the first design, and say how many are as good."""
-    return names[0] if len(names) == 1 else f"{names[0]}; {len(names) - 1} alike"
+def _judged(comparison: Comparison, wanted: RequirementVerdict) -> list[tuple[Compared, RequirementVerdict]]:
+    """Every design with its verdict on a requirement."""
+    return [(one, v) for one in comparison.all for v in one.verdicts if v.id == wanted.id]
 
 
 def number(value: float | None) -> str | None:
@@ -191,20 +184,17 @@ def _ends(comparison: Comparison) -> Iterator[int]:
     room = sorted(range(len(variants)), key=lambda k: (failed(variants[k]), -weakest(variants[k])[0]))
     yield room[0]
     for wanted in comparison.base.verdicts:
-        near = {k: value for k in room if (value := _room(variants[k], wanted)) is not None}
-        if near:
-            yield from (min(near, key=near.__getitem__), max(near, key=near.__getitem__))
+        near = {k: nearness(v) for k in room for v in variants[k].verdicts if v.id == wanted.id}
+        yield from _least_and_most(near)
     yield from (*room[:_MOST_ROOM], *room[-_MOST_ROOM:])
     for name in comparison.names:
-        values = {
-            k: v for k in room if (v := variants[k].figures.get(name.key)) is not None and math.isfinite(v)
-        }
-        if values:
-            yield from (min(values, key=values.__getitem__), max(values, key=values.__getitem__))
+        yield from _least_and_most({k: variants[k].figures.get(name.key) for k in room})
 
 
-def _room(one: Compared, wanted: RequirementVerdict) -> float | None:
-    return next((nearness(v) for v in one.verdicts if v.id == wanted.id), None)
+def _least_and_most(values: Mapping[int, float | None]) -> tuple[int, ...]:
+    """Where the least and the largest of the values that are there stand."""
+    known = {k: value for k, value in values.items() if value is not None and math.isfinite(value)}
+    return (min(known, key=known.__getitem__), max(known, key=known.__getitem__)) if known else ()
 
 
 def worst(comparison: Comparison) -> list[doc.Block]:
@@ -214,7 +204,7 @@ def worst(comparison: Comparison) -> list[doc.Block]:
         return []
     count, items = len(whole.all), list[doc.VerdictItem]()
     for wanted in whole.base.verdicts:
-        found = [(one, v) for one in whole.all for v in one.verdicts if v.id == wanted.id]
+        found = _judged(whole, wanted)
         one, verdict = min(found, key=lambda pair: _rank(pair[1]))
         made: doc.VerdictItem = item(verdict)
         met = tally(v for _, v in found).met

@@ -9,7 +9,6 @@ import numpy as np
 
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, drive_cases
 from analyses.comparison.variants import Compared, Comparison
-from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.responses import answer_curve, curve, frequency_grid
 from analyses.specification.sensitivity import Sensitivity
 from reports import document as doc
@@ -20,10 +19,6 @@ from reports.sections.names import LOOPS
 MOST_CURVES = 7
 MOST_BARS = 10
 MOST_CHARTS = 8
-
-
-def sections(comparison: Comparison) -> list[doc.Section]:
-    return [overlays(comparison), tornadoes(comparison)]
 
 
 def overlays(comparison: Comparison) -> doc.Section:
@@ -57,7 +52,8 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
         own = frequency_grid(result, 140)
         grid = np.unique(np.concatenate([np.geomspace(lowest, own[0], 20), own]))
         response = answer_curve(result, grid) if closed else curve(result.loop.plain_open, grid)
-        values = response.values / (_dc_gain(result) if closed else 1.0)
+        band = result.bandwidth if closed else None
+        values = response.values / abs((band and band.dc_gain) or 1.0)  # in any unit it starts at 0 dB
         curves.append((one.variant.name[:60], replace(response, values=values)))
     whole = math.inf  # curves are cut nowhere: where two differ is what is looked for
     both(curves, None, top, bottom, span=whole, phase_span=whole, look=_look)
@@ -68,11 +64,6 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
 def _look(k: int) -> style.Style:
     colour = style.INK if k == 0 else style.SERIES[(k - 1) % 7]
     return {"colour": colour, "dash": k % 7, "width": 2.4 if k == 0 else 1.7}
-
-
-def _dc_gain(result: LoopFigures) -> float:
-    """Size of the closed loop at DC, so that loops in any unit start at 0 dB; 1 where there is none."""
-    return abs(result.bandwidth.dc_gain or 1.0) if result.bandwidth else 1.0
 
 
 def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[doc.Block]:
@@ -95,12 +86,9 @@ def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[doc.Block]
 def tornadoes(comparison: Comparison) -> doc.Section:
     """Tornado charts of the figures that the requirements look at, then every slope in a table."""
     wanted = _wanted(comparison)
-    blocks: list[doc.Block] = []
-    for key, limit in wanted.items():
-        bars = comparison.sensitivities.tornado(key)
-        if bars:
-            blocks.append(_tornado(comparison, key, bars[:MOST_BARS], limit))
-    blocks = blocks[:MOST_CHARTS]
+    known = [(key, comparison.sensitivities.tornado(key), limit) for key, limit in wanted.items()]
+    shown = [(key, bars, limit) for key, bars, limit in known if bars][:MOST_CHARTS]
+    blocks = [_tornado(comparison, key, bars[:MOST_BARS], limit) for key, bars, limit in shown]
     blocks.append(doc.details("Every sensitivity", [_slopes(comparison)]))
     intro = (
         "Each parameter alone at both ends of its tolerance, or ±10 % where it has none. Slopes are central "
@@ -148,27 +136,22 @@ def _tornado(
     words = f"{LOOPS.get(key.partition('.')[0], 'Drive')}: {name.label if name else key}"
     base = comparison.sensitivities.base[key]
     ends = [v for bar in bars for v in (bar.low, bar.high)]
-    near = limit is not None and min(ends) - 3 * abs(base - min(ends)) <= limit <= max(ends) + 3 * abs(
-        max(ends) - base
-    )
+    low, high = min(ends), max(ends)
+    near = limit is not None and low - 3 * abs(base - low) <= limit <= high + 3 * abs(high - base)
     chart = style.Chart(width=style.WIDE, height=90.0 + 27.0 * len(bars), legend=True)
     panel = chart.panel(f"{words}, {name.unit}" if name and name.unit else words)
-    low: style.Style = {"colour": style.ORANGE, "fill": "none", "hatch": "//", "width": 1.2}
+    look: style.Style = {"colour": style.ORANGE, "fill": "none", "hatch": "//", "width": 1.2}
     for k, bar in enumerate(bars):
-        panel.bar(float(k), base, bar.low, "parameter low", **low)
+        panel.bar(float(k), base, bar.low, "parameter low", **look)
         panel.bar(float(k), base, bar.high, "parameter high", colour=style.BLUE)
     panel.rule_x(base, colour=style.INK, width=1.3)
     if limit is not None and near:
         panel.rule_x(limit, "limit", seen=True, colour=style.RED, width=1.4, dash=1)
-    style.rows(panel, [_bar_label(bar) for bar in bars])
-    caption = f"{words}: each parameter alone at both its ends."
-    return doc.figure("tornado", chart, caption)
-
-
-def _bar_label(bar: Sensitivity) -> str:
-    nominal = 0.5 * (bar.low_value + bar.high_value)
-    width = 50.0 * (bar.high_value - bar.low_value) / abs(nominal) if nominal else 0.0
-    return f"{bar.path} ±{width:.3g} %"
+    widths = [
+        100.0 * (b.high_value - b.low_value) / (abs(b.low_value + b.high_value) or math.inf) for b in bars
+    ]
+    style.rows(panel, [f"{bar.path} ±{width:.3g} %" for bar, width in zip(bars, widths, strict=True)])
+    return doc.figure("tornado", chart, f"{words}: each parameter alone at both its ends.")
 
 
 def _slopes(comparison: Comparison) -> doc.Block:

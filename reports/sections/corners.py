@@ -50,7 +50,6 @@ def summary(result: Corners) -> str:
 
 
 def unmet(corner: Corner) -> str:
-    """Name what a corner fails."""
     return ", ".join(_failings(corner))
 
 
@@ -103,7 +102,8 @@ def chart(result: Corners) -> style.Chart:
 def _summary_table(result: Corners) -> doc.Block:
     columns = [doc.column("corner", "Corner")]
     for name in CORNERED:
-        label = f"{superlative(QUANTITIES[name])} {QUANTITIES[name].words}".capitalize()
+        worst_is = "least" if QUANTITIES[name].better > 0 else "largest"
+        label = f"{worst_is} {QUANTITIES[name].words}".capitalize()
         columns += [figure_column(name, name, label=label, format="fix:1"), doc.column(f"{name}_loop", "in")]
     columns.append(doc.column("unmet", "Not met"))
     rows = []
@@ -118,22 +118,16 @@ def _summary_table(result: Corners) -> doc.Block:
     return doc.table("Corners", columns, rows, note)
 
 
-def superlative(quantity: Quantity) -> str:
-    """What the worst of a figure is."""
-    return "least" if quantity.better > 0 else "largest"
-
-
 def _loop_table(result: Corners) -> doc.Block:
+    def figure(of: Quantity) -> doc.Shown:
+        column = figure_column(of.name, of.name, label=of.label, format=of.at_a_glance)
+        return column, lambda pair: shown(of, pair[1].judged)
+
     columns = [
         doc.of(lambda pair: pair[0].name, "corner", "Corner"),
         doc.of(lambda pair: loop_words(pair[1].loop.name, pair[1].rotor), "loop", "Loop"),
         doc.of(lambda pair: pair[1].sound is True, "stable", "Stable", format="yesno"),
-        *(_figure(each) for each in PER_LOOP),
+        *map(figure, PER_LOOP),
     ]
     loops = [(corner, one) for corner in result.corners for one in corner.figures.values()]
     return doc.listing("Loops at the corners", loops, columns)
-
-
-def _figure(of: Quantity) -> doc.Shown:
-    column = figure_column(of.name, of.name, label=of.label, format=of.at_a_glance)
-    return column, lambda pair: shown(of, pair[1].judged)

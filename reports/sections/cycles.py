@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.limit_cycles.run import Confirmation, LimitCycles
+from analyses.limit_cycles.run import LimitCycles
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, judged_by, verdict_of, words
 from reports import document as doc
 from reports.sections.names import fine_unit, load_unit
@@ -41,13 +41,15 @@ def section(result: LimitCycles) -> doc.Section:
 
 
 def summary(result: LimitCycles) -> str:
-    """Say whether the drive as it is comes to rest."""
     fine, small = fine_unit(result.design.axis)
     swing, count = result.hunting, len(result.confirmations)
     seen = sum(one.verdict == "confirmed" for one in result.confirmations)
     tail = f"; {seen} of {count} predicted cycles confirmed" if count else "; no cycle is predicted"
     if swing is None:
-        return f"The drive as it is comes to rest after every step{_still(result, fine, small)}{tail}."
+        left = [one for one in result.rests if one.hunting or one.swing_rad]  # too small, or not long enough
+        ends = (f"{fine * one.amplitude_rad:.3g} {small} it {words(one.rest, fine, small)}" for one in left)
+        still = f", but after {', after '.join(ends)}" if left else ""
+        return f"The drive as it is comes to rest after every step{still}{tail}."
     does = {
         Verdict.MET: f"comes to rest as far as is asked ({judged_by(result.design)})",
         Verdict.NOT_MET: "does not come to rest",
@@ -55,13 +57,6 @@ def summary(result: LimitCycles) -> str:
     }[_judged(result)]
     at = f"{swing.load_Nm:g} {load_unit(result.design)}"
     return f"The drive as it is {does}: {words(swing.rest, fine, small)} under {at}{tail}."
-
-
-def _still(result: LimitCycles, fine: float, small: str) -> str:
-    """Say what is too small to count as motion, or stands for longer than it was followed."""
-    left = [one for one in result.rests if one.hunting or one.swing_rad]
-    ends = (f"{fine * one.amplitude_rad:.3g} {small} it {words(one.rest, fine, small)}" for one in left)
-    return f", but after {', after '.join(ends)}" if left else ""
 
 
 def _judged(result: LimitCycles) -> Verdict:
@@ -76,7 +71,13 @@ def _predicted(result: LimitCycles, fine: float, small: str) -> doc.Block:
         doc.of(lambda one: "stable" if one.cycle.stable else "unstable", "kind", "Kind"),
         doc.of("cycle.output_rad", "size", "Predicted, peak", scale=fine, **size, better=-1),
         doc.of("cycle.frequency_hz", "hz", "at", "Hz", format="sig:3"),
-        doc.of(_seen, "seen", "Simulated", scale=fine, **size),
+        doc.of(
+            lambda one: one.ratio and one.ratio * one.cycle.output_rad,
+            "seen",
+            "Simulated",
+            scale=fine,
+            **size,
+        ),
         doc.of("frequency_hz", "seen_hz", "at", "Hz", format="sig:3"),
         doc.of("verdict", "verdict", "Verdict"),
     ]
@@ -85,10 +86,6 @@ def _predicted(result: LimitCycles, fine: float, small: str) -> doc.Block:
         "out or by its own describing function, as the column says; no limit acts."
     )
     return doc.listing("Predicted limit cycles, at the output", result.confirmations, columns, note)
-
-
-def _seen(one: Confirmation) -> float | None:
-    return None if one.ratio is None else one.ratio * one.cycle.output_rad
 
 
 def _end(one: Settling) -> str:

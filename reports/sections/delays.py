@@ -21,11 +21,13 @@ PARTS = {
 
 
 def section(budgets: Mapping[str, DelayBudget]) -> doc.Section:
-    parts = _parts(budgets)
+    def part(key: str, label: str) -> doc.Shown:
+        return doc.of(lambda one: one[1].items.get(key, 0.0), key, label, "deg", format="fix:2")
+
     columns = [
         doc.of(lambda one: loop_words(one[0]), "loop", "Loop"),
         doc.of(lambda one: hertz(one[1].frequency_rad_s), "crossover_hz", "Crossover", "Hz", format="sig:4"),
-        *(_part(key, label.capitalize()) for key, label in parts.items()),
+        *(part(key, label.capitalize()) for key, label in _parts(budgets).items()),
         doc.of(lambda one: one[1].total_deg, "total", "Phase in all", "deg", format="fix:2"),
         doc.of(
             lambda one: 180.0 + one[1].total_deg, "margin", "Left to −180°", "deg", format="fix:2", better=1
@@ -97,7 +99,3 @@ def _parts(budgets: Mapping[str, DelayBudget]) -> dict[str, str]:
     parts = dict(PARTS)
     after = {key: parts.pop(key) for key in list(parts) if key not in ("controller", "plant")}
     return parts | {name: name for name in filters} | after
-
-
-def _part(key: str, label: str) -> doc.Shown:
-    return doc.of(lambda one: one[1].items.get(key, 0.0), key, label, "deg", format="fix:2")

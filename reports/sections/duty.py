@@ -20,12 +20,22 @@ def section(result: Duty) -> doc.Section:
         "protection left out. Its current, repeated without end, heats the winding by its mean copper loss "
         "and drives the overload state."
     )
-    blocks = [doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), _note(result))]
-    blocks.append(_figure(result))
+    note = f"Duty: {asked_words(result)}."
+    if result.heating is None:
+        note += " No winding temperature: the design states no temperature.thermal_resistance."
+    if result.overload is None:
+        note += " No overload state: the design states no limits.peak_time."
+    table = doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), note)
     does = result.verdict is Verdict.MET and not result.limited
     severity: Literal["info", "warn"] = "info" if does else "warn"
     return doc.section(
-        "duty", "Duty cycle", blocks, result=summary(result), intro=intro, status=severity, told=severity
+        "duty",
+        "Duty cycle",
+        [table, _figure(result)],
+        result=summary(result),
+        intro=intro,
+        status=severity,
+        told=severity,
     )
 
 
@@ -44,7 +54,6 @@ _COLUMNS = [
 
 
 def asked_words(result: Duty) -> str:
-    """Say the duty."""
     scale, unit = output_unit(result.design.axis)
     asked = result.asked
     words = f"±{scale * asked.amplitude_rad:.3g} {unit} at {asked.frequency_hz:.3g} Hz"
@@ -61,15 +70,6 @@ def summary(result: Duty) -> str:
     limits = f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
     part += limits if result.limited else ""
     return f"{asked_words(result)} is {RATED[result.verdict]}: {result.rms_A:.4g} A rms{part}."
-
-
-def _note(result: Duty) -> str:
-    words = [f"Duty: {asked_words(result)}."]
-    if result.heating is None:
-        words.append("No winding temperature: the design states no temperature.thermal_resistance.")
-    if result.overload is None:
-        words.append("No overload state: the design states no limits.peak_time.")
-    return " ".join(words)
 
 
 def _rows(result: Duty) -> list[doc.Row]:

@@ -43,10 +43,8 @@ def section(result: Failures) -> doc.Section:
         f"detection takes {detected}. The torque is that in the coupling; in a rigid train the motor's "
         "torque times the reduction."
     )
-    blocks = [_table(result, scale, unit, near), _figure(result, scale, unit, load)]
-    blocks += [
-        doc.text(f"{NAMES[name]}: not for this drive, as {why}.") for name, why in result.left_out.items()
-    ]
+    left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
+    blocks = [_table(result, scale, unit, near), _figure(result, scale, unit, load), *map(doc.text, left)]
     severity: doc.Severity = "info" if verdict_of(result.design, swing) is Verdict.MET else "warn"
     return doc.section(
         "failures", "Failure cases", blocks, result=summary(result), intro=intro, told=severity
@@ -117,8 +115,5 @@ def _figure(result: Failures, scale: float, unit: str, load: str) -> doc.Block:
         panel.rule_x(asked.detection_s * per_s, "detected" if panel is top else "")
     top.y.label, bottom.y.label = f"deflection, {unit}", f"{_push(result.design)}, {load}"
     bottom.x.limits(0.0, last * per_s)
-    caption = (
-        f"Deflection of the output and {_push(result.design)} in the train after each failure but the "
-        "oscillation."
-    )
-    return doc.figure("failures", chart, caption)
+    both = f"Deflection of the output and {_push(result.design)}"
+    return doc.figure("failures", chart, f"{both} in the train after each failure but the oscillation.")

@@ -47,8 +47,8 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[st
     note += "" if reasons else " All margins are certified."
     table = doc.table("Margins and bandwidths in the three forms", COLUMNS, rows, note)
     intro = "The forms differ by sampling, hold and computing delay."
-    blocks = [_overlay(forms), table, *(doc.text(f"Not found: {reason}.") for reason in refused)]
-    blocks += [doc.text(reason) for reason in reasons]
+    notes = [*(f"Not found: {reason}." for reason in refused), *reasons]
+    blocks = [_overlay(forms), table, *map(doc.text, notes)]
     return doc.section("forms", "Sampled, continuous, ideal", blocks, result=_result(rows), intro=intro)
 
 
@@ -68,7 +68,6 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) -> doc.Row:
-    """Give one line, with the phase margin lost against the ideal form."""
     margins, response = margin_row(figures), response_row(figures)
     reference = margin_row(ideal)["phase_margin_deg"] if ideal else None
     own = margins["phase_margin_deg"]
@@ -117,10 +116,9 @@ def break_points(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigu
         rows.append(_break_point(name, "all closed", point.figures))
         reasons += [f"{POINTS.get(name, name)}: {point.reason}."] if point.reason else []
     note = "The outermost loop has no other loop outside it, so its two lines agree."
-    blocks = [doc.table("Break-point matrix", BREAK_COLUMNS, rows, note)]
     there = {POINTS.get(name, name): one.figures for name, one in points.items() if one.figures is not None}
-    reasons += evidence_notes(there)
-    blocks += [doc.text(reason) for reason in reasons]
+    blocks = [doc.table("Break-point matrix", BREAK_COLUMNS, rows, note)]
+    blocks += map(doc.text, [*reasons, *evidence_notes(there)])
     exact = [(name, point.exact) for name, point in points.items() if point.exact is not None]
     if exact:
         words = (
@@ -131,8 +129,8 @@ def break_points(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigu
             "A dash: none within a factor of 10⁴. The delay is that of the computing, which acts at the "
             "voltage alone."
         )
-        made = doc.listing("Stability limits of periodic loops", exact, EXACT_COLUMNS, note)
-        blocks += [doc.text(words), made]
+        title = "Stability limits of periodic loops"
+        blocks += [doc.text(words), doc.listing(title, exact, EXACT_COLUMNS, note)]
     intro = (
         "In the finished drive a gain error or a delay occurs at one point, with every other loop closed. "
         "The matrix shows what the drive tolerates at each point."
@@ -158,9 +156,8 @@ def _most_sensitive(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _break_point(name: str, others: str, figures: LoopFigures | None) -> doc.Row:
-    if figures is None:
-        return {"point": POINTS.get(name, name), "others": others, "stable": "see below"}
-    return {"point": POINTS.get(name, name), "others": others, **margin_row(figures)}
+    found = margin_row(figures) if figures else {"stable": "see below"}
+    return {"point": POINTS.get(name, name), "others": others, **found}
 
 
 def operating_points(points: Sequence[OperatingPointFigures], design: Design) -> doc.Section:
@@ -172,15 +169,15 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
         doc.column("load", "Load", load_unit(design), format="short:3"),
         doc.column("slope", "Friction slope", "N s/m" if linear else "mN m s/rad", format="sig:3"),
     ]
-    for name in names:
-        label = name.capitalize()
-        columns += [
-            figure_column("phase_margin", f"{name}_phase", label=f"{label} PM", format="fix:1"),
-            figure_column("gain_margin", f"{name}_gain", label=f"{label} GM", format="gain:1"),
-            figure_column(
-                "bandwidth", f"{name}_band", label=f"{label} −3\N{NO-BREAK SPACE}dB", format="sig:3"
-            ),
-        ]
+    columns += [
+        figure_column(quantity, f"{name}_{key}", label=f"{name.capitalize()} {label}", format=format)
+        for name in names
+        for quantity, key, label, format in (
+            ("phase_margin", "phase", "PM", "fix:1"),
+            ("gain_margin", "gain", "GM", "gain:1"),
+            ("bandwidth", "band", "−3\N{NO-BREAK SPACE}dB", "sig:3"),
+        )
+    ]
     rows = [_operating_point(point, 1.0 if linear else 1e3) for point in points]
     note = (
         "Sliding: the dry part is a constant torque and leaves no trace in the loops, whatever the load. "
@@ -190,15 +187,8 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
     loops = [(f"{point.label}, {name} loop", f) for point in points for name, f in point.figures.items()]
     reasons = list(dict.fromkeys(reason for one in loops for reason in evidence_notes(dict([one]))))
     note += " All margins are certified" + (" but those named below." if reasons else ".")
-    blocks = [
-        doc.table(
-            "PM: phase margin, GM: gain margin, −3 dB: bandwidth (position: to the command)",
-            columns,
-            rows,
-            note,
-        )
-    ]
-    blocks += [doc.text(reason) for reason in reasons]
+    caption = "PM: phase margin, GM: gain margin, −3 dB: bandwidth (position: to the command)"
+    blocks = [doc.table(caption, columns, rows, note), *map(doc.text, reasons)]
     intro = "The effect of friction on small motions depends on speed and load."
     return doc.section("operating-points", "Operating points", blocks, result=_spread(points), intro=intro)
 
@@ -206,11 +196,11 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
 def _spread(points: Sequence[OperatingPointFigures]) -> str:
     """Say the smallest phase margin over all operating points."""
     for sound, words in ((False, "Unstable"), (None, "Stability is not known")):
-        here = [_where(point) for point in points if any(f.sound is sound for f in point.figures.values())]
+        here = [p.place or p.label for p in points if any(f.sound is sound for f in p.figures.values())]
         if here:
             return f"{words} at {len(here)} of {len(points)} operating points: {'; '.join(here)}."
     result = [
-        (row["phase_margin_deg"], name, _where(point))
+        (row["phase_margin_deg"], name, point.place or point.label)
         for point in points
         for name, figures in point.figures.items()
         if (row := margin_row(figures))["phase_margin_deg"] is not None
@@ -222,10 +212,6 @@ def _spread(points: Sequence[OperatingPointFigures]) -> str:
         f"Stable at all {len(points)} operating points; the smallest phase margin is {deg:.1f} deg "
         f"({name} loop, {label})."
     )
-
-
-def _where(point: OperatingPointFigures) -> str:
-    return point.place or point.label
 
 
 def _operating_point(point: OperatingPointFigures, scale: float) -> doc.Row:

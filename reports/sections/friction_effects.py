@@ -11,7 +11,7 @@ from analyses.friction_effects import FrictionEffects
 from analyses.friction_effects.result import FrictionPoint, LimitCycles
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, accepted_rad, noticed, told, verdict_of
 from analyses.motion.settling import words as end_words
-from nonlinear.bench.on_the_bench import quiet
+from nonlinear.bench.operating_motion import quiet
 from reports import document as doc
 from reports.charts import style
 from reports.sections.names import fine_unit, load_unit
@@ -28,17 +28,18 @@ def section(result: FrictionEffects) -> doc.Section:
     fine, small = fine_unit(result.design.axis)
     load = load_unit(result.design)
     items = [_cycle_verdict(result.design, point, fine, small, load) for point in result.points]
-    blocks = [doc.verdicts(items, what="checks"), _threshold_table(result, fine, small, load)]
-    figure = _figure(result, fine, small, load)
-    blocks += [figure] if figure else []
-    blocks += [_settling_table(result, fine, small, load)]
+    blocks = [
+        doc.verdicts(items, what="checks"),
+        _threshold_table(result, fine, small, load),
+        *_figure(result, fine, small, load),
+        _settling_table(result, fine, small, load),
+    ]
     intro = (
         "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion. "
         "Friction alone: counts and noise of the sensors are left out."
     )
-    status: doc.Status = tally(items).role
-    severity: doc.Severity = "fail" if status == "fail" else "warn" if status == "warn" else "info"
-    words = _summary(result, fine, small)
+    status, words = tally(items).role, _summary(result, fine, small)
+    severity: doc.Severity = "info" if status == "pass" else status
     return doc.section(
         "friction-effects", title, blocks, result=words, intro=intro, status=status, told=severity
     )
@@ -49,7 +50,10 @@ def _cycle_verdict(
 ) -> doc.VerdictItem:
     """Say whether friction keeps the drive hunting, and whether that was predicted."""
     cycles, swing = point.cycles, noticed(design, point.cycles.settlings)
-    predicted = _predicted_words(cycles, fine, small) + "; " + _slip_words(cycles, fine, small)
+    predicted = _predicted_words(cycles, fine, small) + "; stick-slip analysis: none"
+    if (one := cycles.stick_slip) is not None:
+        size, kind = fine * one.output_amplitude_rad, "" if one.stable else ", unstable"
+        predicted = predicted.removesuffix("none") + f"±{size:.3g} {small} at {one.frequency_hz:.3g} Hz{kind}"
     if swing is None:
         sizes = len(cycles.settlings)
         result = f"at rest after steps of {sizes} sizes" if sizes > 1 else "at rest after a step of one size"
@@ -72,8 +76,6 @@ def _cycle_verdict(
 
 def _predicted_words(cycles: LimitCycles, fine: float, small: str) -> str:
     """Say what the describing function predicts and what the simulator makes of it."""
-    if not cycles.confirmations:
-        return "describing function of the whole loop: none"
     parts = []
     for item in cycles.confirmations:
         one = item.cycle
@@ -82,17 +84,7 @@ def _predicted_words(cycles: LimitCycles, fine: float, small: str) -> str:
         hz = "" if item.frequency_hz is None else f", {item.frequency_hz:.4g} Hz"
         size = fine * one.output_rad
         parts.append(f"±{size:.3g} {small} at {one.frequency_hz:.4g} Hz ({kind}; {seen}{hz})")
-    return "describing function of the whole loop: " + "; ".join(parts)
-
-
-def _slip_words(cycles: LimitCycles, fine: float, small: str) -> str:
-    """Say what the analysis of stick and slip predicts."""
-    one = cycles.stick_slip
-    if one is None:
-        return "stick-slip analysis: none"
-    kind = "" if one.stable else ", unstable"
-    size = fine * one.output_amplitude_rad
-    return f"stick-slip analysis: ±{size:.3g} {small} at {one.frequency_hz:.3g} Hz{kind}"
+    return "describing function of the whole loop: " + ("; ".join(parts) or "none")
 
 
 def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> doc.Block:
@@ -111,11 +103,11 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
         doc.of("hysteresis.largest_rad", "largest", f"Largest effect of {_cause(result)}", **size),
     ]
     note = (
-        f"The {result.integrator} controller integrates: a step below the threshold moves the output "
-        f"{_when(result)}, and motion lost in front of its sensor is recovered{_behind(result)}. The effect "
+        f"The {result.integrator} controller integrates: a step below the threshold {_below(result)}, and "
+        f"motion lost in front of its sensor is recovered{_behind(result)}. The effect "
         "is largest just after a reversal."
         if result.integrator
-        else f"No controller integrates: a step below the threshold {_never(result)}. Each reversal "
+        else f"No controller integrates: a step below the threshold {_below(result)}. Each reversal "
         f"loses the torque that sliding takes, both ways, over the stiffness{_behind(result)}."
     )
     if not any(point.threshold for point in result.points):
@@ -129,19 +121,16 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
     )
 
 
-def _when(result: FrictionEffects) -> str:
-    """When a step below the threshold moves the output, where a controller integrates."""
-    if result.design.controller.position_loop.kicks:
-        return "at once by its own kick, or later"
+def _below(result: FrictionEffects) -> str:
+    """What a step below the threshold does: now, later or never."""
+    kicks = result.design.controller.position_loop.kicks
+    if not result.integrator:
+        return "moves the output by its own kick or never" if kicks else "never moves the output"
+    if kicks:
+        return "moves the output at once by its own kick, or later"
     known = [point.threshold.static for point in result.points if point.threshold is not None]
     alone = all(static.outer_integral_time_s is None for static in known)
-    return "later, after Tn (A0/A − 1)" if alone else "later"
-
-
-def _never(result: FrictionEffects) -> str:
-    """What a step below the threshold does where nothing integrates."""
-    kicks = result.design.controller.position_loop.kicks
-    return "moves the output by its own kick or never" if kicks else "never moves the output"
+    return "moves the output later" + ", after Tn (A0/A − 1)" * alone
 
 
 def _cause(result: FrictionEffects) -> str:
@@ -161,11 +150,9 @@ def _behind(result: FrictionEffects) -> str:
 
 def _wait(point: FrictionPoint, name: str) -> float | None:
     """A time of the wait at half the threshold, where that was waited for."""
-    known = point.threshold
-    if known is None:
-        return None
-    half = [w for w in known.waiting if abs(w.amplitude_rad / known.static.forward_rad - 0.5) < 0.01]
-    return getattr(half[0], name) if half else None
+    waits = point.threshold.waiting if point.threshold else ()
+    full = point.threshold.static.forward_rad if point.threshold else 1.0
+    return next((getattr(w, name) for w in waits if abs(w.amplitude_rad / full - 0.5) < 0.01), None)
 
 
 def _lost(point: FrictionPoint, name: str) -> float | None:
@@ -179,11 +166,15 @@ def _lost(point: FrictionPoint, name: str) -> float | None:
 
 def _settling_table(result: FrictionEffects, fine: float, small: str, load: str) -> doc.Block:
     size: dict[str, Any] = {"unit": small, "scale": fine}
+
+    def error(one: Settling) -> float:
+        return one.rest.error if abs(one.rest.error) > 1e-6 * one.amplitude_rad else 0.0
+
     columns = [
         doc.of(lambda pair: pair[0], "load", "Load", load, format="short:4"),
         doc.of(lambda pair: pair[1].amplitude_rad, "step", "Step", **size, format="sig:3"),
         doc.of(lambda pair: pair[1].rest.after_s, "wait", "Waited", "s", format="sig:2"),
-        doc.of(lambda pair: _error(pair[1]), "error", "Remaining error", **size, format="sig:2"),
+        doc.of(lambda pair: error(pair[1]), "error", "Remaining error", **size, format="sig:2"),
         doc.of(lambda pair: end_words(pair[1].rest, fine, small), "end", "The drive"),
     ]
     ends = [(point.load_Nm, one) for point in result.points for one in point.cycles.settlings]
@@ -199,18 +190,14 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
     )  # fmt: skip
 
 
-def _error(one: Settling) -> float:
-    return one.rest.error if abs(one.rest.error) > 1e-6 * one.amplitude_rad else 0.0
-
-
-def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> doc.Block | None:
+def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> list[doc.Block]:
     points = [(f"load {point.load_Nm:g} {load}", point) for point in result.points]
     loops = [(label, one.hysteresis) for label, one in points if one.hysteresis is not None]
     waits = [
         (label, one.threshold.waiting) for label, one in points if one.threshold and one.threshold.waiting
     ]
     if not loops:
-        return None
+        return []
     chart = style.Chart(width=style.WIDE, height=330.0)
     title = "Position error over a slow triangle of the command"
     panel = chart.panel(f"command, {small}", f"output less command, {small}", title=title, by_point=True)
@@ -232,7 +219,7 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> doc.
     )
     if waits:
         caption += " Right: a step below the threshold waits until the speed integrator reaches breakaway."
-    return doc.figure("hysteresis", chart, caption)
+    return [doc.figure("hysteresis", chart, caption)]
 
 
 def _summary(result: FrictionEffects, fine: float, small: str) -> str:
@@ -242,9 +229,7 @@ def _summary(result: FrictionEffects, fine: float, small: str) -> str:
     if swing is not None:
         return f"Friction keeps the drive from rest after a step: {told(result.design, swing, fine, small)}."
     left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
-    does = (
-        f"The {result.integrator} controller integrates" if result.integrator else "No controller integrates"
-    )
+    does = f"{f'The {result.integrator}' if result.integrator else 'No'} controller integrates"
     if left:
         most = max(settlings, key=lambda one: abs(one.rest.error))
         under = f", at a load of {most.load_Nm:g} {load_unit(result.design)}" if most.load_Nm else ""

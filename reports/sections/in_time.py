@@ -24,12 +24,8 @@ from reports.sections.names import loop_words, output_unit
 
 def sections(validation: Validation) -> list[doc.Section]:
     """Make the section of the sweep and that of steps and margins, as far as there are any."""
-    made = []
-    if validation.sweeps:
-        made.append(_injection(list(validation.sweeps.values())))
-    if validation.steps or validation.margins:
-        made.append(_in_time(validation))
-    return made
+    made = [_injection(list(validation.sweeps.values()))] if validation.sweeps else []
+    return made + ([_in_time(validation)] if validation.steps or validation.margins else [])
 
 
 def _injection(sweeps: Sequence[BenchSweep]) -> doc.Section:
@@ -80,10 +76,8 @@ def _in_time(validation: Validation) -> doc.Section:
         if name in validation.margins:
             blocks.append(_margin(validation.margins[name]))
     blocks += by_amplitude(validation.amplitude_margins)
-    findings = [
-        doc.Finding(severity="warn", text=words, where="confirmation")
-        for words in remarks(validation.amplitude_margins)
-    ]
+    said = remarks(validation.amplitude_margins)
+    findings = [doc.Finding(severity="warn", text=words, where="confirmation") for words in said]
     rows = [shown.row for shown in validation.steps.values()]
     rows += [row for shown in validation.margins.values() for row in shown.rows]
     met = sum(row.verdict is Verdict.MET for row in rows)
@@ -93,7 +87,7 @@ def _in_time(validation: Validation) -> doc.Section:
         "mode 1 % inside and 1 % outside of the gain margin, where it dies out or grows by the predicted "
         "factor."
     )
-    result = " ".join([f"{met} of {len(rows)} runs go as predicted.", *(one["text"] for one in findings[:1])])
+    result = " ".join([f"{met} of {len(rows)} runs go as predicted.", *said[:1]])
     return doc.section(
         "confirmation", "Predictions in time", blocks, result=result, intro=intro, status=status,
         findings=findings,
@@ -140,7 +134,6 @@ LOWEST = 0.02  # of the linear margin: what lies below is drawn here
 
 
 def by_amplitude(items: Sequence[AmplitudeMargin]) -> list[doc.Block]:
-    """Make figure, remarks and table, if there are any."""
     if not items:
         return []
     return [_amplitudes(items), *(doc.text(words) for words in remarks(items)), _amplitude_table(items)]
@@ -168,27 +161,23 @@ def remark(item: AmplitudeMargin) -> str:
         cause = f"if its gain is raised by {value} or more"
     else:
         cause = f"if a delay of {value} or more is added"
+    scale, unit = output_unit(item.axis)
+    size = f" of {scale * item.output:.2g} {unit} at the output" if item.output > 0.0 else ""
     quiet = "" if item.friction_on else ", without dry friction,"
     acting = f" The {words_of(item.limiter)} acts." if item.limiter else ""
     return (
-        f"The {item.loop} loop{quiet} sustains an oscillation{_of(item)} {cause}, started from "
+        f"The {item.loop} loop{quiet} sustains an oscillation{size} {cause}, started from "
         f"{100.0 * item.part:.0f} % of full range; the linear {item.kind} margin on the validation's "
         f"operating motion is {linear}.{acting}"
     )
 
 
-def _of(item: AmplitudeMargin) -> str:
-    """How large the oscillation is at the output, where it moves."""
-    scale, unit = output_unit(item.axis)
-    return f" of {scale * item.output:.2g} {unit} at the output" if item.output > 0.0 else ""
-
-
 def _already(item: AmplitudeMargin) -> bool:
     """Whether it is the drive as designed: less than a hundredth of the linear margin away."""
-    value = item.value or 0.0
-    if item.kind == "delay":
-        return value < NEXT_TO_NOTHING * item.linear
-    return abs(math.log(value)) < NEXT_TO_NOTHING * abs(math.log(item.linear))
+    value, linear = item.value or 0.0, item.linear
+    if item.kind == "gain":
+        value, linear = abs(math.log(value)), abs(math.log(linear))
+    return value < NEXT_TO_NOTHING * linear
 
 
 def _amplitudes(items: Sequence[AmplitudeMargin]) -> doc.Block:
@@ -230,8 +219,8 @@ def _amplitude_table(items: Sequence[AmplitudeMargin]) -> doc.Block:
         doc.of(lambda item: words_of(item.limiter) if item.limiter else "", "limiter", "Limit acting"),
         doc.of(_remark, "remark", "Remark"),
     ]
-    made = doc.listing("Margins by amplitude", items, columns)
-    return doc.details("Margins from small, medium and large deviations", [made])
+    title = "Margins from small, medium and large deviations"
+    return doc.details(title, [doc.listing("Margins by amplitude", items, columns)])
 
 
 def _remark(item: AmplitudeMargin) -> str:

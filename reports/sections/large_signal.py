@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Command, Design
 from analyses.large_signal.classify import CAUSE_RULE, CAUSES, CRITERIA
-from analyses.large_signal.map import AmplitudeBode, AmplitudeMap
+from analyses.large_signal.map import AmplitudeBode
 from analyses.large_signal.result import LargeSignals, LimitShift
 from analyses.large_signal.sawtooth import (
     FAST,
@@ -31,17 +31,15 @@ def section(result: LargeSignals) -> doc.Section:
     design = result.design
     scale, unit = output_unit(design.axis)
     items = _sawtooth_verdicts(result.sawtooth)
-    rules = doc.details("How the map is read", [doc.text(words) for words in (CAUSE_RULE, CRITERIA)])
     blocks = [doc.verdicts(items, what="checks")] if items else []
-    blocks += [_map_figure(result, scale, unit), rules]
+    blocks.append(_map_figure(result, scale, unit))
+    blocks.append(doc.details("How the map is read", [doc.text(CAUSE_RULE), doc.text(CRITERIA)]))
     if result.shift is not None:
         table = _shift_table(result.shift, design, scale, unit)
         blocks.append(doc.details("The linear limit in numbers", [table]))
-    blocks += [_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad)]
-    blocks += [
-        _bode_table(result.bode, scale, unit, design),
-        *_sawtooth_blocks(result.sawtooth, design, scale, unit),
-    ]
+    blocks.append(_bode_figure(result.bode, scale, unit, design.validation.full_deflection_rad))
+    blocks.append(_bode_table(result.bode, scale, unit, design))
+    blocks += _sawtooth_blocks(result.sawtooth, design, scale, unit)
     intro = (
         "Each point of the map is one sine command, simulated until steady. Below the lines the linear "
         "model holds. Above them the limit that is reached first determines the output."
@@ -99,26 +97,21 @@ def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
 
 
 def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[doc.VerdictItem]:
-    """Judge the rate-limit formulas, where they apply."""
     if not (sawtooth.runs and sawtooth.applicable):
         return []
+
+    def judged(key: str, label: str, error: float, limit: float, unit: str) -> doc.VerdictItem:
+        label, scale = f"Sawtooth: difference of the {label}", 100.0 if unit == "%" else 1.0
+        return doc.verdict(
+            f"validation-sawtooth-{key}", label, value=scale * error, limit=scale * limit, unit=unit,
+            comparison="<=", passed=error <= limit,
+        )  # fmt: skip
+
     gain = max(abs(run.gain_error) for run in sawtooth.runs)
     lag = max(abs(run.lag_error_deg) for run in sawtooth.runs)
-    rows = (
-        ("gain", "Sawtooth: difference of the fundamental from 4/(πx)", gain, GAIN_TOLERANCE, 100.0, "%"),
-        ("lag", "Sawtooth: difference of the lag from arccos(π/2x)", lag, LAG_TOLERANCE_DEG, 1.0, "deg"),
-    )
     return [
-        doc.verdict(
-            f"validation-sawtooth-{key}",
-            label,
-            value=scale * error,
-            limit=scale * limit,
-            unit=unit,
-            comparison="<=",
-            passed=error <= limit,
-        )
-        for key, label, error, limit, scale, unit in rows
+        judged("gain", "fundamental from 4/(πx)", gain, GAIN_TOLERANCE, "%"),
+        judged("lag", "lag from arccos(π/2x)", lag, LAG_TOLERANCE_DEG, "deg"),
     ]
 
 
@@ -134,24 +127,24 @@ def _map_figure(result: LargeSignals, scale: float, unit: str) -> doc.Block:
     shown = result.map
     caption += f" {shown.amplitude_rad.size} amplitudes by {shown.frequency_hz.size} frequencies"
     caption += ": its runs take much work, a coarser grid." if shown.coarser else "."
-    chart = map_chart(result, scale, unit)
-    return doc.figure("map", chart, caption=caption, alt=_map_words(shown))
-
-
-def _map_words(amplitude_map: AmplitudeMap) -> str:
-    shares = {name: amplitude_map.share(name) for name in CAUSES}
-    parts = [f"{name} {100 * share:.0f} %" for name, share in shares.items() if share > 0.0]
-    return "Map of amplitude and frequency; share of the points by what acts: " + ", ".join(parts)
+    parts = [f"{name} {100 * share:.0f} %" for name in CAUSES if (share := shown.share(name)) > 0.0]
+    alt = f"Map of amplitude and frequency; share of the points by what acts: {', '.join(parts)}"
+    return doc.figure("map", map_chart(result, scale, unit), caption, alt=alt)
 
 
 def _shift_table(shift: LimitShift, design: Design, scale: float, unit: str) -> doc.Block:
     """List the linear limit and what friction makes of it, frequency by frequency."""
     small: dict[str, Any] = {"unit": unit, "scale": scale, "format": "sig:4"}
+
+    def percent(k: int) -> float | None:
+        same = shift.linear_limiter[k] == shift.simulated_limiter[k]
+        return 100.0 * (shift.ratio[k] - 1.0) if same else None
+
     columns = [
         doc.of(lambda k: shift.frequency_hz[k], "hz", "Frequency", "Hz", format="sig:3"),
         doc.of(lambda k: shift.linear_rad[k], "linear", "Predicted", **small),
         doc.of(lambda k: shift.simulated_rad[k], "simulated", "Simulated, with friction", **small),
-        doc.of(lambda k: _shift(shift, k), "shift", "Shift by friction", "%", format="fix:2"),
+        doc.of(percent, "shift", "Shift by friction", "%", format="fix:2"),
         doc.of(lambda k: words_of(shift.linear_limiter[k]), "limiter", "Predicted limiter"),
         doc.of(lambda k: words_of(shift.simulated_limiter[k]), "acts", "Acting limiter"),
     ]
@@ -164,12 +157,6 @@ def _shift_table(shift: LimitShift, design: Design, scale: float, unit: str) -> 
         note += " Amplitudes behind the profile and filter of the command."
     places = range(len(shift.frequency_hz))
     return doc.listing("Amplitude at which a limit is first reached", places, columns, note)
-
-
-def _shift(shift: LimitShift, place: int) -> float | None:
-    """In percent, of one and the same limit."""
-    same = shift.linear_limiter[place] == shift.simulated_limiter[place]
-    return 100.0 * (shift.ratio[place] - 1.0) if same else None
 
 
 def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: float) -> doc.Block:
@@ -228,10 +215,9 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, design: 
     rows: list[tuple[object, ...]] = []
     for fraction, amplitude in zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True):
         k = int(np.argmin(np.abs(amplitude_bode.all_amplitude_rad - amplitude)))
-        below, known = bool(amplitude_bode.below_from_start[k]), math.isfinite(amplitude_bode.minus3db_hz[k])
-        note = f"below −3 dB at {amplitude_bode.frequency_hz[0]:.3g} Hz and above" if below else ""
-        if not (below or known):
-            note = f"−3 dB {_between(amplitude_bode, k)}"
+        note = "" if math.isfinite(amplitude_bode.minus3db_hz[k]) else f"−3 dB {_between(amplitude_bode, k)}"
+        if amplitude_bode.below_from_start[k]:
+            note = f"below −3 dB at {amplitude_bode.frequency_hz[0]:.3g} Hz and above"
         corners = (amplitude_bode.minus3db_hz[k], amplitude_bode.minus90deg_hz[k])
         rows.append((100.0 * fraction, scale * amplitude, *corners, note))
     corners = (amplitude_bode.linear_minus3db_hz, amplitude_bode.linear_minus90deg_hz)

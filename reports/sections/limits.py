@@ -29,8 +29,14 @@ def section(design: Design, border: Onset) -> doc.Section:
         "lowest line every linear figure of this report holds, except for dry friction."
     )
     rows = _rows(design, border, scale)
+    columns = [
+        doc.of("amplitude", "amplitude", "Command amplitude", unit, format="short:3"),
+        doc.of("fraction", "fraction", "Of full deflection", "%", scale=100.0, format="fix:0"),
+        doc.of("hz", "hz", "Linear up to", "Hz", format="sig:3"),
+        doc.of("limiter", "limiter", "Then limited by"),
+    ]
     blocks = [doc.figure("onset", _chart(design, border, scale, unit), caption)]
-    blocks += [_table(rows, unit)] if rows else []
+    blocks += [doc.listing("How far the linear model reaches", rows, columns)] if rows else []
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
     words = _result(rows, unit) if rows else _least(border, scale, unit)
     return doc.section(
@@ -39,7 +45,6 @@ def section(design: Design, border: Onset) -> doc.Section:
 
 
 def _chart(design: Design, border: Onset, scale: float, unit: str) -> style.Chart:
-    """Draw every limiter's line; below the lowest the linear model holds."""
     chart = style.Chart(
         width=style.WIDE, height=370.0, legend=True, legend_title="limit reached at this amplitude"
     )
@@ -121,16 +126,6 @@ def _rows(design: Design, border: Onset, scale: float) -> list[_Linear]:
     return rows
 
 
-def _table(rows: Sequence[_Linear], unit: str) -> doc.Block:
-    columns = [
-        doc.of("amplitude", "amplitude", "Command amplitude", unit, format="short:3"),
-        doc.of("fraction", "fraction", "Of full deflection", "%", scale=100.0, format="fix:0"),
-        doc.of("hz", "hz", "Linear up to", "Hz", format="sig:3"),
-        doc.of("limiter", "limiter", "Then limited by"),
-    ]
-    return doc.listing("How far the linear model reaches", rows, columns)
-
-
 def _crossing(border: Onset, first: int, amplitude: float) -> float:
     """Interpolate, on logarithmic scales, where the border falls to an amplitude."""
     if first == 0 or not math.isfinite(border.amplitude_rad[first - 1]):
@@ -164,7 +159,6 @@ EVERY = 2  # a glyph in every second column
 
 
 def map_chart(result: LargeSignals, scale: float, unit: str) -> style.Chart:
-    """Draw regions, glyphs and lines."""
     made = style.Chart(
         width=style.WIDE, height=500.0, legend=True, legend_title="waveform; first reached, linear loop"
     )
@@ -174,77 +168,55 @@ def map_chart(result: LargeSignals, scale: float, unit: str) -> style.Chart:
     panel.x.limits(xe[0], xe[-1])
     panel.y.limits(ye[0], ye[-1])
     panel.x.grid = panel.y.grid = False
-    _regions(panel, CAUSES, shown.cause, xe, ye)
-    _glyphs(panel, WAVEFORMS, shown.waveform, x, y)
+    _regions(panel, shown.cause, xe, ye)
+    _glyphs(panel, shown.waveform, x, y)
     _onsets(panel, x, shown.onset_rad, scale)
-    _first_limited(panel, result, scale)
+    if (shift := result.shift) is not None and np.isfinite(shift.simulated_rad).any():
+        sizes = scale * shift.simulated_rad / shift.command_gain
+        look: style.Style = {"colour": style.INK, "marker": "D", "size": 7.0, "hollow": True}
+        panel.points(shift.frequency_hz, sizes, "simulated, with friction", **look)
     full = scale * result.design.validation.full_deflection_rad
     panel.rule_y(full, "full\ndeflection", dash=4, width=0.8)
-    _names(panel, CAUSES, shown.cause, x, y)
+    for k, name in enumerate(CAUSES):
+        if (mask := shown.cause == k).sum() >= 8:
+            row, column = _deepest(mask)
+            panel.note(WORDS.get(name, name), (x[column], y[row]), bold=True, over=True)
     return made
 
 
 def _edges(centres: np.ndarray) -> np.ndarray:
-    """Give the borders between points on a logarithmic scale."""
     inner = np.sqrt(centres[1:] * centres[:-1])
     first, last = centres[0] ** 2 / inner[0], centres[-1] ** 2 / inner[-1]
     return np.concatenate([[first], inner, [last]])
 
 
-def _regions(
-    panel: style.Panel, names: Sequence[str], cause: np.ndarray, xe: np.ndarray, ye: np.ndarray
-) -> None:
-    """Fill the points of each cause."""
+def _regions(panel: style.Panel, cause: np.ndarray, xe: np.ndarray, ye: np.ndarray) -> None:
     boxes: dict[str, list[Any]] = {}
     for k, row in enumerate(cause):
         for a, b in pairwise([0, *(np.flatnonzero(np.diff(row)) + 1).tolist(), len(row)]):
             ring = ([xe[a], xe[b], xe[b], xe[a]], [ye[k], ye[k], ye[k + 1], ye[k + 1]])
-            boxes.setdefault(names[row[a]], []).append(ring)
+            boxes.setdefault(CAUSES[row[a]], []).append(ring)
     for name, rings in boxes.items():
         if name in COLOURS:
             panel.shape(rings, colour=COLOURS[name], opacity=0.28)
 
 
-def _glyphs(
-    panel: style.Panel, names: Sequence[str], waveform: np.ndarray, x: np.ndarray, y: np.ndarray
-) -> None:
+def _glyphs(panel: style.Panel, waveform: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
     """Mark the waveform in every second column; a sine has no mark."""
     shown = np.zeros_like(waveform, dtype=bool)
     shown[:, ::EVERY] = True
     for name, look in GLYPHS.items():
-        if name not in names:
-            continue
-        rows, columns = np.nonzero((waveform == names.index(name)) & shown)
+        rows, columns = np.nonzero((waveform == WAVEFORMS.index(name)) & shown)
         if len(rows):
             panel.points(x[columns], y[rows], name, colour=style.INK, read=False, **look)
 
 
 def _onsets(panel: style.Panel, hertz: np.ndarray, each_rad: Mapping[str, np.ndarray], scale: float) -> None:
-    """Draw A_k(w) of every limiter."""
     for name, values in each_rad.items():
         if np.isfinite(values).any():
             limited = np.where(np.isfinite(values), scale * np.asarray(values), np.nan)
             look: style.Style = {"colour": COLOURS[name], "dash": LINES[name], "width": 2.3}
             panel.curve(hertz, limited, LIMITERS[name].words, **look)
-
-
-def _first_limited(panel: style.Panel, result: LargeSignals, scale: float) -> None:
-    """Mark the amplitudes at which the simulator first limits."""
-    shift = result.shift
-    if shift is not None and np.isfinite(shift.simulated_rad).any():
-        sizes = scale * shift.simulated_rad / shift.command_gain
-        look: style.Style = {"colour": style.INK, "marker": "D", "size": 7.0, "hollow": True}
-        panel.points(shift.frequency_hz, sizes, "simulated, with friction", **look)
-
-
-def _names(panel: style.Panel, names: Sequence[str], cause: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
-    """Write the name of each region into its middle."""
-    for k, name in enumerate(names):
-        mask = cause == k
-        if mask.sum() < 8:
-            continue
-        row, column = _deepest(mask)
-        panel.note(WORDS.get(name, name), (x[column], y[row]), bold=True, over=True)
 
 
 def _deepest(mask: np.ndarray) -> tuple[int, int]:

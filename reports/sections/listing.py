@@ -9,7 +9,6 @@ from reports import document as doc
 
 
 def section(result: Any) -> doc.Section:
-    """Make the section of a result, a table of each tuple of rows that it has."""
     listed = [value for value in vars(result).values() if isinstance(value, tuple) and value]
     blocks = [doc.listing("", rows, columns) for rows in listed if (columns := _columns(type(rows[0])))]
     return doc.section("list", "List", blocks, result=str(result))

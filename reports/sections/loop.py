@@ -33,7 +33,6 @@ Response = tuple[str, np.ndarray, np.ndarray]  # label, time in s, response
 
 
 def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
-    """Make the section of one loop; of a current loop that with the rotor locked is drawn beside it."""
     locked = figures.locked
     grid = frequency_grid(figures)
     title, status = LOOPS[name], worst_status([figures.sound])
@@ -89,12 +88,8 @@ def _intro(name: str, figures: LoopFigures) -> str:
 
 
 def _facts(figures: LoopFigures) -> doc.Block:
-    chosen = [
-        doc.fact(
-            each.label, _short(shown(each, figures), each.at_a_glance), each.shown[0], better=each.direction
-        )
-        for each in AT_A_GLANCE
-    ]
+    known = [(each, _short(shown(each, figures), each.at_a_glance)) for each in AT_A_GLANCE]
+    chosen = [doc.fact(of.label, value, of.shown[0], better=of.direction) for of, value in known]
     crossover = _short(margin_row(figures)["crossover_hz"], "sig:3")
     return doc.facts([*chosen, doc.fact("Gain crossover", crossover, "Hz")])
 
@@ -111,12 +106,9 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
     """Draw S and T, their peaks and the limit of a requirement."""
     peaks = figures.peaks
     assert peaks is not None
+    asked = [item for item in design.requirements if item.quantity == "sensitivity_peak"]
     limits = [
-        item.maximum
-        for item in design.requirements
-        if item.quantity == "sensitivity_peak"
-        and item.loop in (name, "every", None)
-        and item.maximum is not None
+        item.maximum for item in asked if item.loop in (name, "every", None) and item.maximum is not None
     ]
     grid_hz, values = grid / (2.0 * np.pi), []
     chart = style.Chart(width=style.HALF, height=225.0, loop=name)
@@ -130,7 +122,8 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
         words = f"|{letter}|, no peak"
         if db is not None and at and db >= 0.005:
             words = f"|{letter}|, peak {db:.2f} dB at {style.hertz(at)}"
-        values.append(_db(response_at(system, grid)))
+        with np.errstate(divide="ignore"):
+            values.append(20.0 * np.log10(np.abs(response_at(system, grid))))
         panel.curve(grid_hz, values[k], words, colour=colour, dash=k)
         if db is not None and at and grid_hz[0] <= at <= grid_hz[-1] * 1.001:
             panel.points([at], [db], marker="^", colour=colour, size=7.0, read=False)
@@ -155,12 +148,11 @@ def step(
     """Draw the step responses, as stairs where sampled, and the figures read from the first."""
     figures = loop_figures.step
     assert figures is not None
-    end = None
+    end, drawn = None, {"rotor free" if locked else "closed loop": loop_figures}
     if locked is not None and locked.step is not None:
         end = 4.0 * float(locked.step.settling_time_s)  # the motor's own motion goes on for much longer
-    responses = [_response("rotor free" if locked else "closed loop", loop_figures, end)]
-    if locked is not None and locked.step is not None:
-        responses.append(_response("rotor locked", locked, end))
+        drawn["rotor locked"] = locked
+    responses = [_response(label, one, end) for label, one in drawn.items()]
     width, height = (style.SMALL, 280.0) if small else (style.HALF, 225.0)
     chart = style.Chart(width=width, height=height, loop=name)
     panel = chart.panel(y="response to a unit step")
@@ -229,8 +221,3 @@ def _response(label: str, loop_figures: LoopFigures, end_s: float | None = None)
     if end_s is not None and time[-1] < end_s:
         time, response = np.append(time, end_s), np.append(response, response[-1])
     return label, time, response
-
-
-def _db(values: np.ndarray) -> np.ndarray:
-    with np.errstate(divide="ignore"):
-        return np.asarray(20.0 * np.log10(np.abs(values)))

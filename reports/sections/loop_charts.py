@@ -23,7 +23,6 @@ RED, GREEN, ORANGE = style.RED, style.GREEN, style.ORANGE
 
 
 def nyquist_hz(figures: LoopFigures) -> float | None:
-    """Give the Nyquist frequency of a sampled loop."""
     return None if figures.loop.period_s is None else 0.5 / figures.loop.period_s
 
 
@@ -47,7 +46,6 @@ def open_bode(
 
 
 def margin_words(title: str, figures: LoopFigures) -> str:
-    """Say what an open-loop figure shows."""
     row = margin_row(figures)
     gain = "none" if row["gain_margin_db"] is None else f"{gain_margin(row['gain_margin_db'], 1)} dB"
     phase = "none" if row["phase_margin_deg"] is None else f"{row['phase_margin_deg']:.1f} deg"

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.bandwidth import Bandwidth
 from actuator_lti.files.tree import Tree
 from analyses.linear.loop_figures import AWAY, HELD, OPEN, LoopFigures
 from analyses.linear.loop_survey import OperatingPointFigures
@@ -43,15 +42,31 @@ def _at(name: str) -> Callable[[LoopFigures], float | None]:
     return lambda figures: hertz(getattr(getattr(figures.margins, name), "frequency_rad_s", None))
 
 
+def _state(figures: LoopFigures) -> doc.State:
+    """Say whether a loop is stable, or unstable only by itself."""
+    if figures.held is not None:
+        return {"text": "unstable by itself", "status": "warn"}
+    return {"text": figures.margins.verdict, "status": STATUS[figures.margins.stable]}
+
+
+def _evidence(figures: LoopFigures) -> doc.State:
+    return {"text": figures.margins.evidence, "status": EVIDENCE_STATUS[figures.margins.evidence]}
+
+
+def _samples(figures: LoopFigures) -> float | None:
+    delay = figures.margins.delay_margin
+    return delay.samples if delay and figures.margins.stable else None
+
+
 MARGINS = [
-    doc.of(lambda figures: _state(figures), "stable", "Closed loop"),
-    doc.of(lambda figures: _evidence(figures), "evidence", "Margins are"),
+    doc.of(_state, "stable", "Closed loop"),
+    doc.of(_evidence, "evidence", "Margins are"),
     _figure("gain_margin", "gain_margin_db", "gain:2"),
     doc.of(_at("gain_margin"), "gain_margin_hz", "at", "Hz", format="sig:4"),
     _figure("phase_margin", "phase_margin_deg", "fix:2"),
     doc.of(_at("phase_margin"), "crossover_hz", "at", "Hz", format="sig:4"),
     _figure("delay_margin", "delay_margin_ms", "ms:3"),
-    doc.of(lambda f: _samples(f), "delay_margin_samples", "", "samples", format="sig:3", better=1),
+    doc.of(_samples, "delay_margin_samples", "", "samples", format="sig:3", better=1),
     _figure("modulus_margin", "modulus_margin", "fix:3"),
     _figure("sensitivity_peak", "s_peak_db", "fix:2"),
     doc.of("margins.disk_margin.alpha", "disk_margin", "Disk margin", format="fix:3", better=1),
@@ -60,7 +75,13 @@ RESPONSES = [
     _figure("bandwidth", "minus3db_hz", "sig:4"),
     _figure("bandwidth_90deg", "minus90deg_hz", "sig:4"),
     _figure("resonance_peak", "resonance_db", "fix:2"),
-    doc.of(lambda f: _resonance_hz(f.bandwidth), "resonance_hz", "at", "Hz", format="sig:4"),
+    doc.of(
+        lambda f: (f.bandwidth and f.bandwidth.resonance_hz) or None,
+        "resonance_hz",
+        "at",
+        "Hz",
+        format="sig:4",
+    ),
     doc.of("peaks.complementary_db", "t_peak_db", "Peak of T", "dB", format="fix:2", better=-1),
     _figure("rise_time", "rise_ms", "ms:3"),
     _figure("overshoot", "overshoot_percent", "fix:1"),
@@ -90,7 +111,10 @@ def section(result: Margins) -> list[doc.Section]:
     made = _loops(known, result.operating_points, how)
     made["blocks"] += [doc.text(note) for note in _notes(result, known)]
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
-    said = f"{_stability(known)}. {judged['result']}{_judged_on(result)}{_below_custom(result)}"
+    said = f"{_stability(known)}. {judged['result']}"
+    if result.requirements and (result.asked.form, result.asked.operating_point) != ("sampled", "sliding"):
+        said += " Judged on the sampled loops with sliding friction."
+    said += _below_custom(result)
     return [{**made, "result": said}, judged]
 
 
@@ -110,13 +134,6 @@ def brief(result: Margins) -> Brief:
     return Brief(first["result"], [SideBySide(head, tables), *crossings, *judged["blocks"]], notes)
 
 
-def _judged_on(result: Margins) -> str:
-    """On which loops the requirements are judged, where others are shown."""
-    asked = result.asked
-    alike = (asked.form, asked.operating_point) == ("sampled", "sliding")
-    return "" if alike or not result.requirements else " Judged on the sampled loops with sliding friction."
-
-
 def _named(result: Margins) -> dict[str, LoopFigures]:
     """The loops and the places around them by the words of their rows."""
     return {**{LOOPS[name]: one for name, one in result.loops.items()}, **result.around}
@@ -124,20 +141,14 @@ def _named(result: Margins) -> dict[str, LoopFigures]:
 
 def _below_custom(result: Margins) -> str:
     """Of a design without requirements: margins below what is customary, which nothing else would name."""
-    sound = {} if result.requirements else {name: one for name, one in result.loops.items() if one.sound}
-    low = [
-        f"{LOOPS[name].lower()}, {_against_custom(quantity, value)}"
-        for name, one in sound.items()
-        for quantity, value in figures_of(one.judged.margins).items()
-        if value < CUSTOMARY[quantity]
-    ]
-    return f" Below what is customary: {'; '.join(low)}." if low else ""
-
-
-def _against_custom(quantity: str, value: float) -> str:
-    """Say a margin beside what is customary, both with their unit."""
-    unit = f" {unit_words(QUANTITIES[quantity].unit)}".rstrip()
-    return f"{QUANTITIES[quantity].words} {value:.3g}{unit} (of {CUSTOMARY[quantity]:g}{unit})"
+    low = []
+    for name, one in result.loops.items():
+        for quantity, value in figures_of(one.judged.margins).items() if one.sound else ():
+            if value < CUSTOMARY[quantity]:
+                of, unit = QUANTITIES[quantity], f" {unit_words(QUANTITIES[quantity].unit)}".rstrip()
+                words = f"{of.words} {value:.3g}{unit} (of {CUSTOMARY[quantity]:g}{unit})"
+                low.append(f"{LOOPS[name].lower()}, {words}")
+    return f" Below what is customary: {'; '.join(low)}." if low and not result.requirements else ""
 
 
 def _where(result: Margins) -> str:
@@ -185,9 +196,11 @@ def _loops(
         doc.details("Every crossing of every loop", [crossing_table(own)]),
         *(doc.text(note) for note in evidence_notes(named)),
     ]
+    kinds = {one.margins.evidence for one in named.values()}
+    meaning = " ".join(f"{kind.capitalize()}: {words}." for kind, words in MEANING.items() if kind in kinds)
     intro = (
         "Each loop is cut at its own error, with the loops inside it closed and those outside it open. "
-        f"{how}{evidence_meaning(named)}"
+        f"{how}{meaning}"
     )
     status = worst_status([one.sound for one in loops.values()])
     return doc.section(
@@ -207,11 +220,8 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
         return " ".join(doubts)
     rows = {loop_words(name, one.rotor).lower(): margin_row(one.judged) for name, one in figures.items()}
     words = []
-    both = (
-        ("gain_margin_db", "gain margin", "dB", gain_margin),
-        ("phase_margin_deg", "phase margin", "deg", fixed),
-    )
-    for key, what, unit, write in both:
+    for what, unit, write in (("gain margin", "dB", gain_margin), ("phase margin", "deg", fixed)):
+        key = f"{what.replace(' ', '_')}_{unit.lower()}"
         known = {name: row[key] for name, row in rows.items() if row[key] is not None}
         if known:
             name = min(known, key=lambda n: abs(known[n]))
@@ -233,23 +243,13 @@ def evidence_words(figures: Mapping[str, LoopFigures]) -> str:
     return ", ".join(f"{' and '.join(names)} {evidence}" for evidence, names in others.items())
 
 
-def evidence_meaning(figures: Mapping[str, LoopFigures]) -> str:
-    """Say what each kind of evidence that occurs means."""
-    kinds = {loop_figures.margins.evidence for loop_figures in figures.values()}
-    return " ".join(f"{kind.capitalize()}: {words}." for kind, words in MEANING.items() if kind in kinds)
-
-
 def evidence_notes(named: Mapping[str, LoopFigures]) -> list[str]:
     """Give the reason of every loop whose margins are not certified."""
-    return [
-        f"{name}, {loop_figures.margins.evidence}: {loop_figures.margins.evidence_reason}."
-        for name, loop_figures in named.items()
-        if loop_figures.margins.evidence != "certified"
-    ]
+    known = [(name, one.margins) for name, one in named.items()]
+    return [f"{name}, {m.evidence}: {m.evidence_reason}." for name, m in known if m.evidence != "certified"]
 
 
 def margin_table(named: Mapping[str, LoopFigures]) -> doc.Block:
-    """Make the table of the margins to quote."""
     note = (
         "Of several crossings the table quotes the gain margin nearest to 0 dB and the phase margin nearest "
         "to 0°; all of them are listed below. A dash means that there is no such crossing, or that the loop "
@@ -261,7 +261,6 @@ def margin_table(named: Mapping[str, LoopFigures]) -> doc.Block:
 
 
 def response_table(named: Mapping[str, LoopFigures]) -> doc.Block:
-    """Make the table of bandwidths and step figures."""
     note = (
         "−3 dB: where the closed loop has fallen to 1/√2 of its gain at DC. −90°: where its phase reaches "
         "−90°. Current and velocity: the feedback loop. Position: the response from the user's command to "
@@ -285,16 +284,15 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
     """Make the table of the least and largest margins over the operating points that the drive has."""
     seen = [point for point in points if point.kind != "describing-function"]
     places = "; ".join(dict.fromkeys(point.place or "sliding" for point in seen))
-    labels = [next(iter(with_held({label: figures}))) for label, figures in named.items()]
-    rows: list[doc.Row] = []
-    for label, figures in zip(labels, named.values(), strict=True):
-        name, own = figures.loop.name, spread(seen).get(figures.loop.name, {})
-        row: doc.Row = {"loop": label}
+    ranges, rows = spread(seen), list[doc.Row]()
+    for label, figures in named.items():
+        name, own = figures.loop.name, ranges.get(figures.loop.name, {})
+        row: doc.Row = {"loop": next(iter(with_held({label: figures})))}
         row |= {name.split("_")[0]: range_words(range_, name) for name, range_ in own.items()}
         doubts = [p.place or "sliding" for p in seen if name in p.figures and not p.figures[name].sound]
         row |= {"gain": f"not stable {'; '.join(doubts)}"} if doubts else {}
         rows += [row] if len(row) > 1 else []
-    gains = [own["gain_margin"] for own in spread(seen).values() if "gain_margin" in own]
+    gains = [own["gain_margin"] for own in ranges.values() if "gain_margin" in own]
     note = f"Operating points: {places}."
     note += DOWNWARDS if any(min(one.least, one.most) < 0.0 for one in gains) else ""
     return doc.table("Margins over the operating points", SPREAD_COLUMNS, rows, note)
@@ -302,15 +300,16 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
 
 def range_words(range_: Spread, quantity: str) -> str:
     """Say between which values a margin lies over the operating points; empty where they agree."""
-    least, most = ("∞" if math.isinf(end) else short(end, 3) for end in (range_.least, range_.most))
-    least, most = (
-        f"down to {end}" if quantity == "gain_margin" and end[0] == "−" else end for end in (least, most)
-    )
+
+    def end(value: float) -> str:
+        words = "∞" if math.isinf(value) else short(value, 3)
+        return f"down to {words}" if quantity == "gain_margin" and words[0] == "−" else words
+
+    least, most = end(range_.least), end(range_.most)
     return least if least == most else f"{least} ({range_.where}) to {most}"
 
 
 def crossing_table(named: Mapping[str, LoopFigures]) -> doc.Block:
-    """Make the table of every crossing."""
     rows = [row for name, loop_figures in named.items() for row in _crossings(name, loop_figures)]
     return doc.table("Every gain and phase crossover", CROSSING_COLUMNS, rows)
 
@@ -322,28 +321,6 @@ def margin_row(figures: LoopFigures) -> Tree:
     if figures.margins.stable is not False:
         return row
     return {key: row[key] if key in ("stable", "evidence") else None for key in row}
-
-
-def _samples(figures: LoopFigures) -> float | None:
-    """The delay margin in samples, of a loop that is known to be stable."""
-    delay = figures.margins.delay_margin
-    return delay.samples if delay and figures.margins.stable else None
-
-
-def _resonance_hz(band: Bandwidth | None) -> float | None:
-    """Where the resonance is, unless at DC."""
-    return (band.resonance_hz or None) if band else None
-
-
-def _evidence(figures: LoopFigures) -> doc.State:
-    return {"text": figures.margins.evidence, "status": EVIDENCE_STATUS[figures.margins.evidence]}
-
-
-def _state(figures: LoopFigures) -> doc.State:
-    """Say whether a loop is stable, or unstable only by itself."""
-    if figures.held is not None:
-        return {"text": "unstable by itself", "status": "warn"}
-    return {"text": figures.margins.verdict, "status": STATUS[figures.margins.stable]}
 
 
 def with_held(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
@@ -393,48 +370,31 @@ def shown(quantity: Quantity, figures: LoopFigures) -> float | None:
 
 
 def _crossings(name: str, figures: LoopFigures) -> list[doc.Row]:
-    m = figures.margins
-    rows = [
-        _crossing(name, "phase crossover", margin.db, "dB", margin.frequency_rad_s)
-        | {"note": _gain_note(margin.ratio, margin.tangent)}
-        for margin in m.gain_margins
-    ]
+    m, touches = figures.margins, "touches, does not cross"
+    rows: list[doc.Row] = []
+    for gain in m.gain_margins:
+        note = f"{'upper' if gain.ratio >= 1.0 else 'lower'} limit of the gain{f', {touches}' * gain.tangent}"
+        rows.append(_crossing(name, "phase crossover", gain.db, "dB", gain.frequency_rad_s) | {"note": note})
     delays = {margin.frequency_rad_s: margin for margin in m.delay_margins}
-    for margin in m.phase_margins:
-        row = _crossing(name, "gain crossover", margin.deg, "deg", margin.frequency_rad_s)
-        delay = delays.get(margin.frequency_rad_s)
-        row["note"] = "touches, does not cross" if margin.tangent else ""
-        row["delay_ms"] = None if delay is None else delay.seconds * 1e3
-        row["samples"] = None if delay is None else delay.samples
-        rows.append(row)
+    for phase in m.phase_margins:
+        delay = delays.get(phase.frequency_rad_s)
+        more: doc.Row = {"delay_ms": delay.seconds * 1e3, "samples": delay.samples} if delay else {}
+        more["note"] = touches if phase.tangent else ""
+        rows.append(_crossing(name, "gain crossover", phase.deg, "deg", phase.frequency_rad_s) | more)
     return rows
 
 
 def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> doc.Row:
-    row = {
-        "_loop": next((key for key in LOOPS if name in (LOOPS[key], loop_words(key))), ""),
-        "_hz": finite(hertz(omega_rad_s)) or None,
-        "loop": name,
-        "kind": kind,
-        "value": finite(value),
-        "unit": unit,
-        "delay_ms": None,
-        "samples": None,
-    }
-    return {**row, "rad_s": finite(omega_rad_s), "hz": finite(hertz(omega_rad_s)), "note": ""}
-
-
-def _gain_note(ratio: float, tangent: bool) -> str:
-    limit = "upper limit of the gain" if ratio >= 1.0 else "lower limit of the gain"
-    return limit + (", touches, does not cross" if tangent else "")
+    hz = finite(hertz(omega_rad_s))
+    loop = next((key for key in LOOPS if name in (LOOPS[key], loop_words(key))), "")
+    row = {"_loop": loop, "_hz": hz or None, "loop": name, "kind": kind, "value": finite(value), "unit": unit}
+    return {**row, "delay_ms": None, "samples": None, "rad_s": finite(omega_rad_s), "hz": hz}
 
 
 def worst_status(stable: Iterable[bool | None]) -> doc.Status:
     """Give the status of a section from the stability of its loops: unstable fails, unknown warns."""
     known = list(stable)
-    if False in known:
-        return "fail"
-    return "warn" if None in known else "info"
+    return "fail" if False in known else "warn" if None in known else "info"
 
 
 def finite(value: float | None) -> float | None:

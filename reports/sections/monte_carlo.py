@@ -37,9 +37,7 @@ def section(result: MonteCarloResult) -> doc.Section:
     if result.worst:
         blocks.append(doc.details("Parameters of the worst cases", [_worst_table(result)]))
     blocks += [doc.remark(note) for note in result.notes]
-    blocks.append(doc.facts([
-        doc.fact("Samples", result.samples), doc.fact("Seed", result.seed),
-    ]))  # fmt: skip
+    blocks.append(doc.facts([doc.fact("Samples", result.samples), doc.fact("Seed", result.seed)]))
     blocks.append(doc.remark(f"Parameters that vary: {', '.join(result.paths)}."))
     intro = (
         f"{result.samples} designs drawn from the tolerances; sampled loops. An optimiser seeks the worst "
@@ -51,39 +49,32 @@ def section(result: MonteCarloResult) -> doc.Section:
 
 
 def brief(result: MonteCarloResult) -> Brief:
-    """The odds in few columns."""
     kept = ("label", "probability", "low", "nominal", "worst", "unit")
     tables = [doc.with_columns(_odds_table(result), kept)] if result.odds else []
     return Brief(_result(result), tables, [*result.notes, f"samples and worst designs: {result.folder}"])
 
 
 def text(result: MonteCarloResult | Design) -> str | None:
-    """One sample as a design file."""
     return write_design(result).rstrip("\n") if isinstance(result, Design) else None
 
 
 def _result(result: MonteCarloResult) -> str:
     """Say how many samples meet everything, and which requirement fails most often."""
     words = f"{result.tally.words('requirements')} under tolerances"
-    every = next((odds for odds in result.odds if odds.id == "all"), None)
-    if every is None:
+    each = {odds.id: odds for odds in result.odds}
+    if (every := each.pop("all", None)) is None:
         said = words if result.left_out else "The design states no requirement"
         return f"{said}; {result.samples} samples were drawn."
     words += f"; {every.passed} of {every.count} samples meet every one"
     words += " that is sampled" if result.left_out else ""
-    weakest = min(
-        (odds for odds in result.odds if odds.id != "all"), key=lambda odds: odds.probability, default=None
-    )
+    weakest = min(each.values(), key=lambda odds: odds.probability, default=None)
     if weakest is None or weakest.probability == 1.0:
         return f"{words}."
-    return (
-        f"{words}; the one missed most often is {weakest.label} ({100.0 * weakest.probability:.3g} % meet "
-        "it)."
-    )
+    share = f"{100.0 * weakest.probability:.3g} % meet it"
+    return f"{words}; the one missed most often is {weakest.label} ({share})."
 
 
 def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
-    """Judge one requirement by its odds."""
     wanted = 1.0 if result.at_least is None else result.at_least
     passed = result.judged(odds) is Verdict.MET
     reason = "" if passed else _why(odds, result.case(odds))
@@ -139,11 +130,14 @@ def _odds_table(result: MonteCarloResult) -> doc.Block:
 
 
 def _figure_table(columns: Iterable[ColumnStatistics]) -> doc.Block:
+    def quantile(percent: int, c: ColumnStatistics) -> float | None:
+        return dict(zip(c.shares, c.quantiles, strict=True)).get(percent / 100)
+
     shown = [
         doc.of(lambda c: _words(c.name), "figure", "Figure"),
         doc.of(lambda c: unit_words(c.unit), "unit", "Unit"),
         doc.of("minimum", "minimum", "Min", format="sig:4"),
-        *(doc.of(partial(_quantile, q), f"q{q:02d}", f"{q} %", format="sig:4") for q in _SHOWN),
+        *(doc.of(partial(quantile, q), f"q{q:02d}", f"{q} %", format="sig:4") for q in _SHOWN),
         doc.of("maximum", "maximum", "Max", format="sig:4"),
         doc.of("mean", "mean", "Mean", format="sig:4"),
         doc.of("std", "std", "Std", format="sig:3"),
@@ -153,10 +147,6 @@ def _figure_table(columns: Iterable[ColumnStatistics]) -> doc.Block:
         "Quantiles are values of samples. Missing: samples without such a figure (unstable, or not reached)."
     )
     return doc.listing("Distribution of every figure", columns, shown, note)
-
-
-def _quantile(percent: int, c: ColumnStatistics) -> float | None:
-    return dict(zip(c.shares, c.quantiles, strict=True)).get(percent / 100)
 
 
 def _words(name: str) -> str:
@@ -169,10 +159,8 @@ def _words(name: str) -> str:
     """
     where, _, what = name.partition(".")
     figure, _, load = what.replace("_", " ").partition("@")
-    place = where if where in ("drive", "nonlinear") else f"{where} loop"
-    return f"{'nonlinear step' if place == 'nonlinear' else place}: {figure}" + (
-        f" at {load} N m" if load else ""
-    )
+    place = {"drive": "drive", "nonlinear": "nonlinear step"}.get(where, f"{where} loop")
+    return f"{place}: {figure}" + (f" at {load} N m" if load else "")
 
 
 def _figures(result: MonteCarloResult) -> list[doc.Block]:
@@ -192,8 +180,7 @@ def _figures(result: MonteCarloResult) -> list[doc.Block]:
         for odds, column in part:
             _histogram(chart.panel(title=_words(column.name)), result, odds, column)
         names = ", ".join(_words(column.name) for _, column in part)
-        caption = f"Distribution within the tolerances: {names}."
-        blocks.append(doc.figure("distribution", chart, caption))
+        blocks.append(doc.figure("distribution", chart, f"Distribution within the tolerances: {names}."))
     return blocks
 
 

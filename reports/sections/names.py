@@ -42,7 +42,6 @@ def fine_unit(axis: str) -> tuple[float, str]:
 
 
 def load_unit(design: Design) -> str:
-    """Give the unit of the load at the output."""
     return "N" if design.axis == "linear" else "N m"
 
 

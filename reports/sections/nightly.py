@@ -36,10 +36,8 @@ def _why(design: DesignView) -> str:
 
 
 def data(night: Overview) -> Tree:
-    """Give what ``summary.json`` holds."""
     return summary(night)
 
 
 def write(night: Overview, _folder: Path | None) -> list[str]:
-    """Name the page that was published."""
     return [str(night.site / "index.html")]

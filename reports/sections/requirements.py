@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> doc.Section:
-    """Make the section from the verdicts; ``load_unit`` is N for a linear axis."""
     if not verdicts:
         none = "The design states no requirements."
         return doc.section("verdicts", "Requirements", [], result=none, status="info")
@@ -42,15 +41,11 @@ def result(verdicts: Sequence[RequirementVerdict]) -> str:
 
 
 def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem:
-    """Make one line of the verdicts."""
     requirement = verdict.requirement
     limit, comparison = _limit(verdict)
-    reason = verdict.reason
-    if verdict.value is not None and math.isinf(verdict.value):
-        reason = reason or "unlimited"
-    source = requirement.source + (
-        f" ({requirement.note})" if requirement.note and requirement.note != requirement.source else ""
-    )
+    unlimited = "unlimited" * (verdict.value is not None and math.isinf(verdict.value))
+    source, note = requirement.source, requirement.note
+    source += f" ({note})" if note and note != source else ""
     made = doc.verdict(
         verdict.id,
         label(verdict, load_unit),
@@ -61,7 +56,7 @@ def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem
         distance=verdict.distance,
         passed=None,
         source=source,
-        reason=reason,
+        reason=verdict.reason or unlimited,
         waiver=verdict.waiver.words if verdict.waiver else "",
     )
     return {**made, "verdict": verdict.verdict.value, "loop": verdict.loop, "quantity": requirement.quantity}

@@ -35,7 +35,6 @@ def section(result: Motion) -> doc.Section:
 
 
 def data(result: Motion) -> Tree:
-    """What happened in numbers, without the rows."""
     full = result.design.validation.full_deflection_rad
     return {**summary(result.run, full), "files": result.asked.files}
 
@@ -82,10 +81,8 @@ def _in_words(name: str, value: float) -> list[doc.Row]:
     """
     ending, factor, unit = next((one for one in UNITS if name.endswith(one[0])), ("", 1.0, ""))
     what = name.removesuffix(ending).replace("_", " ")
-    more: list[doc.Row] = (
-        [{"what": "", "value": value * 30.0 / np.pi, "unit": "rpm"}] if unit == "rad/s" else []
-    )
-    return [{"what": what, "value": value * factor, "unit": unit}, *more]
+    rpm: doc.Row = {"what": "", "value": value * 30.0 / np.pi, "unit": "rpm"}
+    return [{"what": what, "value": value * factor, "unit": unit}, *[rpm] * (unit == "rad/s")]
 
 
 def _limits(run: Trajectory) -> doc.Block:
@@ -127,11 +124,8 @@ def chart_of(run: Trajectory) -> style.Chart:
     parts: list[tuple[str, Signals, Acting]] = [
         (f"output position, {unit}", position, ()),
         (f"{'axis' if linear else 'motor'} speed, {'m/s' if linear else 'rad/s'}", speed, _limiters("w_ref")),
-        *(
-            [("motor current, A", current, _limiters("i_ref", "i", "torque_command"))]
-            if run.current_A.any()
-            else []
-        ),
+        *[("motor current, A", current, _limiters("i_ref", "i", "torque_command"))]
+        * bool(run.current_A.any()),
         ("voltage, V", [("voltage", run.voltage_V), *command.get("voltage", [])], _limiters("u")),
     ]
     rows = style.kept_rows([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])

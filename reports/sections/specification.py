@@ -9,6 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from analyses.specification import Specification
+from analyses.specification.capability import Manoeuvre
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import short, significant
@@ -75,19 +76,13 @@ def _commanded(design: Design) -> str:
 
 def _findings(result: Specification) -> list[doc.Finding]:
     """Name the loads at which the drive cannot run without pause."""
-    unit = load_unit(result.design)
-    return [
-        doc.Finding(
-            severity="warn",
-            text=(
-                f"At {one.figures.load_Nm:g} {unit} load the continuous current allows a duty of "
-                f"{100.0 * one.duty:.0f} %."
-            ),
-            where="specification",
-        )
+    words = [
+        f"At {one.figures.load_Nm:g} {load_unit(result.design)} load the continuous current allows a duty of "
+        f"{100.0 * one.duty:.0f} %."
         for one in result.capabilities
         if one.duty is not None and one.duty < 0.995
     ]
+    return [doc.Finding(severity="warn", text=text, where="specification") for text in words]
 
 
 def _capability_table(result: Specification) -> doc.Block:
@@ -142,14 +137,14 @@ def _planes(result: Specification) -> list[doc.Block]:
             # a reversal is a jump of the folded path: leave a gap there
             torque = np.where(np.diff(fold, prepend=fold[0]) != 0.0, np.nan, torque)
             look: style.Style = {"colour": style.SERIES[(k + 2) % 7], "dash": k % 7, "width": 1.5}
-            panel.curve(speed, torque, _short(move.name), **look)
+            head, bracket, tail = move.name.partition(" (")  # long names are broken for the legend
+            head = head.replace(" of what", "\nof what").replace(" as fast", "\nas fast")
+            panel.curve(speed, torque, head + bracket + tail, **look)
         for bound in result.plane.bounds:
             inside = (0.97 * widest, 1.2 * top)
             _bound(panel, bound.name, fast * bound.speed_rad_s, strong * bound.torque_Nm, inside)
-        wanted = [
-            each for each in result.plane.demands if each.name.startswith(f"steady motion at {load:g} ")
-        ]
-        for k, each in enumerate(wanted):
+        start = f"steady motion at {load:g} "
+        for k, each in enumerate(one for one in result.plane.demands if one.name.startswith(start)):
             panel.curve(
                 fast * each.speed_rad_s, strong * each.torque_Nm, each.name, colour=style.INK, width=1.5,
                 dash=2, marker="os^D"[k % 4], size=5.0, every=8,
@@ -166,7 +161,6 @@ def _planes(result: Specification) -> list[doc.Block]:
 def _bound(
     panel: style.Panel, name: str, speed: np.ndarray, torque: np.ndarray, inside: tuple[float, float]
 ) -> None:
-    """Draw one bound in both halves, named once."""
     look: style.Style = {"colour": BOUND_COLOURS.get(name, style.INK), "width": 1.3, "dash": 1}
     if speed[0] == speed[-1]:
         panel.rule_x(speed[0], name, **look)
@@ -180,27 +174,17 @@ def _bound(
         panel.note(name, (float(speed[k]), float(torque[k])), colour=look["colour"])
 
 
-def _short(name: str) -> str:
-    """Break a long name for the legend."""
-    head, bracket, tail = name.partition(" (")
-    return head.replace(" of what", "\nof what").replace(" as fast", "\nas fast") + bracket + tail
-
-
 def _top(result: Specification, moves: list[Any]) -> float:
-    """Torque that the frame must show."""
     level = [c.torque_Nm[0] for c in result.plane.bounds if c.torque_Nm[0] == c.torque_Nm[-1]]
-    paths = [move.peak_torque_Nm for move in moves]
-    return float(max([*level, *paths], default=1.0))
+    return float(max([*level, *(move.peak_torque_Nm for move in moves)], default=1.0))
 
 
 def _fastest(result: Specification, moves: list[Any]) -> float:
     """Speed that the frame must show: the bounds in reach, and the paths."""
-    paths = [float(np.max(np.abs(move.speed_rad_s))) for move in moves]
-    upright = [float(c.speed_rad_s[0]) for c in result.plane.bounds if c.name == "speed limit"]
-    highest = max(paths, default=1.0)
-    crossing = [
-        float(c.speed_rad_s[-1]) for c in result.plane.bounds if c.name == "voltage limit" and not upright
-    ]
+    highest = max((float(np.max(np.abs(move.speed_rad_s))) for move in moves), default=1.0)
+    bounds = {c.name: c.speed_rad_s for c in result.plane.bounds}
+    upright = [float(bounds["speed limit"][0])] if "speed limit" in bounds else []
+    crossing = [float(bounds["voltage limit"][-1])] if "voltage limit" in bounds and not upright else []
     return 1.12 * max([highest, *upright, *[c for c in crossing if c < 4.0 * highest]])
 
 
@@ -220,18 +204,15 @@ def _manoeuvre_table(result: Specification) -> doc.Block:
             doc.of("rms_torque_Nm", "rms_force", "Force, rms", "N", format="sig:3"),
             doc.of("peak_torque_Nm", "peak_force", "peak", "N", format="sig:3"),
         ]
-    columns.append(doc.of(lambda move: _limit_words(move.limits), "limits", "Limits that act"))
-    return doc.listing(f"Standard manoeuvres at {_full(result.design)}", result.manoeuvres, columns)
 
+    def limits(move: Manoeuvre) -> str:
+        parts = [f"{words_of(name)} {short(100.0 * share, 2)} %" for name, share in move.limits.items()]
+        return ", ".join(parts) or "none"
 
-def _full(design: Design) -> str:
-    scale, unit = output_unit(design.axis)
-    return f"{scale * design.validation.full_deflection_rad:.3g} {unit}"
-
-
-def _limit_words(limits: dict[str, float]) -> str:
-    parts = [f"{words_of(name)} {short(100.0 * share, 2)} %" for name, share in limits.items()]
-    return ", ".join(parts) or "none"
+    columns.append(doc.of(limits, "limits", "Limits that act"))
+    scale, unit = output_unit(result.design.axis)
+    full = f"{scale * result.design.validation.full_deflection_rad:.3g} {unit}"
+    return doc.listing(f"Standard manoeuvres at {full}", result.manoeuvres, columns)
 
 
 def _step_table(result: Specification) -> doc.Block:

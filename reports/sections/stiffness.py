@@ -23,28 +23,23 @@ STATES = {
 
 
 def of_design(design: Design) -> doc.Section:
-    """Make the section of a report from the linear loops alone."""
     return {**section(stiffness(design, simulated=False)), "status": "info"}
 
 
 def section(result: Stiffness) -> doc.Section:
     unit = f"{load_unit(result.design)}/{'m' if result.design.axis == 'linear' else 'rad'}"
-    blocks = [*_figure(result, unit), _table(result, unit)]
-    if result.lost_motion is not None:
-        blocks.append(_lost_motion(result))
-    if result.at_rest:
-        blocks.append(_at_rest(result, unit))
-    if result.checks:
-        blocks.append(_checks(result, unit))
-    push = _push(result)
+    blocks = [
+        *(*_figure(result, unit), _table(result, unit)),
+        *([_lost_motion(result)] if result.lost_motion else []),
+        *([_at_rest(result, unit)] if result.at_rest else []),
+        *([_checks(result, unit)] if result.checks else []),
+    ]
     intro = (
-        f"Load {push} over the deflection of the output, the command held: the inverse of the linear "
-        "response from load to output. Friction slides; dry friction and play are not in the curves."
+        f"Load {_push(result)} over the deflection of the output, the command held: the inverse of the "
+        "linear response from load to output. Friction slides; dry friction and play are not in the curves."
     )
-    status: doc.Status = result.verdict.role()
-    return doc.section(
-        "stiffness", "Stiffness", blocks, result=_result(result, unit), intro=intro, status=status
-    )
+    status, words = result.verdict.role(), _result(result, unit)
+    return doc.section("stiffness", "Stiffness", blocks, result=words, intro=intro, status=status)
 
 
 def _push(result: Stiffness) -> str:

@@ -30,7 +30,6 @@ def section(result: TuningResult) -> doc.Section:
 
 
 def write(result: TuningResult, folder: Path | None) -> list[str]:
-    """Write the tuned design into the folder."""
     if folder is None:
         return []
     write_text(folder / "tuned.toml", write_design(result.design))
@@ -65,7 +64,6 @@ def summary(result: TuningResult) -> str:
 
 
 def changed(result: TuningResult) -> bool:
-    """Whether any value differs from what the design had."""
     return any(g.before is None or g.rounded != g.before for g in result.gains)
 
 
@@ -76,12 +74,11 @@ def _amount(r: BindingRequirement) -> str:
 
 
 def _verdict(r: BindingRequirement) -> doc.VerdictItem:
+    corner = "; ".join(f"{path} {value:.4g}" for path, value in r.corner.items()) or "nominal"
+    reason = [_amount(r)] * (r.distance is None) + ["binds"] * r.binds + [f"at {corner}"]
     return doc.verdict(
         f"tuning/{r.id}", f"{r.label}, worst corner", value=r.value, limit=r.limit, unit=r.unit,
-        distance=r.distance, passed=r.relative >= 0.0,
-        reason="; ".join(filter(None, (
-            "" if r.distance is not None else _amount(r), "binds" if r.binds else "", f"at {_corner(r)}",
-        ))),
+        distance=r.distance, passed=r.relative >= 0.0, reason="; ".join(reason),
     )  # fmt: skip
 
 
@@ -120,10 +117,6 @@ def confirmed(result: TuningResult) -> doc.Block:
     return doc.listing("Confirmed by certified margins", result.confirmed, columns, status=lambda v: v.role)
 
 
-def _corner(r: BindingRequirement) -> str:
-    return "; ".join(f"{path} {value:.4g}" for path, value in r.corner.items()) or "nominal"
-
-
 def _curve(result: TuningResult) -> doc.Block:
     limits = {(r.id, r.unit): r.limit for r in result.requirements}
     wanted = [q for q in result.before.requirements if (q.id, q.unit) in limits]
@@ -151,7 +144,6 @@ def _curve(result: TuningResult) -> doc.Block:
 
 
 def checks(result: TuningResult) -> doc.Block:
-    """The nonlinear check."""
     scale, unit = output_unit(result.design.axis)
     columns = [
         doc.of("corner", "corner", "Design"),

@@ -42,7 +42,6 @@ NOISE = 1e-9  # of the value: a smaller error changes with the order in which su
 
 
 def section(validation: Validation) -> list[doc.Section]:
-    """Make all sections of a validation, verdicts first."""
     made = [summary(validation), *in_time.sections(validation)]
     if validation.rest_sweep is not None:
         made += beyond.from_rest(validation.rest_sweep, validation.design.axis)
@@ -73,7 +72,6 @@ def brief(validation: Validation) -> Brief:
 
 
 def summary(validation: Validation) -> doc.Section:
-    """Make the section of verdicts with every check."""
     blocks: list[doc.Block] = [doc.verdicts(verdict_items(validation), what="checks")]
     wrong = [row for row in validation.rows if row.verdict is not Verdict.MET]
     if wrong:
@@ -166,7 +164,6 @@ def _item(id: str, label: str, passed: bool | None, reason: str, **counts: Any) 
 
 
 def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
-    """Group checks by loop, break point or path, in order."""
     grouped: dict[str, list[Check]] = {}
     for row in rows:
         grouped.setdefault(row.loop, []).append(row)
@@ -175,12 +172,16 @@ def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
 
 def table(rows: Sequence[Check], caption: str) -> doc.Block:
     """Lay checks out as a table."""
+
+    def error(row: Check) -> float:
+        return max(row.error, NOISE * abs(row.predicted or 1.0))  # no digits that are noise of the last bit
+
     columns = [
         doc.of(quantity_name, "quantity", "Prediction"),
         doc.of(lambda row: _rounded(row, row.predicted, 12), "predicted", "Predicted", format="sig:6"),
         doc.of(lambda row: _rounded(row, row.found, 10), "found", "Simulated", format="sig:6"),
         doc.of(lambda row: _scaled(row)[1], "unit", "Unit"),
-        doc.of(lambda row: _rounded(row, _error(row), 2), "error", "Error", format="sig:2"),
+        doc.of(lambda row: _rounded(row, error(row), 2), "error", "Error", format="sig:2"),
         doc.of(lambda row: _rounded(row, row.allowed, 2), "allowed", "Allowed", format="sig:2"),
         doc.of(lambda row: str(row.verdict), "verdict", "Verdict"),
         doc.of(lambda row: prose(row.because), "because", "Where"),
@@ -192,18 +193,12 @@ def table(rows: Sequence[Check], caption: str) -> doc.Block:
     )  # fmt: skip
 
 
-def _error(row: Check) -> float:
-    """Without the digits that are noise of the last bit."""
-    return max(row.error, NOISE * abs(row.predicted or 1.0))
-
-
 def _scaled(row: Check) -> tuple[float, str]:
     """Factor and unit of a row: seconds as ms, unless they are many."""
     return row_time_unit([row.predicted, row.found]) if row.unit == "s" else (1.0, unit_words(row.unit))
 
 
 def _rounded(row: Check, value: float | None, digits: int) -> float | None:
-    """A value in the unit of its row."""
     scale, _ = _scaled(row)
     return None if value is None else float(f"{value * scale:.{digits}g}")
 
@@ -217,7 +212,6 @@ def quantity_name(row: Check) -> str:
 
 
 def loop_name(name: str) -> str:
-    """Words for a loop, a break point or a path."""
     known = PLACES.get(name) or LOOPS.get(name)
     if name == "current":
         return f"{known}, rotor locked"
