@@ -19,7 +19,7 @@ from analyses.limit_cycles.stick_slip import StickSlipCycle, stick_slip_cycle
 from analyses.motion.settling import Settling, noticed, settlings_of
 from analyses.specification.capability import drive_figures
 from nonlinear import Rows
-from nonlinear.bench.on_the_bench import quiet
+from nonlinear.bench.operating_motion import quiet
 
 
 @dataclass(frozen=True)

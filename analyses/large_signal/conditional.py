@@ -30,8 +30,7 @@ from analyses.large_signal.tones import full_range
 from analyses.motion.settling import accepted_rad
 from nonlinear import LIMITERS, Rows
 from nonlinear.bench.loop_setup import points_of
-from nonlinear.bench.on_the_bench import quiet
-from nonlinear.bench.operating_motion import lasting_torque_Nm
+from nonlinear.bench.operating_motion import lasting_torque_Nm, quiet
 
 Floats = npt.NDArray[np.float64]
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]

@@ -35,7 +35,7 @@ from analyses.limit_cycles.run import Confirmation, confirm
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
 from nonlinear import Rows
-from nonlinear.bench.on_the_bench import without_counts
+from nonlinear.bench.operating_motion import without_counts
 
 Floats = npt.NDArray[np.float64]
 WITHIN = 0.05  # of its value: a gain that is off by less counts as linear
