@@ -216,10 +216,6 @@ def _moved(part: Rows, tables: Tables) -> Floats:
         return values
     for begin in (_signal_place(place) for place in ("command", "bias", *POINTS)):
         values[values[:, begin] == at.TABLE, begin + 3] += base
-    for offset, length in (
-        (at.LOAD_TABLE, at.LOAD_TABLE_LENGTH),
-        (at.TORQUE_TABLE, at.TORQUE_TABLE_LENGTH),
-        (at.SUPPLY_TABLE, at.SUPPLY_TABLE_LENGTH),
-    ):
-        values[values[:, length] > 0.0, offset] += base
+    for offset in at.TABLES:
+        values[values[:, offset + 1] > 0.0, offset] += base
     return values

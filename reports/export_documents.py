@@ -92,10 +92,6 @@ def summary(check: CodeCheck) -> str:
 
 def _row(row: Row) -> str:
     words = [loop_name(row.loop), quantity_name(row), row.unit]
-    numbers = [_number(row.predicted, ".6g"), _number(row.found, ".6g")]
+    numbers = ["" if value is None else f"{value:.6g}" for value in (row.predicted, row.found)]
     numbers += [f"{row.error:.1e}", f"{row.allowed:.2g}"]
     return "| " + " | ".join([*words, *numbers, str(row.verdict)]) + " |"
-
-
-def _number(value: float | None, form: str) -> str:
-    return "" if value is None else format(value, form)

@@ -70,12 +70,11 @@ def _form(loops: Loops) -> Tree:
 
     design = loops.design
     length, force = ("m", "N") if design.axis == "linear" else ("rad", "N*m")
-    _, asked = stage_words(design)
     answer = {"position": length, "velocity": f"{length}/s", "current": "A"}
     responses: Tree = {}
     if loops.plain_response is not None:
         unit = answer.get(design.controller.outermost, f"{length}/s")
-        responses["command"] = _system(loops.plain_response, asked, unit)
+        responses["command"] = _system(loops.plain_response, stage_words(design)[1], unit)
     if loops.moment_system is not None:
         responses["load"] = _system(loops.moment_system(), force, length)
     return {
@@ -91,21 +90,18 @@ def _loop(loop: Loop, loops: Loops) -> Tree:
     """Open loop, closed loop, sensitivity, and margins: of a periodic loop those of its whole period."""
     from actuator_lti.loops import exact_margins
 
-    systems = {
-        "open_loop": loop.plain_open,
-        "closed_loop": loop.plain_closed,
-        "sensitivity": loop.plain_sensitivity,
-    }
-    result: Tree = {name: _system(one, loop.unit_in, loop.unit_out) for name, one in systems.items()}
-    result["periodic"] = loop.periodic
     if loop.periodic:  # the open loop of the fundamental is not all of it
         exact = asdict(exact_margins(loops, loop.break_point))
-        result["margins"] = {
-            name: value for name, value in exact.items() if value is not None and isfinite(value)
-        }
+        margins = {name: value for name, value in exact.items() if value is not None and isfinite(value)}
     else:
-        result["margins"] = margins_tree(loop.plain_open)
-    return result
+        margins = margins_tree(loop.plain_open)
+    return {
+        "open_loop": _system(loop.plain_open, loop.unit_in, loop.unit_out),
+        "closed_loop": _system(loop.plain_closed, loop.unit_in, loop.unit_out),
+        "sensitivity": _system(loop.plain_sensitivity, loop.unit_in, loop.unit_out),
+        "periodic": loop.periodic,
+        "margins": margins,
+    }
 
 
 def margins_tree(system: Any) -> Tree:
@@ -117,9 +113,7 @@ def margins_tree(system: Any) -> Tree:
     except InputError as refusal:
         return {"verdict": "undecided", "evidence": "withheld", "evidence_reason": refusal.message}
     return {
-        "verdict": found.verdict,
-        "evidence": found.evidence,
-        "evidence_reason": found.evidence_reason,
+        **{name: getattr(found, name) for name in ("verdict", "evidence", "evidence_reason")},
         "gain_margins": [one.ratio for one in found.gain_margins],
         "gain_margins_rad_s": [one.frequency_rad_s for one in found.gain_margins],
         "phase_margins_deg": [one.deg for one in found.phase_margins],

@@ -72,12 +72,3 @@ class Population:
         kinds, place = np.unique(np.column_stack(marks), axis=0, return_inverse=True)
         for kind in range(len(kinds)):
             yield np.flatnonzero(place.reshape(-1) == kind)
-
-    def get(self, path: str, otherwise: float = 0.0) -> np.ndarray | float:
-        """The values of a key, its nominal value where it does not vary, or a default."""
-        try:
-            field, part = located(self.stacked, path)
-        except InputError:
-            return otherwise
-        value = getattr(part, field.attribute)
-        return otherwise if value is None else value

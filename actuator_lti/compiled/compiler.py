@@ -67,15 +67,21 @@ def compiler_for(target: str) -> list[str]:
     InputError
         Where this machine has none; says which package brings one.
     """
-    compiler = system_compiler()
-    zig = zig_command()
     native = target == "linux64" and HERE == "linux-x86_64"
-    if native and compiler and (zig is None or os.environ.get("CC")):
+    wanted = "gcc or clang, or " if target == "linux64" else ""
+    allowed = f"{wanted}pip install 'actuator-lti[export]'"
+    own = native and (zig_command() is None or bool(os.environ.get("CC")))
+    return _chosen(target, ["-target", ZIG_TARGETS[target]], allowed, own=own)
+
+
+def _chosen(target: str, more: Sequence[str], allowed: str, *, own: bool) -> list[str]:
+    """The machine's compiler where it may be taken (``own``) and is there, else zig's."""
+    compiler, zig = system_compiler(), zig_command()
+    if own and compiler:
         return [compiler]
     if zig is None:
-        wanted = "gcc or clang, or " if target == "linux64" else ""
-        raise InputError(f"no C compiler for {target}; allowed: {wanted}pip install 'actuator-lti[export]'")
-    return [*zig, "-target", ZIG_TARGETS[target]]
+        raise InputError(f"no C compiler for {target}; allowed: {allowed}")
+    return [*zig, *more]
 
 
 def compile_library(text: str, output: str, target: str, *, portable: bool = False) -> bytes:
@@ -84,15 +90,11 @@ def compile_library(text: str, output: str, target: str, *, portable: bool = Fal
     ``portable``: for every machine of the target, as in a wheel: by zig, with an old C library. `InputError`:
     there is no compiler, or it fails.
     """
-    compiler, zig = system_compiler(), zig_command()
-    if target == HERE and compiler and not portable:
-        command = [compiler]
-    elif zig is None:
-        raise InputError(f"no C compiler for {target}; allowed: gcc, clang, or pip install ziglang")
-    else:
-        command = [*zig, *(["-target", TARGETS[target].zig] if target in TARGETS else [])]
-    own = TARGETS[target].flags if target in TARGETS else ("-shared", "-fPIC")
-    return compile_files({"kernels.c": text}, output, target, (*LIBRARY_FLAGS, *own), command=command)
+    known = TARGETS.get(target)
+    more, flags = (["-target", known.zig], known.flags) if known else ([], ("-shared", "-fPIC"))
+    allowed = "gcc, clang, or pip install ziglang"
+    command = _chosen(target, more, allowed, own=target == HERE and not portable)
+    return compile_files({"kernels.c": text}, output, target, (*LIBRARY_FLAGS, *flags), command=command)
 
 
 def compile_files(

@@ -10,8 +10,8 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
@@ -35,8 +35,6 @@ class _Bytes(ctypes.Structure):
 _C_TYPES: dict[Kind | None, Any] = {
     "row": ctypes.c_void_p, "bytes": _Bytes, "int": ctypes.c_int, "float": ctypes.c_double, None: None,
 }  # fmt: skip
-
-
 _PLACE = ctypes.c_double * 0
 
 
@@ -59,8 +57,8 @@ class Entry:
 class Called:
     """A kernel of an opened library, or as written; takes arrays of float64 for rows, of uint16 for bytes."""
 
-    def __init__(self, function: Callable[..., Any], passing: Iterable[Callable[[Any], Any]]) -> None:
-        self._function, self._passing = function, tuple(passing)
+    def __init__(self, function: Callable[..., Any], passing: Sequence[Callable[[Any], Any]]) -> None:
+        self._function, self._passing = function, passing
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it."""
@@ -70,17 +68,6 @@ class Called:
         """The call with these arguments, to be made many times; the caller keeps the arrays."""
         passed = [way(each) for way, each in zip(self._passing, arguments, strict=True)]
         return lambda: self._function(*passed)
-
-
-def _of_library(library: ctypes.CDLL, entry: Entry) -> Called:
-    function = getattr(library, f"drive_{entry.name}")
-    function.argtypes = [_C_TYPES[kind] for kind in entry.arguments]
-    function.restype = _C_TYPES[entry.returns]
-    return Called(function, map(_PASSED.get, entry.arguments))  # type: ignore[arg-type]
-
-
-def _as_written(entry: Entry) -> Called:
-    return Called(entry.function, [_itself] * len(entry.arguments))
 
 
 def _row(array: Any) -> Any:
@@ -191,20 +178,22 @@ class Library:
 
     def loaded(self, path: Path) -> Any:
         """The entries of a library file of this text."""
-        opened = ctypes.CDLL(str(path))
-        return SimpleNamespace(**{entry.name: _of_library(opened, entry) for entry in self.entries})
+        opened, found = ctypes.CDLL(str(path)), SimpleNamespace()
+        for entry in self.entries:
+            function = getattr(opened, f"drive_{entry.name}")
+            function.argtypes = [_C_TYPES[kind] for kind in entry.arguments]
+            function.restype = _C_TYPES[entry.returns]
+            setattr(found, entry.name, Called(function, [_PASSED[kind] for kind in entry.arguments]))
+        return found
 
-    @contextmanager
-    def borrowed(self, path: Path) -> Iterator[None]:
+    def borrowed(self, path: Path) -> AbstractContextManager[None]:
         """Let every call of this process go through another library file of this text."""
-        with self._instead(self.loaded(path)):
-            yield
+        return self._instead(self.loaded(path))
 
-    @contextmanager
-    def written(self) -> Iterator[None]:
+    def written(self) -> AbstractContextManager[None]:
         """Let Python run the kernels as they are written, for a debugger or as the reference."""
-        with self._instead(SimpleNamespace(**{entry.name: _as_written(entry) for entry in self.entries})):
-            yield
+        passed = {each.name: Called(each.function, [_itself] * len(each.arguments)) for each in self.entries}
+        return self._instead(SimpleNamespace(**passed))
 
     @contextmanager
     def _instead(self, functions: Any) -> Iterator[None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -216,12 +216,12 @@ def emit_structs(
     return program_of(collector, list(entries))
 
 
-def struct_text(struct: Struct, words: Mapping[str, str]) -> str:
+def struct_text(struct: Struct, words: Callable[[Member], str]) -> str:
     """The structure as C, each member with what it is (``""``: nothing)."""
     types: dict[Kind, str] = {"float": "double", "int": "int32_t", "count": "int32_t"}
     lines = [
         f"{INDENT}{types[each.kind]} {each.name}{f'[{each.length}]' if each.length else ''};"
-        + (f" /* {words[each.name]} */" if words[each.name] else "")
+        + (f" /* {words(each)} */" if words(each) else "")
         for each in struct.members
     ]
     return "\n".join(["typedef struct {", *lines, f"}} {struct.type};"])

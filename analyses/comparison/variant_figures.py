@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan, pi
-from typing import TYPE_CHECKING
 
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES, drive_cases
 from actuator_lti.batch import Population
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.loops import Loops
+from analyses.linear.loop_figures import LoopFigures
 from analyses.specification.capability import drive_figures
 from nonlinear.runs.trajectory import COMMAND_UNITS
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from actuator_lti.loops import Loops
-    from analyses.linear.loop_figures import LoopFigures
 
 Figures = Mapping[str, float | None]
 

@@ -8,13 +8,14 @@ from functools import cached_property, partial
 from math import isfinite, nan
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.batch import variable_paths
 from actuator_lti.design import design_tree, parameter_value
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.reading import as_path
 from actuator_lti.loops import assemble_loops
@@ -25,17 +26,13 @@ from analyses.comparison.variant_figures import (
     small_signal,
 )
 from analyses.comparison.variant_store import Changed, Contribution, Found, Kept
-from analyses.linear.loop_figures import all_loop_figures
+from analyses.linear.loop_figures import LoopFigures, all_loop_figures
 from analyses.specification.requirements import evaluate_requirements, tally
+from analyses.specification.sensitivity import Sensitivities, moved, population_figures, sensitivities
 from analyses.studies.engine import Engine
 from analyses.studies.study import Study, Variant, load_study
 from analyses.validation import CHECKS, validate
 from analyses.validation.row import Row
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.linear.loop_figures import LoopFigures
-    from analyses.specification.sensitivity import Sensitivities
 
 Progress = Callable[[int, int], None]
 _ALIKE = 1e-12  # relative; differences below are rounding
@@ -135,7 +132,6 @@ def compare(
     InputError, NumericalError
         From the base or a variant.
     """
-    from analyses.specification.sensitivity import sensitivities
 
     study = study if isinstance(study, Study) else load_study(as_path(study))
     origin = _design(study.base)
@@ -239,7 +235,6 @@ def _moved_by(
     base: Design, other: Design, changed: tuple[Changed, ...], differences: Mapping[str, float]
 ) -> dict[str, tuple[Contribution, ...]]:
     """Change one number at a time, starting from the base."""
-    from analyses.specification.sensitivity import moved, population_figures
 
     if len(changed) == 1:
         return {key: (Contribution(changed[0].path, amount),) for key, amount in differences.items()}

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import dry_torque
-from actuator_lti.loops import assemble_loops
+from actuator_lti.loops import Loops, assemble_loops
 from analyses.friction_effects.breakaway import Hysteresis, Threshold, hysteresis, threshold
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.limit_cycles.describing import at_load, cycles_of_friction, dry_Nm
@@ -20,10 +19,7 @@ from analyses.limit_cycles.stick_slip import StickSlipCycle, stick_slip_cycle
 from analyses.motion.settling import Settling, noticed, settlings_of
 from analyses.specification.capability import drive_figures
 from nonlinear import Rows
-from nonlinear.bench.on_the_bench import quiet
-
-if TYPE_CHECKING:
-    from actuator_lti.loops import Loops
+from nonlinear.bench.operating_motion import quiet
 
 
 @dataclass(frozen=True)

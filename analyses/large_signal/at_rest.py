@@ -7,7 +7,6 @@ cannot hold here, and with the describing-function operating point at the speed 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,13 +16,11 @@ from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
+from actuator_lti.loops import Loops
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.tones import TANH_TOLERANCE, tone
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS, Rows
-
-if TYPE_CHECKING:
-    from actuator_lti.loops import Loops
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]

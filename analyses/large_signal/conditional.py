@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import asin, inf, isfinite, pi, sqrt
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -24,17 +24,13 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import stage_gain
 from actuator_lti.errors import TooManyTicks
-from actuator_lti.loops import exact_margins, periodic_loop
+from actuator_lti.loops import ExactMargins, Loops, exact_margins, periodic_loop
+from actuator_lti.loops.periodic import PeriodicLoop
 from analyses.large_signal.tones import full_range
 from analyses.motion.settling import accepted_rad
 from nonlinear import LIMITERS, Rows
 from nonlinear.bench.loop_setup import points_of
-from nonlinear.bench.on_the_bench import quiet
-from nonlinear.bench.operating_motion import lasting_torque_Nm
-
-if TYPE_CHECKING:
-    from actuator_lti.loops import ExactMargins, Loops
-    from actuator_lti.loops.periodic import PeriodicLoop
+from nonlinear.bench.operating_motion import lasting_torque_Nm, quiet
 
 Floats = npt.NDArray[np.float64]
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]

@@ -13,6 +13,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
+from actuator_lti.start.extras import need
 from analyses.finite import finite
 from analyses.large_signal.classify import (
     CAUSES,
@@ -92,7 +93,6 @@ class AmplitudeMap:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A data frame with one row a point: command, what acts, waveform, fundamental (pandas needed)."""
-        from actuator_lti.start.extras import need
 
         frame = need("pandas", "tables", "to_pandas")
         amplitude, frequency = np.meshgrid(self.amplitude_rad, self.frequency_hz, indexing="ij")
@@ -227,11 +227,11 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
     phase = np.where(unsteady, np.nan, amplitude_map.phase_deg)
     steps = np.arange(FINE * (hz.size - 1) + 1) / FINE
     fine = np.exp(np.interp(steps, np.arange(hz.size), np.log(hz)))
+    whole = linear_steady_state(loops, 2.0 * math.pi * np.array([1e-6 * hz[0], *fine])).output
     with np.errstate(divide="ignore"):  # the mean of a limited jerk has zeros
-        whole = linear_steady_state(loops, 2.0 * math.pi * np.array([1e-6 * hz[0], *fine])).output
         start, *curve = 20.0 * np.log10(np.abs(whole))
     level, fine_db = MINUS_3DB + start, np.array(curve)
-    fine_deg = np.degrees(np.unwrap(np.angle(whole[1:])))
+    fine_deg = np.degrees(np.unwrap(np.angle(linear_steady_state(loops, 2.0 * math.pi * fine).output)))
     linear_db, linear_deg = fine_db[::FINE], fine_deg[::FINE]
 
     def between(values: np.ndarray, linear: np.ndarray) -> np.ndarray:

@@ -15,12 +15,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from math import inf, pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design, Sensor
+from actuator_lti.loops import Loops
 from analyses.large_signal.conditional import step_rows
 from analyses.large_signal.tones import LONGEST_TICKS, full_range, tone
 from analyses.limit_cycles.describing import (
@@ -31,14 +31,11 @@ from analyses.limit_cycles.describing import (
     quantum_of,
     without_nonlinearities,
 )
+from analyses.limit_cycles.run import Confirmation, confirm
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
 from nonlinear import Rows
-from nonlinear.bench.on_the_bench import without_counts
-
-if TYPE_CHECKING:
-    from actuator_lti.loops import Loops
-    from analyses.limit_cycles.run import Confirmation
+from nonlinear.bench.operating_motion import without_counts
 
 Floats = npt.NDArray[np.float64]
 WITHIN = 0.05  # of its value: a gain that is off by less counts as linear
@@ -102,7 +99,6 @@ def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, 
 
 
 def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Counts:
-    from analyses.limit_cycles.run import confirm
 
     sensor, other = SENSORS[cause]
     quantum, velocity = quantum_of(design, cause) or 0.0, design.controller.velocity

@@ -21,7 +21,7 @@ from analyses.limit_cycles.describing import (
 )
 from analyses.motion.settling import Settling, noticed, settlings_of, verdict_of, waiver_of_rest
 from nonlinear import Rows
-from nonlinear.bench.on_the_bench import without_counts
+from nonlinear.bench.operating_motion import without_counts
 
 SCALES = np.geomspace(0.4, 2.5, 41)
 CYCLES_WATCHED = 24

@@ -12,25 +12,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB
-from actuator_lti.design.model import Design
+from actuator_lti.bandwidth import Bandwidth, Peaks, closed_loop_bandwidth, peaks
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.angle import pushes_away
 from actuator_lti.drive.operating import RotorState
-from actuator_lti.drive.profile import command_mean, profile_note
+from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.loops import Loop, Loops
 from actuator_lti.loops.assemble import loops_at
-from actuator_lti.systems.plain_delays import as_control
+from actuator_lti.margins import StabilityMargins, stability_margins
+from actuator_lti.step import StepFigures, step_figures
+from actuator_lti.systems.as_control import as_control
 from analyses.isolation import attempt
-
-if TYPE_CHECKING:
-    from actuator_lti.bandwidth import Bandwidth, Peaks
-    from actuator_lti.design.model import Requirement
-    from actuator_lti.drive.profile import CommandMean
-    from actuator_lti.loops import Loop, Loops
-    from actuator_lti.margins import StabilityMargins
-    from actuator_lti.step import StepFigures
 
 HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
@@ -167,8 +163,6 @@ def loop_figures(
     Raises `InputError`, `NumericalError`: if the margins cannot be found; another figure that cannot becomes
     a note.
     """
-    from actuator_lti.bandwidth import peaks
-    from actuator_lti.margins import stability_margins
 
     response = loop.plain_closed if response is None else response
     margins = stability_margins(loop.plain_open, certify=certify)
@@ -182,9 +176,7 @@ def _answering(
     figures: LoopFigures, response: Any, mean: CommandMean | None, *, bandwidth: bool, step: bool
 ) -> LoopFigures:
     """The same with bandwidth and step of a response, behind the mean of the command where there is one."""
-    from actuator_lti.bandwidth import closed_loop_bandwidth
     from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
-    from actuator_lti.step import step_figures
 
     notes: list[str] = []
 

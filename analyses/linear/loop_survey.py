@@ -11,19 +11,19 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
+from actuator_lti.drive.operating import Operating, OperatingPoint, slope_at
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.loops import ExactMargins, Loops, assemble_loops, exact_margins
+from actuator_lti.loops.assemble import loops_at
+from actuator_lti.loops.delay_budget import DelayBudget, delay_budget
+from actuator_lti.loops.limiters import Onset, onset
+from actuator_lti.loops.result import Form
 from analyses.isolation import attempt
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
-
-    from actuator_lti.drive.operating import OperatingPoint
-    from actuator_lti.loops import ExactMargins, Loops
-    from actuator_lti.loops.delay_budget import DelayBudget
-    from actuator_lti.loops.limiters import Onset
-    from actuator_lti.loops.result import Form
 
 Progress = Callable[[int, int], None]
 FORMS: tuple[Form, ...] = ("sampled", "continuous", "ideal")
@@ -144,7 +144,6 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
         As `assemble_loops` and `loop_figures`; inside `analyses.isolation.isolated` only of the sampled
         loops: what else fails is left out and noted.
     """
-    from actuator_lti.loops import assemble_loops
 
     def step(done: int) -> None:
         if progress is not None:
@@ -182,7 +181,6 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
 
 def _break_point(loops: Loops, name: str) -> BreakPoint:
     """Measure the loop at one break point."""
-    from actuator_lti.loops import exact_margins
 
     loop = loops.break_points[name]
     exact = exact_margins(loops, name) if loop.periodic else None
@@ -204,8 +202,6 @@ def operating_points(
     ``refused`` gets the loops whose margins are not found, and why; ``described``: friction described at
     small speeds as well; ``certify``: margins by exact arithmetic.
     """
-    from actuator_lti.drive.operating import Operating, slope_at
-    from actuator_lti.loops.assemble import loops_at
     from analyses.specification.capability import drive_figures
 
     def point(
@@ -239,7 +235,6 @@ def operating_points(
 
 def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, DelayBudget]:
     """Give the delay budget at the lowest gain crossover of each loop."""
-    from actuator_lti.loops.delay_budget import delay_budget
 
     budgets: dict[str, DelayBudget] = {}
     for name, result in figures.items() if design.controller.own_law is None else ():  # else of unknown parts
@@ -253,7 +248,6 @@ def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, De
 
 def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
     """Give the limit of linear validity around the bandwidth of the outermost loop."""
-    from actuator_lti.loops.limiters import onset
 
     outermost = loops.design.controller.outermost
     if not loops.limiters or outermost not in figures:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.margins.loop import rational_loop
 from actuator_lti.systems.resolvent import responses
-
-if TYPE_CHECKING:
-    from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_figures import LoopFigures
 
 DECADES_BELOW = 2.0
 DECADES_ABOVE = 1.3
@@ -131,7 +130,6 @@ def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:
 
 def sampled_step(system: Any, samples: int) -> np.ndarray:
     """Give the first samples of the unit step response of a sampled system, for a figure."""
-    from actuator_lti.margins.loop import rational_loop
 
     loop = rational_loop(system)
     state, response = np.zeros(loop.order), np.empty(samples)

@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,12 +18,25 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
 from analyses.finite import finite
-from analyses.monte_carlo.judging import by_loop, in_populations, judge, label, source_columns
-from analyses.monte_carlo.reduction import BLOCK, Reducing, Reduction, Tally, judged, reduced, unpacked
+from analyses.monte_carlo.judging import (
+    BLOCK,
+    Reducing,
+    Reduction,
+    Tally,
+    by_loop,
+    in_populations,
+    judge,
+    judged,
+    label,
+    reduced,
+    source_columns,
+    unpacked,
+)
 from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
 from analyses.monte_carlo.statistics import MOST, clopper_pearson, column_statistics
 from analyses.monte_carlo.store import CHUNK, Store
@@ -33,9 +45,6 @@ from analyses.monte_carlo.worst import worst_case
 from analyses.specification.requirements import RequirementVerdict
 from analyses.studies.engine import Chunk, Engine
 from analyses.studies.sampling import Table, sampler_of
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design, Requirement
 
 Progress = Callable[[int, int], None]
 KEPT = 1_000_000  # samples that are kept as Parquet, about 200 MB

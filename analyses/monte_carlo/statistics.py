@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import reduce
 
 import numpy as np
 from scipy.special import betaincinv
@@ -173,11 +172,6 @@ class Sketch:
         counts = np.zeros(SHOWN_BINS, dtype=np.int64)
         np.add.at(counts, place, self.counts)
         return tuple(edges.tolist()), tuple(counts.tolist())
-
-
-def merged(sketches: Iterable[Sketch]) -> Sketch:
-    """The sketch of all values together."""
-    return reduce(Sketch.merged, sketches, Sketch())
 
 
 def _bounded(dropped: int, keys: np.ndarray, counts: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:

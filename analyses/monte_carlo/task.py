@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,16 +12,14 @@ from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUA
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.design import design_hash, with_values
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
 from analyses.monte_carlo.judging import drive_column, loop_columns, loops_of
 from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version
 from analyses.studies.sampling import Sampler, as_values
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from nonlinear import Rows
+from nonlinear import Rows
 
 
 @dataclass(frozen=True)

@@ -11,19 +11,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import chdtri, ndtr, ndtri
 
+from actuator_lti.design.model import Requirement
 from analyses.finite import finite
 from analyses.monte_carlo.judging import judge
 from analyses.monte_carlo.result import WorstCase
 from analyses.monte_carlo.task import SampleTask
 from analyses.studies.sampling import BOX_SIGMA, Factor, Sampler
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Requirement
 
 _LEAST = 1e-9  # of an eigenvalue of a correlation matrix: below, the direction does not exist
 

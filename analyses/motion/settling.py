@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import degrees, inf, radians
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,14 +13,12 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.files.tree import Tree
+from actuator_lti.loops import Loops
 from analyses.large_signal.tones import TANH_TOLERANCE
 from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
 from nonlinear.runs.trajectory import COMMAND_UNITS, Trajectory
 from nonlinear.settling.rest import Rest, judge
-
-if TYPE_CHECKING:
-    from actuator_lti.loops import Loops
 
 SMALL = 1e-3  # of full deflection: a step beside those that the design asks for
 NOTICED = 1e-6  # of full deflection: a smaller swing is listed, and is rest

@@ -13,12 +13,12 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import profile_onset_rad
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from analyses.corners.run import corners
-from analyses.duty.run import duty
-from analyses.failures.run import failures
+from analyses.corners import corners
+from analyses.duty import duty
+from analyses.failures import failures
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones import run_tones, tone
-from analyses.limit_cycles.run import limit_cycles
+from analyses.limit_cycles import limit_cycles
 from analyses.motion.settling import ending_of
 
 

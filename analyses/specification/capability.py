@@ -1,4 +1,4 @@
-"""Rate, acceleration and current at each load torque, in closed form and simulated."""
+"""What a drive can do at each load torque: rate, acceleration, current; manoeuvres, and their bounds."""
 
 from __future__ import annotations
 
@@ -8,11 +8,185 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.design.model import Command, Design
+from actuator_lti.design.plant import no_load_speed
 from actuator_lti.drive import facts
-from analyses.specification.manoeuvres import thermal_duty
+from actuator_lti.drive.facts import stall_torque_Nm, steady_torque_Nm
+from actuator_lti.drive.steady import motor_torque_Nm, voltage_limit_torque_Nm
+from analyses.large_signal.tones import tone
 from nonlinear import commands, simulate
 
-LONGEST_TICKS = 40_000
+POINTS = 400
+SINE_SHARE, OVERRUN = 0.7, 3.0
+LONGEST_TICKS = 60_000
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """One manoeuvre at one load torque."""
+
+    name: str
+    load_Nm: float
+    # Motor speed and motor torque along it, thinned for drawing
+    speed_rad_s: np.ndarray
+    torque_Nm: np.ndarray
+    # ``None`` for an ideal source, which has no current
+    rms_current_A: float | None
+    peak_current_A: float | None
+    # Of the motor
+    rms_torque_Nm: float
+    peak_torque_Nm: float
+    # Share of the time in which the manoeuvre may run, resting in between, for the rms current to stay at the
+    # continuous current: ``(I_cont/I_rms)^2``, at most 1
+    duty: float | None
+    limits: dict[str, float]  # fraction of the time in which each limit acts, where it does
+    periodic: bool  # whether it repeats: only then rms and duty say what can be kept up
+
+
+def thermal_duty(design: Design, rms_current_A: float | None) -> float | None:
+    """Share of the time that keeps the rms current at the continuous current; ``None`` where unknown.
+
+    Copper heat goes with the square of the current, and the winding's time constant is taken as long against
+    the manoeuvre.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> thermal_duty(load_design("ilr33-amber"), 8.0)
+    0.25
+    """
+    continuous = design.limits.continuous_current_A
+    if rms_current_A is None or not math.isfinite(continuous):
+        return None
+    return 1.0 if rms_current_A <= continuous else (continuous / rms_current_A) ** 2
+
+
+def manoeuvres(
+    design: Design, load_Nm: float, rate_rad_s: float, acceleration_rad_s2: float, settling_s: float
+) -> tuple[Manoeuvre, ...]:
+    """Simulate a step, a sine below the top rate, and a sawtooth at it, all at full deflection.
+
+    Rate and acceleration: the largest of the output; ``settling_s``: of the linear loop.
+    """
+    full = design.validation.full_deflection_rad
+    result = []
+    travel = full / rate_rad_s if 0.0 < rate_rad_s < math.inf else 0.0
+    swing = 2.0 * math.sqrt(full / acceleration_rad_s2) if 0.0 < acceleration_rad_s2 < math.inf else 0.0
+    time = min(travel + 4.0 * swing + 4.0 * settling_s, LONGEST_TICKS * design.controller.period_s)
+    result.append(_manoeuvre(design, "step to full deflection", commands.step(full), time, load_Nm, None))
+    bounds = []  # angular frequencies at which a sine needs all of the rate, or of the acceleration
+    if 0.0 < rate_rad_s < math.inf:
+        bounds.append(rate_rad_s / full)
+    if 0.0 < acceleration_rad_s2 < math.inf:
+        bounds.append(math.sqrt(acceleration_rad_s2 / full))
+    slow = min(bounds) / (2.0 * math.pi) if bounds else None
+    names = ("sine at 70 % of what rate and torque allow", "sine three times as fast as allowed")
+    for name, share in zip(names, (SINE_SHARE, OVERRUN), strict=True):
+        if slow is not None:
+            result.append(_sine(design, name, full, share * slow, load_Nm))
+    return tuple(result)
+
+
+def _sine(design: Design, name: str, full: float, hz: float, load_Nm: float) -> Manoeuvre:
+    """Two periods of a sine; the second counts."""
+    every = design.controller.position_loop.every
+    hz = min(hz, 0.2 / (every * design.controller.period_s))
+    chosen = tone(hz, design)
+    period = chosen.ticks / chosen.cycles * design.controller.period_s
+    time = min(2.0 * period, LONGEST_TICKS * design.controller.period_s)
+    return _manoeuvre(
+        design, f"{name} ({hz:.3g} Hz)", commands.sine(full, chosen.frequency_hz), time, load_Nm, period
+    )
+
+
+def _manoeuvre(
+    design: Design, name: str, command: commands.Command, time: float, load_Nm: float, period: float | None
+) -> Manoeuvre:
+    """Simulate, and read speeds, torques and currents."""
+    run = simulate(design, command, time, load_Nm, raise_on_failure=False)
+    count = run.time_s.size if period is None else min(round(period / run.period_s), run.time_s.size)
+    torque = motor_torque_Nm(design, run.current_A, run.voltage_V)[-count:]
+    current = np.abs(run.current_A[-count:]) if design.motor.has_electrical_dynamics else None
+    speed = run.motor_speed_rad_s[-count:]
+    thin = _thinned(speed, torque)
+    rms = None if current is None else float(np.sqrt(np.mean(current**2)))
+    return Manoeuvre(
+        name=name,
+        load_Nm=load_Nm,
+        speed_rad_s=speed[thin],
+        torque_Nm=torque[thin],
+        rms_current_A=rms,
+        peak_current_A=None if current is None else float(current.max()),
+        rms_torque_Nm=float(np.sqrt(np.mean(torque**2))),
+        peak_torque_Nm=float(np.max(np.abs(torque))),
+        duty=thermal_duty(design, rms) if period is not None else None,
+        limits={key: use.fraction for key, use in run.limits.items() if use.active},
+        periodic=period is not None,
+    )
+
+
+def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """Choose points that lie evenly along the path in the plane, so that fast parts keep their shape."""
+    spans = (max(float(np.ptp(speed)), 1e-300), max(float(np.ptp(torque)), 1e-300))
+    way = np.append(0.0, np.cumsum(np.hypot(np.diff(speed) / spans[0], np.diff(torque) / spans[1])))
+    places = np.searchsorted(way, np.linspace(0.0, way[-1], POINTS))
+    return np.unique(np.minimum(places, len(way) - 1))
+
+
+PLANE_POINTS = 41
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A line in the plane: motor speed (rad/s) and motor torque (N m)."""
+
+    name: str
+    speed_rad_s: np.ndarray
+    torque_Nm: np.ndarray
+
+
+@dataclass(frozen=True)
+class TorqueSpeedPlane:
+    """Motor side, first quadrant."""
+
+    bounds: tuple[Curve, ...]  # voltage line, peak current, continuous current, speed limit; those that exist
+    demands: tuple[Curve, ...]  # friction (and load, where it passes) in steady motion at each load torque
+
+
+def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPlane:
+    """Draw up the plane up to a little above the top speed.
+
+    Sources: equation (1) in steady motion, ``u = R i + kE w``; equation (9).
+    """
+    motor, limits = design.effective_motor, design.limits
+    top = top_speed_rad_s if 0.0 < top_speed_rad_s < math.inf else 1.0
+    speed = np.linspace(0.0, 1.25 * top, PLANE_POINTS)
+    bounds = []
+
+    def level(name: str, torque: float) -> None:
+        if math.isfinite(torque):
+            bounds.append(Curve(name, speed[[0, -1]], np.full(2, torque)))
+
+    if motor.source_gain_Nm_V is not None:
+        level("drive signal at its limit", stall_torque_Nm(design))
+    else:
+        if math.isfinite(limits.voltage_V):
+            line = np.linspace(0.0, no_load_speed(design), PLANE_POINTS)
+            bounds.append(Curve("voltage limit", line, voltage_limit_torque_Nm(design, line)))
+        if design.controller.current is not None:
+            level("peak current", motor_torque_Nm(design, limits.peak_current_A, math.nan))
+        level("continuous current", motor_torque_Nm(design, limits.continuous_current_A, math.nan))
+    if design.controller.velocity is not None and math.isfinite(limits.speed_rad_s):
+        high = max((float(curve.torque_Nm.max()) for curve in bounds), default=1.0)
+        bounds.append(Curve("speed limit", np.full(2, limits.speed_rad_s), np.array([0.0, high])))
+    unit = "N" if design.axis == "linear" else "N m"
+    demands = tuple(
+        Curve(f"steady motion at {load:g} {unit}", speed, steady_torque_Nm(design, load, speed))
+        for load in design.validation.loads_Nm
+    )
+    return TorqueSpeedPlane(tuple(bounds), demands)
+
+
+RUN_UP_TICKS = 40_000
 STEADY_SHARE = 0.1
 
 
@@ -89,7 +263,7 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
     Ts = design.controller.period_s
     force_bound = figures.rate_limit == "force" and friction.viscous(1) > 0.0
     viscous_s = design.inertia_kgm2 / friction.viscous(direction) if force_bound else 0.0
-    time = min(12.0 * rate / push + 8.0 * settling_s + 8.0 * viscous_s, LONGEST_TICKS * Ts)
+    time = min(12.0 * rate / push + 8.0 * settling_s + 8.0 * viscous_s, RUN_UP_TICKS * Ts)
     load = direction * -abs(load_Nm) if design.load.path == "back-drivable" else load_Nm
     run = simulate(design, commands.ramp(direction * 3.0 * rate), time, load)
     speed = direction * run.motor_speed_rad_s / design.total_ratio

@@ -5,24 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import inf, log
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.asked.quantities import CUSTOMARY, LOOP_QUANTITIES, reserve
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import parameter_value
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.corners.run import Corners
+from analyses.linear.loop_survey import LoopSurvey
 from analyses.monte_carlo.judging import by_loop, in_populations, judge, loop_columns
-from analyses.specification.weakest import View, limit_of, views
+from analyses.specification.weakest import View, WeakPoint, limit_of, views
 from analyses.tuning.placing import allowed_range
 from analyses.tuning.problem import GAINS
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.corners.run import Corners
-    from analyses.linear.loop_survey import LoopSurvey
-    from analyses.specification.weakest import WeakPoint
 
 FURTHEST = 4.0  # a gain goes to a quarter of what it is, or to four times it
 STEPS = 12  # on either side, and once more between the last that does not mend and the first that does

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.loops import assemble_loops
+from actuator_lti.loops import Loops, assemble_loops
 from analyses.finite import finite
 from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones import TANH_TOLERANCE
-from analyses.specification.capability import Capability, capability
-from analyses.specification.manoeuvres import Manoeuvre, TorqueSpeedPlane, manoeuvres, torque_speed_plane
+from analyses.specification.capability import (
+    Capability,
+    Manoeuvre,
+    TorqueSpeedPlane,
+    capability,
+    manoeuvres,
+    torque_speed_plane,
+)
 from nonlinear import LIMITERS, Rows
-
-if TYPE_CHECKING:
-    from actuator_lti.loops import Loops
 
 SMALLEST = 0.01  # of full deflection: the small-signal step, beside the design's own fractions
 BAND = 0.02

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, drive_cases
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.design import parameter_value
+from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import command_mean
 from analyses.studies.sampling import Factor
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
 
 STEP = 1e-3
 SWING = 0.1

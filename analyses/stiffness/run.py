@@ -26,8 +26,7 @@ from actuator_lti.loops.stiffness import (
 )
 from nonlinear import commands, simulate, tangent
 from nonlinear.bench.loop_setup import LoopSetup
-from nonlinear.bench.on_the_bench import on_the_bench
-from nonlinear.bench.operating_motion import standing
+from nonlinear.bench.operating_motion import on_the_bench, standing
 from nonlinear.loads import series
 
 State = Literal["powered", "shorted", "open"]

@@ -18,14 +18,15 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
+from actuator_lti.design import tolerances
+from actuator_lti.design.fields import field_of
+from actuator_lti.design.model import Design, Tolerance
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import read_bytes, shown, shown_path
 from actuator_lti.start.extras import need
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from actuator_lti.design.model import Design, Tolerance
 
 _BITS = 32
 _SINGULAR = 1e-12  # what is left of a variance below this is rounding
@@ -215,7 +216,6 @@ def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> 
     >>> sampler_of(load_design("ilr33-amber")).draw(5, 1).shape
     (1, 4)
     """
-    from actuator_lti.design import tolerances
 
     taken = set(table.paths) if table else set()
     factors = tuple(Factor(p, value, t) for p, value, t in tolerances(design) if p not in taken)
@@ -231,7 +231,6 @@ def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> 
 
 def _check_range(factor: Factor, where: str | None) -> None:
     """Refuse a distribution that may give values that the key does not allow."""
-    from actuator_lti.design.fields import field_of
 
     allowed = field_of(factor.path)
     ends = factor.quantile(np.array([_HALF_STEP, 1.0 - _HALF_STEP]))

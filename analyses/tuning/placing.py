@@ -11,18 +11,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations, product
 from math import ceil, floor, inf, pi, sqrt
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
-from actuator_lti.design.model import Filter
-from actuator_lti.design.object_dictionary import OBJECTS, step_of
+from actuator_lti.design.model import Design, Filter
+from actuator_lti.design.object_dictionary import OBJECTS, KnownObject, step_of
 from actuator_lti.drive.facts import resonance_rad_s as free_resonance_rad_s
 from actuator_lti.errors import InputError
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from actuator_lti.design.object_dictionary import KnownObject
 
 
 def object_of(design: Design, path: str) -> KnownObject | None:
@@ -68,7 +64,6 @@ Element = Literal["notch", "lowpass", "feedforward"]
 ELEMENTS: tuple[Element, ...] = get_args(Element)
 DEEPEST = 0.01  # of a notch, -40 dB
 END_OF_BAND = 0.9  # of the Nyquist frequency of the velocity loop
-SHALLOW = 0.999  # a notch above this depth does nothing
 
 
 @dataclass(frozen=True)
@@ -172,19 +167,6 @@ def _feedforward(design: Design) -> list[Variable]:
         Variable(f"control.position.{key}", value, 0.0, max(1.2, value), value, linear=True)
         for key, value in result
     ]
-
-
-def idle(design: Design, placed: Placed) -> Design:
-    """The design without placed filters that came out neutral."""
-    velocity = design.controller.velocity
-    if velocity is None:
-        return design
-    added = sum(1 for element in placed.elements if element != "feedforward")
-    if not added:
-        return design
-    kept = velocity.filters[: len(velocity.filters) - added]
-    kept += tuple(f for f in velocity.filters[-added:] if f.kind != "notch" or f.depth < SHALLOW)
-    return replace(design, controller=replace(design.controller, velocity=replace(velocity, filters=kept)))
 
 
 def change(variables: tuple[Variable, ...], values: np.ndarray) -> np.ndarray:

@@ -7,23 +7,19 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.batch import Population, linear_figures, variable_paths
+from actuator_lti.batch.figures import LinearFigures
 from actuator_lti.design import parameter_value, paths_of, tolerances
-from actuator_lti.design.model import Requirement
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.units import parse_limit
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.judging import in_populations, judge, loop_columns, loops_of
 from analyses.studies.sampling import Factor, correlation_of, semidefinite_root
-from analyses.tuning.placing import Variable, change
-
-if TYPE_CHECKING:
-    from actuator_lti.batch.figures import LinearFigures
-    from actuator_lti.design.model import Design
+from analyses.tuning.placing import Variable, allowed_range, change
 
 GAINS = (
     "control.current.gain",
@@ -218,7 +214,6 @@ def problem_of(
     The search starts from ``start`` (by rules, SI); another gain of the design starts where it is. ``placed``
     are the variables of added elements.
     """
-    from analyses.tuning.placing import allowed_range
 
     variables = []
     for path in (path for path in GAINS if path in set(paths_of(design))):

@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.batch import Population
 from actuator_lti.design import with_values
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.loops import assemble_loops
 from analyses.finite import finite
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.task import StepCheck, step_columns
-from analyses.specification.requirements import judged
+from analyses.specification.requirements import RequirementVerdict, judged
+from analyses.tuning.asked import Aim
 from analyses.tuning.problem import Problem
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design, Requirement
-    from analyses.specification.requirements import RequirementVerdict
-    from analyses.tuning.asked import Aim
 
 
 @dataclass(frozen=True)

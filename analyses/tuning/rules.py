@@ -4,14 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, pi, radians, sin, tan
-from typing import TYPE_CHECKING
 
+from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import own_drag_Nms_rad, standing_gain
-from actuator_lti.errors import InputError
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
 
 WIDE = 2.0 + 3.0**0.5  # a of the symmetric optimum for a phase margin of 60 deg
 SEPARATION = 4.0  # crossover of the velocity loop over the gain of the position loop
@@ -46,52 +41,6 @@ def symmetric_optimum(integrator_gain: float, small_time_s: float, a: float = 2.
     (50.0, 0.004)
     """
     return 1.0 / (a * integrator_gain * small_time_s), a * a * small_time_s
-
-
-def integrator_gain(phase_margin_deg: float, delay_s: float, period_s: float = 0.0) -> float:
-    """Largest K of ``K exp(-s L)/s`` with a phase margin, exact: PM = 90 deg - K L 180/pi.
-
-    With a period T the loop is sampled, ``K T z^-q/(z - 1)`` with L = q T: crossover at
-    ``sin(w T/2) = K T/2``, PM = 90 deg - w (q + 1/2) T.
-
-    Examples
-    --------
-    >>> round(integrator_gain(60.0, 0.01), 4)
-    52.3599
-    """
-    turn = radians(90.0 - phase_margin_deg)
-    if not turn > 0.0:
-        raise InputError(f"phase margin {phase_margin_deg} deg: below 90 for an integrator with delay")
-    if period_s == 0.0:
-        return turn / delay_s
-    omega = turn / (delay_s + 0.5 * period_s)
-    return 2.0 * sin(0.5 * omega * period_s) / period_s
-
-
-def pi_for_crossover(response: complex, omega_rad_s: float, phase_margin_deg: float) -> tuple[float, float]:
-    """PI (gain, integral time) that puts the gain crossover at a frequency with a phase margin.
-
-    ``response``: of the plant at that frequency.
-    Raises `InputError`: if the plant's phase leaves no room: a PI lags by 0 to 90 deg.
-
-    Examples
-    --------
-    The inner loop of the MathWorks example "Designing Cascade Control System with PI Controllers":
-
-    >>> kp, ti = pi_for_crossover(3 / (2j + 2), 2.0, 60.0)
-    >>> round(kp, 3), round(ti, 3)
-    (0.244, 0.134)
-    """
-    from cmath import phase
-
-    lag = radians(180.0 - phase_margin_deg) + phase(response)
-    lag -= 2 * pi * round(lag / (2 * pi))
-    if not 0.0 < lag < 0.5 * pi:
-        raise InputError(
-            f"no PI gives a phase margin of {phase_margin_deg:g} deg at {omega_rad_s:g} rad/s: "
-            f"it would have to lag by {lag * 180 / pi:.1f} deg, allowed 0 to 90"
-        )
-    return cos(lag) / abs(response), 1.0 / (omega_rad_s * tan(lag))
 
 
 @dataclass(frozen=True)

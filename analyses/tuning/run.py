@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,7 +12,9 @@ from actuator_lti.asked.quantities import LOOP_QUANTITIES
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
 from actuator_lti.design.loader import as_design
+from actuator_lti.design.model import Design
 from analyses.monte_carlo.judging import in_populations, label
+from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
 from analyses.tuning.placing import Placed, checked, neighbours, object_of, place, step_of_gain, subsets
@@ -21,10 +22,6 @@ from analyses.tuning.problem import MOST_DESIGNS, Problem, limit_of, loop_requir
 from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult, confirm, nonlinear_checks
 from analyses.tuning.rules import RuleGains, rule_gains
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.specification.requirements import RequirementVerdict
 
 Progress = Callable[[int, int], None]
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding

@@ -27,8 +27,7 @@ from nonlinear import tangent
 from nonlinear.bench.derivative import tangents
 from nonlinear.bench.injection import Watched
 from nonlinear.bench.loop_setup import PATHS, LoopSetup, loop_setup, points_of, stages_of
-from nonlinear.bench.on_the_bench import on_the_bench
-from nonlinear.bench.operating_motion import may_stand, on_its_stand, standing
+from nonlinear.bench.operating_motion import may_stand, on_its_stand, on_the_bench, standing
 
 if TYPE_CHECKING:
     from actuator_lti.drive.operating import Operating

@@ -35,7 +35,7 @@ from analyses.validation.result import Validation
 from analyses.validation.row import Row
 from analyses.validation.settings import FINDINGS, Settings
 from analyses.validation.small_signal import Place, small_signal
-from nonlinear.bench.on_the_bench import on_the_bench
+from nonlinear.bench.operating_motion import on_the_bench
 
 Progress = Callable[[int, int], None]
 T = TypeVar("T")

@@ -168,6 +168,8 @@ from actuator_lti.drive import signals
 ) = range(146)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
 
+TABLES = (LOAD_TABLE, TORQUE_TABLE, SUPPLY_TABLE)  # offsets of series; their lengths stand behind them
+
 # --- a signal: kind and parameters -----------------------------------------------------------------
 SIGNAL_SIZE = 8
 NONE, STEP, RAMP, SINE, TRIANGLE, CHIRP, LOG_CHIRP, TABLE = range(8)

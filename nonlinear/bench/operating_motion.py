@@ -13,7 +13,7 @@ from math import copysign, cosh, inf, isfinite
 
 import numpy as np
 
-from actuator_lti.design.model import Coupling, Design, Friction, LoadFriction
+from actuator_lti.design.model import Command, Coupling, Design, Friction, Instruments, LoadFriction, Sensor
 from actuator_lti.drive.angle import follows_angle, holding_moment_Nm, holding_torque_Nm
 from actuator_lti.drive.operating import Operating, segments
 from actuator_lti.errors import InputError
@@ -281,3 +281,22 @@ def _room(friction: Friction, speed_rad_s: float, sense: int) -> float:
         return min(ROOM * speed_rad_s, speed_rad_s - least) if flat else 0.0
     bends = [0.0, *(start for start, _ in segments(friction.map(sense)))] if friction.points else [0.0]
     return ROOM * min(abs(speed_rad_s - bend) for bend in bends)
+
+
+def on_the_bench(design: Design) -> Design:
+    """A drive as its loops are tested: ideal instruments, and the command taken as it is."""
+    return replace(quiet(design), command=Command())
+
+
+def quiet(design: Design) -> Design:
+    """A drive without counts and noise: what they keep moving is a finding of its own."""
+    return replace(without_counts(design), instruments=Instruments())
+
+
+def without_counts(design: Design, *sensors: Sensor) -> Design:
+    """The same drive with some encoders free of counts, by default with both."""
+    if "motor" in sensors or not sensors:
+        design = replace(design, encoder=replace(design.encoder, counts_per_rev=None))
+    if "output" in sensors or not sensors:
+        design = replace(design, output_encoder=replace(design.output_encoder, counts_per_rev=None))
+    return design

@@ -113,10 +113,8 @@ def _refuse_single(design: Design) -> None:
     if any(noise) or instruments.jitter_s:
         message = "instruments: noise and jitter need double precision; allowed: none of them"
     elif is_elastic(design):
-        message = (
-            "coupling, friction.point: an elastic drive train or a friction map needs double precision; "
-        )
-        message += "allowed: neither"
+        message = "coupling, friction.point: an elastic drive train or a friction map needs double precision"
+        message += "; allowed: neither"
     else:
         return
     raise InputError(f"{message}, or no --single", where=where)

@@ -79,12 +79,8 @@ def _source(program: Program, prefix: str) -> str:
         head += ["#include <math.h>", ""]
     if re.search(r"\bbool\b", body):
         head += ["#include <stdbool.h>", ""]
-    words = {
-        "DESIGN": "actuator-lti controller ",
-        "REVISION": " revision ",
-        "DESIGN_HASH": " ",
-        "SOURCE_HASH": " ",
-    }
+    words = {"DESIGN": "actuator-lti controller ", "REVISION": " revision ", "DESIGN_HASH": " "}
+    words["SOURCE_HASH"] = " "
     parts = " ".join(f'"{word}" {upper}CONTROLLER_{name}' for name, word in words.items())
     return "\n".join([*head, f"const char {prefix}controller_version[] = {parts};", "", body])
 
@@ -123,16 +119,15 @@ def _constants(ours: Controller, upper: str) -> str:
 
 
 def _structs(ours: Controller) -> str:
-    parts, signals = begins(ours.p), (ours.measured, ours.out)
-    said = {each.name: signal_words(each.first) for struct in signals for each in struct.members}
-    texts = [struct_text(ours.state, {m.name: state_words(parts[m.first]) for m in ours.state.members})]
-    return "\n\n".join([*texts, *(struct_text(each, said) for each in signals)])
+    parts = begins(ours.p)
+    state = struct_text(ours.state, lambda each: state_words(parts[each.first]))
+    signals = (struct_text(one, lambda each: signal_words(each.first)) for one in (ours.measured, ours.out))
+    return "\n\n".join([state, *signals])
 
 
 def _sizes(ours: Controller, single_precision: bool) -> str:
-    real = 4 if single_precision else 8
-    counted = [
-        (text, sum(max(each.length, 1) * (real if each.kind == "float" else 4) for each in struct.members))
+    size = {"float": 4 if single_precision else 8}
+    return ", ".join(
+        f"{text} {sum(max(each.length, 1) * size.get(each.kind, 4) for each in struct.members)} bytes"
         for text, struct in (("state", ours.state), ("input", ours.measured), ("output", ours.out))
-    ]
-    return ", ".join(f"{text} {size} bytes" for text, size in counted)
+    )

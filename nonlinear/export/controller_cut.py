@@ -95,8 +95,8 @@ def controller_of(design: Design, prefix: str, *, single_precision: bool = False
     program = emit_structs(functions, entries, prefix, rows)
     measured = {each.name: each for row in ("p", "io") for each in structs[row].members}
     structs["io"] = replace(structs["io"], members=tuple(measured.values()))
-    ours = dict(zip(("state", "measured", "out"), (structs[row] for row in ("s", "io", "to")), strict=True))
-    return Controller(design=design, p=p, program=program, **ours)
+    state, seen, out = (structs[row] for row in ("s", "io", "to"))
+    return Controller(design=design, p=p, program=program, state=state, measured=seen, out=out)
 
 
 def _followed(p: Floats, single_precision: bool) -> dict[str, Leftover]:

@@ -6,7 +6,7 @@ from actuator_lti.design.law import LAW_INPUTS
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout
 from nonlinear.export.c_files import stage_words
-from nonlinear.export.rows import unit_of, words
+from nonlinear.export.rows import UNIT_OF, words
 
 _STAGES = ("position", "velocity", "current", "voltage")
 _UNITS = dict(zip(_STAGES, ("rad", "rad/s", "A", "V"), strict=True))
@@ -20,7 +20,7 @@ _OTHERS = {
     "rad/s": "S_ERROR_RATE S_SPEED_CHAIN IN_OUTPUT_SPEED LAW_SPEED LAW_OUTPUT_SPEED",
     "A": "LAW_CURRENT",
 }
-_UNIT_OF = {name: unit for unit, names in _OTHERS.items() for name in names.split()}
+_UNIT_OF = UNIT_OF | {name: unit for unit, names in _OTHERS.items() for name in names.split()}
 _WORDS = {
     "S_SPEED_REFERENCE": "w_ref", "S_OVERLOADED": "1: the overload limit acts",
     "LAW_STATES": "states of the law of one's own", "LAW_NEXT": "work space of the law: its next states",
@@ -68,7 +68,7 @@ def _unit(design: Design, name: str) -> str:
     for stage, names in _BEHIND.items():
         if name in names:
             return next(_UNITS[each] for each in stages if _STAGES.index(each) > _STAGES.index(stage))
-    return _UNIT_OF.get(name) or unit_of(name)
+    return _UNIT_OF.get(name, "")
 
 
 def state_words(name: str) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.compiled.kinds import c_float
+from actuator_lti.compiled.kinds import Kind, c_float
 from actuator_lti.compiled.structs import Member, Struct
 from actuator_lti.design.field import BIG
 from nonlinear._kernels import layout as at
@@ -65,14 +65,9 @@ def _is_moderate(ours: Controller, vector: Vector) -> bool:
 
 def _is_decided(ours: Controller, vector: Vector, rng: np.random.Generator, scale: float) -> bool:
     """Whether the whole numbers stay where all others are moved by random shares of the roundings."""
-    whole = np.concatenate(
-        [[0], *(_places(ours.state, each) for each in ours.state.members if each.kind == "int")]
-    )
+    whole = _all_places(ours.state, "int")
     plain = after(ours, vector)[whole]
-    floats = [
-        [_places(struct, each) for each in struct.members if each.kind == "float"] for struct in _given(ours)
-    ]
-    places = [np.concatenate([np.zeros(0, int), *each]) for each in floats]
+    places = [_all_places(struct, "float") for struct in (ours.state, ours.measured)]
     for _ in range(_TRIED):
         moved = vector
         for which, place in enumerate(places):
@@ -89,16 +84,17 @@ def roundings(ours: Controller) -> int:
     return ROUNDINGS + (len(own[1].A) + len(own[1].inputs) if own else 0)
 
 
-def _given(ours: Controller) -> tuple[Struct, Struct]:
-    """What a vector holds."""
-    return ours.state, ours.measured
-
-
 def _places(struct: Struct, member: Member) -> npt.NDArray[np.intp]:
     """Where the row of the state, or of inputs, has what a member is."""
     elsewhere = {"out": _OUT, "in": {at.ANGLE_START: at.IN_ANGLE}}.get(struct.argument, {})
     first = elsewhere.get(member.first, member.first)
     return np.arange(first, first + max(member.length, 1))
+
+
+def _all_places(struct: Struct, kind: Kind) -> npt.NDArray[np.intp]:
+    """The same of all members of a kind."""
+    places = (_places(struct, each) for each in struct.members if each.kind == kind)
+    return np.concatenate([np.zeros(0, np.intp), *places])
 
 
 def seen_by(p: Floats, s: Floats, io: Floats) -> Floats:
@@ -159,7 +155,7 @@ def rounding_bounds(ours: Controller, vectors: list[Vector], *, single_precision
 
 def _moved(ours: Controller, vector: Vector, of_counts: float) -> Iterator[tuple[Vector, float]]:
     """Vectors with one number moved, and the weight of each: counts are angles in the simulator alone."""
-    for which, struct in enumerate(_given(ours)):
+    for which, struct in enumerate((ours.state, ours.measured)):
         for each in struct.members:
             if each.kind == "int" or (each.kind == "count" and which):
                 continue

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 
+from actuator_lti.batch._complex import copied
 from actuator_lti.batch._eigen import eigenvalues
 from actuator_lti.batch._response import evaluate
 from actuator_lti.batch._run import one_loop
@@ -147,33 +148,21 @@ def lead_of(p):
 
 
 @kernel
-def poles_of(n, a, b, c, fed_back, poles, work, lent, lent_too, real, imaginary):
-    """Poles of a loop, open and closed; 0 where they were not found."""
-    for side in range(2):
-        closed = fed_back * side
-        for i in range(n):
-            for j in range(n):
-                work[i * n + j] = a[i * n + j] - closed * b[i] * c[j]
-        result = eigenvalues(n, work, lent, lent_too, real, imaginary)
-        if result == 0:
-            return 0
-        for i in range(n):
-            poles[2 * side * n + i] = real[i]
-            poles[(2 * side + 1) * n + i] = imaginary[i]
-    return 1
-
-
-@kernel
 def figures(
     n, a, b, c, lead, time_figures, row, poles, points, stack, xs, rs, ss, work, state, exchanged,
     real, imaginary,
 ):  # fmt: skip
     """Figures of a loop that was assembled (see ``one_loop``); the points scanned, `LOST` without poles."""
-    found = poles_of(
-        n, a, b, c, 0.0 if math.isnan(lead) else 1.0, poles, work, exchanged, state, real, imaginary
-    )
-    if found == 0:
-        return LOST
+    for side in range(2):  # the open loop's poles, then the closed loop's
+        closed = 0.0 if math.isnan(lead) else float(side)
+        for i in range(n):
+            for j in range(n):
+                work[i * n + j] = a[i * n + j] - closed * b[i] * c[j]
+        found = eigenvalues(n, work, exchanged, state, real, imaginary)
+        if found == 0:
+            return LOST
+        copied(n, real, 0, poles, 2 * side * n)
+        copied(n, imaginary, 0, poles, (2 * side + 1) * n)
     return one_loop(
         n, a, b, c, poles, lead, time_figures > 0, row, points, stack, xs, rs, ss, work, state, exchanged
     )

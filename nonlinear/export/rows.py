@@ -47,12 +47,7 @@ _OWN = (
     ("A, row by row,", at.OWN_A, at.OWN_B), ("B, row by row,", at.OWN_B, at.OWN_C), ("C", at.OWN_C, at.OWN_D),
     ("D", at.OWN_D, at.OWN_L), ("L", at.OWN_L, at.OWN_START), ("start", at.OWN_START, at.SIZE),
 )  # fmt: skip
-_UNIT_OF = {name: unit for unit, names in UNITS.items() for name in names.split()}
-
-
-def unit_of(name: str) -> str:
-    """Unit of a name of the layout, of a rotary drive; ``""``: none."""
-    return _UNIT_OF.get(name, "")
+UNIT_OF = {name: unit for unit, names in UNITS.items() for name in names.split()}
 
 
 @cache
@@ -63,7 +58,7 @@ def words() -> dict[str, str]:
         match = _LINE.match(line)
         if match:
             said = match["words"] or match["names"].removeprefix("S_").lower().replace("_", " ")
-            unit = _UNIT_OF.get(match["names"], "")
+            unit = UNIT_OF.get(match["names"], "")
             result[match["names"]] = f"{said} [{unit}]" if unit else said
     return result
 

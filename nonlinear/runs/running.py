@@ -18,7 +18,6 @@ from nonlinear.runs.trajectory import STATUS, Status
 
 Floats = npt.NDArray[np.float64]
 _SIGNALS = (at.COMMAND, at.BIAS, *(at.PROBES + k * at.PROBE_SIZE + at.PROBE_SIGNAL for k in range(4)))
-_TABLES = (at.LOAD_TABLE, at.TORQUE_TABLE, at.SUPPLY_TABLE)
 _NOISE = (at.CURRENT_NOISE, at.ANGLE_NOISE, at.OUTPUT_NOISE, at.JITTER)
 _COUNTED = {at.S_TICK, at.S_STATUS, at.S_AVERAGE_PLACE, at.S_EVENTS, at.S_MAX_EVENTS, at.S_STEPS}
 _BEHIND = (
@@ -120,7 +119,7 @@ class Running:
         """
         twin = self.copy()
         tick = int(self.s[at.S_TICK])
-        for hold, places in ((_hold_signal, _SIGNALS), (_hold_table, _TABLES)):
+        for hold, places in ((_hold_signal, _SIGNALS), (_hold_table, at.TABLES)):
             if not all(hold(twin.p, place, self.tables, tick) for place in places):
                 return None
         twin.p[list(_NOISE)] = 0.0

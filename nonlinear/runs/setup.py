@@ -30,18 +30,12 @@ class Tables:
 
     parts: list[Floats] = field(default_factory=list)
     size: int = 0
-    known: dict[int, tuple[int, int]] = field(default_factory=dict)
 
-    def add(self, values: Floats, key: object = None) -> tuple[int, int]:
-        """Append a series; returns its offset and length.  The same ``key`` object is stored only once."""
-        if key is not None and id(key) in self.known:
-            return self.known[id(key)]
-        place = (self.size, values.size)
+    def add(self, values: Floats) -> tuple[int, int]:
+        """Append a series; returns its offset and length."""
         self.parts.append(np.ascontiguousarray(values, dtype=float))
         self.size += values.size
-        if key is not None:
-            self.known[id(key)] = place
-        return place
+        return self.size - values.size, values.size
 
     def append(self, other: Tables) -> int:
         """Append all series of another set; returns where they begin."""

@@ -26,7 +26,7 @@ class Asked:
 
     match: Annotated[
         str,
-        Option(words="Only keys whose name or meaning holds this text.", metavar="TEXT", argument=True),
+        Option("Only keys whose name or meaning holds this text.", "TEXT", argument=True),
     ] = ""
     explain: Annotated[
         str | None,
@@ -35,7 +35,7 @@ class Asked:
             metavar="FILE",
         ),
     ] = None
-    linear: Annotated[bool, Option(words="Units of a linear axis (m, N, kg).")] = False
+    linear: Annotated[bool, Option("Units of a linear axis (m, N, kg).")] = False
 
 
 @dataclass(frozen=True)

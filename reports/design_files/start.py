@@ -22,22 +22,16 @@ class Asked:
     --motor maxon-ec-i-40-100w-48v --gear harmonic-drive-csf-17-30
     """
 
-    file: Annotated[Path, Option(words="Design file to write.", metavar="FILE", argument=True)] = Path(
-        "my-drive.toml"
-    )
+    file: Annotated[Path, Option("Design file to write.", "FILE", argument=True)] = Path("my-drive.toml")
     source: Annotated[
         str | None,
-        Option(words="Start from this design (shipped name or file) instead.", metavar="NAME", flag="from"),
+        Option("Start from this design (shipped name or file) instead.", "NAME", flag="from"),
     ] = None
-    kind: Annotated[
-        str | None, Option(words=f"Start from a typical drive: {', '.join(KINDS)}.", metavar="KIND")
-    ] = None
-    motor: Annotated[
-        str | None, Option(words="Motor of the catalogue; a wrong name lists them all.", metavar="NAME")
-    ] = None
-    gear: Annotated[
-        str | None, Option(words="Gear of the catalogue; a wrong name lists them all.", metavar="NAME")
-    ] = None
+    kind: Annotated[str | None, Option(f"Start from a typical drive: {', '.join(KINDS)}.", "KIND")] = None
+    motor: Annotated[str | None, Option("Motor of the catalogue; a wrong name lists them all.", "NAME")] = (
+        None
+    )
+    gear: Annotated[str | None, Option("Gear of the catalogue; a wrong name lists them all.", "NAME")] = None
     force: Annotated[bool, FORCE] = False
 
     def __post_init__(self) -> None:

@@ -22,13 +22,11 @@ class AskedC:
     Try: actuator-lti export c fin --out fin-c --prefix fin_
     """
 
-    target: Annotated[Path, Option(words="Folder for the files; drive-c.", metavar="DIR", flag="out")] = Path(
-        "drive-c"
+    target: Annotated[Path, Option("Folder for the files; drive-c.", "DIR", flag="out")] = Path("drive-c")
+    single: Annotated[bool, Option("float in place of double.")] = False
+    prefix: Annotated[str, Option("In front of the design's own files and symbols; drive_.", "NAME_")] = (
+        "drive_"
     )
-    single: Annotated[bool, Option(words="float in place of double.")] = False
-    prefix: Annotated[
-        str, Option(words="In front of the design's own files and symbols; drive_.", metavar="NAME_")
-    ] = "drive_"
     check: Annotated[bool, CHECK] = True
     force: Annotated[bool, FORCE] = False
 
@@ -40,13 +38,11 @@ class AskedController:
     Try: actuator-lti export controller joint --type float --prefix joint_ --out joint-controller
     """
 
-    target: Annotated[
-        Path, Option(words="Folder for the files; controller-c.", metavar="DIR", flag="out")
-    ] = Path("controller-c")
-    number: Annotated[Literal["float", "double"], Option(words="Type of a number; float.", flag="type")] = (
-        "float"
+    target: Annotated[Path, Option("Folder for the files; controller-c.", "DIR", flag="out")] = Path(
+        "controller-c"
     )
-    prefix: Annotated[str, Option(words="In front of every symbol; drive_.", metavar="NAME_")] = "drive_"
+    number: Annotated[Literal["float", "double"], Option("Type of a number; float.", flag="type")] = "float"
+    prefix: Annotated[str, Option("In front of every symbol; drive_.", "NAME_")] = "drive_"
     force: Annotated[bool, FORCE] = False
 
 
@@ -57,15 +53,13 @@ class AskedFmu:
     Try: actuator-lti export fmu joint --platform linux64
     """
 
-    target: Annotated[Path | None, Option(words="File to write; NAME.fmu.", metavar="FILE", flag="out")] = (
-        None
-    )
-    version: Annotated[int, Option(words="Version of FMI; 2.", metavar="2|3", flag="fmi")] = 2
+    target: Annotated[Path | None, Option("File to write; NAME.fmu.", "FILE", flag="out")] = None
+    version: Annotated[int, Option("Version of FMI; 2.", "2|3", flag="fmi")] = 2
     platform: Annotated[
         list[str] | None,
-        Option(words="linux64 or win64, may be repeated; both.", metavar="NAME"),
+        Option("linux64 or win64, may be repeated; both.", "NAME"),
     ] = None
-    plain: Annotated[bool, Option(words="Without reports inside, and no check.")] = False
+    plain: Annotated[bool, Option("Without reports inside, and no check.")] = False
     check: Annotated[bool, CHECK] = True
     force: Annotated[bool, FORCE] = False
 
@@ -77,9 +71,9 @@ class AskedLinear:
     Try: actuator-lti export linear joint --to mat
     """
 
-    to: Annotated[Literal["json", "mat", "python"], Option(words="Format; json.")] = "json"
+    to: Annotated[Literal["json", "mat", "python"], Option("Format; json.")] = "json"
     target: Annotated[
         Path | None,
-        Option(words="File to write; NAME-linear.json, .mat or .py.", metavar="FILE", flag="out"),
+        Option("File to write; NAME-linear.json, .mat or .py.", "FILE", flag="out"),
     ] = None
     force: Annotated[bool, FORCE] = False

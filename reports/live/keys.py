@@ -94,10 +94,9 @@ def _top(design: Design, path: str) -> float:
 
 def named(design: Design, path: str) -> Tree:
     """Give path, value and unit as the design file writes them."""
-    field, _ = located(design, path)
-    value, known = parameter_value(design, path), design.parameters.get(path)
+    field, value = located(design, path)[0], parameter_value(design, path)
     unit = field.unit(Structure.of(design))
-    shown, factor = _written(known, value, unit)
+    shown, factor = _written(design.parameters.get(path), value, unit)
     return {
         "path": path,
         "about": field.description,
@@ -119,12 +118,11 @@ def _written(known: Parameter | None, value: float, unit: str) -> tuple[str, flo
 
 def _slider(design: Design, path: str) -> Tree:
     """Give a key with the range of its slider and the band of its tolerance."""
-    field, _ = located(design, path)
-    made, value = named(design, path), parameter_value(design, path)
+    field, value = located(design, path)[0], parameter_value(design, path)
     low, high = _range(design, path, value)
     known = design.parameters.get(path)
     return {
-        **made,
+        **named(design, path),
         "low": max(low, field.low),
         "high": min(high, field.high),
         "least": field.low if math.isfinite(field.low) else None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import accumulate, takewhile
 
 from actuator_lti.design import read_design_text, with_overrides
 from actuator_lti.design.mistakes import lines_of
@@ -70,9 +71,7 @@ def _entry_of(path: str, text: str) -> tuple[int, int] | None:
     number = lines.get(path)
     if number is None:
         return None
-    starts = [0]
-    for line in text.splitlines(keepends=True):
-        starts.append(starts[-1] + len(line))
+    starts = list(accumulate(map(len, text.splitlines(keepends=True)), initial=0))
     last = max([number, *(line for key, line in lines.items() if key.startswith(f"{path}."))])
     return starts[number - 1], starts[last]
 
@@ -104,15 +103,16 @@ def _added(path: str, text: str) -> Patch | None:
     return place, place, f"{path} = ", "\n"
 
 
+def _alike(one: Sequence[str], other: Sequence[str]) -> int:
+    """How many lines are the same from the first on."""
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(one, other, strict=False)))
+
+
 def _patch(text: str, changed: str) -> Patch:
     """Give the lines in which two texts differ, the second cut at the mark."""
     old, new = text.splitlines(keepends=True), changed.splitlines(keepends=True)
-    first = 0
-    while first < min(len(old), len(new)) and old[first] == new[first]:
-        first += 1
-    last = 0
-    while last < min(len(old), len(new)) - first and old[-1 - last] == new[-1 - last]:
-        last += 1
+    first = _alike(old, new)
+    last = _alike(old[first:][::-1], new[first:][::-1])
     begin, end = sum(map(len, old[:first])), sum(map(len, old[: len(old) - last]))
     before, _, after = "".join(new[first : len(new) - last]).partition(f'"{MARK}"')
     return begin, end, before, after

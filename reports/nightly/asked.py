@@ -28,23 +28,19 @@ class Settings(OnMachines):
     """
 
     build: ClassVar[str] = "reports.nightly.compute:build"
-    workers: Annotated[int | None, Option(words="Worker processes; 2.", metavar="N")] = 2
-    time_limit_s: Annotated[
-        float, Option(words="A design that takes longer is ended; 900.", metavar="SECONDS")
-    ] = 900.0
-    memory_limit: Annotated[int, Option(words="A design that needs more has no result.", metavar="MB")] = (
+    workers: Annotated[int | None, Option("Worker processes; 2.", "N")] = 2
+    time_limit_s: Annotated[float, Option("A design that takes longer is ended; 900.", "SECONDS")] = 900.0
+    memory_limit: Annotated[int, Option("A design that needs more has no result.", "MB")] = (
         JOB_MEMORY.most // 1_000_000
     )
-    wait_s: Annotated[
-        float, Option(words="Wait for another nightly on the same site; 0.", metavar="SECONDS")
-    ] = 0.0
-    keep: Annotated[int, Option(words="Nights whose reports stay on the site; 60.", metavar="NIGHTS")] = 60
+    wait_s: Annotated[float, Option("Wait for another nightly on the same site; 0.", "SECONDS")] = 0.0
+    keep: Annotated[int, Option("Nights whose reports stay on the site; 60.", "NIGHTS")] = 60
     state: Annotated[
-        Path | None, Option(words="History and cache; DIR.state beside the site otherwise.", metavar="DIR")
+        Path | None, Option("History and cache; DIR.state beside the site otherwise.", "DIR")
     ] = None
-    accept_lost_history: Annotated[
-        bool, Option(words="Begin anew where the history knows less than the site.")
-    ] = False
+    accept_lost_history: Annotated[bool, Option("Begin anew where the history knows less than the site.")] = (
+        False
+    )
 
     @property
     def engine(self) -> Engine:
@@ -68,20 +64,20 @@ class Asked(Settings):
     words: Annotated[
         list[str],
         Option(
-            words="Study file (compare --example prints one), design file or shipped design; first 'approve'"
+            "Study file (compare --example prints one), design file or shipped design; first 'approve'"
             " to approve.",
-            metavar="[approve] STUDY",
+            "[approve] STUDY",
             argument=True,
         ),
     ]
-    site: Annotated[Path | None, Option(words="Folder of the site; has to be given.", metavar="DIR")] = None
-    pdf: Annotated[bool, Option(words="A PDF beside each report.")] = False
-    no_validation: Annotated[bool, Option(words="Linear reports only, no simulation.")] = False
-    by: Annotated[str, Option(words="Who approves.", metavar="NAME")] = ""
-    reason: Annotated[str, Option(words="Why the night is approved.", metavar="TEXT")] = ""
+    site: Annotated[Path | None, Option("Folder of the site; has to be given.", "DIR")] = None
+    pdf: Annotated[bool, Option("A PDF beside each report.")] = False
+    no_validation: Annotated[bool, Option("Linear reports only, no simulation.")] = False
+    by: Annotated[str, Option("Who approves.", "NAME")] = ""
+    reason: Annotated[str, Option("Why the night is approved.", "TEXT")] = ""
     only: Annotated[
         list[str] | None,
-        Option(words="Approve only this design; may be repeated.", metavar="NAME", flag="design"),
+        Option("Approve only this design; may be repeated.", "NAME", flag="design"),
     ] = None
 
     def __post_init__(self) -> None:

@@ -11,7 +11,7 @@ from analyses.friction_effects import FrictionEffects
 from analyses.friction_effects.result import FrictionPoint, LimitCycles
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, accepted_rad, noticed, told, verdict_of
 from analyses.motion.settling import words as end_words
-from nonlinear.bench.on_the_bench import quiet
+from nonlinear.bench.operating_motion import quiet
 from reports import document as doc
 from reports.charts import style
 from reports.sections.names import fine_unit, load_unit

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from analyses.specification import Specification
-from analyses.specification.manoeuvres import Manoeuvre
+from analyses.specification.capability import Manoeuvre
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import short, significant

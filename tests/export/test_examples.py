@@ -8,7 +8,6 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import system_compiler
 from examples import firmware_controller as firmware
-from nonlinear.export import fmu_bytes
 
 pytestmark = pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
 
@@ -16,25 +15,27 @@ pytestmark = pytest.mark.skipif(system_compiler() is None, reason="no C compiler
 def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> None:
     """Linear loop on one side, the compiled drive in a flight on the other: the border lies between."""
     pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
+    from fmu_host import written
+
     from examples.autopilot_loop import GAIN_S, fly, margins
 
     design = load_design("ilr33-amber")
     result = margins(design)
     assert result.stable
     limit = GAIN_S * result.gain_margins[0].ratio
-    path = tmp_path / "drive.fmu"
-    path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
+    path = written(tmp_path, design)
     assert fly(design, path, 0.97 * limit, 0.6).growth < 1.0 < fly(design, path, 1.03 * limit, 0.6).growth
 
 
 def test_a_host_with_an_integrator_of_its_own_flies_the_same(tmp_path: Path) -> None:
     """solve_ivp with the C inside, FMPy with the unit: 1e-7, a fourth at half the step; held: 2.6e-3."""
     pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
+    from fmu_host import written
+
     from examples.autopilot_loop import fly, fly_inside, smooth
 
     design = load_design("ilr33-amber")
-    path = tmp_path / "drive.fmu"
-    path.write_bytes(fmu_bytes(design, 2, ("linux64",)))
+    path = written(tmp_path, design)
     inside = fly_inside(smooth(design), tmp_path, 2.0, 0.006).roll_rate_rad_s
     far = [
         np.abs(fly(design, path, 2.0, 0.006, parts=parts).roll_rate_rad_s - inside).max()

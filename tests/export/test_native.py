@@ -2,6 +2,7 @@
 
 import os
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 
 import control
@@ -21,6 +22,20 @@ from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native,
 from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row
 
+
+def same_as_written(work: Callable[[], Trajectory]) -> Trajectory:
+    """A run that is the same, to the bit, by the compiled kernels and by those as written."""
+    ours = work()
+    with native.LIBRARY.written():
+        theirs = work()
+    assert ours.parameters_hash == theirs.parameters_hash
+    for name, values in ours.columns().items():
+        assert values.tobytes() == theirs.columns()[name].tobytes(), name
+    assert (ours.status, ours.limits) == (theirs.status, theirs.limits)
+    assert repr((ours.final, ours.energy)) == repr((theirs.final, theirs.energy))  # NaN where a run failed
+    return ours
+
+
 quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
 
 
@@ -38,15 +53,7 @@ def test_runs_have_the_bits_of_the_kernels_as_written(seed: int) -> None:
             record_every=1 + seed % 2, raise_on_failure=False,
         )  # fmt: skip
 
-    ours = work()
-    with native.LIBRARY.written():
-        theirs = work()
-    assert ours.parameters_hash == theirs.parameters_hash
-    for name, values in ours.columns().items():
-        assert values.tobytes() == theirs.columns()[name].tobytes(), name
-    assert ours.status == theirs.status
-    assert repr((ours.final, ours.energy)) == repr((theirs.final, theirs.energy))  # NaN where a run failed
-    assert ours.limits == theirs.limits
+    same_as_written(work)
 
 
 @quiet
@@ -74,13 +81,9 @@ def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(
     def work() -> Trajectory:
         return simulate(design, commands.triangle(2e-3, 40.0), 600 * control.period_s, loads.constant(3.0))
 
-    ours = work()
-    with native.LIBRARY.written():
-        theirs = work()
+    ours = same_as_written(work)
     assert form.startswith("tanh") or ours.events > 3
     assert ours.limit_flags.any()
-    for name, values in ours.columns().items():
-        assert values.tobytes() == theirs.columns()[name].tobytes(), name
 
 
 @quiet

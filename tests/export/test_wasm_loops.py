@@ -7,7 +7,7 @@ import json
 import math
 import shutil
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -163,12 +163,8 @@ def limiters_agree(design: Design, ours: dict[str, Any]) -> int:
 
 def smooth(design: Design) -> Design:
     """Without instruments, cogging and gear error: drives found before these were drawn, as they were."""
-    return replace(
-        design,
-        motor=replace(design.motor, cogging_Nm=0.0),
-        load=replace(design.load, gear_error_Nm=0.0),
-        instruments=Instruments(),
-    )
+    load = replace(design.load, gear_error_Nm=0.0)
+    return replace(design, motor=replace(design.motor, cogging_Nm=0.0), load=load, instruments=Instruments())
 
 
 def shipped() -> list[Design]:
@@ -184,16 +180,20 @@ def without_outer_stages() -> list[Design]:
     return [replace(whole, controller=each) for each in controllers]
 
 
+def made(make: Callable[[np.random.Generator], Design], seeds: Iterable[int]) -> list[Design]:
+    """Random drives without instruments, which do not matter to a loop."""
+    designs = (make(np.random.default_rng(seed)) for seed in seeds)
+    return [replace(design, instruments=Instruments()) for design in designs]
+
+
 def random_drives() -> list[Design]:
-    """Filters, sensors, estimators, delays and periods at random; instruments do not matter to a loop."""
-    made = (random_drive(np.random.default_rng(seed)) for seed in range(40))
-    return [replace(design, instruments=Instruments()) for design in made]
+    """Filters, sensors, estimators, delays and periods at random."""
+    return made(random_drive, range(40))
 
 
 def random_elastic_drives() -> list[Design]:
     """Couplings with play, damping and friction behind them, friction maps, or both."""
-    made = (random_elastic_drive(np.random.default_rng(seed)) for seed in range(30))
-    designs = [replace(design, instruments=Instruments()) for design in made]
+    designs = made(random_elastic_drive, range(30))
     assert sum(design.coupling is not None for design in designs) > 10
     assert sum(bool(design.friction.points) for design in designs) > 10
     return designs
@@ -204,17 +204,17 @@ def once_different() -> list[Design]:
 
     The first two differ by rounding of the entries, which is shown; in the last the linear form lost digits.
     """
-    return [smooth(random_elastic_drive(np.random.default_rng(seed))) for seed in (52004, 52023, 52080)]
+    return [smooth(design) for design in made(random_elastic_drive, (52004, 52023, 52080))]
 
 
 def with_a_damped_load() -> list[Design]:
     """Stiff springs and soft ones, with the two keys of the load that random drives leave out."""
-    designs = []
-    for seed in range(300, 325):
-        design, rng = random_elastic_drive(np.random.default_rng(seed)), np.random.default_rng([seed, 5])
-        damping = 10 ** rng.uniform(-3.0, 0.5) if design.load.path == "back-drivable" else 0.0
-        load = replace(design.load, moment_damping_Nms_rad=damping)
-        designs.append(replace(design, load=load, instruments=Instruments()))
+    designs = made(random_elastic_drive, range(300, 325))
+    for k, design in enumerate(designs):
+        damping = 10 ** np.random.default_rng([300 + k, 5]).uniform(-3.0, 0.5)
+        if design.load.path != "back-drivable":
+            damping = 0.0
+        designs[k] = replace(design, load=replace(design.load, moment_damping_Nms_rad=damping))
     assert sum(each.coupling is not None and each.load.moment_damping_Nms_rad > 0.0 for each in designs) > 4
     return designs
 
@@ -236,7 +236,7 @@ def test_loops_and_limiters_are_those_of_the_linear_form(make: Callable[[], list
 
 def test_a_pole_on_the_unit_circle_is_no_verdict() -> None:
     """Seed 14: poles at 1 and -1 but for rounding; one kind of processor said stable, another unstable."""
-    design = smooth(random_elastic_drive(np.random.default_rng(14)))
+    design = smooth(*made(random_elastic_drive, [14]))
     truth = stability_margins(assemble_loops(design).present["current"].open_loop)
     assert truth.stable is None
     many = linear_figures(Population(design, {}, 1), time_figures=False)
@@ -260,7 +260,7 @@ def test_a_hidden_mode_at_rest_withholds_no_figures() -> None:
 
 def test_a_gain_margin_at_nyquist_is_listed_once() -> None:
     """Seed 1: L stays within rounding of the real axis next to its end there."""
-    design = replace(random_elastic_drive(np.random.default_rng(1)), instruments=Instruments())
+    (design,) = made(random_elastic_drive, [1])
     loop = assemble_loops(design).present["position"].open_loop
     found, truth = (stability_margins(loop, certify=certify) for certify in (False, True))
     assert len(truth.gain_margins) == 1
@@ -269,7 +269,7 @@ def test_a_gain_margin_at_nyquist_is_listed_once() -> None:
 
 def test_a_periodic_loop_of_many_states_has_its_poles(tmp_path) -> None:
     """Seed 51345: 153 states at the voltage, their poles on circles; the search for them gave up."""
-    design = smooth(random_drive(np.random.default_rng(51345)))
+    design = smooth(*made(random_drive, [51345]))
     (found,) = in_node([design], tmp_path)
     assert found["u"]["n"] == len(assemble_loops(design).break_points["u"].plain_open.A) == 153
     responses_agree(design, found)
@@ -297,10 +297,9 @@ def test_periodic_points_have_the_margins_of_the_fundamental(tmp_path) -> None:
         assert loop.periodic
         wanted = stability_margins(loop.open_loop)
         got = dict(zip(LOOP_QUANTITIES, numbers(ours["i_ref"]["figures"]), strict=False))
-        assert got["gain_margin"] == pytest.approx(wanted.gain_margin_db, rel=1e-9)
-        assert got["phase_margin"] == pytest.approx(wanted.phase_margin_deg, rel=1e-9)
-        assert got["delay_margin"] == pytest.approx(wanted.delay_margin_s, rel=1e-9)
-        assert got["modulus_margin"] == pytest.approx(wanted.modulus_margin, rel=1e-9)
+        known = wanted.gain_margin_db, wanted.phase_margin_deg, wanted.delay_margin_s, wanted.modulus_margin
+        names = ("gain_margin", "phase_margin", "delay_margin", "modulus_margin")
+        assert [got[name] for name in names] == pytest.approx(known, rel=1e-9)
 
 
 @pytest.mark.parametrize("base", ["ilr33-amber", "ilr33-amber-multirate", "ilr33-amber-compliant", "joint"])
@@ -341,19 +340,13 @@ def test_a_crossover_below_the_scan_withholds_the_figures(tmp_path) -> None:
 
 def unstable_inside(seed: int) -> Design:
     """A current loop far beyond its border that runs 8 to 24 times between two position updates."""
-    rng = np.random.default_rng([seed, 16])
-    design = load_design("ilr33-amber-multirate")
-    control = design.controller
-    every = int(rng.choice([4, 6, 8]))
-    return replace(
-        design,
-        controller=replace(
-            control,
-            current=replace(control.current, gain_V_A=control.current.gain_V_A * 10.0 ** rng.uniform(0.6, 2)),
-            velocity=replace(control.velocity, every=every),
-            position=replace(control.position, every=every * int(rng.choice([2, 3]))),
-        ),
-    )
+    rng, design = np.random.default_rng([seed, 16]), load_design("ilr33-amber-multirate")
+    control, every = design.controller, int(rng.choice([4, 6, 8]))
+    current = replace(control.current, gain_V_A=control.current.gain_V_A * 10.0 ** rng.uniform(0.6, 2))
+    position = replace(control.position, every=every * int(rng.choice([2, 3])))
+    velocity = replace(control.velocity, every=every)
+    control = replace(control, current=current, velocity=velocity, position=position)
+    return replace(design, controller=control)
 
 
 def test_where_rounding_decides_no_figure_is_given_as_sure(tmp_path) -> None:

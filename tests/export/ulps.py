@@ -10,8 +10,8 @@ import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS
 from actuator_lti.batch import Population
+from actuator_lti.batch import _figures as fig
 from actuator_lti.batch import figures as many
-from actuator_lti.batch._figures import COLUMNS
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
@@ -47,15 +47,16 @@ def moved_by_an_ulp(design: Design, loop: str, timed: bool) -> dict[str, float]:
     """
     rng = np.random.default_rng(0)
     wired = wire(Population(design, {}, COUNT).stacked, Operating())
-    rows, out = np.full((COUNT, COLUMNS), np.nan), np.full((COUNT, len(LOOPS), COLUMNS), np.nan)
+    out = np.full((COUNT, len(LOOPS), fig.COLUMNS), np.nan)
+    rows = np.full((COUNT, fig.COLUMNS), np.nan)
     lead, response = many._command_path(wired) if loop == "position" else (0.0, None)
     many._figures_of(
         nudged(fundamental(stage_blocks(wired, loop)), rng), lead, timed and response is None, rows
     )
     if response is not None:
-        verdict = rows[:, [0, 14]].copy()
+        verdict = rows[:, [fig.STABLE, fig.RADIUS]]
         many._figures_of(nudged(response, rng), np.nan, timed, rows)
-        rows[:, [0, 14]] = verdict
+        rows[:, [fig.STABLE, fig.RADIUS]] = verdict
     out[:, LOOPS.index(loop)] = rows
     period = np.full((COUNT, len(LOOPS)), wired.period_s(loop))
     figures = many.LinearFigures(wired.stages, COUNT, out, period)

@@ -14,8 +14,7 @@ from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
 from actuator_lti.loops import PeriodicLoop, exact_margins, periodic_loop
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import all_loop_figures
-from nonlinear.bench.on_the_bench import on_the_bench
-from nonlinear.bench.operating_motion import on_its_stand
+from nonlinear.bench.operating_motion import on_its_stand, on_the_bench
 from tests.validation.random_drives import full_drive
 
 SYSTEMS = [  # of one state, by turns

@@ -18,8 +18,7 @@ from actuator_lti.loops.periodic import fundamental, point_blocks
 from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.loops.tick import Block
 from actuator_lti.systems.rest_mode import without_rest_mode
-from nonlinear.bench.on_the_bench import on_the_bench
-from nonlinear.bench.operating_motion import on_its_stand
+from nonlinear.bench.operating_motion import on_its_stand, on_the_bench
 from tests.validation.random_drives import full_drive
 
 SLOPES = (-6000.0, -100.0, -0.1, 50.0)

@@ -16,13 +16,11 @@ from nonlinear.runs.reduced import whole_periods
 def mixed_runs() -> list[Run]:
     designs = [load_design(n) for n in ("ilr33-amber", "emps", "ilr33-amber-multirate")]
     table = commands.sampled([0.0, 0.1, 0.2], [0.0, 0.01, -0.01])
+    asked = [commands.sine(0.002 * (k + 1), 2.0 + k) if k % 2 else table for k in range(12)]
+    load, kept = [loads.proportional(3.0 * k, 1.0) for k in range(12)], Reducers(extremes=True)
     return [
         Run(
-            design=designs[k % 3],
-            command=commands.sine(0.002 * (k + 1), 2.0 + k) if k % 2 else table,
-            duration_s=0.2 + 0.01 * k,
-            load_Nm=loads.proportional(3.0 * k, 1.0),
-            reducers=Reducers(extremes=True),
+            design=designs[k % 3], command=asked[k], duration_s=0.2 + 0.01 * k, load_Nm=load[k], reducers=kept
         )
         for k in range(12)
     ]
@@ -62,18 +60,10 @@ def test_windows_against_the_history() -> None:
     design = load_design("ilr33-amber")
     frequency, ticks, cycles = whole_periods(37.0, design.controller.period_s)
     probe = Probe(point="w_ref", injection=commands.sine(20.0, frequency))
-    bias = commands.ramp(0.1)
-    duration = (2 * ticks + 731) * design.controller.period_s
-    run = Run(
-        design=design,
-        command=commands.hold(),
-        bias=bias,
-        probes=(probe,),
-        duration_s=duration,
-        reducers=Reducers(window_ticks=ticks, cycles=cycles, harmonics=3),
-    )
-    batch = simulate_many([run])
-    history = simulate(design, commands.hold(), duration, bias=bias, probes=[probe])
+    asked = {"command": commands.hold(), "bias": commands.ramp(0.1), "probes": (probe,)}
+    asked["duration_s"] = (2 * ticks + 731) * design.controller.period_s
+    kept = Reducers(window_ticks=ticks, cycles=cycles, harmonics=3)
+    batch, history = simulate_many([Run(design=design, reducers=kept, **asked)]), simulate(design, **asked)
     for last in (0, 1):
         part = slice(-(last + 1) * ticks, -last * ticks if last else None)
         t = history.time_s[part]
@@ -96,13 +86,10 @@ def test_windows_against_the_history() -> None:
 def test_step_figures_against_the_history() -> None:
     design = load_design("ilr33-amber")
     target = 0.01
-    run = Run(
-        design=design,
-        command=commands.step(target),
-        duration_s=0.2,
-        reducers=Reducers(step_target_rad=target),
-    )
-    step = simulate_many([run]).step
+    kept = Reducers(step_target_rad=target)
+    step = simulate_many(
+        [Run(design=design, command=commands.step(target), duration_s=0.2, reducers=kept)]
+    ).step
     history = simulate(design, commands.step(target), 0.2)
     y, t = history.output_angle_rad / target, history.time_s
     rise = np.interp(0.9, y[: y.argmax()], t[: y.argmax()]) - np.interp(0.1, y[: y.argmax()], t[: y.argmax()])
@@ -122,17 +109,10 @@ def test_rows_are_the_same_as_runs() -> None:
     rows.window(500, 5)
     rows.sine("i_ref", gains, 100.0)
     batch = rows.run()
-    runs = [
-        Run(
-            design=design,
-            command=commands.hold(),
-            bias=commands.ramp(0.1),
-            duration_s=0.2,
-            probes=(Probe(point="i_ref", injection=commands.sine(g, 100.0)),),
-            reducers=Reducers(window_ticks=500, cycles=5),
-        )
-        for g in gains
-    ]
+    probes = [Probe(point="i_ref", injection=commands.sine(g, 100.0)) for g in gains]
+    asked = {"command": commands.hold(), "bias": commands.ramp(0.1), "duration_s": 0.2}
+    kept = Reducers(window_ticks=500, cycles=5)
+    runs = [Run(design=design, probes=(probe,), reducers=kept, **asked) for probe in probes]
     assert np.array_equal(batch.outs, simulate_many(runs).outs)
 
 
@@ -140,9 +120,8 @@ def test_refusals() -> None:
     design = load_design("ilr33-amber")
     with pytest.raises(InputError, match="at least one"):
         simulate_many([])
-    long_window = Run(
-        design=design, command=commands.hold(), duration_s=0.1, reducers=Reducers(window_ticks=800)
-    )
+    kept = Reducers(window_ticks=800)
+    long_window = Run(design=design, command=commands.hold(), duration_s=0.1, reducers=kept)
     with pytest.raises(InputError, match="must fit twice"):
         simulate_many([long_window])
     with pytest.raises(InputError, match="harmonics"):
@@ -182,22 +161,15 @@ def test_open_loop_at_every_break_point(name: str, point: str, frequency_hz: flo
     frequency, ticks, cycles = whole_periods(frequency_hz, control.period_s, least_ticks=2000)
     ticks, cycles = 10 * ticks, 10 * cycles  # whole position periods
     moving = point != "output"  # a ramp has no steady phasor at the output: there, at rest without friction
+    ahead = -CRUISE / control.position.gain
+    start = State(motor_angle_rad=ahead, motor_speed_rad_s=CRUISE, speed_command_rad_s=CRUISE)
+    motion = {"bias": commands.ramp(CRUISE / design.total_ratio), "initial": start} if moving else {}
     run = Run(
-        design=design,
-        command=commands.hold(),
-        bias=commands.ramp(CRUISE / design.total_ratio) if moving else None,
-        initial=State(
-            motor_angle_rad=-CRUISE / control.position.gain,
-            motor_speed_rad_s=CRUISE,
-            speed_command_rad_s=CRUISE,
-        )
-        if moving
-        else None,
-        friction_on=moving,
+        design=design, command=commands.hold(), friction_on=moving, **motion,
         probes=(Probe(point=point, injection=commands.sine(INJECTION[point], frequency)),),
         duration_s=(2 * ticks + 10_000) * control.period_s,
         reducers=Reducers(window_ticks=ticks, cycles=cycles),
-    )
+    )  # fmt: skip
     result = simulate_many([run])
     before, after = (f"probe_{point}_{side}" for side in ("before", "after"))
     measured = -result.phasor(before)[0] / result.phasor(after)[0]

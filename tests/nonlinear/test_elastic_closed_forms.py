@@ -27,6 +27,9 @@ def test_reference_number_k5() -> None:
     assert run.coupling_torque_Nm.min() == pytest.approx(-0.445253372927, abs=1e-12)
     assert run.coupling_torque_Nm.max() == pytest.approx(0.638947611306, abs=1e-12)
     assert run.energy.relative_error < 1e-9
+    assert run.energy.coupling_damping_J > 1e-5
+    assert run.energy.parting_J > 1e-7
+    assert run.energy.load_dry_friction_J == 0.0
 
 
 def test_free_vibration_of_two_masses() -> None:
@@ -63,9 +66,8 @@ def test_impact_at_the_edge_of_a_tick(offset: float) -> None:
 def test_play_crossed_many_times_in_a_tick() -> None:
     v = 20.0
     Ts = 5.3 * (2 * B / v + np.pi / RESONANCE)
-    run = run_plant(
-        two_mass(Ts, source=True, coupling=IDEAL), np.zeros(20), start=(0.0, v * N, 0.0, 0.0, 0.0)
-    )
+    design = two_mass(Ts, source=True, coupling=IDEAL)
+    run = run_plant(design, np.zeros(20), start=(0.0, v * N, 0.0, 0.0, 0.0))
     assert max(run.events) >= 10
     twist = run.states[:, 3] / N - run.states[:, 4]
     np.testing.assert_allclose(twist, bounce(np.arange(21) * Ts, v), atol=1e-12)
@@ -91,9 +93,8 @@ def test_damped_contact_parts_at_no_torque() -> None:
 
 
 def test_motor_swings_on_its_spring_while_the_load_sticks() -> None:
-    design = two_mass(
-        1e-3, source=True, coupling=IDEAL | {"play_rad": 0.0}, load_friction={"dry_torque_Nm": 50.0}
-    )
+    stuck = {"dry_torque_Nm": 50.0}
+    design = two_mass(1e-3, source=True, coupling=IDEAL | {"play_rad": 0.0}, load_friction=stuck)
     run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.2, 0.0))
     w0 = np.sqrt(K / (J_M * N * N))
     np.testing.assert_allclose(run.states[:, 3], 0.2 * np.cos(w0 * np.arange(101) * 1e-3), atol=1e-12)
@@ -104,9 +105,8 @@ def test_load_swings_behind_a_self_locking_stage() -> None:
     parts = {"path": "self-locking", "friction": {"load_coefficient": 0.2}}
     design = two_mass(1e-3, coupling=IDEAL | {"play_rad": 0.0}, **parts)
     run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.0, 0.02))
-    np.testing.assert_allclose(
-        run.states[:, 4], 0.02 * np.cos(np.sqrt(K / J_L) * np.arange(101) * 1e-3), atol=1e-13
-    )
+    swing = 0.02 * np.cos(np.sqrt(K / J_L) * np.arange(101) * 1e-3)
+    np.testing.assert_allclose(run.states[:, 4], swing, atol=1e-13)
     assert np.abs(run.states[:, 3]).max() < 1e-18
 
 
@@ -184,23 +184,16 @@ def test_map_of_one_line_is_c0_and_cv() -> None:
     rigid = two_mass(1e-3, coupling=None, friction=mapped)
     with_map = run_plant(rigid, voltages, 0.5)
     without = run_plant(replace(rigid, friction=replace(rigid.friction, points=(), **plain)), voltages, 0.5)
-    scale = np.abs(without.states).max()
-    np.testing.assert_allclose(
-        with_map.states[:, [0, 1, 3]], without.states[:, [0, 1, 3]], atol=1e-11 * scale
-    )
+    seen, wanted = (run.states[:, [0, 1, 3]] for run in (with_map, without))
+    np.testing.assert_allclose(seen, wanted, atol=1e-11 * np.abs(without.states).max())
     assert sum(with_map.events) == sum(without.events) >= 5
 
 
-LOSSES = [
-    layout.ENERGY_COPPER, layout.ENERGY_DRY, layout.ENERGY_VISCOUS, layout.ENERGY_DAMPING,
-    layout.ENERGY_PARTING, layout.ENERGY_LOAD_DRY, layout.ENERGY_LOAD_VISCOUS,
-]  # fmt: skip
+LOSSES = [getattr(layout, f"ENERGY_{name}") for name in (
+    "COPPER", "DRY", "VISCOUS", "DAMPING", "PARTING", "LOAD_DRY", "LOAD_VISCOUS")]  # fmt: skip
 SPENT = [
     *LOSSES,
-    layout.ENERGY_OFFSET,
-    layout.ENERGY_LOAD,
-    layout.ENERGY_CONVERSION,
-    layout.ENERGY_LOAD_OFFSET,
+    *(getattr(layout, f"ENERGY_{name}") for name in ("OFFSET", "LOAD", "CONVERSION", "LOAD_OFFSET")),
 ]
 
 
@@ -209,12 +202,8 @@ def stored(design: Design, x: np.ndarray) -> float:
     i, w, W, th, phi = x
     coupling, L = design.coupling, design.motor.inductance_H or 0.0
     stretch = max(0.0, abs(th / design.ratio_to_coupling - phi) - coupling.play_rad / 2)
-    bends = (
-        (coupling.torque_1_Nm, coupling.stiffness_2_Nm_rad),
-        (coupling.torque_2_Nm, coupling.stiffness_3_Nm_rad),
-    )
-    spring, T, k = 0.0, 0.0, coupling.stiffness_Nm_rad
-    for bend, beyond in bends:
+    c, (spring, T, k) = coupling, (0.0, 0.0, coupling.stiffness_Nm_rad)
+    for bend, beyond in ((c.torque_1_Nm, c.stiffness_2_Nm_rad), (c.torque_2_Nm, c.stiffness_3_Nm_rad)):
         if bend is not None and T + k * stretch > bend:
             spring += 0.5 * (bend * bend - T * T) / k
             stretch, T, k = stretch - (bend - T) / k, bend, beyond
@@ -245,14 +234,6 @@ def test_energies_do_not_change_the_motion(seed: int) -> None:
     scale = np.abs(without.states).max(axis=0)
     assert np.all(np.abs(with_energy.states - without.states) <= 1e-10 * scale)
     assert with_energy.events == without.events
-
-
-def test_trajectory_names_each_share() -> None:
-    energy = simulate(drive_f(), commands.step(0.1), 0.1, energy=True).energy
-    assert energy.relative_error < 1e-9
-    assert energy.coupling_damping_J > 1e-5
-    assert energy.parting_J > 1e-7
-    assert energy.load_dry_friction_J == 0.0
 
 
 def test_state_fits_its_place() -> None:

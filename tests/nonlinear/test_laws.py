@@ -146,15 +146,25 @@ FRICTION = {
 }
 
 
-@pytest.mark.parametrize(
-    ("amplitude", "frequency", "load", "what"),
-    [(0.0002, 3.0, 8.0, "stick"), (0.0873, 1.0, 4.0, "speed"), (0.1, 20.0, 0.0, "current")],
-)
-def test_baseline(amplitude: float, frequency: float, load: float, what: str) -> None:
-    run = simulate(load_design("ilr33-amber"), commands.sine(amplitude, frequency), 1.0, load, energy=True)
+BALANCED = [  # drive, amplitude (None: a quarter of full deflection), Hz, seconds, load, what happens in it
+    ("ilr33-amber", 0.0002, 3.0, 1.0, 8.0, "stick"),
+    ("ilr33-amber", 0.0873, 1.0, 1.0, 4.0, "speed"),
+    ("ilr33-amber", 0.1, 20.0, 1.0, 0.0, "current"),
+    *((name, None, 1.0, 1.5, 0.0, "") for name in ("emps", "ctms-motor-position", "ilr33-amber-multirate")),
+]
+
+
+@pytest.mark.parametrize(("name", "size", "frequency", "seconds", "load", "what"), BALANCED)
+def test_balance(
+    name: str, size: float | None, frequency: float, seconds: float, load: float, what: str
+) -> None:
+    design = load_design(name)
+    size = size or design.validation.full_deflection_rad / 4
+    run = simulate(design, commands.sine(size, frequency), seconds, load, energy=True)
     assert run.energy.relative_error < 1e-9
-    assert run.energy.electrical_input_J > 0.0
-    assert run.stick_fraction > 0.1 if what == "stick" else run.limits[what].fraction > 0.1
+    if what:
+        assert run.energy.electrical_input_J > 0.0
+        assert run.stick_fraction > 0.1 if what == "stick" else run.limits[what].fraction > 0.1
 
 
 def test_asymmetric_back_drivable_with_fractional_delay() -> None:
@@ -172,14 +182,6 @@ def test_asymmetric_back_drivable_with_fractional_delay() -> None:
     assert abs(energy.conversion_J) > 1e-3
     assert abs(energy.output_work_J) > 1e-6
     assert run.events > 5
-
-
-@pytest.mark.parametrize("name", ["emps", "ctms-motor-position", "ilr33-amber-multirate"])
-def test_other_drives(name: str) -> None:
-    design = load_design(name)
-    amplitude = design.validation.full_deflection_rad / 4
-    run = simulate(design, commands.sine(amplitude, 1.0), 1.5, energy=True)
-    assert run.energy.relative_error < 1e-9
 
 
 def test_every_loss_of_a_steady_speed() -> None:

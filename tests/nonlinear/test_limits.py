@@ -77,13 +77,9 @@ def test_h2_pure_acceleration_limit() -> None:
     Ts, f, a = 1e-6, 20.0, radians(20_000.0)
     design = ideal_drive(Ts, model.Limits(voltage_V=inf, acceleration_rad_s2=a))
     start = -a / (4.0 * f)
-    run = Run(
-        design=design,
-        command=commands.sine(radians(1000.0), f),
-        initial=State(motor_speed_rad_s=start, speed_command_rad_s=start),
-        duration_s=2.0 / f,
-        reducers=Reducers(window_ticks=round(1.0 / (f * Ts))),
-    )
+    begin, window = State(motor_speed_rad_s=start, speed_command_rad_s=start), round(1.0 / (f * Ts))
+    asked = {"command": commands.sine(radians(1000.0), f), "duration_s": 2.0 / f, "initial": begin}
+    run = Run(design=design, reducers=Reducers(window_ticks=window), **asked)
     result = simulate_many([run])
     low, high = result.span("output_angle_rad", last=1)
     assert degrees(high[0] - low[0]) / 2.0 == pytest.approx(1.5625, abs=5e-4)

@@ -8,7 +8,7 @@ import pytest
 
 from actuator_lti import InputError, load_design, plant
 from actuator_lti.design import Design, design_hash, read_design_text, with_overrides, write_design
-from actuator_lti.design.model import Controller, PositionLoop
+from actuator_lti.design.model import Controller, Friction, Limits, Motor, PositionLoop
 from nonlinear import commands, simulate
 
 AMBER = load_design("ilr33-amber")
@@ -76,20 +76,11 @@ BUS = 10.0 - 4.0 * TIME + 2.0 * np.sin(9.0 * TIME)
 
 def _integrator(position: PositionLoop | None) -> Design:
     """An ideal torque source on an inertia without friction: w' = gain u / J."""
-    base = load_design("ilr33-amber")
-    motor = replace(
-        base.motor, source_gain_Nm_V=0.002, resistance_ohm=None, inductance_H=None,
-        torque_constant_Nm_A=None, back_emf_constant_Vs_rad=None, rotor_inertia_kgm2=1e-4,
-    )  # fmt: skip
-    friction = replace(base.friction, dry_torque_Nm=0.0, viscous_Nms_rad=0.0, load_coefficient=0.0)
-    controller = Controller(period_s=TICK, computing_delay_s=0.0, position=position)
-    limits = replace(
-        base.limits, voltage_V=10.0, speed_rad_s=np.inf, acceleration_rad_s2=np.inf,
-        peak_current_A=np.inf, continuous_current_A=np.inf,
-    )  # fmt: skip
     return replace(
-        base, motor=motor, friction=friction, controller=controller, limits=limits, requirements=()
-    )
+        AMBER, motor=Motor(rotor_inertia_kgm2=1e-4, source_gain_Nm_V=0.002), friction=Friction(),
+        controller=Controller(period_s=TICK, computing_delay_s=0.0, position=position),
+        limits=Limits(voltage_V=10.0), requirements=(),
+    )  # fmt: skip
 
 
 def _sampled_motion(design: Design, voltage_V: np.ndarray) -> np.ndarray:
@@ -131,20 +122,16 @@ def test_a_duty_ratio_is_scaled_by_the_bus_between_the_loop_s_updates_too() -> N
 
 
 def test_a_constant_supply_at_the_nominal_voltage_changes_nothing() -> None:
-    design = load_design("ilr33-amber")
-    command = commands.step(0.05)
-    nominal = commands.sampled([0.0, 0.1], [design.limits.voltage_V] * 2)
-    plain, supplied = simulate(design, command, 0.1), simulate(design, command, 0.1, supply=nominal)
+    command, nominal = commands.step(0.05), commands.sampled([0.0, 0.1], [AMBER.limits.voltage_V] * 2)
+    plain, supplied = simulate(AMBER, command, 0.1), simulate(AMBER, command, 0.1, supply=nominal)
     np.testing.assert_array_equal(plain.output_angle_rad, supplied.output_angle_rad)
     np.testing.assert_array_equal(plain.limit_flags, supplied.limit_flags)
 
 
 def test_a_supply_that_cannot_be_is_refused() -> None:
-    design = load_design("ilr33-amber")
     series = commands.sampled([0.0, 0.1], [12.0, 11.0])
     with pytest.raises(InputError, match="without a current loop"):
-        simulate(design, commands.hold(0.0), 0.1, supply=series, supply_scales=True)
-    with pytest.raises(InputError, match="voltages of 0 or more"):
-        simulate(design, commands.hold(0.0), 0.1, supply=commands.sampled([0.0, 0.1], [12.0, -1.0]))
-    with pytest.raises(InputError, match="voltages of 0 or more"):
-        simulate(design, commands.hold(0.0), 0.1, supply=commands.sine(12.0, 1.0))
+        simulate(AMBER, commands.hold(0.0), 0.1, supply=series, supply_scales=True)
+    for negative in (commands.sampled([0.0, 0.1], [12.0, -1.0]), commands.sine(12.0, 1.0)):
+        with pytest.raises(InputError, match="voltages of 0 or more"):
+            simulate(AMBER, commands.hold(0.0), 0.1, supply=negative)

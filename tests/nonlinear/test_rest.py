@@ -12,7 +12,7 @@ from analyses.friction_effects import friction_effects
 from analyses.motion.settling import conduct, settle
 from nonlinear import Rows, State, commands, simulate
 from nonlinear._kernels import layout as at
-from nonlinear.bench.on_the_bench import quiet
+from nonlinear.bench.operating_motion import quiet
 from nonlinear.settling.drift import overload, ticks_until_it_acts
 from nonlinear.settling.rest import first_motion_s, judge
 from tests.nonlinear.rest_agreement import answers
@@ -121,9 +121,8 @@ def test_overload_on_its_way_is_leapt_over() -> None:
     rows["ticks"] = rest.after_s / joint.controller.period_s
     rows.window(1.0, 1, 0)
     run = rows.run()
-    trips_s = joint.controller.period_s * float(
-        run.outs[0, at.OUT_LIMIT_FIRST + at.LIMITERS.index("overload")]
-    )
+    tripped = run.outs[0, at.OUT_LIMIT_FIRST + at.LIMITERS.index("overload")]
+    trips_s = joint.controller.period_s * float(tripped)
     assert trips_s < rest.after_s < 1.1 * trips_s
     assert rest.work < 200_000
 
@@ -145,22 +144,16 @@ def test_a_drive_that_its_load_carries_off_diverges() -> None:
     assert "current" in rest.limited
 
 
-def test_a_gimbal_with_a_spring_and_play_hunts() -> None:
-    """+-0.40 deg at 0.12 Hz."""
-    rest = settle(load_design(HERE / "gimbal.toml"), 0.0, 0.1).rest
-    assert rest.verdict == "limit cycle"
-    assert DEG * rest.amplitude == pytest.approx(0.40, abs=0.01)
-    assert rest.frequency_hz == pytest.approx(0.12, abs=0.005)
-    assert rest.limited == ()
-
-
-def test_a_steering_motor_crosses_its_play_for_ever() -> None:
-    """0.213 Hz, 0.458 deg peak to peak of the motor at the output's side, 0.3 deg of it play."""
-    rest = settle(load_design(HERE / "steering.toml"), 0.0, 0.002).rest
-    assert rest.verdict == "limit cycle"
-    assert 2.0 * DEG * rest.motor_amplitude == pytest.approx(0.458, abs=0.004)
-    assert rest.frequency_hz == pytest.approx(0.213, abs=0.003)
-    assert rest.amplitude < 0.2 * rest.motor_amplitude
+def test_a_gimbal_with_a_spring_and_a_steering_motor_with_play_hunt() -> None:
+    """+-0.40 deg at 0.12 Hz; 0.213 Hz, 0.458 deg peak to peak at the motor's side, 0.3 deg of it play."""
+    gimbal = settle(load_design(HERE / "gimbal.toml"), 0.0, 0.1).rest
+    steering = settle(load_design(HERE / "steering.toml"), 0.0, 0.002).rest
+    assert (gimbal.verdict, steering.verdict, gimbal.limited) == ("limit cycle", "limit cycle", ())
+    assert DEG * gimbal.amplitude == pytest.approx(0.40, abs=0.01)
+    assert gimbal.frequency_hz == pytest.approx(0.12, abs=0.005)
+    assert 2.0 * DEG * steering.motor_amplitude == pytest.approx(0.458, abs=0.004)
+    assert steering.frequency_hz == pytest.approx(0.213, abs=0.003)
+    assert steering.amplitude < 0.2 * steering.motor_amplitude
 
 
 @pytest.mark.parametrize("share", [0.01, 0.05, 0.25, 1.0])
@@ -235,16 +228,8 @@ def test_random_drives_against_a_plain_run(seed: int) -> None:
     design = full_drive(seed)
     if not is_stable(design) or design.controller.outermost != "position":
         pytest.skip("no stable position loop")
-    silent = replace(
-        design,
-        instruments=replace(
-            design.instruments,
-            current_noise_A=0.0,
-            angle_noise_rad=0.0,
-            output_angle_noise_rad=0.0,
-            jitter_s=0.0,
-        ),
-    )
+    noises = ("current_noise_A", "angle_noise_rad", "output_angle_noise_rad", "jitter_s")
+    silent = replace(design, instruments=replace(design.instruments, **dict.fromkeys(noises, 0.0)))
     step = 0.01 * design.validation.full_deflection_rad
     rest = settle(design, 0.0, step).rest
     rows = Rows.of(silent)

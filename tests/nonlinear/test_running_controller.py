@@ -49,11 +49,7 @@ def some_drive(rng: np.random.Generator) -> model.Design:
     base = load_design("ilr33-amber")
     Ts, n_v, wide = 10 ** rng.uniform(-5, -3), int(pick(1, 2, 5)), 10 ** rng.uniform(-1, 1)
     laws = ("conditional", "clamped", "back-calculation")
-    has_position, has_velocity, has_current = (
-        pick(True, True, False),
-        pick(True, True, False),
-        pick(True, True, False),
-    )
+    has_position, has_velocity, has_current = (pick(True, True, False) for _ in range(3))
     cascade = model.CurrentLoop(
         gain_V_A=wide,
         integral_time_s=pick(None, 20 * Ts),
@@ -103,13 +99,8 @@ def some_drive(rng: np.random.Generator) -> model.Design:
         current_rate_A_s=pick(inf, inf, 3.0 / T_o),
     )
     if has_current and np.isfinite(limits.peak_current_A):
-        limits = replace(
-            limits,
-            continuous_current_A=2.0,
-            peak_time_s=pick(None, 30 * Ts),
-            release=0.8,
-            overload=pick("thermal", "excess"),
-        )
+        peak_s, kind = pick(None, 30 * Ts), pick("thermal", "excess")
+        limits = replace(limits, continuous_current_A=2.0, peak_time_s=peak_s, release=0.8, overload=kind)
     encoder = model.Encoder(
         counts_per_rev=pick(None, 4096),
         speed=pick("ideal", "difference", "tracking"),
@@ -117,21 +108,13 @@ def some_drive(rng: np.random.Generator) -> model.Design:
         filter_time_s=pick(0.0, 4 * Ts),
         bandwidth_rad_s=0.2 / (n_v * Ts),
     )
-    control = replace(
-        base.controller,
-        period_s=Ts,
-        computing_delay_s=0.0,
-        position=position if has_position else None,
-        velocity=velocity if has_velocity else None,
-        current=cascade if has_current else None,
-    )
+    control = model.Controller(
+        period_s=Ts, computing_delay_s=0.0, position=position if has_position else None,
+        velocity=velocity if has_velocity else None, current=cascade if has_current else None,
+    )  # fmt: skip
+    behind = model.OutputEncoder(counts_per_rev=pick(None, 10**6))
     return replace(
-        base,
-        controller=control,
-        limits=limits,
-        encoder=encoder,
-        command=command,
-        output_encoder=model.OutputEncoder(counts_per_rev=pick(None, 10**6)),
+        base, controller=control, limits=limits, encoder=encoder, command=command, output_encoder=behind
     )
 
 

@@ -21,6 +21,12 @@ def changed(design: model.Design = AMBER, **control: object) -> model.Design:
     return replace(design, controller=replace(design.controller, **control))
 
 
+def torque_drive(gain: float, integral_time_s: float | None, **limits: float) -> model.Design:
+    """A current loop alone."""
+    current = model.CurrentLoop(gain_V_A=gain, integral_time_s=integral_time_s)
+    return replace(changed(position=None, velocity=None, current=current), limits=model.Limits(**limits))
+
+
 def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
     """Every tick integrated afresh with the moment of its beginning."""
     ticks, Ts = 200, AMBER.controller.period_s
@@ -108,18 +114,8 @@ def test_supply(supply: model.Supply) -> None:
 @pytest.mark.parametrize(("overload", "tau"), [("thermal", 8.490187), ("excess", 8.0)])
 def test_overload_time_at_the_peak(overload: str, tau: float) -> None:
     """r = 3, 1 s: after one second at the peak the limit falls to the continuous current."""
-    limits = model.Limits(
-        voltage_V=24.0,
-        peak_current_A=6.0,
-        continuous_current_A=2.0,
-        peak_time_s=1.0,
-        overload=overload,
-        release=0.5,
-    )
-    design = replace(
-        changed(position=None, velocity=None, current=model.CurrentLoop(gain_V_A=1.0, integral_time_s=None)),
-        limits=limits,
-    )
+    protected = {"peak_current_A": 6.0, "continuous_current_A": 2.0, "peak_time_s": 1.0, "release": 0.5}
+    design = torque_drive(1.0, None, voltage_V=24.0, overload=overload, **protected)
     Ts = design.controller.period_s
     drive = Drive(design)
     out = np.array([drive.control(6.0, 6.0, 0.0, 0.0) for _ in range(round(1.2 / Ts))])
@@ -139,11 +135,8 @@ def test_the_overload_protection_is_not_called_the_current_limit(amperes: float,
 
     Thermal: x = (i/i_c)^2 (1 - exp(-t/tau)) reaches 1; tau from one second at three times i_c.
     """
-    limits = model.Limits(voltage_V=inf, peak_current_A=6.0, continuous_current_A=2.0, peak_time_s=1.0)
-    design = replace(
-        changed(position=None, velocity=None, current=model.CurrentLoop(gain_V_A=GAIN, integral_time_s=1e-3)),
-        limits=limits,
-    )
+    protected = {"peak_current_A": 6.0, "continuous_current_A": 2.0, "peak_time_s": 1.0}
+    design = torque_drive(GAIN, 1e-3, voltage_V=inf, **protected)
     design = replace(design, friction=replace(design.friction, dry_torque_Nm=10.0))  # the rotor stays
     tau = 1.0 / np.log(9.0 / 8.0)
     ratio2 = (min(amperes, 6.0) / 2.0) ** 2
@@ -158,18 +151,11 @@ def test_the_overload_protection_is_not_called_the_current_limit(amperes: float,
 
 def test_noise_resolution_and_their_seeds() -> None:
     """A torque drive that is commanded 0 shows its measured current as -u over its gain."""
-    design = replace(
-        changed(position=None, velocity=None, current=model.CurrentLoop(gain_V_A=GAIN, integral_time_s=None)),
-        limits=model.Limits(voltage_V=inf),
-    )
+    design = torque_drive(GAIN, None, voltage_V=inf)
     noisy = replace(design, instruments=model.Instruments(current_noise_A=0.1, seed=3))
     ticks = 20_000
-    runs = [
-        simulate(
-            replace(noisy, instruments=replace(noisy.instruments, seed=s)), commands.hold(), ticks * 1e-4
-        )
-        for s in (3, 3, 4)
-    ]
+    seeded = [replace(noisy, instruments=replace(noisy.instruments, seed=s)) for s in (3, 3, 4)]
+    runs = [simulate(each, commands.hold(), ticks * 1e-4) for each in seeded]
     assert np.array_equal(runs[0].current_A, runs[1].current_A)
     assert not np.array_equal(runs[0].current_A, runs[2].current_A)
     noise = (-runs[0].voltage_V / GAIN - runs[0].current_A) / 0.1
@@ -190,20 +176,12 @@ def test_jitter_and_angle_noise() -> None:
     """A source that cannot be felt, at constant speed: the position loop shows what it reads."""
     Ts, w, ticks = 1e-3, 40.0, 4000
     design = model.Design(
-        name="coasting",
-        title="",
+        name="coasting", title="", limits=model.Limits(voltage_V=inf), validation=AMBER.validation,
         motor=model.Motor(rotor_inertia_kgm2=1.0, source_gain_Nm_V=1e-15),
-        controller=replace(
-            AMBER.controller,
-            period_s=Ts,
-            computing_delay_s=0.0,
-            position=model.PositionLoop(gain=1.0),
-            velocity=None,
-            current=None,
+        controller=model.Controller(
+            period_s=Ts, computing_delay_s=0.0, position=model.PositionLoop(gain=1.0)
         ),
-        limits=model.Limits(voltage_V=inf),
-        validation=AMBER.validation,
-    )
+    )  # fmt: skip
     start = State(motor_speed_rad_s=w)
     for instruments, rms in (
         (model.Instruments(jitter_s=1e-4), 1e-4 * w),
@@ -219,23 +197,12 @@ def test_jitter_and_angle_noise() -> None:
 def everything() -> model.Design:
     """A drive with every rare feature on."""
     control = AMBER.controller
-    velocity = replace(
-        control.velocity,
-        every=2,
-        filters=(
-            model.Filter(kind="notch", frequency_rad_s=4000.0, width_rad_s=1000.0),
-            model.Filter(kind="lowpass", on="speed", frequency_rad_s=6000.0),
-        ),
-    )
-    position = replace(
-        control.position,
-        every=4,
-        integral_time_s=0.05,
-        derivative_time_s=1e-3,
-        sensor="output",
-        acceleration_feedforward=0.7,
-        friction_feedforward=0.05,
-    )
+    notch = model.Filter(kind="notch", frequency_rad_s=4000.0, width_rad_s=1000.0)
+    smooth = model.Filter(kind="lowpass", on="speed", frequency_rad_s=6000.0)
+    velocity = replace(control.velocity, every=2, filters=(notch, smooth))
+    fed = {"acceleration_feedforward": 0.7, "friction_feedforward": 0.05}
+    pid = {"integral_time_s": 0.05, "derivative_time_s": 1e-3}
+    position = replace(control.position, every=4, sensor="output", **pid, **fed)
     return replace(
         changed(velocity=velocity, position=position, computing_delay_s=1.3e-4),
         encoder=replace(AMBER.encoder, speed="tracking", bandwidth_rad_s=1500.0, counts_per_rev=4096),

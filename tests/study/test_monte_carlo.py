@@ -1,33 +1,23 @@
 """Monte Carlo studies: closed-form odds, worst cases in corners, the same bits however computed, resuming."""
 
-import tomllib
-
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-import tomli_w
+from toleranced import toleranced
 
-from actuator_lti import load_design, read_design_text, write_design
+from actuator_lti import load_design, read_design_text
 from actuator_lti.errors import InputError
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
-from analyses.monte_carlo.reduction import Reduction, reduced, unpacked
+from analyses.monte_carlo.judging import Reduction, reduced, unpacked
 from analyses.monte_carlo.statistics import MOST
 from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
 from analyses.studies.sampling import sampler_of
 
 
-def toleranced():
-    """The baseline with a friction coefficient that may be wrong by 60 % and a resistance by 20 %."""
-    tree = tomllib.loads(write_design(load_design("ilr33-amber")))
-    tree["friction"]["load_coefficient"]["tolerance"] = "60 %"
-    tree["motor"]["resistance"]["tolerance"] = "20 %"
-    return read_design_text(tomli_w.dumps(tree))
-
-
 @pytest.fixture(scope="module")
 def design():
-    return toleranced()
+    return read_design_text(toleranced(friction={"load_coefficient": 60}, motor={"resistance": 20}))
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +99,12 @@ def test_permuting_samples_changes_nothing(design):
     assert all(np.array_equal(straight[k][order], mixed[k], equal_nan=True) for k in straight)
 
 
+def in_parts(monkeypatch, **sizes):
+    """Studies of a thousand samples count as more than are kept."""
+    for name, value in {"KEPT": 999, **sizes}.items():
+        monkeypatch.setattr(run, name, value)
+
+
 def interrupted(design, folder, settings, after):
     """A study that is stopped once so many samples are done."""
 
@@ -122,7 +118,6 @@ def interrupted(design, folder, settings, after):
 
 def test_an_interrupted_study_goes_on(study, design, tmp_path):
     settings = MonteCarloSettings(samples=1000, seed=3, chunk=100, worst_cases=False)
-
     interrupted(design, tmp_path, settings, after=300)
     left = sorted(tmp_path.glob("*.parquet"))
     assert 3 <= len(left) < 10
@@ -141,9 +136,7 @@ def test_another_study_does_not_mix_into_a_folder(study, design):
 @pytest.mark.parametrize("engine", [Engine(threads=2), Engine(workers=1)])
 def test_more_samples_than_are_kept_come_to_the_same(engine, study, design, tmp_path, monkeypatch):
     """Reduced where they are computed, in parts of another size: the same to the last bit, none kept."""
-    monkeypatch.setattr(run, "KEPT", 999)
-    monkeypatch.setattr(run, "PARTS", 4)
-    monkeypatch.setattr(run, "BLOCK", 70)
+    in_parts(monkeypatch, PARTS=4, BLOCK=70)
     settings = MonteCarloSettings(samples=1000, seed=3, worst_cases=False)
     result = monte_carlo(design, tmp_path, settings, engine=engine)
     assert result.columns == study.columns
@@ -155,11 +148,8 @@ def test_more_samples_than_are_kept_come_to_the_same(engine, study, design, tmp_
 @pytest.mark.parametrize("damage", [None, 0, 200, -40])
 def test_a_reduced_study_that_was_interrupted_goes_on(damage, study, design, tmp_path, monkeypatch):
     """With what was noted, or from the beginning where that is damaged."""
-    monkeypatch.setattr(run, "KEPT", 999)
-    monkeypatch.setattr(run, "PARTS", 10)
-    monkeypatch.setattr(run, "BLOCK", 25)
+    in_parts(monkeypatch, PARTS=10, BLOCK=25)
     settings = MonteCarloSettings(samples=1000, seed=3, worst_cases=False)
-
     interrupted(design, tmp_path, settings, after=400)
     (noted,) = tmp_path.glob("reduced-*.npz")
     if damage is not None:
@@ -186,10 +176,6 @@ def test_what_many_samples_come_to_does_not_grow(count, design):
     data = whole.packed([(0, 5)])
     assert len(data) < 16 * MOST * len(whole.columns) + 100_000
     again, done = unpacked(data)
-    assert (again.count, again.together, again.tallies, done) == (
-        count,
-        whole.together,
-        whole.tallies,
-        [(0, 5)],
-    )
+    assert done == [(0, 5)]
+    assert (again.count, again.together, again.tallies) == (count, whole.together, whole.tallies)
     assert again.packed(done) == data

@@ -5,7 +5,6 @@ import math
 from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
 
 from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.errors import InputError
@@ -13,6 +12,8 @@ from analyses.comparison.variant_figures import LargeSignal, figure_names
 from analyses.comparison.variants import compare
 from analyses.specification.sensitivity import sensitivities
 from analyses.studies.study import is_study, load_study, study_of
+from reports.sections.compare import batches, brief, ledger, section
+from reports.sections.compare_best import section as best_section
 
 HEAD = '[study]\nname = "s"\nbase = "ilr33-amber"\n'
 
@@ -25,9 +26,7 @@ def study(tmp_path, text):
 
 
 def test_variants_sweeps_and_grids_are_listed_in_order(tmp_path):
-    path = study(
-        tmp_path,
-        """
+    path = study(tmp_path, """
 [[variant]]
 name = "slow"
 override = { "gear.worm.ratio" = 50 }
@@ -41,8 +40,7 @@ axes = [{ parameter = "limits.voltage", values = ["11 V", "13 V"] },
         { parameter = "gear.worm.ratio", values = [30, 40] }]
 [monte_carlo]
 samples = 50
-""",
-    )
+""")  # fmt: skip
     result = load_study(path)
     assert is_study(path)
     assert [v.name for v in result.variants][:2] == ["slow", "motor.resistance = 0.05 ohm"]
@@ -104,9 +102,7 @@ def test_a_refused_variant_is_kept_where_others_shall_go_on(tmp_path):
 
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory):
-    path = study(
-        tmp_path_factory.mktemp("v"),
-        """
+    path = study(tmp_path_factory.mktemp("v"), """
 [[variant]]
 name = "same"
 override = { "motor.resistance" = "0.055 ohm" }
@@ -119,8 +115,7 @@ override = { "control.velocity.gain" = "0.06 A*s/rad", "control.current.gain" = 
 [[variant]]
 name = "slower gear"
 override = { "gear.worm.ratio" = 50 }
-""",
-    )
+""")  # fmt: skip
     return compare(load_study(path))
 
 
@@ -135,8 +130,6 @@ def test_half_the_gain_is_six_decibels_and_says_so(compared):
     assert half.differences["velocity.gain_margin"] == pytest.approx(20 * math.log10(2))
     assert [p.path for p in half.moved_by["velocity.gain_margin"]] == ["control.velocity.gain"]
     assert "current.gain_margin" not in half.differences
-    from reports.sections.compare import brief
-
     table = brief(replace(compared, variants=(half,))).blocks[1]
     rows = {row["figure"]: row["d1"] for row in table["rows"]}
     assert "(+6.02)" in rows["Velocity loop: gain margin"]
@@ -168,9 +161,7 @@ def test_a_slower_gear_fails_the_rate_and_nothing_else(compared):
 
 
 def test_requirements_are_rows_and_designs_are_columns(compared):
-    from reports.sections.compare import section as sections
-
-    made = {part["id"]: part for part in sections(compared)}
+    made = {part["id"]: part for part in section(compared)}
     table = made["verdicts"]["blocks"][0]
     labels = [column["label"] for column in table["columns"]]
     names = ["ilr33-amber", "same", "half the velocity gain", "two changes", "slower gear"]
@@ -184,10 +175,6 @@ def test_requirements_are_rows_and_designs_are_columns(compared):
 
 
 def test_more_designs_than_fit_a_screen_make_more_tables_each_with_the_base(compared):
-    from dataclasses import replace
-
-    from reports.sections.compare import batches
-
     many = replace(compared, variants=compared.variants * 3)
     tables = batches(many)
     assert all(table[0] is compared.base and len(table) <= 5 for table in tables)
@@ -195,9 +182,7 @@ def test_more_designs_than_fit_a_screen_make_more_tables_each_with_the_base(comp
 
 
 def test_one_page_says_which_variant_is_best_for_what_and_what_it_gives_up(compared):
-    from reports.sections.compare_best import section
-
-    made = section(compared)
+    made = best_section(compared)
     assert made["result"].startswith("4 of 5 designs meet every requirement;")
     designs, best = (block["rows"] for block in made["blocks"])
     half = next(row for row in designs if row["design"] == "half the velocity gain")
@@ -223,14 +208,10 @@ def test_slopes_are_those_of_closed_forms():
     assert entry.low - entry.high == pytest.approx(20 * math.log10(1.1 / 0.9), rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("changes", "unit", "per_si"),
-    [
-        ({}, "deg/s", 180.0 / math.pi),
-        ({"axis": "linear"}, "mm/s", 1e3),
-        ({"position": True}, "deg", 180.0 / math.pi),
-    ],
-)
+@pytest.mark.parametrize(("changes", "unit", "per_si"), [
+    ({}, "deg/s", 180.0 / math.pi), ({"axis": "linear"}, "mm/s", 1e3),
+    ({"position": True}, "deg", 180.0 / math.pi),
+])  # fmt: skip
 def test_an_amplitude_is_in_the_unit_of_the_command(changes, unit, per_si):
     """Of a speed drive a speed; it was shown in degrees."""
     design = load_design("ilr33-amber")
@@ -243,13 +224,10 @@ def test_an_amplitude_is_in_the_unit_of_the_command(changes, unit, per_si):
     assert name.unit == unit
 
 
-def test_the_page_escapes_names_and_has_every_figure(tmp_path):
+def test_the_page_escapes_names_and_has_every_figure(cli, tmp_path):
     gain = 'override = { "control.position.gain" = "90 1/s" }'
     path = study(tmp_path, f'[[variant]]\nname = "<script>alert(1)</script>"\n{gain}\n')
-    from reports.cli.app import build
-
-    done = CliRunner().invoke(build(), ["compare", str(path), "--out", str(tmp_path / "o"), "--quiet"])
-    assert done.exit_code == 0, done.output
+    cli.text("compare", path, "--out", tmp_path / "o", "--quiet")
     page = (tmp_path / "o" / "compare.html").read_text()
     assert "<script>alert" not in page
     assert "&lt;script&gt;alert" in page
@@ -261,35 +239,24 @@ def test_the_page_escapes_names_and_has_every_figure(tmp_path):
     assert "tornado" in kinds
 
 
-def test_a_single_design_is_a_study_of_one():
-    alone = study_of(load_design("emps"))
-    assert alone.variants == ()
-
-
 def test_the_checks_of_every_design_stands_side_by_side(tmp_path):
-    from reports.sections.compare import ledger as sections
-
     change = 'override = { "control.velocity.gain" = "0.2 A*s/rad" }\n'
     path = study(tmp_path, '[[variant]]\nname = "faster"\n' + change)
     result = compare(load_study(path), validation=True)
     assert len(result.base.checks) == len(result.variants[0].checks) > 20
-    (made,) = sections(result)
+    (made,) = ledger(result)
     assert made["status"] == "pass"
     first = made["blocks"][0]
     assert [column["label"] for column in first["columns"]] == ["Prediction", "Unit", "ilr33-amber", "faster"]
     assert first["rows"][0]["d0"]["status"] == first["rows"][0]["d1"]["status"] == "pass"
-    assert sections(compare(study_of(load_design("ilr33-amber")))) == []
+    assert ledger(compare(study_of(load_design("ilr33-amber")))) == []
 
 
-def test_the_printed_example_is_a_study(tmp_path, capsys):
-    from reports.cli.main import main
-
-    assert main(["compare", "--example"]) == 0
+def test_the_printed_example_is_a_study(cli, tmp_path):
     path = tmp_path / "study.toml"
-    path.write_text(capsys.readouterr().out)
+    path.write_text(cli.text("compare", "--example"))
     assert len(load_study(path).variants) == 10
-    assert main(["compare"]) == 2
-    assert "--example" in capsys.readouterr().err
+    assert "--example" in cli.refused("compare")
 
 
 def test_a_settling_of_23_s_stands_in_a_row_of_seconds(cli, tmp_path):

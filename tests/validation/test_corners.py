@@ -73,18 +73,14 @@ def test_command_and_section(cli) -> None:
     assert made["result"].startswith("Every loop is stable")
     fin = corners(load_design("fin"))
     words = section(fin)["result"]
-    assert words.startswith(
-        "The drive fails at 3 of 7 corners (cold; worst gain margin; worst phase margin): "
-    )
-    assert {*words.rstrip(".").partition("): ")[2].split(", ")} == {
-        one for c in told.values() for one in [v["id"] for v in c["verdicts"] if not v["passes"]]
-    } | {"position loop not stable"}
-    left, right = (column.panels[0] for column in chart(fin).columns)
-    limits = [
-        [item.at for item in panel.items if item.kind == "rule" and item.label] for panel in (left, right)
-    ]
+    fails = "The drive fails at 3 of 7 corners (cold; worst gain margin; worst phase margin): "
+    assert words.startswith(fails)
+    failed = {v["id"] for c in told.values() for v in c["verdicts"] if not v["passes"]}
+    assert {*words.rstrip(".").partition("): ")[2].split(", ")} == failed | {"position loop not stable"}
+    panels = [column.panels[0] for column in chart(fin).columns]
+    limits = [[item.at for item in panel.items if item.kind == "rule" and item.label] for panel in panels]
     assert limits == [[6.0], [45.0]]
-    seen = [item.words for panel in (left, right) for item in panel.items if item.kind == "note"]
+    seen = [item.words for panel in panels for item in panel.items if item.kind == "note"]
     assert seen == ["not stable"] * 2 * sum(not one.sound for c in fin.corners for one in c.figures.values())
     assert "allowed: cold below hot" in cli.refused("corners", "fin", "--hot", "-60")
 

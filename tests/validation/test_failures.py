@@ -25,11 +25,8 @@ from tests.loops.two_mass import drive_d
 def test_two_halves_without_a_failure_are_the_drive(name: str) -> None:
     """Bit for bit, limits and friction at work, under a load."""
     design = load_design(name)
-    size, load, ticks = (
-        0.3 * design.validation.full_deflection_rad,
-        0.5 * max(design.validation.loads_Nm),
-        1500,
-    )
+    size, ticks = 0.3 * design.validation.full_deflection_rad, 1500
+    load = 0.5 * max(design.validation.loads_Nm)
     rig = Rig(design, load)
     seen = [rig.step(size) for _ in range(ticks)]
     run = simulate(design, commands.step(size), ticks * design.controller.period_s, load)
@@ -204,10 +201,8 @@ def test_the_headline_names_what_reaches_the_stop_first() -> None:
     early = (case("hard-over", 0.2 * detection, 1.0), case("frozen-sensor", 0.5 * detection, 1.002))
     late = (case("jam", 2.0 * detection, 0.4), case("lost-sensor", None, 0.5))
     told = summary(replace(found, cases=(*late, *early)))
-    assert (
-        told.partition("; ")[0]
-        == "Hard-over of the power stage reaches the stop first, 20 ms after it occurs"
-    )
+    first = "Hard-over of the power stage reaches the stop first, 20 ms after it occurs"
+    assert told.partition("; ")[0] == first
     assert summary(replace(found, cases=late)).startswith("Lost sensor moves the output most")
     told = summary(replace(found, cases=late[:1]))
     assert told.endswith("detected: 4 deg in 100 ms; it reaches the stop after 200 ms.")

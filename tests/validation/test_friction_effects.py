@@ -17,7 +17,7 @@ from analyses.friction_effects.result import limit_cycles
 from analyses.linear.static_threshold import static_threshold
 from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
-from nonlinear.bench.on_the_bench import quiet
+from nonlinear.bench.operating_motion import quiet
 from nonlinear.settling.rest import first_motion_s
 from reports.sections.friction_effects import section
 
@@ -125,12 +125,8 @@ def test_hunting_needs_breakaway_above_sliding_friction(amber: Design, breakaway
 
     A describing function of dry friction foresees none either way; the simulator refutes it.
     """
-    values = {
-        "friction.breakaway_ratio": breakaway,
-        "control.velocity.integral_time": 3e-3,
-        "control.position.gain": 250.0,
-    }
-    design = with_values(amber, values)
+    values = {"friction.breakaway_ratio": breakaway, "control.velocity.integral_time": 3e-3}
+    design = with_values(amber, {**values, "control.position.gain": 250.0})
     threshold = static_threshold(design).forward_rad
     cycles = limit_cycles(design, 0.0)
     assert cycles.confirmations == ()
@@ -172,12 +168,9 @@ def test_the_foreseen_amplitude_grows_with_friction(amber: Design) -> None:
 @pytest.mark.parametrize("gain", [60.0, 120.0, 250.0])
 def test_stick_slip_is_foreseen(amber: Design, integral_time: float, gain: float) -> None:
     """Breakaway 1.5: amplitude within 6 %, frequency within 3 %; also where larger steps slide to rest."""
-    values = {
-        "friction.breakaway_ratio": 1.5,
-        "control.velocity.integral_time": integral_time,
-        "control.position.gain": gain,
-    }
-    cycles = friction_effects(with_values(amber, values)).points[0].cycles
+    values = {"friction.breakaway_ratio": 1.5, "control.velocity.integral_time": integral_time}
+    design = with_values(amber, {**values, "control.position.gain": gain})
+    cycles = friction_effects(design).points[0].cycles
     assert cycles.stick_slip.stable
     assert cycles.as_predicted
     swing = cycles.hunting

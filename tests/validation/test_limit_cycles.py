@@ -162,18 +162,15 @@ def test_friction_quiets_the_fin() -> None:
 
 def test_without_play_there_is_no_cycle_of_it() -> None:
     design = load_design("fin")
-    assert (
-        cycles_of_play(replace(design, coupling=replace(design.coupling, play_rad=0.0)), friction=False) == ()
-    )
+    tight = replace(design, coupling=replace(design.coupling, play_rad=0.0))
+    assert cycles_of_play(tight, friction=False) == ()
 
 
 def test_amplitudes_go_with_the_play() -> None:
     """Without friction a drive with twice the play has twice the cycle, at the same frequency."""
     wide = with_overrides(load_design("fin"), {"coupling.play": "3 mrad"})
-    pairs = zip(
-        cycles_of_play(load_design("fin"), friction=False), cycles_of_play(wide, friction=False), strict=True
-    )
-    for one, two in pairs:
+    cycles = [cycles_of_play(each, friction=False) for each in (load_design("fin"), wide)]
+    for one, two in zip(*cycles, strict=True):
         assert two.output_rad == pytest.approx(2.0 * one.output_rad, rel=1e-6)
         assert two.frequency_hz == pytest.approx(one.frequency_hz, rel=1e-6)
 
@@ -206,10 +203,8 @@ def test_a_drive_with_too_much_gain_hunts_and_says_so(cli) -> None:
 
 def test_section_and_refusal() -> None:
     made = section(limit_cycles(load_design("ballscrew")))
-    assert (
-        made["result"]
-        == "The drive as it is comes to rest after every step; 0 of 1 predicted cycles confirmed."
-    )
+    words = "The drive as it is comes to rest after every step; 0 of 1 predicted cycles confirmed."
+    assert made["result"] == words
     design: Design = load_design("fin")
     with pytest.raises(InputError, match="position loop"):
         limit_cycles(replace(design, controller=replace(design.controller, position=None)))

@@ -132,14 +132,8 @@ def test_a_command_below_the_threshold_moves_nothing() -> None:
 
 
 def test_a_drive_without_limits_has_no_border(amber: Design) -> None:
-    limits = replace(
-        amber.limits,
-        voltage_V=math.inf,
-        speed_rad_s=math.inf,
-        acceleration_rad_s2=math.inf,
-        peak_current_A=math.inf,
-    )
-    design = replace(amber, limits=limits)
+    names = ("voltage_V", "speed_rad_s", "acceleration_rad_s2", "peak_current_A")
+    design = replace(amber, limits=replace(amber.limits, **dict.fromkeys(names, math.inf)))
     loops = assemble_loops(design)
     assert limit_shift(design, loops, count=3) is None
     map_ = amplitude_map(design, loops, counts=(6, 4))

@@ -13,10 +13,9 @@ from actuator_lti.drive.steady import motor_torque_Nm
 from analyses.friction_effects import friction_effects
 from analyses.large_signal import large_signals
 from analyses.specification import Specification, specification
-from analyses.specification.capability import drive_figures
-from analyses.specification.manoeuvres import thermal_duty, torque_speed_plane
+from analyses.specification.capability import drive_figures, thermal_duty, torque_speed_plane
 from nonlinear import commands, simulate
-from nonlinear.bench.on_the_bench import on_the_bench
+from nonlinear.bench.operating_motion import on_the_bench
 from reports import document as doc
 from reports.drawing import draw_svg
 from reports.sections import friction_effects as friction_section
@@ -122,21 +121,15 @@ def test_sections_are_plain_and_their_figures_can_be_drawn(name: str) -> None:
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_note_speaks_of_no_column_and_no_controller_that_is_not_there(name: str) -> None:
     design = load_design(name)
-    (table,) = [
-        b
-        for b in specification_section.section(specification(design))["blocks"]
-        if "Rate," in b.get("caption", "")
-    ]
+    blocks = specification_section.section(specification(design))["blocks"]
+    (table,) = [block for block in blocks if "Rate," in block.get("caption", "")]
     assert ("Duty" in table["note"]) == any(column["key"] == "duty" for column in table["columns"])
     assert "current controller" not in table["note"]
 
 
 def test_a_hunting_drive_fails_its_verdict() -> None:
-    values = {
-        "friction.breakaway_ratio": 1.5,
-        "control.velocity.integral_time": 3e-3,
-        "control.position.gain": 250.0,
-    }
+    values = {"friction.breakaway_ratio": 1.5, "control.velocity.integral_time": 3e-3}
+    values["control.position.gain"] = 250.0
     made = friction_section.section(friction_effects(with_values(load_design("ilr33-amber"), values)))
     assert made["status"] == "fail"
     items = next(block["items"] for block in made["blocks"] if block["kind"] == "verdicts")

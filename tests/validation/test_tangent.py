@@ -19,8 +19,7 @@ from nonlinear import tangent
 from nonlinear.bench.derivative import Tangent
 from nonlinear.bench.lifted import GRID, relative
 from nonlinear.bench.loop_setup import points_of, stages_of
-from nonlinear.bench.on_the_bench import on_the_bench
-from nonlinear.bench.operating_motion import on_its_stand, operating_motion, operating_motion_at
+from nonlinear.bench.operating_motion import on_its_stand, on_the_bench, operating_motion, operating_motion_at
 from tests.validation.random_drives import full_drive, is_stable
 
 Z = np.exp(1j * GRID)
