@@ -6,29 +6,44 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.design import design_hash, warnings_of
 from actuator_lti.design.loader import as_design, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import as_path
-from actuator_lti.files.tree import Tree
 from actuator_lti.loops import assemble_loops
-from analyses.corners.run import corners
+from analyses.corners.run import Corners, corners
 from analyses.isolation import attempt, isolated
-from analyses.specification.requirements import evaluate_requirements
+from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_survey import LoopSurvey, survey_loops
+from analyses.margins.measured import measured_if_asked
+from analyses.specification.mending import mending
+from analyses.specification.requirements import RequirementVerdict, evaluate_requirements
+from analyses.specification.weakest import Spread, WeakPoint, spread, weakest
+from analyses.validation import validate
 from reports import document as doc
 from reports.analyses import BY_NAME, FURTHER, Analysis
 from reports.document_schema import Document
-
-if TYPE_CHECKING:
-    from analyses.corners.run import Corners
-    from analyses.isolation import Missing
-    from analyses.linear.loop_figures import LoopFigures
-    from analyses.linear.loop_survey import LoopSurvey
-    from analyses.specification.requirements import RequirementVerdict
-    from analyses.specification.weakest import Spread, WeakPoint
+from reports.html import write_report
+from reports.live import live_model
+from reports.provenance import provenance
+from reports.sections import (
+    answer,
+    delays,
+    forms,
+    limits,
+    loop,
+    margins,
+    measured,
+    parameters,
+    requirements,
+    stiffness,
+    validation,
+)
+from reports.sections.names import load_unit
+from reports.study_pages import design_head, notices
 
 Progress = Callable[[int, int], None]
 Step = Callable[[str], AbstractContextManager[Progress | None]]
@@ -90,8 +105,6 @@ def report(
     >>> made["verdict"]["verdict"]
     'met'
     """
-    from reports.html import write_report
-
     drive, folder = as_design(design), None if out is None else as_path(out)
     if source is None and not isinstance(design, Design):
         source = design_text(design)
@@ -109,9 +122,6 @@ def report(
 
 
 def _measured(design: Design, response: Any, place: str, averages: int | None) -> list[doc.Section]:
-    from analyses.margins.measured import measured_if_asked
-    from reports.sections import measured
-
     laid = measured_if_asked(assemble_loops(design), response, place, averages)
     return [] if laid is None else [measured.section(laid)]
 
@@ -134,10 +144,6 @@ def design_report(
         From the computations. Whatever else fails leaves out its part only: a notice stands in its place, and
         `analyses.isolation.drain` gives it.
     """
-    from reports.live import live_model
-    from reports.provenance import provenance
-    from reports.sections import answer, parameters
-
     origin, head = provenance(design_hash(design)), design_head(design)
     with isolated() as missing:
         figures, loops, survey = _loops(design, progress)
@@ -181,8 +187,6 @@ def _views(
     design: Design, survey: LoopSurvey | None
 ) -> tuple[WeakPoint | None, Mapping[str, Mapping[str, Spread]], Corners | None]:
     """The weakest point of all views, the spread over the operating points, and the corners."""
-    from analyses.specification.weakest import spread, weakest
-
     if survey is None:
         return None, {}, None
     bounds = attempt("corners", lambda: corners(design), None)
@@ -192,21 +196,16 @@ def _views(
 
 def _mend(point: WeakPoint | None, survey: LoopSurvey | None, bounds: Corners | None) -> str:
     """Say which move mends the weakest point, where it is beyond its limit."""
-    from analyses.specification.mending import mending
-    from reports.sections.answer import NO_MOVE, move_words
-
     if point is None or survey is None or point.reserve >= 0.0:
         return ""
     move = attempt("move that mends the weakest point", lambda: mending(point, survey, bounds), None)
-    return NO_MOVE if move is None else move_words(survey.design, move)
+    return answer.NO_MOVE if move is None else answer.move_words(survey.design, move)
 
 
 def _loops(
     design: Design, progress: Progress | None
 ) -> tuple[Mapping[str, LoopFigures], list[doc.Section], LoopSurvey | None]:
     """Compute the linear loops and make their sections; none where the loops themselves fail."""
-    from analyses.linear.loop_survey import survey_loops
-
     survey = attempt("linear loops", lambda: survey_loops(design, progress), None)
     if survey is None:
         return {}, [], None
@@ -228,54 +227,31 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
     made: list[doc.Section] = []
     with isolated() as missing:
         for name in dict.fromkeys(names):
-            one = BY_NAME[name]
             try:
-                part = attempt(f"section {name}", partial(_further, one, design), None)
+                made += attempt(f"section {name}", partial(_further, BY_NAME[name], design), [])
             except InputError as error:
-                part = doc.section(name, name.capitalize(), [], result=_not_for(name, error))
-            made += [part] if part is not None else []
+                why = f"Not for this drive: {error.message.removeprefix(f'{name}: ')}."
+                made.append(doc.section(name, name.capitalize(), [], result=why))
     return [*made, *notices(missing, "further")]
 
 
-def _not_for(name: str, error: InputError) -> str:
-    return f"Not for this drive: {error.message.removeprefix(f'{name}: ')}."
-
-
-def _further(one: Analysis, design: Design) -> doc.Section:
-    (made,) = one.sections(one.run(design, *one.asked(design, {})))
-    return made
+def _further(one: Analysis, design: Design) -> list[doc.Section]:
+    return one.sections(one.run(design, *one.asked(design, {})))
 
 
 def validation_sections(design: Design, progress: Progress | None = None) -> list[doc.Section]:
     """Put the predictions to the simulator; a design that cannot be tested says why."""
-    from analyses.validation import validate
-    from reports.sections.validation import section
-
     title = "Predictions against simulation"
     with isolated() as missing:
         try:
-            made = attempt(title, lambda: section(validate(design, progress=progress)), [])
+            made = attempt(title, lambda: validation.section(validate(design, progress=progress)), [])
         except InputError as error:
             made = [doc.section("validation", title, [doc.text(f"Not tested: {error}")], status="warn")]
     return [*made, *notices(missing, "validation")]
 
 
-def notices(missing: Sequence[Missing], id: str) -> list[doc.Section]:
-    """Make the section that says what is missing and why; none where nothing is."""
-    if not missing:
-        return []
-    columns = [doc.column("part", "Part"), doc.column("why", "Why it is missing")]
-    rows = [{"part": one.part, "why": one.why, "_status": "fail"} for one in missing]
-    note = "The rest of the report does not depend on these parts; the exit status is 3."
-    what = doc.table("Parts of this report that could not be computed", columns, rows, note)
-    return [doc.section(f"missing-{id}", "Missing parts", [what], status="fail")]
-
-
 def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) -> list[doc.Section]:
     """Make the sections about the linear loops, verdicts first."""
-    from reports.sections import delays, forms, limits, loop, margins, requirements, stiffness
-    from reports.sections.names import load_unit
-
     design, figures, onset = survey.design, survey.figures, survey.onset
     makers: dict[str, Callable[[], doc.Section]] = {
         "Requirements": lambda: requirements.section(verdicts, load_unit(design)),
@@ -294,7 +270,3 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
         makers["Limits"] = lambda: limits.section(design, onset)
     made = [attempt(f"section {name}", make, None) for name, make in makers.items()]
     return [part for part in made if part is not None]
-
-
-def design_head(design: Design) -> Tree:
-    return {name: getattr(design, name) for name in ("name", "title", "revision", "origin", "axis")}

@@ -47,21 +47,20 @@ def summarise(results: Sequence[CorrelationResult]) -> dict[str, SignalSummary]:
 def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary:
     outcome = [(result, result[name]) for result in results if name in result.signals]
     signals = [signal for _, signal in outcome]
-    samples = np.array([signal.samples for signal in signals])
-    squared = np.array([signal.rms_error**2 for signal in signals]) * samples
-    measured = np.array([float(np.sum(signal.measured**2)) for signal in signals])
-    motion = np.array([float(np.sum((signal.measured - signal.measured.mean()) ** 2)) for signal in signals])
+    off = np.concatenate([signal.modelled - signal.measured for signal in signals])
+    motion = np.concatenate([signal.measured - signal.measured.mean() for signal in signals])
+    size, whole = np.linalg.norm(off), np.linalg.norm(np.concatenate([one.measured for one in signals]))
     worst = max(outcome, key=lambda pair: pair[1].share_of_motion)
     return SignalSummary(
         name=name,
         unit=signals[0].unit,
         records=len(signals),
-        samples=int(samples.sum()),
-        mean_error=float(np.array([signal.mean_error for signal in signals]) @ samples / samples.sum()),
-        rms_error=float(np.sqrt(squared.sum() / samples.sum())),
-        max_error=max(signal.max_error for signal in signals),
-        relative_error=float(np.sqrt(squared.sum() / measured.sum())),
-        share_of_motion=float(np.sqrt(squared.sum() / (motion.sum() or measured.sum()))),
+        samples=len(off),
+        mean_error=float(np.mean(np.abs(off))),
+        rms_error=float(np.sqrt(np.mean(off**2))),
+        max_error=float(np.max(np.abs(off))),
+        relative_error=float(size / whole),
+        share_of_motion=float(size / (np.linalg.norm(motion) or whole)),
         worst=worst[0].record,
     )
 

@@ -24,7 +24,7 @@ from analyses.identification.diagnosis import Diagnosed, Fitted, diagnosed
 from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
 from analyses.identification.friction_map import LawChoice, fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
-from analyses.identification.joint_model import NAMES, JointModel
+from analyses.identification.joint_model import NAMES, FrictionForm, JointModel
 from analyses.identification.output_error import OutputErrorResult, Resimulated, refine_records, resimulate
 from analyses.identification.own_bias import without_bias
 from analyses.identification.residuals import ResidualTest, residual_tests
@@ -152,7 +152,7 @@ class _Fits:
         cutoff, decimation = settings.cutoff_hz, settings.decimation
         usual = cutoff is None and decimation is None
         self.recipe = None if usual else recipe_for(used[0], cutoff, decimation)
-        form = "per-direction" if settings.friction == "per-direction" else "symmetric"
+        form: FrictionForm = "symmetric" if settings.friction == "map" else settings.friction
         fixed = fixed_values(design, settings.fix)
         self.held = held_by_name(
             fixed, (*NAMES[form], "load_coefficient"), dict.fromkeys(INERTIAS, "inertia")

@@ -12,12 +12,11 @@ import numpy as np
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Coupling, Design, LoadFriction
 from actuator_lti.errors import InputError, NumericalError
-from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.parameters import own_std, parameter
+from analyses.estimation.parameters import parameter
 from analyses.identification.asked import held_by_name
 from analyses.identification.frequency import Lines, excited_lines, period_of_excitation, response
-from analyses.identification.play import Play, find_play
+from analyses.identification.play import Play, play_of
 from analyses.identification.rows import drive_of
 from analyses.identification.sampled_current import held_voltage
 from analyses.identification.to_design import design_with_fit
@@ -32,14 +31,12 @@ from analyses.identification.two_mass import (
 )
 from analyses.identification.verdict import RESIDUAL_LIMIT, Identified, Item, inputs_item, simulated_item
 from analyses.records.consistency import Finding, check_record
-from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
 
 MISFIT_LIMIT = 3.0
 MISFIT_DOUBTED = 1.5
 """Above this other starts are tried: a valley may be the wrong one."""
-GUARD = 1.5
 COMMANDS = ("reference", "speed_reference", "current_reference", "voltage_reference", "current")
 
 
@@ -102,7 +99,7 @@ def identify_frequency(
     lines = _between_ticks(design, record, excited_lines(with_torque, tuple(names), period))
     held = _held(design, dict(fixed or {}))
     fit = _fitted(lines, reduction, held, _reaction(design, with_torque))
-    play = None if play_record is None else _play_of(design, play_record, fit)
+    play = None if play_record is None else play_of(design, play_record, fit)
     made = _made(design, fit, play, record.name, behind)
     text = write_design(made)
     findings = {one.name: check_record(design, one) for one in (record, play_record) if one is not None}
@@ -212,68 +209,6 @@ def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
         change = held["load_inertia"] - design.load.inertia_kgm2
         held["load_inertia"] = design.load_side_inertia_kgm2 + change / design.ratio_behind_coupling**2
     return held
-
-
-OF_THE_LOAD = ("stiffness", "load_inertia", "damping", "load_viscous")
-
-
-def _play_of(design: Design, record: Record, fit: TwoMass) -> Play:
-    """The play, its error with what the errors of the frequency response make of it."""
-    dry = 0.0 if design.load.friction is None else design.load.friction.dry_torque_Nm
-    dry_std = own_std(design, "load.friction.dry_torque")
-    own = {**{name: fit[name] for name in OF_THE_LOAD}, "load_dry": dry}
-    play = _play_at(design, record, fit, own)
-
-    def moved(name: str, step: float) -> float:
-        """By how much one standard error of a value moves the play."""
-        return _play_at(design, record, fit, {**own, name: own[name] + step}).half_rad - play.half_rad
-
-    used = fit.renamed({name: name for name in OF_THE_LOAD if name in fit.names})
-    g = np.array([moved(name, used.std(name)) if used.std(name) > 0.0 else 0.0 for name in used.names])
-    passed_on = max(float(g @ used.correlation @ g), 0.0)
-    of_dry = moved("load_dry", dry_std) if dry_std > 0.0 else 0.0
-    whole = np.sqrt(play.half_std_rad**2 + passed_on + of_dry**2)
-    return replace(play, half_std_rad=float(whole))
-
-
-def _play_at(design: Design, record: Record, fit: TwoMass, values: Mapping[str, float]) -> Play:
-    """The play from the twist and from the torque that the load's own motion needs."""
-    if not {"angle", "output_angle"} <= set(record.signals):
-        raise InputError("the play needs the motor's angle and the output's", where=record.name)
-    behind = design.ratio_behind_coupling
-    period = record.period_s
-    cutoff = min(0.05 / period, 4.0 * fit.resonance_rad_s[0] / (2.0 * np.pi))
-    motor = filtered_motion(record["angle"], period, cutoff_hz=cutoff, order=4)
-    load = filtered_motion(behind * record["output_angle"], period, cutoff_hz=cutoff, order=4)
-    inertial = values["load_inertia"] * load.acceleration + values["load_dry"] * np.sign(load.velocity)
-    if "torque" in record.signals:
-        inertial = inertial - record["torque"] / behind
-    twist = motor.position / fit.reduction - load.position
-    twist_rate = motor.velocity / fit.reduction - load.velocity
-    edge = min(max(round(0.5 / (cutoff * period)), 10), len(twist) // 10)
-    part = slice(edge, len(twist) - edge)
-    steps = (_resolution(record["angle"]) / fit.reduction, behind * _resolution(record["output_angle"]))
-    return find_play(
-        twist[part],
-        (inertial - values["damping"] * twist_rate)[part],
-        load.velocity[part],
-        stiffness_Nm_rad=values["stiffness"],
-        viscous_Nms_rad=values["load_viscous"],
-        guard_samples=round(GUARD / (cutoff * period)),
-        resolution_rad=float(np.hypot(*steps)),
-        smooth_samples=0.5 / (cutoff * period),
-    )
-
-
-def _resolution(values: FloatArray) -> float:
-    """The step of a recorded signal: the smallest difference between its values, if most are multiples."""
-    steps = np.diff(np.unique(values))
-    if not len(steps):
-        return 0.0
-    step = float(np.min(steps[steps > 1e-9 * float(np.ptp(values))], initial=np.inf))
-    shares = steps / step
-    whole = np.abs(shares - np.round(shares)) < 0.01
-    return step if np.isfinite(step) and np.mean(whole) > 0.95 else 0.0
 
 
 def _misfit_item(fit: TwoMass) -> Item:

@@ -70,30 +70,27 @@ def fit_map(
     speed, rest = _plain_residual(rows, plain)
     top = float(np.max(np.abs(speed)))
     n = len(rest) / correlation_time(plain.residual)
-    best: tuple[float, JointModel, tuple[float, ...] | None] = (_bic(plain, n), plain, None)
-    laws = [_law("plain, C0 + Cv |w|", None, plain, 0.0)]
-    result: tuple[float, ...] = ()
+    best, lowest, model = 0, 0.0, plain
+    laws = [_law((), plain, 0.0)]
+    breaks: tuple[float, ...] = ()
     for count in range(1, MOST_BREAKS + 1):
-        result = _one_more(speed, rest, top, result)
-        if len(result) < count:
+        breaks = _one_more(speed, rest, top, breaks)
+        if len(breaks) < count:
             break
-        knots = (0.0, *result, top)
-        model = fitted(knots)
-        own = _bic(model, n)
-        gain = own - _bic(plain, n)
-        laws.append(_law(f"map, {count} break points", result, model, gain))
-        if own < best[0] - (CLEARLY_BETTER if best[2] is None else 0.0):
-            best = (own, model, knots)
-    chosen = 0 if best[2] is None else len(best[2]) - 2
-    marked = tuple(replace(law, taken=k == chosen) for k, law in enumerate(laws))
-    return MapResult(laws=marked, model=best[1], knots_rad_s=best[2])
+        tried = fitted((0.0, *breaks, top))
+        gain = _bic(tried, n) - _bic(plain, n)
+        laws.append(_law(breaks, tried, gain))
+        if gain < lowest - (0.0 if best else CLEARLY_BETTER):
+            best, lowest, model = count, gain, tried
+    laws[best] = replace(laws[best], taken=True)
+    return MapResult(laws=tuple(laws), model=model, knots_rad_s=model.knots_rad_s)
 
 
-def _law(name: str, breaks: tuple[float, ...] | None, model: JointModel, gain: float) -> LawChoice:
+def _law(breaks: tuple[float, ...], model: JointModel, gain: float) -> LawChoice:
     return LawChoice(
-        name=name,
-        breaks_rad_s=breaks or (),
-        parameters=len(model.names) + len(breaks or ()),
+        name=f"map, {len(breaks)} break points" if breaks else "plain, C0 + Cv |w|",
+        breaks_rad_s=breaks,
+        parameters=len(model.names) + len(breaks),
         relative_residual=model.relative_residual,
         criterion=gain,
         taken=False,
@@ -140,24 +137,20 @@ def _one_more(
     free = [v for v in grid if all(abs(np.log(v / b)) > 0.1 for b in result)]
     if not free:
         return result
-    chosen = [*result, min(free, key=lambda v: misfit([*result, v]))]
+    chosen = [*result, float(min(free, key=lambda v: misfit([*result, v])))]
     for k in range(len(chosen)):
         chosen[k] = _moved(chosen, k, top, misfit)
-    return tuple(sorted(float(v) for v in chosen))
+    return tuple(sorted(chosen))
 
 
 def _moved(
     chosen: Sequence[float], place: int, top: float, misfit: Callable[[Sequence[float]], float]
 ) -> float:
     """One break point, refined between the grid's neighbours."""
-
     others = [v for k, v in enumerate(chosen) if k != place]
-    here = float(np.log(chosen[place]))
-    step = float(np.log(0.95 / LEAST_SHARE)) / (GRID - 1)
-    low, high = here - step, min(here + step, float(np.log(0.97 * top)))
-    result = minimize_scalar(
-        lambda x: misfit([*others, float(np.exp(x))]), bounds=(low, high), method="bounded"
-    )
+    here, step = np.log(chosen[place]), np.log(0.95 / LEAST_SHARE) / (GRID - 1)
+    ends = here - step, min(here + step, np.log(0.97 * top))
+    result = minimize_scalar(lambda x: misfit([*others, float(np.exp(x))]), bounds=ends, method="bounded")
     new = float(np.exp(result.x))
     apart = all(abs(np.log(new / v)) > 0.1 for v in others)
     return new if apart and result.fun < misfit(chosen) else float(chosen[place])

@@ -55,10 +55,10 @@ def two_sides(
             torque=torque,
             told="load's own motion, the motor's by the design's stiffness",
         )
-    followed = _follows(design, record, motion, moment)
-    measured = _measured(design, record, followed, moment, recipe)
-    load = followed if measured is None else measured
-    told = "load's motion " + ("by the design's coupling" if measured is None else "of the output's encoder")
+    load, told = _follows(design, record, motion, moment), "load's motion by the design's coupling"
+    measured = _measured(design, record, load, moment, recipe)
+    if measured is not None:
+        load, told = measured, "load's motion of the output's encoder"
     return TwoSides(motor=motion, load=load, torque=_of_load(design, load), told=told)
 
 
@@ -102,12 +102,10 @@ def _follows(design: Design, record: Record, motion: Motion, moment: FloatArray)
     if inertia == 0.0:
         return driver
     a = np.array([[0.0, 1.0], [-k / inertia, -(c + viscous) / inertia]])
-    b = np.array([[0.0], [1.0 / inertia]])
-    system = (a, b, np.eye(2), np.zeros((2, 1)))
+    system = (a, np.array([[0.0], [1.0 / inertia]]), np.eye(2), np.zeros((2, 1)))
     time = record.period_s * np.arange(len(moment))
     pull = k * driver.position + c * driver.velocity + moment / design.ratio_behind_coupling - offset
-    speed = driver.velocity
-    place = driver.position
+    place, speed = driver.position, driver.velocity
     for _ in range(ROUNDS if dry > 0.0 else 1):
         force = pull - dry * np.sign(speed)
         rest = force[0] - (c + viscous) * speed[0]
@@ -126,8 +124,4 @@ def _with_twist(
     assert coupling is not None
     twist = design.ratio_to_coupling / coupling.stiffness_Nm_rad * carried
     extra = recipe.motion(twist, record.period_s)
-    return Motion(
-        position=motion.position + extra.position,
-        velocity=motion.velocity + extra.velocity,
-        acceleration=motion.acceleration + extra.acceleration,
-    )
+    return Motion(**{name: values + vars(extra)[name] for name, values in vars(motion).items()})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -49,6 +50,16 @@ def without_bias(
     less = model
     simulated: tuple[Record, ...] = ()
     driven: tuple[Record, ...] = ()
+    fit = partial(
+        fit_records,
+        start,
+        form=model.form,
+        recipe=recipe,
+        fixed={name: one.value for name, one in model.fixed.items()},
+        gravity="gravity_sin" in model,
+        knots_rad_s=model.knots_rad_s,
+        weights=model.weights,
+    )
     for _ in range(ROUNDS):
         try:
             made = make(less)
@@ -57,16 +68,7 @@ def without_bias(
                 return replace(model, bias_told=reason), ()
             driven = driven or tuple(_driven(made, record) for record in records)
             simulated = tuple(_with_model_signals(made, record) for record in driven)
-            again = fit_records(
-                start,
-                simulated,
-                form=model.form,
-                recipe=recipe,
-                fixed={name: one.value for name, one in model.fixed.items()},
-                gravity="gravity_sin" in model,
-                knots_rad_s=model.knots_rad_s,
-                weights=model.weights,
-            )
+            again = fit(simulated)
         except (InputError, NumericalError) as error:
             return replace(less, bias_told=f"not taken off: {error}"), simulated
         before, less = less.values, _corrected(start, made, model, again)
@@ -81,10 +83,9 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     bias = np.array([found.get(name, 0.0) for name in model.names])
     wild = [n for n, b, s in zip(model.names, bias, _sizes(model), strict=True) if abs(b) > LARGEST_BIAS * s]
     if wild:
-        told = (
-            f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}; the intervals hold it"
-        )
-        return replace(model, bias_told=told, covariance=model.covariance + np.outer(bias, bias))
+        told = f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}"
+        covariance = model.covariance + np.outer(bias, bias)
+        return replace(model, bias_told=f"{told}; the intervals hold it", covariance=covariance)
     parts = tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
     blocks = [(g * part.w, g * part.noise) for g, part in zip(model.weights, parts, strict=True)]
     moved = _by_direction(model, again)
@@ -154,7 +155,6 @@ def _driven(design: Design, record: Record) -> Record:
         return record
     name = "position_reference" if design.axis == "linear" else "reference"
     wanted = command = _place(design, record)
-    driven = record
     assert design.controller.position is not None  # _cannot has seen to it
     gain = design.controller.position.gain
     for _ in range(COMMAND_ROUNDS):  # learnt: the loop is about gain/(s + gain), what it lacks is added
@@ -178,8 +178,8 @@ def _place(design: Design, record: Record) -> FloatArray:
 
 def _sizes(model: JointModel) -> np.ndarray:
     """What a bias is held against: the value or, where it may be zero, that of its kind or its error."""
-    gravity = math.hypot(model["gravity_sin"], model["gravity_cos"]) if "gravity_sin" in model else 0.0
+    gravity = math.hypot(model.get("gravity_sin", 0.0), model.get("gravity_cos", 0.0))
     dry = next((abs(model[n]) for n in ("dry", "dry_forward", "map_0") if n in model), 0.0)
-    errors = np.sqrt(np.diag(model.covariance)) / LARGEST_BIAS
     like = [gravity if n.startswith("gravity") else dry if n == "offset" else 0.0 for n in model.names]
+    errors = model.standard_errors / LARGEST_BIAS
     return np.maximum(np.maximum(np.abs(model.values), like), errors)

@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_erosion
 
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.estimation.least_squares import solve, told_apart
+from analyses.estimation.parameters import own_std
+from analyses.identification.two_mass import TwoMass
+from analyses.records.differentiation import filtered_motion
+from analyses.records.record import Record
 
+OF_THE_LOAD = ("stiffness", "load_inertia", "damping", "load_viscous")
 CONTACT = 0.25
 """Rows whose torque is above this share of its largest (95 % point) are taken as in contact."""
 LEAST_ROWS = 50
 BEYOND = 0.9
 ROUNDS = 8
+GUARD = 1.5
+"""Periods of the cut-off that are left out on both sides of a loss of contact: the filter smears over it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,67 +49,90 @@ class Play:
         return self.half_rad > 2.0 * self.half_std_rad
 
 
-def find_play(
-    twist_rad: FloatArray,
-    inertial_Nm: FloatArray,
-    load_speed_rad_s: FloatArray,
-    *,
-    stiffness_Nm_rad: float,
-    viscous_Nms_rad: float = 0.0,
-    guard_samples: int = 0,
-    resolution_rad: float = 0.0,
-    smooth_samples: float = 1.0,
-) -> Play:
+def play_of(design: Design, record: Record, fit: TwoMass) -> Play:
+    """The play, its error with what the errors of the frequency response make of it."""
+    if not {"angle", "output_angle"} <= set(record.signals):
+        raise InputError("the play needs the motor's angle and the output's", where=record.name)
+    dry = 0.0 if design.load.friction is None else design.load.friction.dry_torque_Nm
+    dry_std = own_std(design, "load.friction.dry_torque")
+    own = {**{name: fit[name] for name in OF_THE_LOAD}, "load_dry": dry}
+    play = _play_with(design, record, fit, own)
+
+    def moved(name: str, step: float) -> float:
+        """By how much one standard error of a value moves the play."""
+        changed = {**own, name: own[name] + step}
+        return _play_with(design, record, fit, changed).half_rad - play.half_rad if step > 0.0 else 0.0
+
+    used = fit.renamed({name: name for name in OF_THE_LOAD if name in fit.names})
+    g = np.array([moved(name, used.std(name)) for name in used.names])
+    passed_on = max(float(g @ used.correlation @ g), 0.0) + moved("load_dry", dry_std) ** 2
+    return replace(play, half_std_rad=float(np.sqrt(play.half_std_rad**2 + passed_on)))
+
+
+def _play_with(design: Design, record: Record, fit: TwoMass, values: Mapping[str, float]) -> Play:
     """Fit ``twist = middle + b sgn(T) + T/k`` to the rows in contact, with ``T = inertial + friction``.
 
-    The friction of the load, ``Cv_l W + C0_l sgn(W)``, is found along with the play where the rows tell it;
-    which rows are in contact follows from the torque so found, in rounds.
-
-    Parameters
-    ----------
-    twist_rad : array, shape (n,)
-        Motor angle over the reduction, less the load's angle.
-    inertial_Nm : array, shape (n,)
-        What the load's inertia (less its outer load and the coupling's damping) needs.
-    stiffness_Nm_rad : float
-        From a frequency response on one flank.
-    viscous_Nms_rad : float
-        First value of the load's viscous friction.
-    guard_samples : int
-        Rows left out on both sides of a loss of contact: what a filter smears over it.
-    smooth_samples : float
-        Rows worth one independent one after filtering.
+    ``inertial`` is what the load's inertia (less its outer load and the coupling's damping) needs. The load's
+    friction, ``Cv_l W + C0_l sgn(W)``, is found along with the play where the rows tell it; which rows are
+    in contact follows from the torque so found, in rounds.
     """
-    k = stiffness_Nm_rad
-    friction = np.column_stack([load_speed_rad_s, np.sign(load_speed_rad_s)])
+    behind, period, k = design.ratio_behind_coupling, record.period_s, values["stiffness"]
+    cutoff = min(0.05 / period, 4.0 * fit.resonance_rad_s[0] / (2.0 * np.pi))
+    motor = filtered_motion(record["angle"], period, cutoff_hz=cutoff, order=4)
+    load = filtered_motion(behind * record["output_angle"], period, cutoff_hz=cutoff, order=4)
+    needed = values["load_inertia"] * load.acceleration + values["load_dry"] * np.sign(load.velocity)
+    if "torque" in record.signals:
+        needed = needed - record["torque"] / behind
+    needed = needed - values["damping"] * (motor.velocity / fit.reduction - load.velocity)
+    edge = min(max(round(0.5 / (cutoff * period)), 10), len(needed) // 10)
+    part = slice(edge, len(needed) - edge)
+    inertial, speed = needed[part], load.velocity[part]
+    twist = (motor.position / fit.reduction - load.position)[part]
+    friction = np.column_stack([speed, np.sign(speed)])
     names = ("middle", "play", "viscous", "dry")
-    own = {"viscous": viscous_Nms_rad, "dry": 0.0}
-    middle, half = _first_gap(twist_rad, inertial_Nm, k)
+    own = {"viscous": values["load_viscous"], "dry": 0.0}
+    middle, half = _first_gap(twist, inertial, k)
     for _ in range(ROUNDS):
-        torque = inertial_Nm + friction @ np.array([own["viscous"], own["dry"]])
-        touching = _in_contact(torque, twist_rad - middle, half, guard_samples)
+        torque = inertial + friction @ np.array([own["viscous"], own["dry"]])
+        touching = _in_contact(torque, twist - middle, half, round(GUARD / (cutoff * period)))
         w = np.column_stack([np.ones_like(torque), np.sign(torque), friction / k])[touching]
         kept, _ = told_apart(w, names)
-        result = solve(w[:, kept], (twist_rad - inertial_Nm / k)[touching])
-        values = dict(zip((names[j] for j in kept), result.values.tolist(), strict=True))
-        middle, half = values["middle"], values["play"]
-        new = {name: max(values.get(name, own[name]), 0.0) for name in own}
+        result = solve(w[:, kept], (twist - inertial / k)[touching])
+        found = dict(zip((names[j] for j in kept), result.values.tolist(), strict=True))
+        middle, half = found["middle"], found["play"]
+        new = {name: max(found.get(name, own[name]), 0.0) for name in own}
         if all(abs(new[name] - own[name]) <= 1e-9 * abs(new[name]) for name in own):
             break
         own = new
+    steps = _resolution(record["angle"]) / fit.reduction, behind * _resolution(record["output_angle"])
+    coarse = _coarse(float(np.hypot(*steps)), touching, 0.5 / (cutoff * period))
     std = np.sqrt(result.correlated[kept.index(1), kept.index(1)])
     return Play(
         half_rad=half,
-        half_std_rad=float(np.hypot(std, _coarse(resolution_rad, touching, smooth_samples))),
+        half_std_rad=float(np.hypot(std, coarse)),
         middle_rad=middle,
-        viscous_Nms_rad=values.get("viscous"),
-        dry_Nm=values.get("dry"),
+        viscous_Nms_rad=found.get("viscous"),
+        dry_Nm=found.get("dry"),
         rows=int(np.count_nonzero(touching)),
     )
 
 
+def _resolution(values: FloatArray) -> float:
+    """The step of a recorded signal: the smallest difference between its values, if most are multiples."""
+    steps = np.diff(np.unique(values))
+    if not len(steps):
+        return 0.0
+    step = float(np.min(steps[steps > 1e-9 * float(np.ptp(values))], initial=np.inf))
+    shares = steps / step
+    whole = np.abs(shares - np.round(shares)) < 0.01
+    return step if np.isfinite(step) and np.mean(whole) > 0.95 else 0.0
+
+
 def _coarse(resolution_rad: float, touching: BoolArray, smooth_samples: float) -> float:
-    """Error from a resolution: uniform, averaged over the independent rows of one cycle (two contacts)."""
+    """Error from a resolution: uniform, averaged over the independent rows of one cycle (two contacts).
+
+    ``smooth_samples`` rows are worth one independent one after filtering.
+    """
     visits = max(int(np.count_nonzero(np.diff(touching.astype(np.int8)) == 1)), 2)
     independent = np.count_nonzero(touching) / (0.5 * visits) / max(smooth_samples, 1.0)
     return float(resolution_rad / np.sqrt(12.0 * max(independent, 1.0)))
@@ -122,8 +154,6 @@ def _in_contact(torque_Nm: FloatArray, twist: FloatArray, half: float, guard_sam
         touching = np.asarray(binary_erosion(touching, iterations=guard_samples))
     least = min(np.count_nonzero(side[touching] > 0.0), np.count_nonzero(side[touching] < 0.0))
     if least < LEAST_ROWS:
-        raise InputError(
-            f"{least} rows on the rarer flank, {LEAST_ROWS} wanted: the torque through the coupling must "
-            "reverse and stay"
-        )
+        told = f"{least} rows on the rarer flank, {LEAST_ROWS} wanted"
+        raise InputError(f"{told}: the torque through the coupling must reverse and stay")
     return np.asarray(touching)

@@ -105,9 +105,8 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> Cam
     imported = import_campaign(listed, progress=progress)
     result = identify_campaign(imported, design, fixed=held)
     fit, count = result.fit, asked.suggest
-    made = design_with_fit(
-        with_fixed(design, fixed), fit.by_key(), f"identified from {len(fit.points)} runs, {listed.name}"
-    )
+    source = f"identified from {len(fit.points)} runs, {listed.name}"
+    made = design_with_fit(with_fixed(design, fixed), fit.by_key(), source)
     text = write_design(made)
     simulated = steady_current_error(read_design_text(text), fit.points, progress=progress)
     load, speed = design.load.moment_max_Nm, design.limits.speed_rad_s

@@ -96,10 +96,11 @@ def spec_of_names(
             other = before if taken is found else found
             why[str(other.column)] = f"{MEANINGS[found.name]} is read from {taken.column}"
         signals[found.name] = taken
-    why |= dict.fromkeys(times[1:], f"the time is read from {times[0]}")
-    if not times or not signals:
+    first, *others = times or [""]
+    why |= dict.fromkeys(others, f"the time is read from {first}")
+    if not first or not signals:
         return None, why
-    time = TimeColumn(column=times[0], unit=taken_apart(_own_name(times[0])).unit or "s")
+    time = TimeColumn(column=first, unit=taken_apart(_own_name(first)).unit or "s")
     return RecordSpec(format=layout or CsvFormat(), time=time, signals=tuple(signals.values())), why
 
 

@@ -141,10 +141,15 @@ class Record:
             f"{steps[longest]:.4g} s at {self.time_s[longest]:.4g} s, error up to "
             f"{100.0 * errors[worst]:.2g} % of the range ({worst})"
         )
-        if errors[worst] > self.resample_tolerance:
-            allowed = f"allowed: {100.0 * self.resample_tolerance:g} % (resample_tolerance of a record file)"
-            raise InputError(f"{note}; {allowed}", where=self.name)
+        check_error(errors[worst], self.resample_tolerance, note, self.name)
         return replace(self, time_s=grid, signals=MappingProxyType(cut), notes=(*self.notes, note))
+
+
+def check_error(error: float, tolerance: float, note: str, where: str) -> None:
+    """Refuse what straight lines between samples would do to a signal."""
+    if error > tolerance:
+        allowed = f"allowed: {100.0 * tolerance:g} % (resample_tolerance of a record file)"
+        raise InputError(f"{note}; {allowed}", where=where)
 
 
 def line_error(time_s: FloatArray, values: FloatArray, gap: float) -> float:

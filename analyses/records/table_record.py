@@ -13,7 +13,7 @@ from actuator_lti.files.reading import shown_path
 from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.records.csv_rows import Block
 from analyses.records.inputs import inputs_of
-from analyses.records.record import Record, RowCounts, line_error
+from analyses.records.record import Record, RowCounts, check_error, line_error
 from analyses.records.spec import RecordSpec, converter, unit_factor
 
 
@@ -38,9 +38,7 @@ def filled(
             f"{name}: {len(values) - count} of {len(values)} values missing, linear between the others, "
             f"error up to {100.0 * error:.2g} % of the range"
         )
-        if error > tolerance:
-            allowed = f"allowed: {100.0 * tolerance:g} % (resample_tolerance of a record file)"
-            raise InputError(f"{note}; {allowed}", where=where)
+        check_error(error, tolerance, note, where)
         whole[name] = np.interp(time_s, time_s[there], values[there])
         notes.append(note)
     return whole, notes

@@ -129,10 +129,10 @@ def answer(
     from analyses.isolation import isolated
     from reports import document as doc
     from reports.as_json import as_json as plain_data
-    from reports.build import notices
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line, print_note, print_warning
     from reports.cli.progress import progress
+    from reports.study_pages import notices
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
     values = {name: _read(name, option, chosen[name], drive) for name, (_, option) in _options(one).items()}

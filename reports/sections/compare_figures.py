@@ -21,6 +21,10 @@ MOST_BARS = 10
 MOST_CHARTS = 8
 
 
+def sections(comparison: Comparison) -> list[doc.Section]:
+    return [overlays(comparison), tornadoes(comparison)]
+
+
 def overlays(comparison: Comparison) -> doc.Section:
     """Open-loop Bode, closed-loop Bode and step of every loop, one design over the other."""
     drawn = comparison.all[:MOST_CURVES]

@@ -36,29 +36,21 @@ def record_section(
     result: CorrelationResult, number: int = 1, *, error_limit: float | None = None
 ) -> doc.Section:
     """Make the section of one record; ``error_limit`` is the largest relative error allowed."""
-    figures = [signal_figure(signal) for signal in result.signals.values()]
-    active = {name: share for name, share in result.limits.items() if share > 0.0}
-    limits = ", ".join(f"{name} {100.0 * share:.1f} % of the time" for name, share in active.items())
-    told = limits or "none"
-    intro = (
-        f"Model {result.design} with the command of {result.record}; {result.counts}. Limits reached: {told}."
-    )
+    active = [(name, 100.0 * share) for name, share in result.limits.items() if share > 0.0]
+    limits = ", ".join(f"{name} {share:.1f} % of the time" for name, share in active) or "none"
+    intro = f"Model {result.design} with the command of {result.record}; {result.counts}."
     blocks = [
         comparison_table(result),
-        *figures,
+        *[signal_figure(signal) for signal in result.signals.values()],
         input_table(f"Inputs: {result.record}", result.inputs),
         finding_table(result.record, result.findings),
         *[doc.remark(note) for note in result.notes],
     ]
-    judged = agrees([result], error_limit)
     return doc.section(
-        f"correlation-{number}",
-        f"Model against {result.record}",
-        blocks,
-        result=words([result], error_limit),
-        intro=intro,
-        status="pass" if judged else "fail",
-    )
+        f"correlation-{number}", f"Model against {result.record}", blocks,
+        result=words([result], error_limit), intro=f"{intro} Limits reached: {limits}.",
+        status="pass" if agrees([result], error_limit) else "fail",
+    )  # fmt: skip
 
 
 def words(results: Sequence[CorrelationResult], error_limit: float | None = None) -> str:

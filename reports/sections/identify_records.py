@@ -63,10 +63,9 @@ def _result(result: BenchResult, axis: str) -> str:
         name = one.label[:1].lower() + one.label[1:]
         parts[-1] += f", all at the design's {name}, {show(model[given], 'sig:4')} {one.unit}"
     worst = max(result.resimulated, key=lambda one: one.relative_error)
-    met = "The written design meets "
-    met += "its records" if len(result.resimulated) > 1 else worst.record
-    words = f"{', '.join(parts)}. {met} within {100.0 * worst.relative_error:.3g} % ({worst.how})."
-    return words[0].upper() + words[1:]
+    met = "its records" if len(result.resimulated) > 1 else worst.record
+    words = f"{', '.join(parts)}. The written design meets {met} within"
+    return f"{words[0].upper()}{words[1:]} {100.0 * worst.relative_error:.3g} % ({worst.how})."
 
 
 def _intro(result: BenchResult) -> str:
@@ -156,8 +155,8 @@ def law_table(result: BenchResult, axis: str) -> doc.Block:
 def scatter_table(model: JointModel, axis: str) -> doc.Block:
     """Each record alone, and the scatter between them."""
     columns = [doc.column("name", "Parameter")]
-    count = max((len(values) for values in model.singles.values()), default=0)
-    columns += [doc.column(f"r{k}", f"record {k + 1} alone", format="sig:5") for k in range(min(count, 6))]
+    count = min(len(model.alone), 6)
+    columns += [doc.column(f"r{k}", f"record {k + 1} alone", format="sig:5") for k in range(count)]
     columns += [doc.column("between", "Scatter between records", format="sig:3"), doc.column("unit", "Unit")]
     rows = []
     for name in model.names:

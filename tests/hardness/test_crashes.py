@@ -17,14 +17,14 @@ REPORT = ("report", "ilr33-amber", "--quiet")
 
 # What is broken on purpose (module, function), and the sections that must be there all the same.
 BROKEN = {
-    "analyses.linear.loop_survey:survey_loops": {"parameters", "provenance"},
+    "reports.build:survey_loops": {"parameters", "provenance"},
     "analyses.linear.loop_survey:_other_form": {"margins", "loop-position", "parameters"},
     "analyses.linear.loop_figures:_locked": {"margins", "loop-current", "parameters"},
     "analyses.linear.loop_survey:_break_points": {"margins", "loop-position", "parameters"},
     "analyses.linear.loop_survey:operating_points": {"margins", "loop-position", "parameters"},
     "analyses.linear.loop_survey:_budgets": {"margins", "loop-position", "parameters"},
     "analyses.linear.loop_survey:_onset": {"margins", "loop-position", "parameters"},
-    "analyses.specification.requirements:evaluate_requirements": {"margins", "loop-position", "parameters"},
+    "reports.build:evaluate_requirements": {"margins", "loop-position", "parameters"},
     "reports.sections.answer:section": {"margins", "loop-position", "parameters"},
     "reports.sections.margins:of_loops": {"loop-position", "parameters"},
     "reports.sections.loop:section": {"margins", "parameters"},
@@ -72,7 +72,7 @@ def test_a_part_that_crashes_is_noted_and_the_rest_is_written(place, tmp_path, m
 
 @pytest.mark.usefixtures("unpainted")
 def test_a_validation_that_crashes_leaves_the_linear_report(tmp_path, monkeypatch, capsys) -> None:
-    monkeypatch.setattr(import_module("analyses.validation"), "validate", broken)
+    monkeypatch.setattr(import_module("reports.build"), "validate", broken)
     assert main([*REPORT, "--out", str(tmp_path)]) == 3
     traceback_file(capsys.readouterr().err).unlink()
     ids = [part["id"] for part in json.loads((tmp_path / "report.json").read_text("utf-8"))["sections"]]

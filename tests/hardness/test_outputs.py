@@ -269,9 +269,7 @@ def test_a_cached_result_that_leads_elsewhere_is_built_again(tmp_path) -> None:
     assert elsewhere.is_file()
 
 
-@pytest.mark.parametrize(
-    "why", ["history lost", "history damaged", "history newer", "locked", "no designs", "foreign"]
-)
+@pytest.mark.parametrize("why", ["history lost", "history damaged", "history newer", "locked", "no designs"])
 def test_a_night_that_is_refused_creates_nothing(why, tmp_path) -> None:
     site, state = tmp_path / "site", tmp_path / "site.state"
     jobs = () if why == "no designs" else (job("a"),)
@@ -279,9 +277,6 @@ def test_a_night_that_is_refused_creates_nothing(why, tmp_path) -> None:
     if why == "history lost":
         night(site)
         shutil.rmtree(state)
-    elif why == "foreign":
-        site.mkdir()
-        (site / "mine").write_text("mine")
     elif why == "history damaged":
         state.mkdir()
         (state / "history.json").write_bytes(b"no history" * 1000)

@@ -31,7 +31,7 @@ def test_a_campaign_as_json(campaign: Path, cli) -> None:
     assert len(result["suggestion"]["runs"]) == 2
 
 
-def test_a_campaign_on_paper(campaign: Path, tmp_path, cli) -> None:
+def test_a_campaign_on_paper_as_a_design_and_in_the_report(campaign: Path, tmp_path, cli) -> None:
     out = cli.text("identify", campaign, "--out", tmp_path, "--suggest", "0")
     assert "8 of 9 runs" in out
     assert "run05_torque.csv: cannot be read: no such file" in " ".join(out.split())
@@ -45,11 +45,11 @@ def test_a_campaign_on_paper(campaign: Path, tmp_path, cli) -> None:
     tolerance = identified.parameters["friction.load_coefficient"].tolerance
     assert tolerance.kind == "normal"
     assert len(identified.correlations) >= 1
-
-
-def test_the_identified_design_goes_on_into_margins(campaign: Path, tmp_path, cli) -> None:
-    cli("identify", campaign, "--out", tmp_path, "--suggest", "0")
     assert cli.data("margins", tmp_path / "ilr33-amber-identified.toml")["loops"]
+    cli("report", "ilr33-amber", "--include", tmp_path / "identification.json", "--out", tmp_path / "r")
+    ids = [part["id"] for part in load_document(tmp_path / "r" / "report.json")["sections"]]
+    assert "identification" in ids
+    assert ids.count("provenance") == 1
 
 
 def test_emps_on_the_command_line(emps_file: Path, tmp_path, cli) -> None:
@@ -61,15 +61,6 @@ def test_emps_on_the_command_line(emps_file: Path, tmp_path, cli) -> None:
     signals = cli.data("correlate", "emps", emps_file, "--out", tmp_path)["records"][0]["signals"]
     assert 100.0 * signals["force"]["relative_error"] < 5.848
     assert (tmp_path / "correlation.html").stat().st_size > 10_000
-
-
-def test_the_results_become_sections_of_the_report(campaign: Path, tmp_path, cli) -> None:
-    cli("identify", campaign, "--out", tmp_path / "i", "--suggest", "0")
-    result, out = str(tmp_path / "i" / "identification.json"), str(tmp_path / "r")
-    cli("report", "ilr33-amber", "--include", result, "--out", out)
-    ids = [part["id"] for part in load_document(tmp_path / "r" / "report.json")["sections"]]
-    assert "identification" in ids
-    assert ids.count("provenance") == 1
 
 
 def test_the_virtual_bench_writes_54_runs(tmp_path, capsys, monkeypatch) -> None:

@@ -121,6 +121,11 @@ CASES = [
 ]  # fmt: skip
 
 
+def _logged(case: Case) -> Columns:
+    run = simulate(_bare(case.name), case.command, case.seconds, record_every=case.every)
+    return case.log(run, np.random.default_rng(7))
+
+
 def _truth(design: Design, name: str) -> float:
     friction = design.friction
     return {
@@ -134,9 +139,7 @@ def _truth(design: Design, name: str) -> float:
 @pytest.mark.parametrize("case", CASES, ids=[case.log.__name__[1:] for case in CASES])
 def test_a_drive_is_found_from_its_record(case: Case, tmp_path, cli) -> None:
     design = _bare(case.name)
-    run = simulate(design, case.command, case.seconds, record_every=case.every)
-    table: Columns = case.log(run, np.random.default_rng(7))
-    write(tmp_path / "r.csv", table, mark=";")
+    write(tmp_path / "r.csv", _logged(case), mark=";")
     (tmp_path / "wrong.toml").write_text(write_design(_wrong(design)))
     record, out = str(tmp_path / "r.csv"), str(tmp_path / "o")
     ran = cli("identify", record, "--design", tmp_path / "wrong.toml", "--out", out, "--json")
@@ -160,13 +163,11 @@ def test_a_drive_is_found_from_its_record(case: Case, tmp_path, cli) -> None:
 def test_a_clock_that_is_off_shows_in_the_following_error(name: str, clock: float, tmp_path, cli) -> None:
     """A position and a current alone: inertia and friction agree with any clock, the loops' gains do not."""
     case = next(case for case in CASES if case.name == name)
-    design = _bare(name)
-    run = simulate(design, case.command, case.seconds, record_every=case.every)
-    table: Columns = case.log(run, np.random.default_rng(7))
+    table = _logged(case)
     first = next(iter(table))
     table[first] = clock * table[first]
     write(tmp_path / "r.csv", table, mark=";")
-    (tmp_path / "d.toml").write_text(write_design(design))
+    (tmp_path / "d.toml").write_text(write_design(_bare(name)))
     out = tmp_path / "o"
     ran = cli("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml", "--out", out, "--json")
     assert ran.status == 1
@@ -188,8 +189,7 @@ def test_a_fault_on_a_linear_axis_is_named(
 ) -> None:
     """Friction behind the coupling counts in the common factor of a wrong scale of the current."""
     case = next(case for case in CASES if case.name == "ballscrew")
-    run = simulate(_bare("ballscrew"), case.command, case.seconds, record_every=case.every)
-    table = _linear(run, np.random.default_rng(7))
+    table = _logged(case)
     changed = {change.get(k, (k, 1.0))[0]: change.get(k, (k, 1.0))[1] * v for k, v in table.items()}
     write(tmp_path / "r.csv", changed, mark=";")
     out = tmp_path / "o"

@@ -155,12 +155,6 @@ def test_a_chart_is_well_formed_whatever_it_is_called(title: str) -> None:
     assert {e.tag.rpartition("}")[2] for e in root.iter()} <= {"div", *drawn}
 
 
-@pytest.mark.parametrize("name", ["", " \n", "\ud800"])
-def test_a_name_without_a_sign_or_with_half_of_one_is_refused(tmp_path, name: str) -> None:
-    with pytest.raises(InputError, match="a name needs at least one sign"):
-        run_night(study(job(name)), tmp_path / "site", INLINE, code=CODE)
-
-
 @pytest.mark.parametrize(
     "data", [b"", b"\xff\xfe", b"[study", b"\x00" * 100, b"[study]\nbase='x'\n" * 2, b"#" * 2_000_000]
 )

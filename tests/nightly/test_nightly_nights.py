@@ -227,18 +227,19 @@ def test_a_folder_that_holds_something_else_is_refused(tmp_path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["thesis.tex"]
 
 
-def test_too_large_a_study_is_refused_with_the_limit(tmp_path) -> None:
-    with pytest.raises(InputError, match=f"at most {NIGHTLY_JOBS.most}"):
-        run_night(
-            study(*(Job(name=str(k)) for k in range(NIGHTLY_JOBS.most + 1))),
-            tmp_path / "s",
-            INLINE,
-            code=CODE,
-        )
-    with pytest.raises(InputError, match="used twice"):
-        run_night(study(job("a"), job("a")), tmp_path / "s", INLINE, code=CODE)
-    with pytest.raises(InputError, match="at most 20000 allowed"):
-        run_night(study(job("a" * 20001)), tmp_path / "s", INLINE, code=CODE)
+@pytest.mark.parametrize(
+    ("jobs", "words"),
+    [
+        ([Job(name=str(k)) for k in range(NIGHTLY_JOBS.most + 1)], f"at most {NIGHTLY_JOBS.most}"),
+        ([job("a"), job("a")], "used twice"),
+        ([job("a" * 20001)], "at most 20000 allowed"),
+        *(([job(name)], "a name needs at least one sign") for name in ("", " \n", "\ud800")),
+    ],
+    ids=["too many", "twice", "too long", "empty", "blank", "half a sign"],
+)
+def test_a_study_that_cannot_be_is_refused_with_the_limit(tmp_path, jobs: list[Job], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        run_night(study(*jobs), tmp_path / "s", INLINE, code=CODE)
     assert not (tmp_path / "s").exists()
 
 

@@ -24,6 +24,7 @@ from reports.cli.main import main
 from reports.drawing import draw_svg
 from reports.html import page
 from reports.numbers import show
+from reports.provenance import build_time
 from reports.sections.names import loop_words
 from tests.nightly.site_checks import Page
 
@@ -53,34 +54,27 @@ def test_every_section_that_a_review_asks_for_is_there(built: Built) -> None:
 @pytest.mark.parametrize("name", ["current", "velocity", "position"])
 def test_the_tables_hold_the_margins_of_the_engine(built: Built, name: str) -> None:
     margins = stability_margins(getattr(assemble_loops(load_design("ilr33-amber")), name).open_loop)
-    row = next(
-        row
-        for row in rows_of(built.document, "margins", "Stability margins")
-        if row["loop"] == loop_words(name)
-    )
+
+    def own(caption: str) -> list[dict[str, Any]]:
+        rows = rows_of(built.document, "margins", caption)
+        return [row for row in rows if row["loop"] == loop_words(name)]
+
+    (row,) = own("Stability margins")
     assert row["gain_margin_db"] == certain(margins.gain_margin_db, "db")
     assert row["phase_margin_deg"] == certain(margins.phase_margin_deg, "deg")
     assert row["crossover_hz"] == pytest.approx(margins.phase_margin.frequency_hz)
     assert row["delay_margin_ms"] == pytest.approx(1e3 * margins.delay_margin_s)
-    crossings = [
-        row
-        for row in rows_of(built.document, "margins", "Every gain and phase")
-        if row["loop"] == loop_words(name)
-    ]
-    assert len(crossings) == len(margins.gain_margins) + len(margins.phase_margins)
+    assert len(own("Every gain and phase")) == len(margins.gain_margins) + len(margins.phase_margins)
 
 
 def test_the_page_shows_what_the_json_holds(built: Built) -> None:
     words = " ".join(Page(built.page.read_text(encoding="utf-8")).words)
-    for section in built.document["sections"]:
-        for block in doc.walk(section):
-            if block["kind"] != "table":
-                continue
-            for row in block["rows"]:
-                for column in block["columns"]:
-                    value = row.get(column["key"])
-                    value = value["text"] if isinstance(value, dict) else value
-                    assert show(value, column["format"]) in words
+    blocks = [block for part in built.document["sections"] for block in doc.walk(part)]
+    tables = [block for block in blocks if block["kind"] == "table"]
+    for row, column in ((row, column) for one in tables for row in one["rows"] for column in one["columns"]):
+        value = row.get(column["key"])
+        value = value["text"] if isinstance(value, dict) else value
+        assert show(value, column["format"]) in words
 
 
 def test_every_margin_is_marked_on_its_bode_figure(built: Built) -> None:
@@ -134,8 +128,6 @@ def test_a_package_shows_its_public_names(package) -> None:
 
 
 def test_a_time_that_is_none_is_refused(monkeypatch) -> None:
-    from reports.provenance import build_time
-
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
     with pytest.raises(InputError, match="SOURCE_DATE_EPOCH"):
         build_time()
@@ -180,16 +172,8 @@ def test_names_from_a_design_file_stay_text() -> None:
         path: replace(item, text=HOSTILE, source=HOSTILE)
         for path, item in list(design.parameters.items())[:3]
     }
-    hostile = replace(
-        design,
-        name=HOSTILE,
-        title=HOSTILE,
-        description=HOSTILE,
-        revision=HOSTILE,
-        origin=HOSTILE,
-        requirements=(requirement,),
-        parameters=parameters,
-    )
+    names = dict.fromkeys(("name", "title", "description", "revision", "origin"), HOSTILE)
+    hostile = replace(design, **names, requirements=(requirement,), parameters=parameters)
     content = page(design_report(hostile))
     reader = Page(content)
     kinds = [attributes.get("type") for tag, attributes in reader.tags if tag == "script"]
