@@ -1,4 +1,4 @@
-"""Every key of a design file from the registry of fields; how a file's numbers are read."""
+"""Every key of a design file as a list to read, and how the numbers of one file are read."""
 
 from __future__ import annotations
 
