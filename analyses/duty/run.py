@@ -7,7 +7,6 @@ from math import exp, inf, isfinite, log
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
@@ -130,6 +129,8 @@ def _moving(design: Design, asked: Asked) -> tuple[Trajectory, int]:
 
 def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Overload | None:
     """The first-order state of (i/i_cont)^2 over motion and rest, repeated for ever."""
+    from scipy.signal import lfilter  # takes a second to load, and the first screen asks of this room
+
     tau, Ts = design.limits.overload_time_s, design.controller.period_s
     if tau is None:
         return None

@@ -239,8 +239,7 @@ def all_loop_figures(
                 result[name] = loop_figures(loop, step=step, certify=certify)
             wanted = name == "current" and loops.operating.rotor != "locked"
             if wanted and (needed if locked is None else locked):
-                fixed = other_loops(loops, loops.design, rotor="locked").present[name]
-                own = partial(loop_figures, fixed, step=step, certify=certify)
+                own = partial(_locked, loops, step=step, certify=certify)
                 with_it = own() if needed else attempt("current loop with the rotor locked", own, None)
                 result[name] = replace(result[name], locked=with_it)
         except (InputError, NumericalError) as error:
@@ -255,6 +254,12 @@ def all_loop_figures(
                 held = one.locked or _if_there_is(found, [])
                 result[name] = replace(one, held=held if held is not None and held.stable else None)
     return result
+
+
+def _locked(loops: Loops, *, step: bool, certify: bool) -> LoopFigures:
+    """The current loop with the rotor locked."""
+    fixed = other_loops(loops, loops.design, rotor="locked").present["current"]
+    return loop_figures(fixed, step=step, certify=certify)
 
 
 def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFigures:

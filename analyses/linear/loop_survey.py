@@ -154,19 +154,11 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     forms: dict[str, Mapping[str, LoopFigures]] = {
         "sampled": all_loop_figures(loops, certify=True, locked=True)
     }
-
-    def measured(form: Form) -> Mapping[str, LoopFigures]:
-        return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
-
     for form in () if design.controller.sampled_only else FORMS[1:]:
-        other = attempt(f"{form} form", partial(measured, form), None)
+        other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
         forms |= {} if other is None else {form: other}
     step(2)
-    break_points = attempt(
-        "loops at the break points",
-        lambda: {name: _break_point(loops, name) for name in loops.break_points},
-        {},
-    )
+    break_points = attempt("loops at the break points", lambda: _break_points(loops), {})
     step(3)
     points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
     step(4)
@@ -177,6 +169,16 @@ def survey_loops(design: Design, progress: Progress | None = None) -> LoopSurvey
     return LoopSurvey(
         design, loops, forms, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
     )
+
+
+def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
+    """Measure the loops in a form other than the sampled one."""
+    return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
+
+
+def _break_points(loops: Loops) -> dict[str, BreakPoint]:
+    """Measure the loop at every break point."""
+    return {name: _break_point(loops, name) for name in loops.break_points}
 
 
 def _break_point(loops: Loops, name: str) -> BreakPoint:

@@ -61,8 +61,6 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
     InputError, NumericalError
         Where the loops cannot be assembled as asked, or the margins of one not be found.
     """
-    from analyses.linear.outer_loop import loop_around, read_outer_loop
-
     asked = asked or Asked()
     loops = assemble_loops(
         design,
@@ -73,6 +71,8 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
     step = asked.form != "continuous"  # with delays it takes its time
     around = {}
     if asked.around is not None:
+        from analyses.linear.outer_loop import loop_around, read_outer_loop  # loads python-control
+
         outer = read_outer_loop(asked.around)
         around[outer.name] = loop_figures(loop_around(loops, outer), step=step, certify=True)
     measured = measured_if_asked(loops, asked.response, asked.response_of, asked.averages)
