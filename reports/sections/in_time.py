@@ -21,6 +21,8 @@ from reports.numbers import gain_margin
 from reports.sections.limits import words_of
 from reports.sections.names import loop_words, output_unit
 
+TESTED = "locked"  # how the rotor stands in the current loop that is put to the simulator
+
 
 def sections(validation: Validation) -> list[doc.Section]:
     """Make the section of the sweep and that of steps and margins, as far as there are any."""
@@ -53,14 +55,9 @@ def _sweep(sweep: BenchSweep) -> doc.Block:
     style.phase_axis(bottom, phase.tolist())
     style.frequency(bottom)
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
-    caption = f"{_tested(sweep.loop)}, open: linear (line), simulated (circles)"
+    caption = f"{loop_words(sweep.loop, TESTED)}, open: linear (line), simulated (circles)"
     caption += f"; largest difference {_largest([sweep]):.1e}."
     return doc.figure("injected_sweep", chart, caption)
-
-
-def _tested(loop: str) -> str:
-    """The loop as it is put to the simulator: the current loop with the rotor locked."""
-    return loop_words(loop, "locked")
 
 
 def _largest(sweeps: Sequence[BenchSweep]) -> float:
@@ -104,7 +101,7 @@ def _step(shown: StepShown) -> doc.Block:
     look: style.Style = {"size": 4.5, "hollow": True, "colour": style.ORANGE}
     panel.points(scale * shown.time_s[few], shown.simulated[few], "simulated", **look)
     caption = (
-        f"{_tested(shown.place)}: small step on the operating motion; largest difference "
+        f"{loop_words(shown.place, TESTED)}: small step on the operating motion; largest difference "
         f"{shown.row.error:.1e} of its height, {shown.row.because.split(', of ')[-1]}."
     )
     return doc.figure("small_step", chart, caption, layout="half")
@@ -120,9 +117,9 @@ def _margin(shown: MarginShown) -> doc.Block:
         panel.points(scale * run.time_s, run.amplitude, f"{words}, simulated", **look | {"size": 4.0})
     decibel = 20.0 * math.log10(shown.ratio)
     caption = (
-        f"{_tested(shown.place)}: gain margin on the operating motion {gain_margin(decibel, 2)} dB at "
-        f"{shown.frequency_hz:.4g} Hz. The run inside dies out, the run outside grows (circles), each by the "
-        "predicted factor (lines)."
+        f"{loop_words(shown.place, TESTED)}: gain margin on the operating motion "
+        f"{gain_margin(decibel, 2)} dB at {shown.frequency_hz:.4g} Hz. The run inside dies "
+        "out, the run outside grows (circles), each by the predicted factor (lines)."
     )
     return doc.figure("margin_runs", chart, caption, layout="half")
 
