@@ -59,6 +59,22 @@ def test_delays_are_placed_right(encoder: Encoder) -> None:
     assert np.all(gaps[2] < 0.02 * 100.0 * 0.5e-4 / 32)
 
 
+def test_sampled_tends_to_continuous_and_both_to_ideal() -> None:
+    design, omega = amber(2, 10, delay_s=1e-4), np.array([20.0, 100.0, 300.0])
+    ideal = assemble_loops(design, "ideal")
+    for form in ("sampled", "continuous"):
+        errors = []
+        for k in (64, 128):
+            loops = assemble_loops(faster(design, k), form).present
+            ratios = [
+                response(loop.open_loop, omega) / response(getattr(ideal, name).open_loop, omega)
+                for name, loop in loops.items()
+            ]
+            errors.append(np.abs(np.array(ratios) - 1).max())
+        assert errors[1] < 5e-3
+        assert errors[0] / errors[1] == pytest.approx(2, abs=0.1)  # first order in Ts
+
+
 def test_ideal_loops_are_the_hand_transfer_functions() -> None:
     design = amber()
     loops = assemble_loops(design, "ideal")
