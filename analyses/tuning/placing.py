@@ -7,9 +7,9 @@ measure as a gain (`change`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import product
 from math import ceil, floor, inf, pi, sqrt
 from typing import Literal, get_args
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design, Filter
 from actuator_lti.design.object_dictionary import OBJECTS, KnownObject, step_of
-from actuator_lti.drive.facts import resonance_rad_s as free_resonance_rad_s
+from actuator_lti.drive.facts import resonance_rad_s
 from actuator_lti.errors import InputError
 
 
@@ -37,9 +37,7 @@ def step_of_gain(design: Design, path: str) -> float | None:
 def allowed_range(design: Design, path: str) -> tuple[float, float]:
     """Smallest and largest SI value of a gain that its object can hold."""
     known, step = object_of(design, path), step_of_gain(design, path)
-    if known is None or step is None:
-        return 0.0, inf
-    return max(known.low, 1) * step, known.high * step
+    return (0.0, inf) if known is None or step is None else (max(known.low, 1) * step, known.high * step)
 
 
 def neighbours(design: Design, paths: tuple[str, ...], gains: np.ndarray) -> np.ndarray:
@@ -89,22 +87,17 @@ class Placed:
     elements: tuple[Element, ...]
 
 
-def subsets(allowed: tuple[Element, ...]) -> Iterator[tuple[Element, ...]]:
-    """Nothing, then each element alone, then pairs, and so on."""
-    for count in range(len(allowed) + 1):
-        yield from combinations(allowed, count)
-
-
-def checked(design: Design, wanted: tuple[str, ...]) -> tuple[Element, ...]:
+def checked(design: Design, wanted: Sequence[str]) -> tuple[Element, ...]:
     """What may be placed in a design; an unknown word, or what the drive has no place for, is refused."""
+    control, name = design.controller, design.name
     for word in wanted:
         if word not in ELEMENTS:
             raise InputError(f"place = {word!r}: allowed: {', '.join(ELEMENTS)}")
-        if design.controller.velocity is None:
-            raise InputError(f"place = {word}: the design {design.name} has no control.velocity to hold it")
-        if word == "feedforward" and design.controller.position is None:
+        if control.velocity is None:
+            raise InputError(f"place = {word}: the design {name} has no control.velocity to hold it")
+        if word == "feedforward" and control.position is None:
             raise InputError(
-                f"place = {word}: the design {design.name} has no control.position, whose command it needs"
+                f"place = {word}: the design {name} has no control.position, whose command it needs"
             )
     return tuple(item for item in ELEMENTS if item in wanted)
 
@@ -116,40 +109,31 @@ def place(design: Design, elements: tuple[Element, ...]) -> Placed:
         if element == "feedforward":
             variables += _feedforward(design)
             continue
-        item, rows = _filter(design, element)
         velocity = design.controller.velocity
         assert velocity is not None
+        item, own = _filter(design, element)
         filters = (*velocity.filters, item)
         control = replace(design.controller, velocity=replace(velocity, filters=filters))
-        design = replace(design, controller=control)
-        variables += [replace(v, path=f"control.velocity.filter.{len(filters)}.{v.path}",
-                              per=f"control.velocity.filter.{len(filters)}.{v.per}" if v.per else "")
-                      for v in rows]  # fmt: skip
+        design, path = replace(design, controller=control), f"control.velocity.filter.{len(filters)}."
+        variables += [replace(v, path=path + v.path, per=path + v.per if v.per else "") for v in own]
     return Placed(design, tuple(variables), elements)
 
 
-def band_rad_s(design: Design) -> tuple[float, float]:
-    """Frequencies that a filter may have: to 90 % of Nyquist of the velocity loop, three decades down."""
+def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
+    """A neutral filter, from Nyquist of the velocity loop (90 % of it) three decades down.
+
+    A notch begins at the resonance of motor and load on the coupling, without damping; without one in the
+    middle of the band.
+    """
     velocity = design.controller.velocity
     assert velocity is not None
     high = END_OF_BAND * pi / (velocity.every * design.controller.period_s)
-    return high / 1000.0, high
-
-
-def resonance_rad_s(design: Design) -> float:
-    """Resonance of motor and load on the coupling, without damping; the middle of the band without one."""
-    low, high = band_rad_s(design)
-    if design.coupling is None:
-        return sqrt(low * high)
-    return float(np.clip(free_resonance_rad_s(design), low, high))
-
-
-def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
-    low, high = band_rad_s(design)
+    low = high / 1000.0
     if element == "lowpass":
         lowpass = Filter(kind="lowpass", frequency_rad_s=high)
         return lowpass, [Variable("frequency", high, low, high, high)]
-    centre = resonance_rad_s(design)
+    free = sqrt(low * high) if design.coupling is None else resonance_rad_s(design)
+    centre = float(np.clip(free, low, high))
     item = Filter(kind="notch", frequency_rad_s=centre, width_rad_s=0.5 * centre, depth=1.0)
     return item, [
         Variable("frequency", centre, low, high, None),
@@ -160,12 +144,10 @@ def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
 
 def _feedforward(design: Design) -> list[Variable]:
     position = design.controller.position_loop
-    result = [("feedforward", position.feedforward)]
-    if design.controller.velocity is not None:
-        result.append(("acceleration_feedforward", position.acceleration_feedforward))
     return [
         Variable(f"control.position.{key}", value, 0.0, max(1.2, value), value, linear=True)
-        for key, value in result
+        for key in ("feedforward", "acceleration_feedforward")
+        for value in [getattr(position, key)]
     ]
 
 
