@@ -41,8 +41,8 @@ class Store:
         if path.exists():
             result = _read_manifest(path)
             if {key: result.get(key) for key in wanted} != wanted:
-                raise InputError("holds another study (design, seed, settings or code); take another folder",
-                                 where=str(folder))  # fmt: skip
+                words = "holds another study (design, seed, settings or code); take another folder"
+                raise InputError(words, where=str(folder))
             chunk = int(result["chunk"])
         text = json.dumps({**wanted, "chunk": chunk}, indent=1, sort_keys=True)
         return cls(folder, chunk, text.encode())
