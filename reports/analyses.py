@@ -22,7 +22,7 @@ from analyses.margins.asked import Asked as MarginsAsked
 from analyses.monte_carlo.asked import Asked as MonteCarloAsked
 from analyses.motion.asked import Asked as MotionAsked
 from analyses.studies.study_asked import Asked as StudyAsked
-from analyses.tuning.asked import TuningSettings
+from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.settings import Asked as ValidationAsked
 from reports.design_files.keys import Asked as KeysAsked
 from reports.design_files.start import Asked as StartAsked
@@ -187,6 +187,7 @@ ANALYSES = (
         study=True,
         keeps=True,
         out="out/compare",
+        example="analyses.studies.study",
     ),
     Analysis(
         "montecarlo",
@@ -198,9 +199,7 @@ ANALYSES = (
         keeps=True,
         out="out/montecarlo",
     ),
-    Analysis(
-        "tune", STUDIES, TuningSettings, function="analyses.tuning.tune", doing="tuning", out="out/tune"
-    ),
+    Analysis("tune", STUDIES, TuningAsked, function="analyses.tuning.tune", doing="tuning", out="out/tune"),
     Analysis(
         "nightly",
         STUDIES,

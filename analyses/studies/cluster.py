@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 IN_FLIGHT = 3  # parts a worker that are under way or waiting to be written
 CONNECT_S = 10.0
 TLS_FILES = {"tls_ca_file": "ca.pem", "tls_client_cert": "cert.pem", "tls_client_key": "key.pem"}
+PARTS = ("scheduler", "worker", "nanny")
 _RETRIES = 20  # workers that may die over one part before the run gives up
 
 
@@ -58,9 +59,8 @@ def connected(address: str, tls: Path | None) -> Client:
     try:
         return distributed.Client(address, timeout=CONNECT_S, security=security)
     except ssl.SSLError as error:
-        raise InputError(
-            f"--tls {tls}: {error.reason or error}: certificates that fit the scheduler"
-        ) from error
+        said = f"--tls {tls}: {error.reason or error}: certificates that fit the scheduler"
+        raise InputError(said) from error
     except ValueError as error:
         raise InputError(f"--scheduler {address!r}: an address such as tcp://host:8786") from error
 
@@ -74,9 +74,7 @@ def local_cluster(workers: int) -> LocalCluster:
 
     resource_tracker.ensure_running()  # its start would take the mask away again
     held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # what is started now inherits it
-    settings: dict[str, Any] = {
-        f"distributed.{part}.http.routes": [] for part in ("scheduler", "worker", "nanny")
-    }
+    settings: dict[str, Any] = {f"distributed.{part}.http.routes": [] for part in PARTS}
     settings["distributed.nanny.pre-spawn-environ"] = {}  # workers add up as this process does
     try:
         with dask.config.set(settings):

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -34,16 +34,12 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Engine:
-    """Where parts are computed.
+    """Where parts are computed."""
 
-    A local Dask cluster of ``workers`` processes; a running ``scheduler``, such as ``tls://host:8786``, with
-    """
-
-    workers: int | None = None
-    scheduler: str | None = None
-    threads: int | None = None
-    # A folder with ca.pem, cert.pem and key.pem; else ``threads`` of this process (default: all processors)
-    tls: Path | None = None
+    workers: int | None = None  # processes of a local Dask cluster
+    scheduler: str | None = None  # one that is running, such as ``tls://host:8786``
+    threads: int | None = None  # without either, of this process; all processors where left out
+    tls: Path | None = None  # with a scheduler: folder with ca.pem, cert.pem and key.pem
 
     @property
     def caution(self) -> str:
@@ -60,12 +56,12 @@ class Engine:
             raise InputError("--workers and --scheduler: one of them")
         if self.workers is not None and self.workers < 1:
             raise InputError(f"--workers {self.workers}: at least 1")
-        if self.tls is not None and not (self.scheduler or "").startswith("tls://"):
+        encrypted = (self.scheduler or "").startswith("tls://")
+        if self.tls is not None and not encrypted:
             raise InputError("--tls: goes with --scheduler tls://HOST:PORT")
-        if self.tls is None and (self.scheduler or "").startswith("tls://"):
-            raise InputError(
-                f"--scheduler {self.scheduler}: needs --tls DIR with {', '.join(cluster.TLS_FILES.values())}"
-            )
+        if self.tls is None and encrypted:
+            files = ", ".join(cluster.TLS_FILES.values())
+            raise InputError(f"--scheduler {self.scheduler}: needs --tls DIR with {files}")
 
     @property
     def distributed(self) -> bool:
@@ -103,9 +99,7 @@ class Engine:
             with self._client() as client:
                 cluster.submit(client, work, todo, take)
                 finished = True
-        except (OSError, TimeoutError, CancelledError) as error:
-            if isinstance(error, InputError):
-                raise
+        except (OSError, CancelledError) as error:
             if not finished:  # a cluster too slow to close takes no result back
                 said = " ".join(str(error).split()) or "no answer in time"
                 if isinstance(error, CancelledError):
@@ -120,16 +114,13 @@ class Engine:
         need("distributed", "cluster", "a cluster of workers")
         import distributed
 
-        if self.scheduler is not None:
-            with cluster.quiet(), cluster.connected(self.scheduler, self.tls) as client:
-                yield client
-            return
-        with (
-            cluster.quiet(),
-            cluster.local_cluster(self.workers or 1) as here,
-            distributed.Client(here) as client,
-        ):
-            yield client
+        with ExitStack() as stack:
+            stack.enter_context(cluster.quiet())
+            if self.scheduler is not None:
+                yield stack.enter_context(cluster.connected(self.scheduler, self.tls))
+            else:
+                here = stack.enter_context(cluster.local_cluster(self.workers or 1))
+                yield stack.enter_context(distributed.Client(here))
 
 
 def _threads(

@@ -1,4 +1,4 @@
-"""What is asked of tuning."""
+"""What is asked of tuning, in words."""
 
 from __future__ import annotations
 
@@ -8,13 +8,27 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from analyses.request import Option
 
 if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
+    from actuator_lti.design.model import Design, Requirement
 
 Aim = Literal["least-change", "reserve"]
 
 
 @dataclass(frozen=True)
 class TuningSettings:
+    """What tuning is to do; the words of `Asked`, read."""
+
+    # In place of those of the design on the same figure of the same loop
+    requirements: tuple[Requirement, ...] = ()
+    rounded: bool = True
+    # Whether the trade-off curve and the nonlinear check are wanted
+    curve: bool = True
+    check: bool = True
+    aim: Aim = "least-change"
+    place: tuple[str, ...] = ()  # of `analyses.tuning.placing.ELEMENTS`
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
     """Find gains that meet the requirements at every corner of the tolerances, or say by how much none can.
 
     By default the least change of the design. With --place also a notch, a low-pass, feed-forward where
@@ -28,13 +42,12 @@ class TuningSettings:
     Try: actuator-lti tune joint --require "position.bandwidth>=60 Hz" --place notch,feedforward
     """
 
-    requirements: tuple[Any, ...] = ()  # in place of those of the design on the same figure of the same loop
     require: Annotated[
         list[str] | None,
         Option(
             'In place of that of the design: "position.bandwidth>=30 Hz"; repeatable.', "LOOP.QUANTITY>=LIMIT"
         ),
-    ] = None  # as words, `requirements` of a command
+    ] = None
     aim: Annotated[
         Aim,
         Option(
@@ -54,13 +67,13 @@ class TuningSettings:
         bool, Option("Round to the steps of the motion controller's objects.", flag="round/--no-round")
     ] = True
     curve: Annotated[bool, Option("Trade-off curve.", flag="curve/--no-curve")] = True
-    check: bool = True  # whether the nonlinear check is wanted
 
     @classmethod
     def of(cls, design: Design, **chosen: Any) -> TuningSettings:
-        """What is chosen, its words read; raises `InputError` for a requirement that cannot be read."""
+        """The settings; raises `InputError` for a requirement that cannot be read."""
         from analyses.tuning.problem import read_requirement
 
-        wanted = tuple(read_requirement(words, design) for words in chosen.get("require") or ())
-        elements = tuple(word.strip() for words in chosen.get("place") or () for word in words.split(","))
-        return cls(**{**chosen, "requirements": wanted, "place": elements})
+        asked = cls(**chosen)
+        wanted = tuple(read_requirement(words, design) for words in asked.require or ())
+        elements = tuple(word.strip() for words in asked.place or () for word in words.split(","))
+        return TuningSettings(wanted, asked.rounded, asked.curve, aim=asked.aim, place=elements)

@@ -54,7 +54,7 @@ def tune(
     """
     design, settings = as_design(design), settings or TuningSettings()
     wanted = loop_requirements(design, settings.requirements)
-    allowed = checked(design, settings.place or ())
+    allowed = checked(design, settings.place)
     choices = [each for count in range(len(allowed) + 1) for each in combinations(allowed, count)]
     stages = len(choices) + 3
     tell = progress or (lambda done, total: None)

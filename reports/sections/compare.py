@@ -45,10 +45,6 @@ def section(comparison: Comparison) -> list[doc.Section]:
     return [*made, *ledger(shown), *compare_figures.sections(shown)]
 
 
-def text(comparison: Comparison | str) -> str | None:
-    return comparison if isinstance(comparison, str) else None
-
-
 def brief(comparison: Comparison) -> Brief:
     """Which designs meet their requirements, and what moved in their loops."""
     shown = compare_best.choice(comparison)
