@@ -18,7 +18,7 @@ from analyses.corners.run import Corners, corners
 from analyses.isolation import attempt, isolated
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.loop_survey import LoopSurvey, survey_loops
-from analyses.margins.measured import measured_if_asked
+from analyses.margins.run import measured_if_asked
 from analyses.specification.mending import mending
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements
 from analyses.specification.weakest import Spread, WeakPoint, spread, weakest
@@ -81,7 +81,7 @@ def report(
         Sections of other documents, put before the further ones.
     response : path or control.FrequencyResponseData, optional
         A measured response, laid over the model; of what, and with how many averages behind its coherence, as
-        `analyses.margins.measured.measured_over` has it.
+        `analyses.margins.run.measured_over` has it.
     response_of : str
     averages : int, optional
     source : str, optional

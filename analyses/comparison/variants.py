@@ -19,13 +19,16 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.reading import as_path
 from actuator_lti.loops import assemble_loops
-from analyses.comparison.variant_figures import (
+from analyses.comparison.found import (
+    Changed,
+    Contribution,
     FigureName,
+    Found,
+    Kept,
     LargeSignal,
     figure_names,
     small_signal,
 )
-from analyses.comparison.variant_store import Changed, Contribution, Found, Kept
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures
 from analyses.specification.requirements import evaluate_requirements, tally
 from analyses.specification.sensitivity import Sensitivities, moved, population_figures, sensitivities

@@ -15,6 +15,7 @@ from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from actuator_lti.start.extras import need
 from analyses.finite import finite
+from analyses.friction_effects.breakaway import static_threshold
 from analyses.large_signal.classify import (
     CAUSES,
     WAVEFORMS,
@@ -32,7 +33,6 @@ from analyses.large_signal.tones import (
     tones,
     work_ticks,
 )
-from analyses.linear.static_threshold import static_threshold
 
 if TYPE_CHECKING:
     import pandas

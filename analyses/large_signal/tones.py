@@ -90,8 +90,8 @@ def work_ticks(design: Design, loops: Loops, count: int) -> int:
 def amplitudes(design: Design, count: int, smallest_rad: float | None) -> np.ndarray:
     """Give command amplitudes up to full deflection, among them those that the design asks for.
 
-    ``smallest_rad``: command that just overcomes dry friction at once (`analyses.linear.static_threshold`);
-    the range begins at twice that, within 1/20000 to 1/200 of full deflection.
+    ``smallest_rad``: command that just overcomes dry friction at once; the range begins at twice that, within
+    1/20000 to 1/200 of full deflection.
     """
     full = design.validation.full_deflection_rad
     wanted = sorted({fraction * full for fraction in design.validation.amplitude_fractions})

@@ -39,8 +39,7 @@ from analyses.monte_carlo.judging import (
 )
 from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
 from analyses.monte_carlo.statistics import MOST, clopper_pearson, column_statistics
-from analyses.monte_carlo.store import CHUNK, Store
-from analyses.monte_carlo.task import SampleTask, StepCheck
+from analyses.monte_carlo.task import CHUNK, SampleTask, StepCheck, Store
 from analyses.monte_carlo.worst import worst_case
 from analyses.slugs import slug
 from analyses.specification.requirements import RequirementVerdict

@@ -24,7 +24,7 @@ class TuningSettings:
     curve: bool = True
     check: bool = True
     aim: Aim = "least-change"
-    place: tuple[str, ...] = ()  # of `analyses.tuning.placing.ELEMENTS`
+    place: tuple[str, ...] = ()  # of `analyses.tuning.start.ELEMENTS`
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """The least change that meets the requirements: the nearest point of what is allowed to the design as it is.
 
-Minimise the change (`analyses.tuning.placing.change`: squares of ln ratios of gains, of shares fed forward)
+Minimise the change (`analyses.tuning.start.change`: squares of ln ratios of gains, of shares fed forward)
 with every requirement met at every corner of the working set: sequential quadratic programming from the
 design itself, and from gains with reserve (`solve`) where that finds nothing. As margins have kinks (another
 crossover becomes the worst) and what is allowed may fall apart, differential evolution (Storn and Price 1997)

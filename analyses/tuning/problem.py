@@ -19,7 +19,7 @@ from actuator_lti.design.units import parse_limit
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.judging import in_populations, judge, loop_columns, loops_of
 from analyses.studies.sampling import Factor, correlation_of, semidefinite_root
-from analyses.tuning.placing import Variable, allowed_range, change
+from analyses.tuning.start import Variable, allowed_range, change
 
 GAINS = (
     "control.current.gain",
@@ -79,7 +79,7 @@ class Problem:
         return np.where(self._linear, coordinates, np.exp(np.where(self._linear, 0.0, coordinates)))
 
     def change(self, values: np.ndarray) -> np.ndarray:
-        """How far each row is from the design as it came, see `analyses.tuning.placing.change`."""
+        """How far each row is from the design as it came, see `analyses.tuning.start.change`."""
         return change(self.variables, values)
 
     @cached_property

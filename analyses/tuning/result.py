@@ -12,7 +12,7 @@ from actuator_lti.batch import Population
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.loops import assemble_loops
-from analyses.comparison.variant_figures import LargeSignal
+from analyses.comparison.found import LargeSignal
 from analyses.finite import finite
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.task import StepCheck, step_columns

@@ -18,11 +18,19 @@ from analyses.monte_carlo.judging import in_populations, label
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
-from analyses.tuning.placing import Placed, checked, neighbours, object_of, place, step_of_gain
 from analyses.tuning.problem import MOST_DESIGNS, Problem, limit_of, loop_requirements, problem_of, size_of
 from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult, confirm, nonlinear_checks
-from analyses.tuning.rules import RuleGains, rule_gains
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
+from analyses.tuning.start import (
+    Placed,
+    RuleGains,
+    checked,
+    neighbours,
+    object_of,
+    place,
+    rule_gains,
+    step_of_gain,
+)
 
 Progress = Callable[[int, int], None]
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding

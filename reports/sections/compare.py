@@ -11,7 +11,7 @@ from typing import Any
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
-from analyses.comparison.variant_figures import FigureName
+from analyses.comparison.found import FigureName
 from analyses.comparison.variants import Compared, Comparison
 from analyses.specification.requirements import RequirementVerdict
 from analyses.validation.row import Row as Check
