@@ -1,4 +1,4 @@
-"""What the drive does at rest: the smallest command that moves the output, what a slow one loses at a reversal.
+"""At rest: the smallest command that moves the output, and what a slow one loses at a reversal.
 
 Both by the gains of the controllers, and simulated.
 """
