@@ -27,7 +27,9 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.reading import decode, read_bytes
 from actuator_lti.loops import Loops
+from actuator_lti.loops.limiters import onset
 from analyses.linear.loop_figures import LoopFigures
+from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict
 from analyses.studies.proof import code_version
@@ -83,9 +85,6 @@ class LargeSignal:
 
     def figures(self, design: Design, loops: Loops) -> dict[str, float | None]:
         """Largest linear amplitudes, and the nonlinear step of full deflection at every load."""
-        from actuator_lti.loops.limiters import onset
-        from analyses.monte_carlo.task import StepCheck, step_columns
-
         shown = COMMAND_UNITS[design.axis, design.controller.outermost][1]
         figures: dict[str, float | None] = {}
         for frequency in self.frequencies_hz:
@@ -99,7 +98,7 @@ class LargeSignal:
             columns = step_columns(step, Population(design, {}, 1))
             for name in ("rise_time", "overshoot", "settling_time", "peak_current"):
                 value = float(columns[f"nonlinear.{name}"][0])
-                figures[f"large.{name}@{load:g}"] = None if value != value else value
+                figures[f"large.{name}@{load:g}"] = None if isnan(value) else value
         return figures
 
 
@@ -112,21 +111,19 @@ def figure_names(all_figures: Sequence[Figures], design: Design) -> tuple[Figure
 def _name(key: str, design: Design) -> FigureName:
     group, _, rest = key.partition(".")
     quantity, _, at = rest.partition("@")
-    known = QUANTITIES.get(quantity)
+    known, words = QUANTITIES.get(quantity), quantity.replace("_", " ")
     if known is not None:
         unit, better = known.unit_for(design.axis), int(known.better)
     else:  # of the large signal
         command = COMMAND_UNITS[design.axis, design.controller.outermost][0]
         unit, better = (command, 1) if quantity == "onset" else ("A", -1)
-    words = quantity.replace("_", " ")
     if quantity == "onset":
         words, at = "linear up to", f"{at} Hz"
     elif known is not None and known.source == "stiffness":
         at = ""  # no load changes it
     elif at:
         at = f"{at} {'N' if design.axis == 'linear' else 'N m'}"
-    label = f"{words} at {at}" if at else words
-    return FigureName(key, label, "" if unit == "1" else unit, group, better)
+    return FigureName(key, f"{words} at {at}" if at else words, "" if unit == "1" else unit, group, better)
 
 
 LIBRARIES = ("numpy", "scipy")
