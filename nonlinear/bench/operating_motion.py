@@ -14,8 +14,13 @@ from math import copysign, cosh, inf, isfinite
 import numpy as np
 
 from actuator_lti.design.model import Command, Coupling, Design, Friction, Instruments, LoadFriction, Sensor
-from actuator_lti.drive.angle import follows_angle, holding_moment_Nm, holding_torque_Nm
-from actuator_lti.drive.operating import Operating, segments
+from actuator_lti.drive.operating import (
+    Operating,
+    follows_angle,
+    holding_moment_Nm,
+    holding_torque_Nm,
+    segments,
+)
 from actuator_lti.errors import InputError
 from nonlinear.bench.steady_control import commands_fit
 from nonlinear.rows import Rows
