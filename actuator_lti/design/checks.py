@@ -67,7 +67,8 @@ def out_of_range(design: Design) -> Iterator[Refusal]:
 def _fits(field: Field, value: Any) -> bool:
     """Whether a key takes a value."""
     if isinstance(value, tuple | list):
-        return all(_fits(field, one) for one in value)
+        listed = field.kind in ("quantities", "matrix", "names")
+        return listed and all(_fits(field, one) for one in value)
     if field.kind in ("choice", "names"):
         return value in field.choices
     if field.kind in ("quantity", "integer", "quantities", "matrix"):

@@ -7,11 +7,11 @@ from dataclasses import fields as part_fields
 from math import inf, pi
 from typing import Any
 
-from actuator_lti.design.control import FEED_FORWARD, stable_pair
+from actuator_lti.design.control import FEED_FORWARD, FILTER_KEYS, Filter, FilterPlace, stable_pair
 from actuator_lti.design.fields import FIELDS, Field, fields_in
 from actuator_lti.design.law import BESIDE_A_LAW, MOST_STATES, Law
 from actuator_lti.design.mistakes import UNREAD, Refusal, Rule, readable
-from actuator_lti.design.model import FILTER_KEYS, Design, Filter, FilterPlace
+from actuator_lti.design.model import Design
 
 MAX_FILTERS = 8  # of each place; the running drive has room for so many second-order sections
 _BELOW_NYQUIST = ("frequency_rad_s", "zero_rad_s", "pole_rad_s")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from math import inf, isclose, log, pi
 from typing import Any
 
-from actuator_lti.design.mistakes import Refusal, Rule, readable
+from actuator_lti.design.mistakes import UNREAD, Refusal, Rule, readable
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.sections import part_at
@@ -116,7 +116,8 @@ def _no_gear(design: Design, path: str, attribute: str) -> Iterator[Refusal]:
     name, names = getattr(part_at(design, path), attribute, None), [gear.name for gear in design.gears]
     if name is not None and name not in names:
         known = ", ".join(names) or "none, as there are no gears; leave it out"
-        yield f"{path}.{attribute}", shown(f"{name}"), f"is no gear; allowed: {known}"
+        given = "" if name is UNREAD else shown(name)
+        yield f"{path}.{attribute}", given, f"is no gear; allowed: {known}"
 
 
 def _locking(design: Design) -> Iterator[Refusal]:
