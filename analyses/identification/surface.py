@@ -150,7 +150,7 @@ class _Runs:
             if self.kept is None:
                 told = "the runs do not tell C0, Cv and CM apart: vary speed and load, not together only"
                 raise NumericalError(told)
-            why = "no run is loaded" if one.name == "CM" and not one.like else str(one)
+            why = "no run is loaded" if one.name == "CM" and not one.moves else str(one)
             held[one.name] = Fixed(value=self.kept[one.name], reason=f"{why}: the design's value kept")
         self._check_count(len(NAMES) - len(held))
         return held
