@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -188,7 +189,12 @@ def _model(
     for block, rest, own in zip(blocks, rests, [rest for _, rest in singles] or rests, strict=True):
         other = block.explained(found, [name for name in block.names if not name.startswith(FRICTION)])
         rows = replace(block, names=tuple(free), w=block.columns(free))
-        residuals = {"residual": rest, "own_residual": own, "noise": own, "friction": block.y - other}
+        residuals: dict[str, Any] = {
+            "residual": rest,
+            "own_residual": own,
+            "noise": own,
+            "friction": block.y - other,
+        }
         parts.append(RecordFit(**vars(rows), **residuals, compared=np.ones(len(own), dtype=bool)))
     scaled = [(g * part.w, g * part.own_residual) for g, part in zip(weights, parts, strict=True)]
     drive = np.concatenate([block.y for block in blocks])

@@ -109,10 +109,10 @@ def fit_surface(
     aside, far = outliers == "set-aside", np.abs(size) > limit
     named = tuple(
         Outlier(run=points[k].run, standardised=float(size[k]), limit=limit, set_aside=aside)
-        for k in np.flatnonzero(far)
+        for k in np.flatnonzero(far).tolist()
     )
     if aside and named:
-        runs = _Runs([points[k] for k in np.flatnonzero(~far)], fixed or {}, kept or {})
+        runs = _Runs([points[k] for k in np.flatnonzero(~far).tolist()], fixed or {}, kept or {})
     return _fitted(runs, instruments, torque_constant_Nm_A, named)
 
 
