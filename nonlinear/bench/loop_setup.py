@@ -25,7 +25,7 @@ from nonlinear.bench.operating_motion import (
     standing,
 )
 from nonlinear.bench.probe import Probe
-from nonlinear.bench.steady_control import current_state, own_start, velocity_state
+from nonlinear.bench.steady_control import own_start, steady_state
 from nonlinear.rows import Rows
 
 STAGES = ("current", "velocity", "position")
@@ -119,9 +119,10 @@ class LoopSetup:
         """
         row = self._base.copy()
         row.probe(Probe(point=self.point, delay_samples=delay_samples))  # type: ignore[arg-type]
-        for place in gains_of(self.design, producer(self.design, self.point)):
-            row[place] *= gain
         self._start(row)
+        stage, own = producer(self.design, self.point), self.design.controller.own_law
+        for place in (*GAINS[stage], *(["own_gain"] if own is not None and own[0] == stage else [])):
+            row[place] *= gain
         return row
 
     @cached_property
@@ -152,43 +153,26 @@ class LoopSetup:
         row["voltage_start"] = wanted = bias.voltage_V
         for stage in self._running:
             if stage == "position":
-                self._position(row, wanted)
                 if point == "w_ref":
                     row["speed_command_start"] = wanted
+                self._position(row, wanted)
                 return
-            if stage == "current":
-                wanted, point = self._current(row), "i_ref"
-                row["current_command_start"] = wanted
+            if stage == self._own:
+                command, output = self._own_start(row, wanted), wanted
             else:
-                wanted, point = self._velocity(row, wanted), "w_ref"
+                steady = steady_state(self.design, bias, stage, wanted)
+                row[f"{stage}_integrator_start"] = steady.integrator
+                command, output = steady.command, steady.output
+            # the current's own, or what the torque filters begin with
+            row["current_command_start"] = command if stage == "current" else output
+            wanted, point = command, "i_ref" if stage == "current" else "w_ref"
         if self.outer == "current":
             row["current_command_start"] = 0.0  # filters of a velocity controller that is out of action
         row.step(point, wanted, -1.0)
 
-    def _current(self, row: Rows) -> float:
-        """The current controller in its steady state; returns the current command."""
-        back_emf, resistance = row.value("back_emf_feedforward"), row.value("resistance_feedforward")
-        if self._own == "current":
-            return self._own_start(row, self.bias.voltage_V, resistance, back_emf * self.bias.speed_rad_s)
-        gain, integral = row.value("current_gain"), row.value("current_integral") != 0.0
-        steady = current_state(self.bias, gain, integral, back_emf, resistance)
-        row["current_integrator_start"] = steady.integrator
-        return steady.command
-
-    def _velocity(self, row: Rows, wanted: float) -> float:
-        """The velocity controller in its steady state; returns the speed command."""
-        if self._own == "velocity":
-            row["current_command_start"] = wanted
-            return self._own_start(row, wanted)
-        gain, integral = row.value("velocity_gain"), row.value("velocity_integral") != 0.0
-        steady = velocity_state(self.design, self.bias, wanted, gain, integral)
-        row["velocity_integrator_start"] = steady.integrator
-        row["current_command_start"] = steady.output  # what the torque filters begin with
-        return steady.command
-
-    def _own_start(self, row: Rows, wanted: float, direct: float = 0.0, fed: float = 0.0) -> float:
+    def _own_start(self, row: Rows, wanted: float) -> float:
         """A law of one's own in its steady state; returns the command of its stage."""
-        start = own_start(self.design, self.bias, wanted, row.value("own_gain"), direct, fed)
+        start = own_start(self.design, self.bias, wanted)
         row.values[0, at.OWN_START : at.OWN_START + len(start.states)] = start.states
         return start.command
 
@@ -217,8 +201,7 @@ class LoopSetup:
     @property
     def steady_start(self) -> bool:
         """Whether the steady state is known that a run begins in; a ramp sets what a PI of position holds."""
-        own = self.design.controller.own_law
-        if self._own is not None and own and not own_start(self.design, self.bias, 0.0, own[1].gain).steady:
+        if self._own is not None and not own_start(self.design, self.bias, 0.0).steady:
             return False
         return not (self.outer == "position" and remembers(self.design) and self.bias.speed_rad_s != 0.0)
 
@@ -272,12 +255,6 @@ def remembers(design: Design) -> bool:
     """Whether the position controller has a state that a ramp sets."""
     place = design.controller.position
     return place is not None and (place.integral_time_s is not None or place.derivative_time_s > 0.0)
-
-
-def gains_of(design: Design, stage: str) -> tuple[str, ...]:
-    """Columns of a row that are the gain of a stage."""
-    own = design.controller.own_law
-    return (*GAINS[stage], *(("own_gain",) if own is not None and own[0] == stage else ()))
 
 
 def stages_of(design: Design) -> tuple[str, ...]:

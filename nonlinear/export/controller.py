@@ -120,10 +120,8 @@ def _constants(ours: Controller, upper: str) -> str:
 
 def _structs(ours: Controller) -> str:
     names = begins(ours.p)
-    texts = [struct_text(ours.state, lambda each: member_words(names[each.first]))]
-    for signals in (ours.measured, ours.out):
-        texts.append(struct_text(signals, _signal_words))
-    return "\n\n".join(texts)
+    state = struct_text(ours.state, lambda each: member_words(names[each.first]))
+    return "\n\n".join([state, *(struct_text(each, _signal_words) for each in (ours.measured, ours.out))])
 
 
 def _signal_words(member: Member) -> str:

@@ -13,7 +13,14 @@ _INSIDE = {  # numbers in the unit of the command of the next stage inside
     "S_VELOCITY_INTEGRATOR": "velocity", "S_TORQUE_FEEDFORWARD": "velocity", "S_TORQUE_CHAIN": "velocity",
     "S_POSITION_INTEGRATOR": "position",
 }  # fmt: skip
-_OUTERMOST = ("S_PROFILE", "S_PROFILE_COMMAND", "AT_AVERAGE", "S_AVERAGE_SUM", "S_COMMAND_CHAIN", "IN_COMMAND")
+_OUTERMOST = (
+    "S_PROFILE",
+    "S_PROFILE_COMMAND",
+    "AT_AVERAGE",
+    "S_AVERAGE_SUM",
+    "S_COMMAND_CHAIN",
+    "IN_COMMAND",
+)
 _UNITS = {
     "AT_ANGLES": "rad", "LAW_ANGLE": "rad", "LAW_OUTPUT_ANGLE": "rad", "LAW_SPEED": "rad/s",
     "LAW_OUTPUT_SPEED": "rad/s", "LAW_CURRENT": "A",

@@ -1,7 +1,7 @@
 """What each number of the flat rows is: name, words and unit, read from the layout of the kernels.
 
-They are the comments that stand behind each name in ``nonlinear/_kernels/layout.py``; units are SI, motor side
-(linear axis: read N for N m, m for rad, kg for kg m2).
+They are the comments behind each name in ``nonlinear/_kernels/layout.py``; units are SI, motor side (linear
+axis: read N for N m, m for rad, kg for kg m2).
 """
 
 from __future__ import annotations
