@@ -15,6 +15,7 @@ from math import inf, lcm
 
 from actuator_lti.design.control import FEED_FORWARD
 from actuator_lti.design.model import Design
+from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear.bench.operating_motion import (
@@ -56,26 +57,29 @@ class LoopSetup:
     held: bool = False
 
     @cached_property
-    def stages(self) -> tuple[str, ...]:
-        """Stages that the design has, innermost first."""
-        return stages_of(self.design)
+    def wired(self) -> Drive:
+        """The drive's stages, innermost first, what each drives and how often."""
+        return wire(self.design)
 
     @cached_property
     def outer(self) -> str:
         """Outermost stage that runs."""
-        return self.loop if self.loop in STAGES or not self.stages else self.stages[-1]
+        return self.loop if self.loop in STAGES or not self.wired.stages else self.wired.stages[-1]
 
     @cached_property
     def point(self) -> str:
         """Where the instrument sits."""
-        if self.loop in PATHS:
-            return target(self.design, self.outer) if self.stages else "u"
-        return target(self.design, self.loop) if self.loop in STAGES else self.loop
+        point = self.outer if self.loop in PATHS else self.loop
+        return self.wired.target.get(point, "u" if self.loop in PATHS else self.loop)
 
     @cached_property
     def hold_ticks(self) -> int:
         """Ticks between two updates at the point."""
-        return every(self.design, producer(self.design, self.point))
+        return self.every(self.wired.producer(self.point))
+
+    def every(self, stage: str) -> int:
+        """Ticks between two updates of a stage, 1 where there is none."""
+        return self.wired.interval.get(stage, 1)
 
     @cached_property
     def base_ticks(self) -> int:
@@ -83,9 +87,8 @@ class LoopSetup:
         current, own = self.design.controller.current, self.design.controller.own_law
         fed = current is not None and current.back_emf_feedforward != 0.0
         taken = fed or (own is not None and self._own is not None and "speed" in own[1].inputs)
-        measured = taken and not self.held and "velocity" in self.stages
-        stages = self._running + (("velocity",) if measured else ())
-        return lcm(*(every(self.design, stage) for stage in stages))
+        measured = taken and not self.held and "velocity" in self.wired.stages
+        return lcm(*map(self.every, (*self._running, *(["velocity"] if measured else []))))
 
     @property
     def period_s(self) -> float:
@@ -94,7 +97,8 @@ class LoopSetup:
 
     @property
     def _running(self) -> tuple[str, ...]:
-        return self.stages[: self.stages.index(self.outer) + 1] if self.stages else ()
+        stages = self.wired.stages
+        return stages[: stages.index(self.outer) + 1] if stages else ()
 
     @property
     def _own(self) -> str | None:
@@ -120,7 +124,7 @@ class LoopSetup:
         row = self._base.copy()
         row.probe(Probe(point=self.point, delay_samples=delay_samples))  # type: ignore[arg-type]
         self._start(row)
-        stage, own = producer(self.design, self.point), self.design.controller.own_law
+        stage, own = self.wired.producer(self.point), self.design.controller.own_law
         for place in (*GAINS[stage], *(["own_gain"] if own is not None and own[0] == stage else [])):
             row[place] *= gain
         return row
@@ -241,7 +245,8 @@ def loop_setup(design: Design, loop: str, *, limits_on: bool = True, held: bool 
     InputError
         If the design has no such loop or break point, or has no operating motion.
     """
-    known = (*stages_of(design), *points_of(design), *PATHS)
+    wired = wire(design)
+    known = (*wired.stages, *wired.points, *PATHS)
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
     result = LoopSetup(design, loop, operating_motion(design), limits_on, held)
@@ -255,36 +260,3 @@ def remembers(design: Design) -> bool:
     """Whether the position controller has a state that a ramp sets."""
     place = design.controller.position
     return place is not None and (place.integral_time_s is not None or place.derivative_time_s > 0.0)
-
-
-def stages_of(design: Design) -> tuple[str, ...]:
-    """Stages of the cascade, innermost first."""
-    control = design.controller
-    there = {"current": control.current, "velocity": control.velocity, "position": control.position}
-    return tuple(stage for stage in STAGES if there[stage] is not None)
-
-
-def target(design: Design, stage: str) -> str:
-    """The signal that a stage drives: ``u``, ``i_ref`` or ``w_ref``."""
-    stages = stages_of(design)
-    inside = stages[: stages.index(stage)]
-    return {"current": "i_ref", "velocity": "w_ref"}[inside[-1]] if inside else "u"
-
-
-def points_of(design: Design) -> tuple[str, ...]:
-    """Break points that exist, from the motor outwards."""
-    output = () if design.controller.position is None else ("output",)
-    return (*(target(design, stage) for stage in stages_of(design)), *output)
-
-
-def producer(design: Design, point: str) -> str:
-    """The stage that updates a break point; the position stage reads the output."""
-    return next((stage for stage in stages_of(design) if target(design, stage) == point), "position")
-
-
-def every(design: Design, stage: str) -> int:
-    """Ticks between two updates of a stage."""
-    control = design.controller
-    if stage == "velocity" and control.velocity is not None:
-        return control.velocity.every
-    return control.position_loop.every if stage == "position" else 1
