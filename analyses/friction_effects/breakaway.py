@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from actuator_lti.design.model import Command, Design
-from actuator_lti.drive.angle import holding_torque_Nm
 from actuator_lti.drive.facts import breakaway_torque_Nm, stall_torque_Nm
+from actuator_lti.drive.operating import holding_torque_Nm
 from actuator_lti.drive.steady import motor_torque_Nm, standing_gain, torque_gain_Nm_rad
 from analyses.finite import finite
 from nonlinear import Rows, commands, simulate
