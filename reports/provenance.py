@@ -51,7 +51,6 @@ def provenance(design_hash: str | None = None) -> Tree:
 
 
 def build_time() -> str:
-    """Give the time of the build in UTC, ISO 8601, whole seconds."""
     text = os.environ.get("SOURCE_DATE_EPOCH")
     if text is None:
         return datetime.now(UTC).isoformat(timespec="seconds")

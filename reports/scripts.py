@@ -35,7 +35,6 @@ def bundled(*entries: str) -> str:
 
 
 def _take(name: str, made: dict[str, str], above: tuple[str, ...]) -> None:
-    """Add a module behind those that it imports."""
     if name in above:
         raise ValueError(f"scripts import each other: {' -> '.join([*above, name])}")
     if name in made:

@@ -45,7 +45,6 @@ class Brief:
 
 
 def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequence[str] = ()) -> None:
-    """Print the tables and verdicts among the blocks; figures are for pages."""
     out = console()
     for block in blocks:
         if isinstance(block, SideBySide):
@@ -151,7 +150,6 @@ def _list(text: Text, said: Iterable[tuple[Mapping[str, Any], Any]]) -> None:
 
 
 def _names(side: SideBySide) -> list[str]:
-    """The rows of the blocks: each becomes a column."""
     rows = {str(row[block["columns"][0]["key"]]): None for block in side.blocks for row in block["rows"]}
     return list(rows)
 

@@ -73,7 +73,6 @@ def _plain(value: Any) -> Any:
 
 
 def _said(owner: Any, each: Any) -> bool:
-    """Whether a field has to be written: it is not the default."""
     value = getattr(owner, each.name)
     if each.name == "kind" or isinstance(value, np.ndarray):
         return True

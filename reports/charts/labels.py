@@ -58,7 +58,6 @@ class Room:
             self.ink.append((start + t * (stop - start)).reshape(-1, 2))
 
     def add_points(self, x: np.ndarray, y: np.ndarray, size: float = 4.0) -> None:
-        """Keep words off markers."""
         good = np.isfinite(x) & np.isfinite(y)
         for dx, dy in ((0, 0), (size, 0), (-size, 0), (0, size), (0, -size)):
             self.ink.append(np.column_stack([x[good] + dx, y[good] + dy]))
@@ -119,7 +118,6 @@ def _around(at: tuple[float, float], size: tuple[float, float], over: bool) -> I
 
 
 def distance(box: Box, at: tuple[float, float]) -> float:
-    """How far a box is from a point."""
     dx = max(box[0] - at[0], 0.0, at[0] - box[2])
     dy = max(box[1] - at[1], 0.0, at[1] - box[3])
     return math.hypot(dx, dy)

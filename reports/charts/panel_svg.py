@@ -90,7 +90,6 @@ def _axes(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
 
 
 def room_y(panel: Panel, height: float) -> int:
-    """Say how many ticks a panel of that height has room for."""
     return min(max(2, int(height / 24)), 7) if panel.y.ticks is None else 99
 
 

@@ -108,7 +108,6 @@ def _below(panel: Panel, hidden: bool) -> float:
 
 
 def _make_equal(panel: Panel, frame: Frame) -> None:
-    """Widen one axis so that a unit is as long on both."""
     (x0, x1), (y0, y1) = panel.x.span(), panel.y.span()
     scale = min(frame.width / (x1 - x0), frame.height / (y1 - y0))
     for axis, size, (low, high) in ((panel.x, frame.width, (x0, x1)), (panel.y, frame.height, (y0, y1))):

@@ -53,8 +53,6 @@ VariantOption = Annotated[
 
 
 def command(one: Analysis) -> Callable[..., None]:
-    """The function that typer makes a command of."""
-
     usual = getattr(one.request, "design_of", lambda _given: DEFAULT_DESIGN)
 
     def run(design: str | None = None, changes: list[str] | None = None, **given: Any) -> None:
@@ -79,7 +77,6 @@ def command(one: Analysis) -> Callable[..., None]:
 
 
 def _parameters(one: Analysis) -> dict[str, tuple[Any, Any]]:
-    """Annotation and default of every parameter of a command, by name."""
     asked = [(name, *each, getattr(one.request, name, None)) for name, each in _options(one).items()]
     needed = any(option.argument and default is None for _, _, option, default in asked)  # so is a design
     paged = one.page and not one.alone
@@ -168,7 +165,6 @@ def answer(
 
 
 def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, quiet: bool) -> list[str]:
-    """Write page and JSON."""
     from reports.cli.progress import progress
     from reports.html import write_report
     from reports.study_pages import study_document
@@ -182,7 +178,6 @@ def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, qu
 def _print(
     one: Analysis, name: str, result: Any, parts: Sequence[Section], passed: bool | Verdict | None
 ) -> None:
-    """Print the sections, or in brief what they say."""
     from reports.terminal import print_blocks, print_section, print_verdict
 
     brief = one.shows("brief", _nothing)(result)

@@ -124,7 +124,6 @@ def _by_option(error: InputError, known: Callable[[], Mapping[str, str]]) -> str
 
 
 def _say(line: str, status: int) -> int:
-    """Print one line on standard error and hand the status on."""
     words = "".join(c if c.isprintable() else "?" for c in " ".join(line.split()))
     words = words if len(words) <= _LONGEST else f"{words[: _LONGEST - 300]} ... {words[-295:]}"
     sys.stderr.write(f"actuator-lti: {words}\n")
@@ -132,7 +131,6 @@ def _say(line: str, status: int) -> int:
 
 
 def _usage_line(error: BaseException) -> str:
-    """Say what was wrong with the arguments, and where the help is."""
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "actuator-lti"
     message = error.format_message() if hasattr(error, "format_message") else str(error)
@@ -142,7 +140,6 @@ def _usage_line(error: BaseException) -> str:
 
 
 def _os_line(error: OSError) -> str:
-    """Name the file and what the system said."""
     name = f"{error.filename}: " if error.filename else ""
     return f"{name}{error.strerror or error}"
 

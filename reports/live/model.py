@@ -156,7 +156,6 @@ def _step(design: Design) -> Tree:
 
 
 def _map(design: Design) -> Tree | None:
-    """Give the cells of the map of sines, and the rule that names them; none without a position loop."""
     if design.controller.position is None:
         return None
     return {

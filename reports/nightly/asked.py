@@ -44,7 +44,6 @@ class Settings(OnMachines):
 
     @property
     def engine(self) -> Engine:
-        """Where to compute."""
         from analyses.studies.engine import Engine
 
         return Engine(None, self.scheduler, threads=self.workers or 1, tls=self.tls)
@@ -81,7 +80,6 @@ class Asked(Settings):
     ] = None
 
     def __post_init__(self) -> None:
-        """Refuse numbers out of range."""
         for name, (least, most) in _ALLOWED.items():
             if not least <= getattr(self, name) <= most:
                 to = "" if most == inf else f" to {most}"

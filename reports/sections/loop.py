@@ -60,7 +60,6 @@ def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
 
 
 def result(figures: LoopFigures) -> str:
-    """Say in one sentence what the loop is like."""
     row, bandwidth = margin_row(figures), response_row(figures)["minus3db_hz"]
     parts = [
         ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"], gain_margin),

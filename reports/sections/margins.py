@@ -43,7 +43,6 @@ def _at(name: str) -> Callable[[LoopFigures], float | None]:
 
 
 def _state(figures: LoopFigures) -> doc.State:
-    """Say whether a loop is stable, or unstable only by itself."""
     if figures.held is not None:
         return {"text": "unstable by itself", "status": "warn"}
     return {"text": figures.margins.verdict, "status": STATUS[figures.margins.stable]}
@@ -119,7 +118,6 @@ def section(result: Margins) -> list[doc.Section]:
 
 
 def brief(result: Margins) -> Brief:
-    """The tables as one, a column a loop."""
     first, judged = section(result)
     known = _named(result)
     every, own = with_held(known), with_own_margins(with_held(known))
@@ -162,7 +160,6 @@ def _notes(result: Margins, named: Mapping[str, LoopFigures]) -> list[str]:
 
 
 def _stability(named: Mapping[str, LoopFigures]) -> str:
-    """Say which loops are not stable; or that all are, and which only with the rotor or load held."""
     unstable = [name for name, one in named.items() if one.sound is False]
     unknown = [name for name, one in named.items() if one.sound is None]
     if unstable or unknown:
@@ -244,7 +241,6 @@ def evidence_words(figures: Mapping[str, LoopFigures]) -> str:
 
 
 def evidence_notes(named: Mapping[str, LoopFigures]) -> list[str]:
-    """Give the reason of every loop whose margins are not certified."""
     known = [(name, one.margins) for name, one in named.items()]
     return [f"{name}, {m.evidence}: {m.evidence_reason}." for name, m in known if m.evidence != "certified"]
 
@@ -359,7 +355,6 @@ def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
 
 
 def response_row(figures: LoopFigures) -> Tree:
-    """Give bandwidth, resonance and step of one loop by column."""
     return {one["key"]: doc.plain(read(figures)) for one, read in RESPONSES}
 
 
@@ -398,11 +393,9 @@ def worst_status(stable: Iterable[bool | None]) -> doc.Status:
 
 
 def finite(value: float | None) -> float | None:
-    """Give a number, or nothing where there is none or no bound."""
     return None if value is None or not math.isfinite(value) else float(value)
 
 
 def times(value: float | None, factor: float) -> float | None:
-    """Give a number in another unit, or nothing."""
     known = finite(value)
     return None if known is None else known * factor

@@ -59,7 +59,6 @@ def text(result: MonteCarloResult | Design) -> str | None:
 
 
 def _result(result: MonteCarloResult) -> str:
-    """Say how many samples meet everything, and which requirement fails most often."""
     words = f"{result.tally.words('requirements')} under tolerances"
     each = {odds.id: odds for odds in result.odds}
     if (every := each.pop("all", None)) is None:

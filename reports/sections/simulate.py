@@ -158,7 +158,6 @@ def _scaled(signals: Signals, factor: float) -> Signals:
 
 
 def _limit(panel: style.Panel, limit: float, peak: float) -> None:
-    """Draw both signs of the limit where it lies within reach of the signals."""
     if limit > 4.0 * peak:
         panel.note(f"limit ±{limit:.4g}, off scale", corner="top left", colour=style.MUTED)
         return

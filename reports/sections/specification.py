@@ -39,7 +39,6 @@ def section(result: Specification) -> doc.Section:
 
 
 def _result(result: Specification) -> str:
-    """Say what the drive can do at the largest load."""
     scale, unit = output_unit(result.design.axis)
     one = max(result.capabilities, key=lambda one: one.figures.load_Nm, default=None)
     if one is None:
@@ -67,7 +66,6 @@ def _unlike(value: float, simulated: float | None, scale: float) -> str:
 
 
 def _commanded(design: Design) -> str:
-    """What the profile of the command asks for at most."""
     scale, unit = output_unit(design.axis)
     limits = ((design.command.rate_rad_s, f"{unit}/s"), (design.command.acceleration_rad_s2, f"{unit}/s²"))
     parts = [f"{significant(scale * value)} {per}" for value, per in limits if math.isfinite(value)]
@@ -75,7 +73,6 @@ def _commanded(design: Design) -> str:
 
 
 def _findings(result: Specification) -> list[doc.Finding]:
-    """Name the loads at which the drive cannot run without pause."""
     words = [
         f"At {one.figures.load_Nm:g} {load_unit(result.design)} load the continuous current allows a duty of "
         f"{100.0 * one.duty:.0f} %."

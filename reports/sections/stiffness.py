@@ -47,7 +47,6 @@ def _push(result: Stiffness) -> str:
 
 
 def _result(result: Stiffness, unit: str) -> str:
-    """Say the static stiffness, where the drive is weakest, and what was compared with the simulator."""
     powered = result.curves[0]
     words = f"A load {_push(result)} does not move the output of this drive"
     if np.isfinite(powered.stiffness_Nm_rad).any():
@@ -60,7 +59,6 @@ def _result(result: Stiffness, unit: str) -> str:
 
 
 def _compared(result: Stiffness) -> str:
-    """What was put to the simulator, and how far it is off; or why it could not be."""
     if not result.checks:
         return f"nothing is compared: {result.unproven}" if result.unproven else ""
     most = max(check.difference for check in result.checks)

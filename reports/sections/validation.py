@@ -92,7 +92,6 @@ def summary(validation: Validation) -> doc.Section:
 
 
 def result(validation: Validation) -> str:
-    """Say how many predictions are met, and what the drive does that it must not."""
     words = [validation.tally.words("predictions"), *validation.failures]
     words += [f"stability of the {name} loop not known" for name in validation.undecided]
     words += [validation.rest_words] if validation.rest is not Verdict.NOT_MET else []
@@ -100,7 +99,6 @@ def result(validation: Validation) -> str:
 
 
 def findings(validation: Validation) -> list[doc.Finding]:
-    """Name what has to be watched, the gravest first."""
     made = [
         doc.Finding(severity="fail", text=f"{loop_words(name)}: not stable.", where="validation")
         for name in validation.unstable
@@ -171,8 +169,6 @@ def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
 
 
 def table(rows: Sequence[Check], caption: str) -> doc.Block:
-    """Lay checks out as a table."""
-
     def error(row: Check) -> float:
         return max(row.error, NOISE * abs(row.predicted or 1.0))  # no digits that are noise of the last bit
 

@@ -14,8 +14,8 @@ from nightly_fakes import CODE, INLINE, Calendar, fake_document, job, study
 from site_checks import Page, check_whole
 
 from actuator_lti.errors import InputError
-from reports.nightly.course import line_chart
 from reports.nightly.night import approve, run_night
+from reports.nightly.pages import line_chart
 from reports.nightly.source import read_study
 from reports.nightly.text import one_line
 from reports.visible import visible

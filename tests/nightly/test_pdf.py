@@ -23,8 +23,7 @@ from reports.document import (
     verdict,
     verdicts,
 )
-from reports.pdf import pdf_bytes, write_pdf
-from reports.pdf.printable import clean
+from reports.pdf import clean, pdf_bytes, write_pdf
 
 pypdf = pytest.importorskip("pypdf")
 
