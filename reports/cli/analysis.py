@@ -63,14 +63,12 @@ def command(one: Analysis) -> Callable[..., None]:
             subject = load_drive(usual(given) if design is None else design, changes)
         answer(one, subject, **given)
 
-    parameters = _parameters(one)
-    run.__signature__ = Signature(  # type: ignore[attr-defined]
-        [
-            Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-            for name, (annotation, default) in parameters.items()
-        ]
-    )
-    run.__annotations__ = {name: annotation for name, (annotation, _) in parameters.items()}
+    parameters = [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+        for name, (annotation, default) in _parameters(one).items()
+    ]
+    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
     words = one.help.replace("[", "\\[")  # of keys, no markup
     run.__doc__ = words + (f"\n\nIn the report: --also {one.name}." if one.also else "")
     return run
@@ -82,12 +80,13 @@ def _parameters(one: Analysis) -> dict[str, tuple[Any, Any]]:
     paged = one.page and not one.alone
     made: dict[str, tuple[Any, Any]] = {}
     if one.study:
-        made = {"design": (StudyArgument, None), "changes": (VariantOption, None)}
+        made["design"] = (StudyArgument, None)
     elif hasattr(one.request, "design_of"):
-        made = {"design": (DesignOption, None), "changes": (SetOption, None)}
+        made["design"] = (DesignOption, None)
     elif not one.alone:
-        design = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
-        made = {"design": design, "changes": (SetOption, None)}
+        made["design"] = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
+    if made:
+        made["changes"] = (VariantOption if one.study else SetOption, None)
     made |= {name: _option(name, kind, option, default) for name, kind, option, default in asked}
     if paged:
         made["out"] = (FolderOption, Path(one.out) if one.out else None)
@@ -132,7 +131,10 @@ def answer(
     from reports.study_pages import notices
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
-    values = {name: _read(name, option, chosen[name], drive) for name, (_, option) in _options(one).items()}
+    values: dict[str, Any] = {}
+    for name, (_, option) in _options(one).items():
+        of, value = f"--{option.flag or flag(name)}", chosen[name]
+        values[name] = value if option.kind == "plain" else read_quantity(of, value, option.kind, drive)
     if one.written and (as_json or out is not None):
         values[one.written] = True
     asked = one.asked(subject, values)
@@ -201,12 +203,6 @@ def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, An
         return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], needed
     made = typer.Option(f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words)
     return (Annotated[bool, made], default) if kind is bool else (Annotated[text | None, made], None)
-
-
-def _read(name: str, option: Option, value: Any, drive: Design) -> Any:
-    """The value of an option in SI, once the drive is known."""
-    of = f"--{option.flag or flag(name)}"
-    return value if option.kind == "plain" else read_quantity(of, value, option.kind, drive)
 
 
 def _nothing(*_result: Any) -> None:
