@@ -19,10 +19,9 @@ if TYPE_CHECKING:
 def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     """Compute a report: what `reports.nightly.figures.digest` keeps of it, and its files.
 
-    The payload has ``name``, ``settings`` (``pdf``, ``validation``, ``monte_carlo``) and either ``design``,
-    the text of a design file, or ``study``, all designs of a study as texts, which makes their comparison (no
-    figures are kept of it, as they are those of its designs); ``refused`` in place of them says why there is
-    no design.
+    The payload has ``name``, ``settings`` (``pdf``, ``validation``, ``monte_carlo``) and either ``design``, a
+    design file's text, or ``study``, all designs of a study, for their comparison (figures are kept of the
+    designs alone), or ``refused``, why there is none.
     """
     from analyses.isolation import drain
     from reports import document as doc

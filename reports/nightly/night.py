@@ -7,7 +7,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.start.extras import need
@@ -25,6 +25,7 @@ from reports.nightly.view import Overview, overview
 from reports.visible import visible
 
 DESIGNS_A_LIMIT = 50  # of a comparison, within one time limit
+Outcome = tuple[Result, Reported | None]  # of a job; what the history keeps of its report, where it has one
 
 
 def _nobody(*_said: object) -> None:
@@ -57,14 +58,6 @@ def nightly(asked: Asked, progress: Callable[[int, int], None]) -> Overview:
     except HistoryLost as lost:  # no bad input: the gate cannot judge, so it does not open
         say(str(lost))
         raise typer.Exit(VERDICT_FAILED) from lost
-
-
-class Outcome(NamedTuple):
-    """What came of a job; what its report says and what the history keeps, where there is one."""
-
-    result: Result
-    meta: Mapping[str, Any]
-    reported: Reported | None
 
 
 def run_night(
@@ -105,8 +98,8 @@ def run_night(
             host=socket.gethostname(),
         )
         outcomes = _outcomes(run, jobs, cache, use, progress, say)
-        history.finish_run(run, clock(), [(one.result, one.reported) for one in outcomes])
-        return _published(study, site, history, cache, use, {one.result.key: one.meta for one in outcomes})
+        history.finish_run(run, clock(), outcomes)
+        return _published(study, site, history, cache, use)
 
 
 def approve(
@@ -136,15 +129,12 @@ def approve(
                 raise InputError(f"{shown} has no result in the last night: nothing to approve", study.name)
         about = {"by": one_line(by, 200), "reason": one_line(reason, 2000)}
         history.approve(last.id, list(names) or None, at=clock(), **about)
-        return _published(study, site, history, cache, use, {})
+        return _published(study, site, history, cache, use)
 
 
-def _published(
-    study: Study, site: Path, history: History, cache: Cache, use: Settings,
-    metas: Mapping[str, Mapping[str, Any]],
-) -> Overview:  # fmt: skip
-    """The site of the last finished night made anew; ``metas``: what is known already, by content address."""
-    view = overview(history, cache, study, metas, site)
+def _published(study: Study, site: Path, history: History, cache: Cache, use: Settings) -> Overview:
+    """The last finished night, its site made anew from history and cache."""
+    view = overview(history, cache, study, site)
     site_files.publish(site, view, history, cache, keep_reports=use.keep)
     return view
 
@@ -171,6 +161,7 @@ def _outcomes(
     run: Run, jobs: Sequence[Job], cache: Cache, use: Settings, progress: Callable[[int, int], None],
     say: Callable[[str], None],
 ) -> list[Outcome]:  # fmt: skip
+    """What came of each job; in the cache is then what the pages need of it."""
     done: dict[str, Outcome] = {}
     todo: dict[str, Job] = {}
     tasks: list[Task] = []
@@ -208,7 +199,7 @@ def _built(run: Run, job: Job, key: str, answer: Answer, cache: Cache) -> Outcom
         except InputError as error:
             raise InputError(f"result of {one_line(job.name, 60)!r} cannot be kept: {error}") from error
     said: dict[str, Any] = {"status": status, "seconds": answer.seconds, "message": visible(message)}
-    return Outcome(Result(run=run.id, name=job.name, kind=job.kind, **said), {}, None)
+    return Result(run=run.id, name=job.name, kind=job.kind, **said), None
 
 
 def _reported(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any) -> Outcome:
@@ -236,4 +227,4 @@ def _reported(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any
         "design_hash": job.design_hash,
         "revision": job.revision,
     }
-    return Outcome(result, meta, ([Figure(**f) for f in meta["figures"]], inputs))
+    return result, ([Figure(**f) for f in meta["figures"]], inputs)

@@ -47,7 +47,7 @@ class Run:
 
 @dataclass(frozen=True, kw_only=True)
 class Content:
-    """The figures of a result, as `packed`, in one of the layouts of its night; parameters and settings."""
+    """Of a result: its figures as `packed` in one of the layouts of the night; parameters and settings."""
 
     layout: int
     values: str

@@ -29,10 +29,9 @@ from analyses.studies.study import Variant, is_study, study_from_tree, study_of
 from analyses.toml_tables import Table
 from reports.nightly.text import one_line, sha256
 from reports.nightly.tolerance import Tolerances, read_tolerances
-from reports.provenance import git, package_version
+from reports.provenance import LIBRARIES, git, package_version
 
 PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
-LIBRARIES = ("control", "numpy", "scipy", "matplotlib", "jinja2", "typst")
 COMMITS = 8  # named at most between two nights
 MAX_NAME = 20_000
 _SUFFIXES = (".py", ".toml", ".html", ".j2", ".css", ".js", ".typ", ".svg")
@@ -88,7 +87,7 @@ def code_version(root: Path | None = None) -> CodeVersion:
     folder = Path(__file__).resolve().parents[2] if root is None else root
     return CodeVersion(
         sources=sha256(canonical([hash_of(folder / package, _SUFFIXES) for package in PACKAGES])),
-        libraries={name: package_version(name, "absent") for name in LIBRARIES},
+        libraries={name: package_version(name, "absent") for name in (*LIBRARIES, "typst")},
         commit=commit_of(folder),
     )
 

@@ -29,26 +29,23 @@ def state_of(site: Path, state: Path | None = None) -> Path:
 
     Refused is what is no folder, leads elsewhere or lies inside the site.
     """
-    place = Path(os.path.abspath(site))  # "." and ".." have names, too
-    if state is None and not place.name:
-        raise InputError("is the root of the disk: --site takes a folder below it", where=shown_path(site))
-    if state is not None and Path(os.path.realpath(state)).is_relative_to(os.path.realpath(site)):
-        raise InputError(
-            "lies inside the site and would be published with it: --state takes a folder elsewhere",
-            where=shown_path(state),
-        )
-    state = place.with_name(f"{place.name}.state") if state is None else state
+    if state is None:
+        place = Path(os.path.abspath(site))  # "." and ".." have names, too
+        if not place.name:
+            raise InputError("is the root of the disk: --site takes a folder below it", shown_path(site))
+        state = place.with_name(f"{place.name}.state")
+    elif Path(os.path.realpath(state)).is_relative_to(os.path.realpath(site)):
+        why = "lies inside the site and would be published with it: --state takes a folder elsewhere"
+        raise InputError(why, shown_path(state))
     folders = (state, state / CACHE, state / NIGHTS)
     for folder in folders:
         if os.path.lexists(folder) and not folder.is_dir():
-            raise InputError("is no folder; allowed: a folder, or none yet", where=shown_path(folder))
+            raise InputError("is no folder; allowed: a folder, or none yet", shown_path(folder))
     inside = [path for folder in folders if folder.is_dir() for path in folder.iterdir()]
     for path in (state, *inside):
         if path.is_symlink():
-            raise InputError(
-                "is a symbolic link: history and cache are kept in the state folder itself",
-                where=shown_path(path),
-            )
+            why = "is a symbolic link: history and cache are kept in the state folder itself"
+            raise InputError(why, shown_path(path))
     return state
 
 
@@ -122,9 +119,10 @@ def check_memory(site: Path, now: Memory, state: Path) -> None:
             " version, or begin anew on purpose with --accept-lost-history"
         )
     before = remembered(site)
-    lost = before is not None and (now.nights < before.nights or now.approvals < before.approvals)
-    other = before is not None and before.id and now.id != before.id
-    if not (lost or other):
+    if before is None:
+        return
+    other = before.id and now.id != before.id
+    if not other and now.nights >= before.nights and now.approvals >= before.approvals:
         return
     what = "is that of another site" if other else f"holds {now}"
     what = what if now.nights else "is missing or empty"

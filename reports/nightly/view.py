@@ -137,14 +137,12 @@ def report_folder(result: Result) -> str:
     return f"reports/{hashed(result.name)}/{result.key[:16]}"
 
 
-def overview(
-    history: History, cache: Cache, study: Study, metas: Mapping[str, Mapping[str, Any]], site: Path
-) -> Overview:
+def overview(history: History, cache: Cache, study: Study, site: Path) -> Overview:
     """Put together what the site says about the last finished night."""
     runs = history.runs
     between = Between(history, study.tolerances, study.origin)
     tonight = history.night(runs[-1].id).by_name
-    designs = [_design(result, between, cache, metas) for result in tonight.values()]
+    designs = [_design(result, between, cache) for result in tonight.values()]
     before = history.night(runs[-2].id).by_name if len(runs) > 1 else {}
     return Overview(
         study=study,
@@ -159,9 +157,7 @@ def overview(
     )
 
 
-def _design(
-    result: Result, between: Between, cache: Cache, metas: Mapping[str, Mapping[str, Any]]
-) -> DesignView:
+def _design(result: Result, between: Between, cache: Cache) -> DesignView:
     history = between.history
     past = history.results(result.name, last=2 * STRIP)
     runs, known = {run.id: run for run in history.runs}, outcomes(past)
@@ -169,12 +165,10 @@ def _design(
         one for one in history.index.baselines[::-1] if one.name in (None, result.name) and one.run in runs
     )
     approval = next((one for one in own if history.first(result.name, [runs[one.run]])), None)
-    meta = metas.get(result.key)
-    if meta is None and result.key and (entry := cache.whole(result.key)):
-        meta = entry.meta
+    entry = cache.whole(result.key) if result.key else None
     return DesignView(
         result=result,
-        meta=meta or {},
+        meta=entry.meta if entry else {},
         last_night=between.last_night(result, past),
         baseline=between.baseline(result, approval),
         approval=approval,
