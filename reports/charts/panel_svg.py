@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from reports.charts.axis import minor_ticks
@@ -25,7 +23,9 @@ def panel_svg(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
         world.append(drawn)
         marks.append(dots)
     clip = f"{pen.prefix}c"
-    notes = "".join(note_svg(item, panel, frame, pen, room) for item in by_need(panel.items))
+    wordy = [item for item in panel.items if isinstance(item, Rule | Note) and item.words]
+    wordy.sort(key=lambda item: not (isinstance(item, Note) and item.pinned))  # which cannot give way
+    notes = "".join(note_svg(item, panel, frame, pen, room) for item in wordy)
     inside = (
         f'<clipPath id="{clip}"><rect x="{frame.left:.1f}" y="{frame.top:.1f}" width="{frame.width:.1f}" '
         f'height="{frame.height:.1f}"/></clipPath><g clip-path="url(#{clip})">'
@@ -133,10 +133,9 @@ def _curve(item: Curve, panel: Panel, frame: Frame, pen: Pen, room: Room, key: s
 
 def _dots(x: np.ndarray, y: np.ndarray, item: Curve, pen: Pen, key: str) -> str:
     """Write markers: one drawn, the others refer to it."""
-    look = item.look
     if not len(x):
         return ""
-    name = f"{pen.prefix}m"
+    look, name = item.look, f"{pen.prefix}m"
     shape = f'<path id="{name}" d="{MARKER_PATHS[look.marker]}" transform="scale({look.size / 2:g})"/>'
     uses = "".join(f'<use href="#{name}" x="{a:.2f}" y="{b:.2f}"/>' for a, b in zip(x, y, strict=True))
     mute = "" if item.read and not item.line else " mute"
@@ -145,14 +144,13 @@ def _dots(x: np.ndarray, y: np.ndarray, item: Curve, pen: Pen, key: str) -> str:
 
 
 def _rule(item: Rule, panel: Panel, frame: Frame, pen: Pen, room: Room, key: str) -> str:
-    axis = panel.x if item.across == "x" else panel.y
     if item.across == "x":
-        (at,) = frame.x(axis, [item.at])
+        (at,) = frame.x(panel.x, [item.at])
         path, ends = f"M{at:.2f} -{RULE_LENGTH}V{RULE_LENGTH}", ([at, at], [frame.top, frame.bottom])
     else:
-        (at,) = frame.y(axis, [item.at])
+        (at,) = frame.y(panel.y, [item.at])
         path, ends = f"M-{RULE_LENGTH} {at:.2f}H{RULE_LENGTH}", ([frame.left, frame.right], [at, at])
-    room.add_line(np.array(ends[0]), np.array(ends[1]))
+    room.add_line(*map(np.array, ends))
     return pen.line(path, item.look, f' class="rule"{key}' if pen.page else "")
 
 
@@ -172,15 +170,8 @@ NOTE = 10.5
 LEADER = 26.0  # words further away from their point are tied to it by a line
 
 
-def by_need(items: Sequence[Item]) -> list[Item]:
-    """Give what has words, the pinned ones first: they cannot give way."""
-    wordy = [item for item in items if (isinstance(item, Rule | Note) and item.words)]
-    return sorted(wordy, key=lambda item: 0 if isinstance(item, Note) and item.pinned else 1)
-
-
-def note_svg(item: Item, panel: Panel, frame: Frame, pen: Pen, room: Room) -> str:
+def note_svg(item: Rule | Note, panel: Panel, frame: Frame, pen: Pen, room: Room) -> str:
     """Write the words of a rule or note where they cover nothing."""
-    assert isinstance(item, Rule | Note)
     w, h = text_box(item.words, NOTE)
     size = (w + 6.0, h + 2.0)
     if isinstance(item, Rule):
