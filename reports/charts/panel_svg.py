@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from reports.charts.axis import minor_ticks
@@ -67,7 +69,7 @@ def _axes(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
     below = [pen.words(words, x, low, size=TICK, anchor="middle") for x, (_, words) in shown]
     beside = [pen.words(w, left, y + 3.7, size=TICK, anchor="end") for y, (_, w) in zip(py, ys, strict=True)]
     parts.append(f'<g class="xt">{"".join(below)}</g><g class="yt">{"".join(beside)}</g>')
-    middle = {"size": LABEL, "anchor": "middle"}
+    middle: dict[str, Any] = {"size": LABEL, "anchor": "middle"}
     if panel.x.label and not hide_x:
         low = frame.bottom + (17.0 if xs else 3.0) + LABEL
         parts.append(pen.words(panel.x.label, (frame.left + frame.right) / 2.0, low, **middle))

@@ -90,8 +90,9 @@ class Columns:
         for k in np.flatnonzero(self.moved(before, after)):
             of = self.figures[k]
             old, new = (float(value) if np.isfinite(value) else None for value in (before[k], after[k]))
-            about = {"figure": of.name, "unit": of.unit, "kind": of.kind, "tolerance": float(allowed[k])}
-            changes.append(Change(**about, before=old, after=new, worse=_worse(of, old, new)))
+            about: dict[str, Any] = {"figure": of.name, "unit": of.unit, "kind": of.kind}
+            about |= {"before": old, "after": new, "tolerance": float(allowed[k])}
+            changes.append(Change(**about, worse=_worse(of, old, new)))
         return tuple(sorted(changes, key=_order))
 
 

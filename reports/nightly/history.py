@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -25,6 +25,7 @@ from reports.nightly.records import Baseline, Content, Index, Named, Night, Resu
 from reports.nightly.state import INDEX, NIGHTS, Memory
 from reports.nightly.text import one_line, sha256
 
+SCHEMA: Final = "actuator-lti/nightly-history"
 VERSION = 1
 Shape = TypeVar("Shape")
 Reported = tuple[Sequence[Figure], dict[str, Any]]  # figures and inputs
@@ -90,7 +91,8 @@ class History:
 
     def approve(self, run: int, names: Sequence[str] | None, **about: str) -> None:
         """Make a night the baseline (see `Baseline`) of some designs, or of all (``None``)."""
-        more = [Baseline(run=run, name=name, **about) for name in names or [None]]
+        every: Sequence[str | None] = names or [None]
+        more = [Baseline(run=run, name=name, **about) for name in every]
         self._put(replace(self.index, baselines=[*self.index.baselines, *more]))
 
     def claim(self, study: str) -> None:
@@ -104,8 +106,8 @@ class History:
             self._put(replace(self.index, study=study))
 
     def _put(self, index: Index) -> None:
-        about = {"schema": "actuator-lti/nightly-history", "version": VERSION}
-        sealed = _Sealed(**about, sha256=sha256(_INDEX.dump_json(index)), index=index)
+        checksum = sha256(_INDEX.dump_json(index))
+        sealed = _Sealed(schema=SCHEMA, version=VERSION, sha256=checksum, index=index)
         write_bytes(self.state / INDEX, _SEALED.dump_json(sealed))
         self.index = index
 
