@@ -26,7 +26,7 @@ from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.settings import Asked as ValidationAsked
 from reports.design_files.keys import Asked as KeysAsked
 from reports.design_files.start import Asked as StartAsked
-from reports.exports import AskedC, AskedController, AskedFmu, AskedLinear
+from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
 from reports.nightly.asked import Asked as NightlyAsked
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.errors import InputError
 from reports.analyses import FURTHER
 from reports.cli.options import (
@@ -76,7 +77,6 @@ def report(
 
     Try: actuator-lti report joint --also corners --also failures --pdf --out out/joint
     """
-    from actuator_lti.asked.verdict import Verdict
     from actuator_lti.design.loader import design_text
     from reports import build
     from reports.cli.errors import leave_with
