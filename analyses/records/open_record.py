@@ -14,7 +14,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import MatContent
 from actuator_lti.files.reading import as_path, open_regular, read_campaign_toml
 from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
-from analyses.records.csv_rows import STAMP
+from analyses.records.csv_stream import STAMP
 from analyses.records.inputs import spec_of_names
 from analyses.records.naming import is_unit
 from analyses.records.readers import TABLES, columns_of, load_mat, names_in, read_record
