@@ -14,7 +14,7 @@ from actuator_lti.files.reading import shown_path
 from analyses.estimation.arrays import BoolArray, FloatArray, IntArray
 from analyses.records.inputs import inputs_of
 from analyses.records.record import Record, RowCounts, check_error, line_error
-from analyses.records.spec import RecordSpec, converter, unit_factor
+from analyses.records.spec import RecordSpec, to_si, unit_factor
 
 
 def filled(
@@ -65,7 +65,7 @@ class SiRows:
     def __init__(self, spec: RecordSpec, counts: RowCounts, origin: str) -> None:
         self._spec, self._counts, self._origin = spec, counts, origin
         self._factor = spec.time.tick_s or unit_factor(spec.time.unit, "s", "time")
-        self._converters = [converter(signal) for signal in spec.signals]
+        self._factors = [to_si(signal)[0] for signal in spec.signals]
         self._row, self._wraps, self._last_time = 0, 0.0, -np.inf
         self._last_raw: float | None = None
 
@@ -85,9 +85,9 @@ class SiRows:
             time, raw = time[keep], self._kept(block, keep, "whose time does not increase").values[:, 1:]
         self._counts.rows_out += len(time)
         signals, first = [], 0
-        for signal, own in zip(spec.signals, self._converters, strict=True):
+        for signal, factor in zip(spec.signals, self._factors, strict=True):
             signs = [sign for sign, _ in signal.terms(self._counts.columns)]
-            signals.append(own(raw[:, first : first + len(signs)] @ signs))
+            signals.append((raw[:, first : first + len(signs)] @ signs + signal.offset) * factor)
             first += len(signs)
         return np.column_stack([time, *signals])
 
@@ -182,7 +182,7 @@ def record_of_rows(
         name=shown_path(path.name),
         time_s=time,
         signals=MappingProxyType(signals),
-        units=MappingProxyType({signal.name: converter(signal).si_unit for signal in spec.signals}),
+        units=MappingProxyType({signal.name: to_si(signal)[1] for signal in spec.signals}),
         counts=counts,
         averaged=averaged,
         sha256=digest,
