@@ -83,7 +83,6 @@ def join_records(
         The first record with the second one's signals added (linear interpolation), cut to the time both
         cover; and how it was done.
     """
-    signals = {"first_signal": first_signal, "second_signal": second_signal}
     if method == "given":
         if offset_s is None:
             raise InputError('join method "given": needs an offset', where=second.name)
@@ -94,7 +93,7 @@ def join_records(
         where = f"{first.name} with {second.name}"
         _check_durations(a, b, where)
         join = (_by_event if method == "event" else _by_correlation)(a, b, where)
-    join = replace(join, method=method, **signals)
+    join = replace(join, method=method, first_signal=first_signal, second_signal=second_signal)
     time = join.offset_s + join.rate * second.time_s
     start = int(np.searchsorted(first.time_s, time[0]))
     stop = int(np.searchsorted(first.time_s, time[-1], side="right"))
