@@ -24,11 +24,11 @@ from analyses.large_signal.classify import (
     not_linear,
     waveforms,
 )
-from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones import (
     MOST_TICKS,
     amplitudes,
     frequency_range_hz,
+    linear_steady_state,
     run_tones,
     tones,
     work_ticks,

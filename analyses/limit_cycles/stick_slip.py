@@ -17,7 +17,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import breakaway_torque_Nm
 from actuator_lti.drive.steady import standing_gain, steady_input
 from actuator_lti.loops import Loops, assemble_loops
-from analyses.large_signal.steady_start import AT_REST, linear_steady_state, without_value
+from analyses.large_signal.tones import AT_REST, linear_steady_state, without_value
 
 SMALLEST, LARGEST, POINTS = 1e-3, 1.0, 241  # of the threshold
 SLOPE_STEP = 1e-3

@@ -11,7 +11,7 @@ from actuator_lti import load_design, read_design_text
 from actuator_lti.errors import InputError
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
 from analyses.monte_carlo.judging import Reduction, reduced, unpacked
-from analyses.monte_carlo.statistics import MOST
+from analyses.monte_carlo.result import MOST
 from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
 from analyses.studies.sampling import sampler_of

@@ -15,7 +15,7 @@ from actuator_lti.batch import Population
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.model import Tolerance
 from actuator_lti.errors import InputError
-from analyses.monte_carlo.statistics import MOST, SHARES, Sketch, clopper_pearson, column_statistics
+from analyses.monte_carlo.result import MOST, SHARES, Sketch, clopper_pearson, column_statistics
 from analyses.monte_carlo.task import StepCheck, step_columns, step_rows, step_units
 from analyses.studies.sampling import Factor, Sampler, read_table, sampler_of
 from nonlinear import Reducers, Run, commands, simulate_many
@@ -159,7 +159,7 @@ def test_sketches_of_parts_are_that_of_the_whole_in_any_order(values, cuts, seed
     column = np.array(values)
     parts = np.split(column, sorted({cut for cut in cuts if cut < len(column)}))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("analyses.monte_carlo.statistics.MOST", 16)
+        patch.setattr("analyses.monte_carlo.result.MOST", 16)
         whole = Sketch.of(column)
         shuffled = [Sketch.of(parts[k]) for k in np.random.default_rng(seed).permutation(len(parts))]
         made = merged(shuffled)
