@@ -72,12 +72,6 @@ def clopper_pearson(passed: int, count: int) -> tuple[float, float]:
 
     For points of a scrambled Sobol sequence the share of passes scatters less than that of independent
     trials, so the interval is on the safe side. Clopper and Pearson 1934.
-
-    Examples
-    --------
-    >>> low, high = clopper_pearson(100, 100)
-    >>> round(low, 4), high
-    (0.9638, 1.0)
     """
     if not 0 <= passed <= count or count == 0:
         raise InputError(f"{passed} of {count}: passes must lie between 0 and the number of samples")

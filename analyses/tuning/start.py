@@ -31,14 +31,6 @@ def magnitude_optimum(gain: float, time_constant_s: float, small_time_s: float) 
 
     The zero cancels T1 and the loop becomes ``1/(2 T_sigma s (1 + s T_sigma))``: damping 0.707, overshoot
     4.3 %. Kessler 1958 (Betragsoptimum).
-
-    Examples
-    --------
-    A winding of 0.055 ohm, 6 uH; one and a half ticks of 100 us:
-
-    >>> kp, tn = magnitude_optimum(1 / 0.055, 6e-6 / 0.055, 1.5e-4)
-    >>> round(1e3 * kp, 6), round(1e6 * tn, 2)
-    (20.0, 109.09)
     """
     return time_constant_s / (2.0 * gain * small_time_s), time_constant_s
 
@@ -48,11 +40,6 @@ def symmetric_optimum(integrator_gain: float, small_time_s: float, a: float = 2.
 
     Crossover at 1/(a T_sigma) where the phase is highest, Tn = a^2 T_sigma; a = 2 is the usual choice.
     Phase margin ``arctan(a) - arctan(1/a)``: 36.9 deg for a = 2, 60 deg for 2 + sqrt(3). Kessler 1958.
-
-    Examples
-    --------
-    >>> symmetric_optimum(10.0, 0.001)
-    (50.0, 0.004)
     """
     return 1.0 / (a * integrator_gain * small_time_s), a * a * small_time_s
 
