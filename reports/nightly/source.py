@@ -27,8 +27,8 @@ from analyses.studies.proof import hash_of
 from analyses.studies.study import Study as StudyFile
 from analyses.studies.study import Variant, is_study, study_from_tree, study_of
 from analyses.toml_tables import Table
+from reports.nightly.moves import Tolerances, read_tolerances
 from reports.nightly.text import one_line, sha256
-from reports.nightly.tolerance import Tolerances, read_tolerances
 from reports.provenance import LIBRARIES, git, package_version
 
 PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
