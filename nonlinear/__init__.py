@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from nonlinear.bench.probe import Probe
     from nonlinear.drive import Drive
     from nonlinear.rows import LIMITERS, Rows
-    from nonlinear.runs.batch import Reducers, Run, simulate_many
+    from nonlinear.runs.batch import simulate_many
+    from nonlinear.runs.setup import Reducers, Run
     from nonlinear.runs.simulation import simulate
     from nonlinear.runs.trajectory import State, Trajectory
 
@@ -46,9 +47,9 @@ _WHERE = {
     "Drive": "nonlinear.drive",
     "LIMITERS": "nonlinear.rows",
     "Probe": "nonlinear.bench.probe",
-    "Reducers": "nonlinear.runs.batch",
+    "Reducers": "nonlinear.runs.setup",
     "Rows": "nonlinear.rows",
-    "Run": "nonlinear.runs.batch",
+    "Run": "nonlinear.runs.setup",
     "State": "nonlinear.runs.trajectory",
     "Tangent": "nonlinear.bench.derivative",
     "Trajectory": "nonlinear.runs.trajectory",

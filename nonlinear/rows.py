@@ -72,13 +72,6 @@ class Rows:
         """
         return cls(design, design_rows(design, count, friction_on=friction_on, limits_on=limits_on))
 
-    @classmethod
-    def join(cls, parts: Sequence[Rows]) -> Rows:
-        """All rows of several sets one after the other, with their time series."""
-        tables = Tables()
-        rows = [_moved(part, tables) for part in parts]
-        return cls(parts[0].design, np.concatenate(rows), tables)
-
     def __len__(self) -> int:
         return len(self.values)
 
@@ -99,9 +92,7 @@ class Rows:
 
     def _with(self, values: Floats) -> Rows:
         """Other values with the same time series, to which more may be added."""
-        tables = Tables()
-        tables.append(self.tables)
-        return replace(self, values=values, tables=tables)
+        return replace(self, values=values, tables=Tables([*self.tables.parts], self.tables.size))
 
     def repeat(self, count: int) -> Rows:
         """The first row ``count`` times."""
@@ -206,16 +197,3 @@ def _signal_place(place: str) -> int:
     if place not in places:
         raise InputError(f"place = {place!r} of a signal: one of {', '.join((*places, *POINTS))}")
     return places[place]
-
-
-def _moved(part: Rows, tables: Tables) -> Floats:
-    """The rows of one part, its time series moved behind those that are there already."""
-    base = tables.append(part.tables)
-    values = part.values.copy()
-    if base == 0 or not part.tables.parts:
-        return values
-    for begin in (_signal_place(place) for place in ("command", "bias", *POINTS)):
-        values[values[:, begin] == at.TABLE, begin + 3] += base
-    for offset in at.TABLES:
-        values[values[:, offset + 1] > 0.0, offset] += base
-    return values

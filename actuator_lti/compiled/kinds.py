@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -52,10 +53,31 @@ class Function:
         """Its name in C."""
         return f"{self.prefix}{self.name}"
 
+    def local(self, name: str) -> Kind | None:
+        """The kind of a variable or argument; None for any other name."""
+        return self.variables.get(name) or self.arguments.get(name)
+
     def error(self, node: ast.AST, text: str) -> EmitError:
         """The error of one place in the source."""
         line = self.first_line + getattr(node, "lineno", 1) - 1
         return EmitError(f"{self.file}:{line}: {self.name}: {text}")
+
+    def want(self, holds: bool, node: ast.AST, text: str) -> None:
+        """Refuse a place in the source where something does not hold."""
+        if not holds:
+            raise self.error(node, text)
+
+
+def named(node: ast.AST, scope: Mapping[str, Any]) -> Any:
+    """What a global name, or an attribute of one, stands for; None for anything else."""
+    if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+        return getattr(scope.get(node.value.id), node.attr, None)
+    return scope.get(node.id) if isinstance(node, ast.Name) else None
+
+
+def stored(tree: ast.AST) -> list[str]:
+    """The variables that a function assigns, once for each place where it does."""
+    return [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
 
 
 def c_name(name: str) -> str:

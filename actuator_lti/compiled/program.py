@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.compiled.expressions import Constant, Expressions
-from actuator_lti.compiled.form import Form
+from actuator_lti.compiled.form import Form, Known
 from actuator_lti.compiled.kernel import is_seldom
 from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name
 from actuator_lti.compiled.statements import INDENT, Statements, result_type
@@ -110,8 +110,8 @@ def program_of(collector: Collector, names: Sequence[str], second: Sequence[_For
 class Collector:
     """The functions of a program, analysed as they are called."""
 
-    def __init__(self, prefix: str, helpers: str = "", form: Form | None = None) -> None:
-        self.prefix, self.helpers, self.form = prefix, helpers or prefix, form
+    def __init__(self, prefix: str, helpers: str = "") -> None:
+        self.prefix, self.helpers = prefix, helpers or prefix
         self.constants: dict[str, Constant] = {}
         self.done: dict[str, tuple[Function, list[str]]] = {}
         self.open: list[str] = []
@@ -153,7 +153,7 @@ class Collector:
 
     def statements(self, function: Function) -> Statements:
         """What translates its body."""
-        return Statements(Expressions(function, self.call, self.constants, self.helpers, self.form))
+        return Statements(Expressions(function, self.call, self.constants, self.helpers))
 
     def definition(self, function: Function, head: str, lines: list[str]) -> str:
         """Its definition in C."""
@@ -186,16 +186,20 @@ class _Formed(Collector):
     """The functions of a form; those marked `seldom` are those of the program."""
 
     def __init__(self, program: Collector, form: Form) -> None:
-        super().__init__(f"{program.prefix}{form.name}_", program.helpers, form)
-        self.program, self.constants = program, program.constants
+        super().__init__(f"{program.prefix}{form.name}_", program.helpers)
+        self.program, self.form, self.constants = program, form, program.constants
         self.chooser, lines = program.done[form.of]
         self.root = self.call(self.chooser.scope[form.of], list(self.chooser.arguments.values()), None, None)
         given = ", ".join(map(c_name, self.root.arguments))
         chosen = f"return {self.root.c_name}({given});"
         lines[:0] = [f"{INDENT}if ({form.test()}) {{", f"{INDENT * 2}{chosen}", f"{INDENT}}}"]
 
+    def parsed(self, python: Any, kinds: list[Kind]) -> Function:
+        function = super().parsed(python, kinds)
+        Known(self.form, function).visit(function.tree)
+        return function
+
     def call(self, python: Any, kinds: list[Kind], node: ast.AST | None, caller: Function | None) -> Function:
-        """A function of the form, or one of the program."""
         return (self.program.call if is_seldom(python) else super().call)(python, kinds, node, caller)
 
 

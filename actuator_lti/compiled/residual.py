@@ -19,7 +19,8 @@ from typing import Any
 
 from actuator_lti.compiled.form import value_of
 from actuator_lti.compiled.kernel import is_kernel
-from actuator_lti.compiled.statements import assigned_once, overlap, without_docstring
+from actuator_lti.compiled.kinds import named, stored
+from actuator_lti.compiled.statements import overlap, without_docstring
 
 SHORT = 16  # rounds of a loop that is written out
 _FOLD: dict[type, Callable[[Any, Any], Any]] = {
@@ -94,12 +95,10 @@ class _Body(ast.NodeTransformer):
     def __init__(self, residual: Residual, left: Leftover) -> None:
         self.residual, self.left = residual, left
         self.scope = left.python.__globals__
-        stored = {
-            n.id for n in ast.walk(left.tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
-        }
-        self.local = stored | set(left.arguments)
-        self.once = assigned_once(left.tree) - set(left.arguments)
-        self.known: dict[str, Any] = {k: v for k, v in left.known.items() if k not in stored}
+        names = stored(left.tree)
+        self.local = {*names, *left.arguments}
+        self.once = {name for name in names if names.count(name) == 1} - set(left.arguments)
+        self.known: dict[str, Any] = {k: v for k, v in left.known.items() if k not in names}
 
     def block(self, nodes: list[ast.stmt]) -> list[ast.stmt]:
         """Statements that are left; none behind a return."""
@@ -236,7 +235,7 @@ class _Body(ast.NodeTransformer):
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
         arguments = [self.visit(each) for each in node.args]
-        target = self._target(node.func)
+        target = named(node.func, {**_BUILT_IN, **self.scope})
         if not is_kernel(target):
             if callable(target) and all(isinstance(each, ast.Constant) for each in arguments):
                 return ast.Constant(target(*(each.value for each in arguments)))
@@ -246,11 +245,6 @@ class _Body(ast.NodeTransformer):
             if instead is not None:
                 return instead
         return self._followed(target, arguments)
-
-    def _target(self, node: ast.expr) -> Any:
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            return getattr(self.scope.get(node.value.id), node.attr, None)
-        return self.scope.get(node.id, _BUILT_IN.get(node.id)) if isinstance(node, ast.Name) else None
 
     def _followed(self, target: Any, arguments: list[ast.expr]) -> ast.expr:
         names = list(inspect.signature(target).parameters)

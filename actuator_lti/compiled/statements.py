@@ -15,7 +15,7 @@ class Statements:
 
     def __init__(self, expressions: Expressions) -> None:
         self.function, self.expressions = expressions.function, expressions
-        self.once = assigned_once(self.function.tree) if expressions.form is not None else frozenset()
+        self.want, self.emit = expressions.want, expressions.emit
         self.lines: list[str] = []
         self.depth = 1
         self.temporaries = 0
@@ -34,7 +34,7 @@ class Statements:
             method = getattr(self, f"_{type(node).__name__}", None)
             if method is None:
                 raise self.function.error(node, f"{type(node).__name__} is not in the subset")
-            check_order(self.function, node, self.expressions)
+            self.expressions.whole = _evaluated(node)
             method(node)
 
     def _indented(self, nodes: list[ast.stmt]) -> None:
@@ -45,59 +45,47 @@ class Statements:
     # --- assignment ------------------------------------------------------------------------------
 
     def _Assign(self, node: ast.Assign) -> None:
-        if len(node.targets) > 1:
-            self._chained(node)
-        elif isinstance(node.targets[0], ast.Tuple):
-            self._tuple(node.targets[0], node)
-        else:
-            target, value = node.targets[0], self.expressions.value(node.value)
-            if isinstance(target, ast.Name) and target.id in self.once and isinstance(value, bool):
-                self.expressions.told[target.id] = value
-                return
-            text, kind = self.expressions.emit(node.value)
-            self._store(target, bare(text), kind)
+        target = node.targets[0]
+        if len(node.targets) == 1 and isinstance(target, ast.Tuple):
+            self._tuple(target, node)
+            return
+        text, kind = self.emit(node.value)
+        text = bare(text) if len(node.targets) == 1 else self._temporary(kind, bare(text))
+        for target in node.targets:
+            self._store(target, text, kind)
 
     def _store(self, target: ast.expr, text: str, kind: Kind) -> None:
         if isinstance(target, ast.Subscript):
-            if kind not in ("float", "int"):
-                raise self.function.error(target, f"a {kind} stored in a row")
-            self._mark_written(target)
-            if self._is_bytes(target):
-                if kind != "int":
-                    raise self.function.error(target, f"a {kind} stored in a row of small whole numbers")
-                self._put(f"{self.expressions.element(target)} = (unsigned short){text};")
-                return
-            text = f"(double){text}" if kind == "int" and text.isidentifier() else bare(widened(text, kind))
-            self._put(f"{self.expressions.element(target)} = {text};")
+            self._store_element(target, text, kind)
         elif isinstance(target, ast.Name):
             self._declare(target, kind)
             self._put(f"{c_name(target.id)} = {text};")
         else:
             raise self.function.error(target, "this target is not in the subset")
 
-    def _is_bytes(self, target: ast.Subscript) -> bool:
-        name = target.value.id if isinstance(target.value, ast.Name) else ""
-        return self.function.arguments.get(name) == "bytes"
+    def _store_element(self, target: ast.Subscript, text: str, kind: Kind) -> None:
+        self.want(kind in ("float", "int"), target, f"a {kind} stored in a row")
+        row = self._written(target)
+        if self.function.arguments.get(row) == "bytes":
+            self.want(kind == "int", target, f"a {kind} stored in a row of small whole numbers")
+            text = f"(unsigned short){text}"
+        else:
+            text = f"(double){text}" if kind == "int" and text.isidentifier() else bare(widened(text, kind))
+        self._put(f"{self.expressions.element(target)} = {text};")
+
+    def _written(self, target: ast.Subscript) -> str:
+        """Note that a row is written; its name."""
+        row = target.value.id if isinstance(target.value, ast.Name) else ""
+        if row in self.function.arguments:
+            self.function.written.add(row)
+        return row
 
     def _declare(self, target: ast.Name, kind: Kind) -> None:
         function, name = self.function, target.id
-        if kind == "row":
-            raise function.error(target, f"{name}: a second name for a row")
-        if name in self.loops:
-            raise function.error(target, f"{name} is the index of a loop")
+        self.want(kind != "row", target, f"{name}: a second name for a row")
+        self.want(name not in self.loops, target, f"{name} is the index of a loop")
         known = function.arguments.get(name) or function.variables.setdefault(name, kind)
-        if known != kind:
-            raise function.error(target, f"{name} is a {known} and becomes a {kind}; one type a variable")
-
-    def _mark_written(self, target: ast.Subscript) -> None:
-        if isinstance(target.value, ast.Name) and target.value.id in self.function.arguments:
-            self.function.written.add(target.value.id)
-
-    def _chained(self, node: ast.Assign) -> None:
-        text, kind = self.expressions.emit(node.value)
-        name = self._temporary(kind, bare(text))
-        for target in node.targets:
-            self._store(target, name, kind)
+        self.want(known == kind, target, f"{name} is a {known} and becomes a {kind}; one type a variable")
 
     def _temporary(self, kind: Kind, text: str) -> str:
         name = f"value_{self._count()}"
@@ -110,7 +98,7 @@ class Statements:
             return
         if not isinstance(node.value, ast.Tuple) or len(node.value.elts) != len(targets.elts):
             raise self.function.error(node, "a tuple on the left wants one of the same length on the right")
-        emitted = [self.expressions.emit(value) for value in node.value.elts]
+        emitted = [self.emit(value) for value in node.value.elts]
         if overlap(targets, node.value):
             emitted = [(self._temporary(kind, bare(text)), kind) for text, kind in emitted]
         for target, (text, kind) in zip(targets.elts, emitted, strict=True):
@@ -118,23 +106,19 @@ class Statements:
 
     def _results(self, targets: ast.Tuple, call: ast.Call) -> None:
         callee, texts = self.expressions.called(call)
-        if callee is None or callee.returns is None or len(callee.returns) != len(targets.elts):
-            raise self.function.error(call, "the number of results differs from the number of targets")
-        self._mark_callee_writes(call, callee)
+        kinds = callee.returns or ()
+        self.want(
+            len(kinds) == len(targets.elts), call, "the number of results differs from the number of targets"
+        )
         name = self._named_result(callee, texts)
-        for index, (target, kind) in enumerate(zip(targets.elts, callee.returns, strict=True)):
+        for index, (target, kind) in enumerate(zip(targets.elts, kinds, strict=True)):
             if not (isinstance(target, ast.Name) and target.id.startswith("_")):
                 self._store(target, f"{name}.r{index}", kind)
 
-    def _mark_callee_writes(self, call: ast.Call, callee: Function) -> None:
-        for argument, name in zip(call.args, callee.arguments, strict=True):
-            if name in callee.written and isinstance(argument, ast.Name):
-                self.function.written.add(argument.id)
-
     def _AugAssign(self, node: ast.AugAssign) -> None:
-        plain = ast.BinOp(left=_loaded(node.target), op=node.op, right=node.value)
-        ast.copy_location(plain, node)
-        text, kind = self.expressions.emit(ast.fix_missing_locations(plain))
+        loaded = ast.parse(ast.unparse(node.target), mode="eval").body
+        plain = ast.copy_location(ast.BinOp(left=loaded, op=node.op, right=node.value), node)
+        text, kind = self.emit(ast.fix_missing_locations(plain))
         self._store(node.target, bare(text), kind)
 
     # --- control flow ----------------------------------------------------------------------------
@@ -143,21 +127,14 @@ class Statements:
         if not isinstance(node.value, ast.Call):
             raise self.function.error(node, "an expression that does nothing")
         callee, texts = self.expressions.called(node.value)
-        if callee is None:
-            raise self.function.error(node, "a call that does nothing")
-        self._mark_callee_writes(node.value, callee)
         cast = "" if callee.returns is None else "(void)"
         self._put(f"{cast}{callee.c_name}({', '.join(texts)});")
 
     def _If(self, node: ast.If, word: str = "if") -> None:
-        known = self.expressions.value(node.test) if word == "if" else None
-        if known is not None:
-            self._block(node.body if known else node.orelse)
-            return
         self._put(f"{word} ({self.expressions.condition(node.test)}) {{")
         self._indented(node.body)
         if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
-            check_order(self.function, node.orelse[0], self.expressions)
+            self.expressions.whole = node.orelse[0].test
             self._If(node.orelse[0], "} else if")
             return
         if node.orelse:
@@ -166,8 +143,7 @@ class Statements:
         self._put("}")
 
     def _While(self, node: ast.While) -> None:
-        if node.orelse:
-            raise self.function.error(node, "else after while is not in the subset")
+        self.want(not node.orelse, node, "else after while is not in the subset")
         self._put(f"while ({self.expressions.condition(node.test)}) {{")
         self._indented(node.body)
         self._put("}")
@@ -178,12 +154,11 @@ class Statements:
         if not ranged or not isinstance(index, ast.Name) or node.orelse:
             raise self.function.error(node, "only for NAME in range(...) is in the subset")
         assert isinstance(call, ast.Call)
-        bounds = [self.expressions.emit(argument) for argument in call.args]
-        if any(kind != "int" for _, kind in bounds) or len(bounds) > 2:
-            raise self.function.error(node, "range of whole numbers, first and last")
+        bounds = [self.emit(argument) for argument in call.args]
+        whole = all(kind == "int" for _, kind in bounds) and len(bounds) <= 2
+        self.want(whole, node, "range of whole numbers, first and last")
         first, last = ("0", bounds[0][0]) if len(bounds) == 1 else (bounds[0][0], bounds[1][0])
-        if index.id in self.function.variables:
-            raise self.function.error(node, f"{index.id} is a variable too")
+        self.want(index.id not in self.function.variables, node, f"{index.id} is a variable too")
         name = c_name(index.id.lstrip("_") or "round")
         end = bare(last)
         if not end.isdigit():
@@ -212,37 +187,27 @@ class Statements:
         return
 
     def _Return(self, node: ast.Return) -> None:
-        if isinstance(node.value, ast.Call) and self._passed_on(node.value):
-            return
         values = [] if node.value is None else getattr(node.value, "elts", [node.value])
-        emitted = [self.expressions.emit(value) for value in values]
+        several = self._several_results(node.value)
+        emitted = several or [self.emit(value) for value in values]
         kinds: tuple[Kind, ...] | None = tuple(kind for _, kind in emitted) or None
-        self._returns(node, kinds)
-        if kinds is None:
-            self._put("return;")
-        elif len(kinds) == 1:
-            self._put(f"return {bare(emitted[0][0])};")
-        else:
-            texts = ", ".join(bare(text) for text, _ in emitted)
-            self._put(f"return ({result_type(self.function)}){{{texts}}};")
-
-    def _passed_on(self, call: ast.Call) -> bool:
-        """Return the several results of another function; False where it has one."""
-        callee, texts = self.expressions.called(call)
-        if callee is None or callee.returns is None or len(callee.returns) == 1:
-            return False
-        self._returns(call, callee.returns)
-        self._mark_callee_writes(call, callee)
-        name = self._named_result(callee, texts)
-        fields = ", ".join(f"{name}.r{n}" for n in range(len(callee.returns)))
-        self._put(f"return ({result_type(self.function)}){{{fields}}};")
-        return True
-
-    def _returns(self, node: ast.AST, kinds: tuple[Kind, ...] | None) -> None:
         known = self.function.returns
-        if known not in (None, kinds):
-            raise self.function.error(node, f"returns {kinds} here and {known} elsewhere")
+        self.want(known in (None, kinds), node, f"returns {kinds} here and {known} elsewhere")
         self.function.returns = kinds
+        texts = ", ".join(bare(text) for text, _ in emitted)
+        if len(emitted) > 1:
+            texts = f"({result_type(self.function)}){{{texts}}}"
+        self._put(f"return {texts};" if texts else "return;")
+
+    def _several_results(self, node: ast.expr | None) -> list[tuple[str, Kind]]:
+        """The results of another function, to be passed on; empty where it has one."""
+        if not isinstance(node, ast.Call) or self.expressions.built_in(node) is not None:
+            return []
+        callee, texts = self.expressions.called(node)
+        if callee.returns is None or len(callee.returns) == 1:
+            return []
+        name = self._named_result(callee, texts)
+        return [(f"{name}.r{n}", kind) for n, kind in enumerate(callee.returns)]
 
     def _named_result(self, callee: Function, texts: list[str]) -> str:
         name = f"result_{self._count()}"
@@ -255,47 +220,11 @@ def result_type(function: Function) -> str:
     return f"{function.c_name}_result"
 
 
-def check_order(function: Function, node: ast.stmt, expressions: Expressions) -> None:
-    """Refuse an expression whose value depends on an order of evaluation that C leaves open.
-
-    That is one with a call that writes a row, and beside it another such call or a look into that row.
-    """
-    for expression in _own_expressions(node):
-        for call in ast.walk(expression):
-            if not isinstance(call, ast.Call) or not any(_is_row(each, function) for each in call.args):
-                continue
-            callee, _ = expressions.called(call)
-            if callee is None or not callee.written:
-                continue
-            for argument, name in zip(call.args, callee.arguments, strict=True):
-                if name in callee.written and isinstance(argument, ast.Name):
-                    function.written.add(argument.id)
-                    _refuse_beside(function, expression, call, argument.id)
-
-
-def _refuse_beside(function: Function, expression: ast.expr, call: ast.Call, row: str) -> None:
-    everywhere, inside = (
-        sum(isinstance(each, ast.Name) and each.id == row for each in ast.walk(tree))
-        for tree in (expression, call)
-    )
-    if everywhere > inside:
-        raise function.error(call, f"writes {row} beside another use of {row}; give it a line of its own")
-
-
-def _is_row(node: ast.expr, function: Function) -> bool:
-    return isinstance(node, ast.Name) and function.arguments.get(node.id) == "row"
-
-
-def _own_expressions(node: ast.stmt) -> list[ast.expr]:
-    """The expressions evaluated by this statement itself, not by those inside it."""
+def _evaluated(node: ast.stmt) -> ast.AST:
+    """The expression that this statement itself evaluates, not those inside it."""
     if isinstance(node, ast.If | ast.While):
-        return [node.test]
-    if isinstance(node, ast.For):
-        return [node.iter]
-    if isinstance(node, ast.Assign) and isinstance(node.value, ast.Tuple):
-        return [node.value]
-    value = getattr(node, "value", None)
-    return [value] if isinstance(value, ast.expr) else []
+        return node.test
+    return node.iter if isinstance(node, ast.For) else getattr(node, "value", None) or ast.Pass()
 
 
 def overlap(targets: ast.Tuple, values: ast.Tuple) -> bool:
@@ -310,17 +239,8 @@ def overlap(targets: ast.Tuple, values: ast.Tuple) -> bool:
     return False
 
 
-def _loaded(target: ast.expr) -> ast.expr:
-    return ast.parse(ast.unparse(target), mode="eval").body
-
-
-def assigned_once(tree: ast.FunctionDef) -> frozenset[str]:
-    """Variables that a function assigns at one place alone."""
-    names = [n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
-    return frozenset(name for name in names if names.count(name) == 1)
-
-
 def without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
+    """The statements that do something."""
     first = body[0]
     described = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
     return body[1:] if described else body

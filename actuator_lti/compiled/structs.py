@@ -138,13 +138,10 @@ def _as_whole(node: ast.expr) -> ast.expr:
 class _MemberStatements(Statements):
     """Statements that store into structures."""
 
-    def _store(self, target: ast.expr, text: str, kind: Kind) -> None:
-        if not isinstance(target, ast.Subscript):
-            super()._store(target, text, kind)
-            return
+    def _store_element(self, target: ast.Subscript, text: str, kind: Kind) -> None:
         expressions = self.expressions
         assert isinstance(expressions, _Members)
-        self._mark_written(target)
+        self._written(target)
         wanted = expressions.member(target).kind
         if kind == "count" and wanted == "float":
             text = bare(expressions.of_counts(text))

@@ -4,11 +4,17 @@ from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.access import parameter_value, paths_of, with_values
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.fields import FIELDS
-from actuator_lti.design.loader import as_design, load_design, read_design_text, shipped_designs
+from actuator_lti.design.loader import (
+    SweepPoint,
+    as_design,
+    load_design,
+    read_design_text,
+    shipped_designs,
+    sweep,
+)
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.suspicions import warnings_of
-from actuator_lti.design.sweep import SweepPoint, sweep
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.writing import design_hash, design_tree, with_overrides, write_design
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 from math import inf
 from typing import Any
 
+from actuator_lti.design.asked import FrozenMap, Parameter
 from actuator_lti.design.checks import check_relations
 from actuator_lti.design.fields import Field, Structure, field_of, fields_in
 from actuator_lti.design.mistakes import nearest
-from actuator_lti.design.model import Design, Parameter
-from actuator_lti.design.parameters import FrozenMap
+from actuator_lti.design.model import Design
 from actuator_lti.design.sections import part_at, parts_of, with_part
 from actuator_lti.design.tolerances import rescaled
 from actuator_lti.design.units import ampere_unit, si_text
@@ -26,7 +26,7 @@ def paths_of(design: Design) -> tuple[str, ...]:
         for section, path, part in parts_of(design)
         if not (section.rare and part == section.kind())
         for field in fields_in(section.template)
-        if field.kind in ("quantity", "integer") and _has_value(field, getattr(part, field.attribute))
+        if field.is_number and _has_value(field, getattr(part, field.attribute))
     )
 
 
@@ -46,13 +46,13 @@ def located(design: Design, path: str) -> tuple[Field, Any]:
     if not isinstance(design, Design) or not isinstance(path, str):
         given = f"design = {shown(design)}, key = {shown(path)}"
         raise InputError(f"{given}: allowed: a Design (load_design) and a dotted key")
-    field = field_of(path)
-    if field is None or field.kind not in ("quantity", "integer"):
+    field, table = field_of(path), path.rpartition(".")[0]
+    if field is None or not field.is_number:
         hint = nearest(path, paths_of(design))
         raise InputError(f"{shown(path)}: unknown parameter{hint}; allowed: a numeric key of the design file")
-    part = part_at(design, path.rpartition(".")[0])
+    part = part_at(design, table)
     if part is None:
-        raise InputError(f"{path}: the design {design.name} has no {path.rpartition('.')[0]}")
+        raise InputError(f"{path}: the design {design.name} has no {table}")
     return field, part
 
 
@@ -104,31 +104,33 @@ def with_values(design: Design, values: Mapping[str, float], *, check: bool = Tr
     >>> with_values(load_design("ilr33-amber"), {"motor.resistance": 0.06}).motor.resistance_ohm
     0.06
     """
-    structure = Structure.of(design)
-    changes: dict[str, dict[str, Any]] = {}
-    parameters: dict[str, Parameter] = {}
-    for path, value in values.items():
-        field, _ = located(design, path)
-        number = _allowed(field, path, value, structure)
-        changes.setdefault(path.rpartition(".")[0], {})[field.attribute] = number
-        parameters[path] = _changed(design.parameters.get(path), field, path, number, design)
-    changed = _replaced(design, changes, parameters)
+    numbers = {path: _allowed(design, path, value) for path, value in values.items()}
+    parameters = {path: _changed(design, path, number) for path, number in numbers.items()}
+    gone = {path for path, item in parameters.items() if item.tolerance is None}
+    changed = replace(
+        stacked(design, numbers),
+        parameters=FrozenMap({**design.parameters, **parameters}),
+        correlations=tuple(pair for pair in design.correlations if not gone & {pair.first, pair.second}),
+    )
     if check:
         check_relations(changed, design.origin or design.name)
     return changed
 
 
-def _allowed(field: Field, path: str, value: float, structure: Structure) -> float | int:
-    if isinstance(value, bool) or (not isinstance(value, int | float) and not hasattr(value, "__float__")):
+def _allowed(design: Design, path: str, value: float) -> float | int:
+    field, _ = located(design, path)
+    if isinstance(value, bool) or not hasattr(value, "__float__"):
         raise InputError(f"{path} = {shown(value)}: allowed: a number")
-    number = float(value)
-    if not field.accepts(number) or (field.kind == "integer" and number != int(number)):
-        whole = "a whole number, " if field.kind == "integer" else ""
-        raise InputError(f"{path} = {number!r}: allowed: {whole}{field.allowed(field.unit(structure))}")
-    return int(number) if field.kind == "integer" else number
+    number, whole = float(value), field.kind == "integer"
+    if not field.accepts(number) or (whole and number != int(number)):
+        allowed = "a whole number, " * whole + field.allowed(field.unit(Structure.of(design)))
+        raise InputError(f"{path} = {number!r}: allowed: {allowed}")
+    return int(number) if whole else number
 
 
-def _changed(old: Parameter | None, field: Field, path: str, value: float, design: Design) -> Parameter:
+def _changed(design: Design, path: str, value: float) -> Parameter:
+    """The pedigree of a changed value."""
+    old, (field, _) = design.parameters.get(path), located(design, path)
     if old is not None and old.value == value:
         return old
     unit = field.unit(Structure.of(design))
@@ -141,19 +143,9 @@ def _changed(old: Parameter | None, field: Field, path: str, value: float, desig
     return replace(new, source=f"changed from {old.text}", grade=grade, tolerance=tolerance)
 
 
-def _replaced(
-    design: Design, changes: Mapping[str, Mapping[str, Any]], parameters: Mapping[str, Parameter]
-) -> Design:
-    for path, attributes in changes.items():
-        design = with_part(design, path, replace(part_at(design, path), **attributes))
-    gone = {path for path, item in parameters.items() if item.tolerance is None}
-    kept = tuple(pair for pair in design.correlations if not gone & {pair.first, pair.second})
-    return replace(design, parameters=FrozenMap({**design.parameters, **parameters}), correlations=kept)
-
-
 def stacked(design: Design, values: Mapping[str, Any]) -> Design:
-    """A design with arrays in place of some numbers: many designs of one structure, unchecked."""
-    changes: dict[str, dict[str, Any]] = {}
-    for path, array in values.items():
-        changes.setdefault(path.rpartition(".")[0], {})[located(design, path)[0].attribute] = array
-    return _replaced(design, changes, {})
+    """A design with other numbers by their dotted keys, or arrays of them: many designs, unchecked."""
+    for path, value in values.items():
+        field, part = located(design, path)
+        design = with_part(design, path.rpartition(".")[0], replace(part, **{field.attribute: value}))
+    return design

@@ -1,8 +1,9 @@
 """What is asked and known of a drive as data: studies, requirements, tolerances, pedigree, objects."""
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import inf
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.field import (
@@ -159,20 +160,61 @@ class Parameter:
     tolerance: Tolerance | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class ControllerObject:
-    """One entry of the motion controller's object dictionary, as an integer in the object's own unit."""
+class FrozenMap(Mapping[str, Any]):
+    """A mapping that can be hashed and sent to a worker; equal to any with the same items in any order.
+
+    Examples
+    --------
+    >>> FrozenMap({"a": 1}) == {"a": 1}
+    True
+    """
+
+    __slots__ = ("_items",)
+
+    def __init__(self, items: Mapping[str, Any] | None = None) -> None:
+        self._items = dict(items or {})
+
+    def __getitem__(self, key: str) -> Any:
+        return self._items[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._items.items()))
+
+    def __repr__(self) -> str:
+        return f"FrozenMap({self._items!r})"
+
+
+@dataclass(frozen=True)
+class ObjectPlace:
+    """Where an object stands in the dictionary of the motion controller."""
 
     index: int
     subindex: int
-    value: int
-    name: str = ""
-    data_type: str = ""
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Index and subindex."""
+        return self.index, self.subindex
 
     @property
     def label(self) -> str:
         """The usual spelling, such as ``0x2344.01``."""
         return f"0x{self.index:04X}.{self.subindex:02X}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ControllerObject(ObjectPlace):
+    """One entry of the motion controller's object dictionary, as an integer in the object's own unit."""
+
+    value: int
+    name: str = ""
+    data_type: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,5 +239,5 @@ class ControllerObjects:
 
     def __post_init__(self) -> None:
         """Put the values in order."""
-        ordered = tuple(sorted(self.values, key=lambda item: (item.index, item.subindex)))
+        ordered = tuple(sorted(self.values, key=lambda item: item.place))
         object.__setattr__(self, "values", ordered)

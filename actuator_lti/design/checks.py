@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Iterator
-from dataclasses import replace
-from math import inf, isclose, log, pi
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields, replace
+from math import isfinite
+from numbers import Real
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
-from actuator_lti.design.checks_control import CONTROL_CHECKS, check_temperature
-from actuator_lti.design.checks_elastic import ELASTIC_CHECKS, check_place
-from actuator_lti.design.checks_own import out_of_range
-from actuator_lti.design.fields import ALL_FIELDS, Field, Structure
-from actuator_lti.design.mistakes import Findings, Refusal
+from actuator_lti.design.checks_control import CONTROL_CHECKS
+from actuator_lti.design.checks_plant import PLANT_CHECKS, check_motor, check_place, check_temperature
+from actuator_lti.design.fields import ALL_FIELDS, FIELDS, Field, Structure, fields_in
+from actuator_lti.design.mistakes import UNREAD, Findings, Refusal, readable
 from actuator_lti.design.model import Correlation, Design, Requirement
-from actuator_lti.design.plant import no_load_speed
-from actuator_lti.design.sections import part_at
-from actuator_lti.design.spellings import split_quantity
-from actuator_lti.design.unread import UNREAD, readable
+from actuator_lti.design.sections import part_at, parts_of
 from actuator_lti.files.reading import shown
 
 CHECKS = "validation"  # what the ids of checks by simulation begin with
-_ELECTRICAL = {
-    "resistance": "resistance_ohm",
-    "inductance": "inductance_H",
-    "torque_constant": "torque_constant_Nm_A",
-    "back_emf_constant": "back_emf_constant_Vs_rad",
-}
 
 
 def check_design(design: Design, where: str) -> None:
@@ -41,23 +32,48 @@ def check_design(design: Design, where: str) -> None:
     InputError
         All at once: key, value and what is allowed.
     """
-    findings = Findings(where)
-    findings.extend(out_of_range(design))
-    findings.refuse()  # the relations ask for numbers that are some
+    _refuse(out_of_range(design), where)  # the relations ask for numbers that are some
     check_relations(design, where)
 
 
 def check_relations(design: Design, where: str) -> None:
-    """Refuse a design whose values, each in its range, contradict each other.
+    """Refuse a design whose values, each in its range, contradict each other; as `check_design`."""
+    _refuse(contradictions(design), where)
 
-    Raises
-    ------
-    InputError
-        All at once: key, value and what is allowed.
-    """
+
+def _refuse(refusals: Iterable[Refusal], where: str) -> None:
     findings = Findings(where)
-    findings.extend(contradictions(design))
+    findings.extend(refusals)
     findings.refuse()
+
+
+def out_of_range(design: Design) -> Iterator[Refusal]:
+    """Of a design made in Python: numbers outside their range, or that are none, and unknown words."""
+    axis = FIELDS["design.axis"]
+    if not _fits(axis, design.axis):  # all units follow from it
+        yield "design.axis", shown(design.axis), f"allowed: {axis.allowed('1')}"
+        return
+    structure = Structure.of(design)
+    for section, path, part in parts_of(design):
+        usual = {item.name: item.default for item in fields(part)}
+        for field in fields_in(section.template):
+            value, default = getattr(part, field.attribute), usual[field.attribute]
+            needed = field.required and getattr(part, "law", None) is None
+            left_out = not needed and type(value) is type(default) and value == default
+            if not (left_out or _fits(field, value)):
+                yield f"{path}.{field.key}", shown(value), f"allowed: {field.allowed(field.unit(structure))}"
+
+
+def _fits(field: Field, value: Any) -> bool:
+    """Whether a key takes a value."""
+    if isinstance(value, tuple | list):
+        return all(_fits(field, one) for one in value)
+    if field.kind in ("choice", "names"):
+        return value in field.choices
+    if field.kind in ("quantity", "integer", "quantities", "matrix"):
+        number = isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
+        return number and field.accepts(float(value)) and (field.kind != "integer" or value == int(value))
+    return True
 
 
 def contradictions(design: Design) -> Iterator[Refusal]:
@@ -85,123 +101,8 @@ def _bounded(field: Field, bound: Callable[[Design], tuple[float, str]], design:
         yield field.path, f"{value:g} {unit}", f"{why}; allowed: at most {most:.4g} {unit}"
 
 
-def _motor(design: Design) -> Iterator[Refusal]:
-    motor = design.motor
-    given = {key: getattr(motor, attribute) for key, attribute in _ELECTRICAL.items()}
-    if motor.source_gain_Nm_V is not None:
-        for key, value in given.items():
-            if value is not None:
-                yield f"motor.{key}", value, "not allowed beside motor.source_gain"
-        return
-    for key, value in given.items():
-        if value is None:
-            words = "R, L, kM and kE together, or motor.source_gain alone"
-            yield f"motor.{key}", "", f"missing; allowed: {words}{_without(key, design)}"
-    same = design.effective_motor
-    kM, kE = same.torque_constant_Nm_A, same.back_emf_constant_Vs_rad
-    if kM is not None and kE is not None and abs(kE - kM) > 0.1 * kM * (1 + 1e-12):
-        wanted = given["back_emf_constant"] * kM / kE
-        as_written = _as_written(design, "back_emf_constant", kM / kE)
-        yield (
-            "motor.back_emf_constant",
-            _stated(design, "back_emf_constant"),
-            f"allowed: within 10 % of {wanted:g}{as_written}, as motor.torque_constant = "
-            f"{_stated(design, 'torque_constant')} has it "
-            f"(in SI the two are one constant){_factor_named(kE / kM)}",
-        )
-
-
-def _stated(design: Design, key: str) -> str:
-    """A constant of the motor in SI, and as the file has it."""
-    return f"{getattr(design.motor, _ELECTRICAL[key]):g}{_as_written(design, key, 1.0)}"
-
-
-def _as_written(design: Design, key: str, times: float) -> str:
-    """So many times a constant in the unit of its file, in brackets; nothing where that is the SI one."""
-    item = design.parameters.get(f"motor.{key}")
-    if item is None or item.value != getattr(design.motor, _ELECTRICAL[key]):
-        return ""
-    number, unit = split_quantity(item.text)
-    if isclose(number, item.value, rel_tol=1e-4):
-        return ""
-    upside_down = _PER_VOLT.search(unit) is not None
-    return f" ({number * (1.0 / times if upside_down else times):.4g} {unit})"
-
-
-def _without(key: str, design: Design) -> str:
-    """What to write where the sheet does not have it."""
-    other = {"torque_constant": "back_emf_constant", "back_emf_constant": "torque_constant"}.get(key, "")
-    held = getattr(design.motor, _ELECTRICAL[other]) if other else None
-    if held is not None and design.motor.constants == "dc":
-        return f"; of a DC motor it is the number of motor.{other} in SI, {held:g}"
-    if held is not None:
-        ratio, words = _TORQUE_OVER_VOLTAGE[design.motor.constants]
-        number, sign = (held * ratio, "times") if key == "torque_constant" else (held / ratio, "over")
-        return f"; with these motor.constants it is motor.{other} {sign} {words} in SI, {number:g}"
-    usual = "; where the sheet has none, R times the electrical time constant, 0.1 to 1 ms of a small motor"
-    return usual if key == "inductance" else ""
-
-
-_TORQUE_OVER_VOLTAGE = {"rms-line": (3**0.5, "sqrt(3)"), "peak-phase": (1.5, "3/2")}
-_PER_VOLT = re.compile(r"/ ?V|\bV\^?-1|V⁻¹|KV\b")  # a speed constant, kE upside down
-_AC = ": see motor.constants, if it is an AC motor"
-_FACTORS = {
-    f"sqrt(2), rms against peak{_AC}": 2**0.5,
-    f"sqrt(3), phase against line-line{_AC}": 3**0.5,
-    f"sqrt(3/2), rms line-line against N m/A rms{_AC}": 1.5**0.5,
-    f"sqrt(3) and sqrt(2) together, V rms of a phase against N m/A peak{_AC}": 6**0.5,
-    f"3/2, dq against phase{_AC}": 1.5,
-    "60/(2 pi), per rpm against per rad/s": 9.549296585513721,
-    "1000, rpm against krpm or mN*m against N*m": 1e3,
-    "9.549 V/krpm": 1e3 / 9.549296585513721,
-}
-
-
-def _factor_named(ratio: float) -> str:
-    """The usual factor between data-sheet conventions that explains a ratio kE/kM, or nothing."""
-    off, words = min((abs(abs(log(ratio)) - log(factor)), words) for words, factor in _FACTORS.items())
-    return f"; the ratio is {words}" if off < 0.08 else ""
-
-
-def _current_loop(design: Design) -> Iterator[Refusal]:
-    if design.controller.current is not None and not design.motor.has_electrical_dynamics:
-        yield "control.current", "a table", "not allowed with motor.source_gain, which has no current"
-
-
-def _multiples(design: Design) -> Iterator[Refusal]:
-    control = design.controller
-    n_v = control.velocity.every if control.velocity else 1
-    n_p = control.position.every if control.position else n_v
-    if n_p % n_v:
-        yield "control.position.every", n_p, f"allowed: a multiple of control.velocity.every = {n_v}"
-
-
-def _delay(design: Design) -> Iterator[Refusal]:
-    delay, period = design.controller.computing_delay_s, design.controller.period_s
-    if delay > 100 * period:
-        yield "control.computing_delay", f"{delay:g} s", f"allowed: at most 100 ticks of {period:g} s"
-
-
-def _top_speed(design: Design) -> Iterator[Refusal]:
-    speed, top = design.limits.speed_rad_s, no_load_speed(design)
-    if top < speed < inf:
-        unit = "m/s" if design.axis == "linear" else "rad/s"
-        turns = "" if design.axis == "linear" else f" ({top * 30.0 / pi:.4g} rpm)"
-        allowed = f"the supply cannot reach it; allowed: at most U/kE = {top:.4g} {unit}{turns}"
-        yield "limits.speed", f"{speed:.4g} {unit}", allowed
-
-
-def _currents(design: Design) -> Iterator[Refusal]:
-    peak, continuous = design.limits.peak_current_A, design.limits.continuous_current_A
-    if peak < continuous < inf:
-        allowed = f"allowed: at most limits.peak_current = {peak:g} A"
-        yield "limits.continuous_current", f"{continuous:g} A", allowed
-
-
-FIRST_RELATIONS = (check_place, check_temperature, _motor)  # the others ask for an inertia and constants
-RELATIONS = (
-    _current_loop, _multiples, _delay, _most, *CONTROL_CHECKS, *ELASTIC_CHECKS, _top_speed, _currents,
-)  # fmt: skip
+FIRST_RELATIONS = (check_place, check_temperature, check_motor)  # the others ask for an inertia and constants
+RELATIONS = (_most, *CONTROL_CHECKS, *PLANT_CHECKS)
 """Between the numbers of a drive; an exported one checks them again when they are changed."""
 
 
@@ -233,8 +134,7 @@ def _asked_of(item: Requirement, design: Design, *_: object) -> Iterator[Refusal
         yield f"{path}.loop", given, f"allowed: {', '.join(sorted(present))}"
     elif quantity.scope != "loop" and item.loop is not None:
         yield f"{path}.loop", shown(item.loop), f"{item.quantity} is of the drive, no loop"
-    current = "current" in present and item.loop in ("current", "every")
-    if item.rotor is not None and not current:
+    if item.rotor is not None and not ("current" in present and item.loop in ("current", "every")):
         yield f"{path}.rotor", shown(item.rotor), "allowed: of the current loop only"
     answers = item.loop in ("position", "every") and quantity.of_response
     if item.to is not None and not (answers and "position" in present):
@@ -256,18 +156,18 @@ def _waivers(design: Design) -> Iterator[Refusal]:
 
 
 def _correlations(design: Design) -> Iterator[Refusal]:
-    known = {path: item for path, item in design.parameters.items() if item is UNREAD or item.tolerance}
+    known = [path for path, item in design.parameters.items() if item is UNREAD or item.tolerance]
     matrix = np.eye(len(known))
     seen: set[frozenset[str]] = set()
     for number, item in enumerate(design.correlations, 1):
-        yield from readable(_pair(item, f"correlation.{number}", tuple(known), seen, matrix))
+        yield from readable(_pair(item, f"correlation.{number}", known, seen, matrix))
     if known and np.linalg.eigvalsh(matrix)[0] < -1e-12:
         allowed = "the coefficients contradict each other; allowed: a positive semidefinite matrix"
         yield "correlation", "", allowed
 
 
 def _pair(
-    item: Correlation, path: str, known: tuple[str, ...], seen: set[frozenset[str]], matrix: np.ndarray
+    item: Correlation, path: str, known: list[str], seen: set[frozenset[str]], matrix: np.ndarray
 ) -> Iterator[Refusal]:
     """One correlation, which is put into the matrix of all."""
     unknown = [key for key in ("first", "second") if getattr(item, key) not in known]

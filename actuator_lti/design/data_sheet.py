@@ -14,9 +14,8 @@ from typing import Any
 from actuator_lti.design import model
 from actuator_lti.design.field import Field, Structure, positive, quantity
 from actuator_lti.design.fields import FIELDS
-from actuator_lti.design.mistakes import Refusal
+from actuator_lti.design.mistakes import UNREAD, Refusal, readable
 from actuator_lti.design.units import si_text
-from actuator_lti.design.unread import UNREAD, readable
 from actuator_lti.files.tree import Tree
 
 _CURRENT, _SPEED, _SHARE = "motor.no_load_current", "motor.no_load_speed", "motor.no_load_dry_share"

@@ -66,6 +66,11 @@ class Field:
     most: Callable[[Design], tuple[float, str]] | None = None
 
     @property
+    def is_number(self) -> bool:
+        """Whether it holds one number, which may be changed by its dotted path."""
+        return self.kind in ("quantity", "integer")
+
+    @property
     def section(self) -> str:
         """Section name, such as ``"control.velocity"``."""
         return self.path.rpartition(".")[0]

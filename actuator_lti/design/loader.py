@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from os import PathLike, fspath
 from pathlib import Path
+from typing import Any
 
 from actuator_lti.design.checks import contradictions
 from actuator_lti.design.mistakes import Findings, lines_of, nearest
@@ -66,9 +69,8 @@ def load_design(name_or_path: Design | str | PathLike[str]) -> Design:
     return read_design_text(design_text(name), shown(name, 200)[1:-1], Path(name).parent)
 
 
-def as_design(design: Design | str | PathLike[str]) -> Design:
-    """A design as it is, or read by name or path: `load_design` for what a function is given as a design."""
-    return load_design(design)
+as_design = load_design
+"""For what a function is given as a design."""
 
 
 def _name_of(given: object) -> str:
@@ -93,18 +95,11 @@ def design_text(name_or_path: str | PathLike[str]) -> str:
         return shipped_path(name).read_text(encoding="utf-8")
     path = Path(name)
     named = not path.suffix and "/" not in name and "\\" not in name
-    if named and not (name and _exists(path)):
+    if named and not (name and os.path.exists(name)):
         hint = nearest(name, shipped_designs())
         names = ", ".join(shipped_designs())
         raise InputError(f"{shown(name)}: no such design{hint}; allowed: {names}, or a design file")
     return decode(read_bytes(path), shown(name, 200)[1:-1])
-
-
-def _exists(path: Path) -> bool:
-    try:
-        return path.exists()
-    except (OSError, ValueError):
-        return False
 
 
 @lru_cache(maxsize=16)
@@ -139,3 +134,45 @@ def design_from_tree(
     findings.extend(contradictions(design))
     findings.refuse()
     return design
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """A value of the key as it was given, and the design that has it."""
+
+    value: Any
+    design: Design
+
+
+def sweep(design: Design | str | PathLike[str], path: str, values: Iterable[Any]) -> tuple[SweepPoint, ...]:
+    """Designs that differ in one key.
+
+    Parameters
+    ----------
+    design : Design, str or path
+        A design, a shipped name, or the path of a design file.
+    path : str
+        Dotted key, such as ``"limits.voltage"``.
+    values : iterable
+        Texts with their unit (``"14 V"``), or numbers in SI.
+
+    Returns
+    -------
+    tuple of SweepPoint
+        In the order of the values.
+
+    Raises
+    ------
+    InputError
+        For an unknown key, a wrong unit, or a value that is not allowed.
+
+    Examples
+    --------
+    >>> result = sweep("ilr33-amber", "limits.voltage", ["12 V", 14.0])
+    >>> [(at.value, at.design.limits.voltage_V) for at in result]
+    [('12 V', 12.0), (14.0, 14.0)]
+    """
+    base = load_design(design)
+    if not isinstance(values, Iterable):
+        raise InputError(f"values = {shown(values)}: allowed: several, such as [12.0, 14.0]")
+    return tuple(SweepPoint(value, base.with_values({path: value})) for value in values)

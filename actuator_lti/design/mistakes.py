@@ -1,17 +1,24 @@
-"""All mistakes of a design file at once, each with the line of its key."""
+"""All mistakes of a design file at once, each with the line of its key.
+
+What could not be read is `UNREAD`, so that what does not need it is checked all the same.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from actuator_lti.errors import InputError, Mistakes
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
 
+if TYPE_CHECKING:
+    from actuator_lti.design.model import Design
+
+T = TypeVar("T")
 MOST = 30  # told at once
 _KEY = r"(?:[\w-]+|\"[^\"]*\"|'[^']*')"
 _HEADER = re.compile(rf"\s*(\[\[?)\s*({_KEY}(?:\s*\.\s*{_KEY})*)\s*\]")
@@ -27,6 +34,65 @@ def refusal_text(refusal: Refusal) -> str:
     path, given, reason = refusal
     value = f"{given}"
     return f"{shown(path, 200)[1:-1]}{f' = {value}' if value else ''}: {reason}"
+
+
+class UnreadError(Exception):
+    """Something was to be decided by a value that could not be read."""
+
+
+class _Unread:
+    """A number, word, list or table of which nothing is known but that it is there (it is not None).
+
+    Sums and products with it are unread too; who decides by it, shows it or asks for its parts, stops.
+    """
+
+    def _passed_on(self, *_: object) -> _Unread:
+        return self
+
+    def _asked(self, *_: object) -> Any:
+        raise UnreadError
+
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _passed_on
+    __mod__ = __rmod__ = __pow__ = __rpow__ = __neg__ = __abs__ = _passed_on
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __hash__ = __format__ = _asked
+    __float__ = __int__ = __index__ = __len__ = __iter__ = __getitem__ = __contains__ = _asked
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(name) if name.startswith("__") else UnreadError
+
+
+UNREAD: Any = _Unread()
+
+
+def readable(items: Iterable[T]) -> Iterator[T]:
+    """The items up to the one that asks for a value that could not be read.
+
+    Examples
+    --------
+    >>> list(readable(x for x in (1, 2 * UNREAD, 3) if x > 0))
+    [1]
+    """
+    try:
+        yield from items
+    except UnreadError:
+        return
+
+
+class Rule(NamedTuple):
+    """What a design must not be: the key that is refused then, its value as shown, and what is allowed.
+
+    The texts show values of the design ``d``, as ``{d.limits.voltage_V:g}``.
+    """
+
+    key: str
+    given: str
+    allowed: str
+    broken: Callable[[Design], Any]
+
+    def __call__(self, design: Design) -> Iterator[Refusal]:
+        """The refusal, if there is one."""
+        if self.broken(design):
+            yield self.key, self.given.format(d=design), self.allowed.format(d=design)
 
 
 class Findings:

@@ -17,6 +17,7 @@ from actuator_lti.design.asked import (
     DutyCycle,
     Fact,
     Failure,
+    FrozenMap,
     ObjectFamily,
     Parameter,
     Requirement,
@@ -48,7 +49,6 @@ from actuator_lti.design.control import (
 )
 from actuator_lti.design.field import Axis, choice, label, text
 from actuator_lti.design.law import Law, StateSpace
-from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.design.plant import (
     Coupling,
     Direction,

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from actuator_lti.design.access import with_values
+from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.checks import check_relations
 from actuator_lti.design.model import ControllerObject, ControllerObjects, Design
 from actuator_lti.design.object_dictionary import OBJECTS, PER_RPM, KnownObject, model_value, step_of
-from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 
@@ -17,6 +17,7 @@ __all__ = ["PER_RPM", "Exported", "Imported", "Rounding", "export_objects", "imp
 
 MAX_OBJECTS = 5000
 _TOLERATED = 1e-9
+_TORQUE_LIMITS = ((0x60E0, 0), (0x60E1, 0))
 _Values = dict[tuple[int, int], int]
 
 
@@ -68,7 +69,7 @@ def import_objects(objects: ControllerObjects, base: Design, where: str = "setti
     changes: dict[str, float] = {}
     kept: list[ControllerObject] = []
     for item in objects.values:
-        known = OBJECTS.get((item.index, item.subindex))
+        known = OBJECTS.get(item.place)
         if known is None or not known.paths:
             kept += [] if known is not None and _follows(known, item.value, given) else [item]
             continue
@@ -104,8 +105,8 @@ def _checked(values: tuple[ControllerObject, ...], where: str) -> _Values:
     """Values by index and subindex; duplicates and values out of their object's range are refused."""
     seen: _Values = {}
     for item in values:
-        known, allowed = OBJECTS.get((item.index, item.subindex)), ""
-        if (item.index, item.subindex) in seen:
+        known, allowed = OBJECTS.get(item.place), ""
+        if item.place in seen:
             allowed = "each object once"
         elif known is not None and not known.low <= item.value <= known.high:
             allowed = f"{known.low} to {known.high} {known.unit}, the {known.meaning}"
@@ -132,26 +133,24 @@ def checked_objects(values: tuple[ControllerObject, ...], factor: Any, where: st
 def _import_notes(given: _Values, factor: float, design: Design) -> tuple[str, ...]:
     """What a reader of the import has to know."""
     first, second = given.get((0x6083, 0)), given.get((0x6084, 0))
+    rated_A, peak_A = given.get((0x2329, 1), 0) * 1e-3, design.limits.peak_current_A
+    limits = {key: given[key] * 1e-3 * rated_A for key in _TORQUE_LIMITS if key in given and rated_A}
     per = "per rad/s" if factor == 1.0 else "per rpm"
-    notes = {
-        f"velocity gain 0x2344.01 read as A s {per} (calibration factor {factor:.4g})": (0x2344, 1) in given,
-        "torque feed-forward 0x2349.01 read as the share of J/kM times the command's acceleration": bool(
-            given.get((0x2349, 1))
-        ),
-        "friction of 0x232A read as that of the whole drive at the motor; check that it is not the motor's "
-        "alone": (0x232A, 2) in given or (0x232A, 3) in given,
-    }
-    rated = given.get((0x2329, 1), 0) * 1e-3
-    for key in ((0x60E0, 0), (0x60E1, 0)):
-        limit = given.get(key, 0) * 1e-3 * rated
-        words = f"limits the torque to that of {limit:.4g} A, below the peak current"
-        low = (0x2329, 1) in given and key in given and limit < design.limits.peak_current_A
-        notes[f"{OBJECTS[key].label} {words}"] = low
-    words = f"deceleration 0x6084 = {second} differs from acceleration 0x6083 = {first}, "
-    notes[words + "which the model uses for both"] = None not in (first, second) and first != second
-    words = "0x2347.01 changes the velocity gain at target; the model leaves it out"
-    notes[words] = given.get((0x2347, 1), 128) != 128
-    return tuple(note for note, holds in notes.items() if holds)
+    notes = [
+        (f"velocity gain 0x2344.01 read as A s {per} (calibration factor {factor:.4g})",
+         (0x2344, 1) in given),
+        ("torque feed-forward 0x2349.01 read as the share of J/kM times the command's acceleration",
+         given.get((0x2349, 1))),
+        ("friction of 0x232A read as that of the whole drive at the motor; check that it is not the motor's "
+         "alone", (0x232A, 2) in given or (0x232A, 3) in given),
+        *((f"{OBJECTS[key].label} limits the torque to that of {limit_A:.4g} A, below the peak current",
+           limit_A < peak_A) for key, limit_A in limits.items()),
+        (f"deceleration 0x6084 = {second} differs from acceleration 0x6083 = {first}, which the model uses "
+         "for both", None not in (first, second) and first != second),
+        ("0x2347.01 changes the velocity gain at target; the model leaves it out",
+         given.get((0x2347, 1), 128) != 128),
+    ]  # fmt: skip
+    return tuple(note for note, holds in notes if holds)
 
 
 def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
@@ -163,11 +162,11 @@ def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
     _check_cascade(design)
     before = design.objects
     complete = not before.values if complete is None else complete
-    original = {(item.index, item.subindex): item.value for item in before.values}
+    original = {item.place: item.value for item in before.values}
     written: list[ControllerObject] = []
     rounded: list[Rounding] = []
     for item in before.values:
-        known = OBJECTS.get((item.index, item.subindex))
+        known = OBJECTS.get(item.place)
         follows = known is not None and (known.paths or _follows(known, item.value, original))
         value = _encode(design, known, rounded) if known is not None and follows else None
         written.append(item if value is None else replace(item, value=value))
@@ -188,15 +187,15 @@ def _encode(design: Design, known: KnownObject, rounded: list[Rounding]) -> int 
     """The integer of an object for this design; None where the design says nothing."""
     value = model_value(design, known)
     path = known.paths[0] if known.paths else known.meaning
+    allowed = f"{known.low} to {known.high} {known.unit}"
     if value is None:
         if path in ("control.current.integral_time", "control.velocity.integral_time"):
-            raise InputError(f"{path}: missing; {known.label} needs {known.low} to {known.high} {known.unit}")
+            raise InputError(f"{path}: missing; {known.label} needs {allowed}")
         return None
     exact = value / step_of(known, design.objects.velocity_gain_factor)
     number = round(exact)
     if not known.low <= number <= known.high:
-        allowed = f"allowed: {known.low} to {known.high} {known.unit}"
-        raise InputError(f"{path} = {exact:.6g} {known.unit}: object {known.label}: {allowed}")
+        raise InputError(f"{path} = {exact:.6g} {known.unit}: object {known.label}: allowed: {allowed}")
     if abs(exact - number) > _TOLERATED * max(1.0, abs(exact)):
         rounded.append(Rounding(label=known.label, path=path, exact=exact, written=number, unit=known.unit))
     return number

@@ -14,18 +14,17 @@ from typing import Any
 
 from actuator_lti.asked.quantities import LOOPS, QUANTITIES
 from actuator_lti.design import model
+from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Axis, Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
 from actuator_lti.design.law_sources import PARTS, read_law
-from actuator_lti.design.mistakes import Findings, meant_of, nearest
-from actuator_lti.design.parameters import FrozenMap
+from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
 from actuator_lti.design.sections import BY_PATH, RECORDS, Section, children
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import ampere_unit, parse_limit, parse_quantity, si_text
-from actuator_lti.design.unread import UNREAD, UnreadError
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
@@ -132,11 +131,10 @@ class Reader:
         fields, stated = fields_in(template), sheet_fields(template)
         meant = self.known(table, (*(field.key for field in (*fields, *stated)), *inner), path)
         for field in stated:
-            where = f"{path}.{field.key}"
-            if field.key in (*table, *meant):
-                self.stated[where] = UNREAD
-            if field.key in table and self.entry(field, table[field.key], where) is not UNREAD:
-                self.stated[where] = self.parameters.pop(where)
+            if field.key in table:
+                self.entry(field, table[field.key], f"{path}.{field.key}", self.stated)
+            elif field.key in meant:
+                self.stated[f"{path}.{field.key}"] = UNREAD
         values: Tree = {}
         for field in fields:
             where = f"{path}.{field.key}"
@@ -158,21 +156,17 @@ class Reader:
             return UNREAD
         if field.kind == "limit":
             return self.limit(table.get("quantity"), raw, path)
-        if field.kind in ("quantity", "integer"):
-            return self.entry(field, raw, path) if field.path in FIELDS else self.number(field, raw, path)
-        if field.kind == "quantities":
-            return self.numbers(field, raw, path)
-        if field.kind == "matrix":
-            return self.rows(field, raw, path)
+        if field.is_number and field.path in FIELDS:
+            return self.entry(field, raw, path, self.parameters)
+        if reads := {"quantities": self.numbers, "matrix": self.rows, "names": self.words}.get(field.kind):
+            return reads(field, raw, path)
+        if field.is_number:
+            return self.number(field, raw, path)
         raw = raw.isoformat() if field.kind == "day" and isinstance(raw, date) else raw
-        if field.kind == "names":
-            return self.words(field, raw, path)
-        if not _fits(field, raw):
-            hint = (
-                nearest(raw, field.choices).strip() + "; " if field.choices and isinstance(raw, str) else ""
-            )
-            return self.refuse(path, raw, f"{hint.removeprefix('; ')}allowed: {field.allowed('1')}")
-        return raw
+        if _fits(field, raw):
+            return raw
+        hint = nearest(raw, field.choices).strip() if field.choices and isinstance(raw, str) else ""
+        return self.refuse(path, raw, f"{hint}{'; ' * bool(hint)}allowed: {field.allowed('1')}")
 
     def words(self, field: Field, raw: Any, path: str) -> tuple[str, ...]:
         """Some of the words that a key may have, each once."""
@@ -186,9 +180,9 @@ class Reader:
                 read = self.refuse(path, word, f"unknown{hint}; allowed: {', '.join(field.choices)}")
         return read
 
-    def entry(self, field: Field, raw: Any, path: str) -> Any:
+    def entry(self, field: Field, raw: Any, path: str, into: dict[str, model.Parameter]) -> Any:
         """A value with its pedigree, which is kept."""
-        self.parameters[path] = UNREAD
+        into[path] = UNREAD
         table = raw if isinstance(raw, dict) else {"value": raw}
         self.known(table, _ENTRY, path)
         if "value" not in table:
@@ -196,23 +190,16 @@ class Reader:
         for key in ("source", "grade"):
             if not isinstance(table.get(key, ""), str):
                 self.refuse(f"{path}.{key}", table[key], "allowed: text")
-        value = self.number(field, table["value"], path)
+        value, unit = self.number(field, table["value"], path), field.unit(self.structure)
         if value is UNREAD:
             return UNREAD
         tolerance = self.tolerance(field, table.get("tolerance"), value, f"{path}.tolerance")
-        if tolerance is UNREAD:
-            return value
-        unit = field.unit(self.structure)
-        self.parameters[path] = model.Parameter(
-            path=path,
-            text=raw if isinstance(raw := table["value"], str) else si_text(raw, unit),
-            value=value,
-            unit=unit,
-            symbol=field.symbol,
-            source=table.get("source", ""),
-            grade=table.get("grade", ""),
-            tolerance=tolerance,
-        )
+        if tolerance is not UNREAD:
+            text = table["value"] if isinstance(table["value"], str) else si_text(table["value"], unit)
+            into[path] = model.Parameter(
+                path=path, text=text, value=value, unit=unit, symbol=field.symbol, tolerance=tolerance,
+                source=table.get("source", ""), grade=table.get("grade", ""),
+            )  # fmt: skip
         return value
 
     def tolerance(self, field: Field, raw: Any, value: float, path: str) -> model.Tolerance | None:

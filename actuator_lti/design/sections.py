@@ -6,7 +6,7 @@ Reading, writing, access by dotted key, the schema and the hash are loops over t
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 from actuator_lti.asked.quantities import LOOPS
@@ -58,6 +58,12 @@ class Section:
     def attribute(self) -> str:
         """Last part of the place."""
         return self.place.rpartition(".")[2]
+
+    @property
+    def optional(self) -> bool:
+        """Whether a design may be without it: its attribute is None then."""
+        owner = BY_PATH[self.parent].kind if self.parent else model.Design
+        return any(item.name == self.attribute and item.default is None for item in fields(owner))
 
     def item_path(self, index: int, item: Any) -> str:
         """Dotted path of one repeated table: ``gear.worm``, ``friction.point.2``."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
@@ -13,7 +14,7 @@ from actuator_lti.design.model import ControllerObject, ControllerObjects, Objec
 from actuator_lti.design.object_dictionary import OBJECTS
 from actuator_lti.design.objects import checked_objects
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown
+from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown, shown_path
 
 _INTEGER = re.compile(r"(?:[+-]?[0-9]{1,20}|0[xX][0-9A-Fa-f]{1,16})\Z")
 _NAMESPACE = "http://www.canopen.org/xml/1.0"
@@ -26,8 +27,8 @@ def read_settings(path: str | Path, velocity_gain_factor: float | None = None) -
 
     The factor is 1 (per rad/s) or 9.549 (per rpm); without it what a TOML file says, else 1.
     """
-    where = shown(str(path), 200)[1:-1]
-    text = decode(read_bytes(Path(path), "settings file"), where)
+    where = shown_path(path)
+    text = decode(read_bytes(path, "settings file"), where)
     read = read_settings_xml if text.lstrip().startswith("<") else read_settings_toml
     return read(text, where, velocity_gain_factor)
 
@@ -37,24 +38,22 @@ def parse_label(label: str, where: str) -> tuple[int, int]:
     match = _LABEL.match(label)
     if match is None:
         raise InputError(f'{shown(label)}: allowed: an object such as "0x2344.01" or "0x6080"', where=where)
-    return int(match.group(1), 16), int(match.group(2) or "0", 16)
+    return int(match[1], 16), int(match[2] or "0", 16)
 
 
-def object_from(label: str, raw: Any, where: str) -> ControllerObject:
+def _object_from(label: str, raw: Any, where: str) -> ControllerObject:
     """One object from its entry in TOML: an integer, or a table with value, name and data_type."""
     index, subindex = parse_label(label, where)
-    table = raw if isinstance(raw, dict) else {"value": raw}
-    unknown = set(table) - {"value", "name", "data_type"}
+    table = {"name": "", "data_type": "", **(raw if isinstance(raw, dict) else {"value": raw})}
     value = table.get("value")
-    if unknown or isinstance(value, bool) or not isinstance(value, int):
+    if len(table) > 3 or isinstance(value, bool) or not isinstance(value, int):
         raise InputError(
             f"{label} = {shown(value)}: allowed: a whole number, or a table with value, name, data_type",
             where=where,
         )
-    texts = {key: table.get(key, "") for key in ("name", "data_type")}
-    if not all(isinstance(text, str) for text in texts.values()):
+    if not all(isinstance(table[key], str) for key in ("name", "data_type")):
         raise InputError(f"{label}: name and data_type are texts", where=where)
-    return ControllerObject(index=index, subindex=subindex, value=value, **texts)
+    return ControllerObject(index=index, subindex=subindex, **table)
 
 
 def object_entry(item: ControllerObject) -> Any:
@@ -81,7 +80,7 @@ def objects_from(
     if family not in get_args(ObjectFamily):
         allowed = " or ".join(f'"{one}"' for one in get_args(ObjectFamily))
         raise InputError(f"family = {shown(family)}: allowed: {allowed}", where=where)
-    read = tuple(object_from(label, entry, where) for label, entry in entries.items())
+    read = tuple(_object_from(label, entry, where) for label, entry in entries.items())
     factor = table.get("velocity_gain_factor", 1.0) if factor is None else factor
     return replace(checked_objects(read, factor, where), family=family)
 
@@ -106,12 +105,11 @@ def write_settings_toml(objects: ControllerObjects) -> str:
         "[objects]",
     ]
     for item in objects.values:
-        entry = object_entry(item)
-        text = tomli_w.dumps({"x": [entry]}, indent=0) if isinstance(entry, dict) else ""
-        inline = text.partition("[")[2].rpartition("]")[0].strip().rstrip(",") if text else str(entry)
-        known = OBJECTS.get((item.index, item.subindex))
-        comment = f"  # {known.meaning}, {known.unit}" if known else "  # kept as it came"
-        lines.append(f'"{item.label}" = {inline}{comment}')
+        listed = tomli_w.dumps({"x": [object_entry(item)]}, indent=0)  # a list has its tables in one line
+        inline = listed.partition("[")[2].rpartition("]")[0].strip().rstrip(",")
+        known = OBJECTS.get(item.place)
+        comment = f"{known.meaning}, {known.unit}" if known else "kept as it came"
+        lines.append(f'"{item.label}" = {inline}  # {comment}')
     return "\n".join(lines) + "\n"
 
 
@@ -150,70 +148,60 @@ def parsed_xml(text: str, where: str) -> Element:
     return root
 
 
-def _local(element: Element) -> str:
-    return str(element.tag).rpartition("}")[2]
-
-
-def _objects_in(root: Element, where: str) -> list[tuple[ControllerObject, Element]]:
+def _objects_in(element: Element, where: str, depth: int = 0) -> Iterator[tuple[ControllerObject, Element]]:
     """Every object with an actual value, and the element that holds it."""
-    result: list[tuple[ControllerObject, Element]] = []
-    stack: list[tuple[Element, int]] = [(root, 0)]
-    while stack:
-        element, depth = stack.pop()
-        if depth > 8 * TOML_DEPTH.most:
-            raise InputError("nested too deeply", where=where)
-        if _local(element) == "CANopenObject":
-            index = _hex(element, "index", 4, where)
-            result += _values_of(element, index, 0, where)
-            for sub in element:
-                if _local(sub) == "CANopenSubObject":
-                    result += _values_of(sub, index, _hex(sub, "subIndex", 2, where), where)
-            continue
-        stack.extend((child, depth + 1) for child in reversed(element))
-    return result
+    if depth > 8 * TOML_DEPTH.most:
+        raise InputError("nested too deeply", where=where)
+    if not _is(element, "CANopenObject"):
+        for child in element:
+            yield from _objects_in(child, where, depth + 1)
+        return
+    index = _hex(element, "index", 4, where)
+    subs = [child for child in element if _is(child, "CANopenSubObject")]
+    for one in (element, *subs):
+        subindex = 0 if one is element else _hex(one, "subIndex", 2, where)
+        text = one.get("actualValue")
+        if text is not None:
+            yield _object_of(one, index, subindex, text.strip(), where), one
+
+
+def _is(element: Element, name: str) -> bool:
+    return str(element.tag).rpartition("}")[2] == name
 
 
 def _hex(element: Element, attribute: str, digits: int, where: str) -> int:
     text = element.get(attribute, "")
-    plain = text[2:] if text[:2] in ("0x", "0X") else text
-    if not re.fullmatch(rf"[0-9A-Fa-f]{{1,{digits}}}", plain):
+    if not re.fullmatch(rf"(?:0[xX])?[0-9A-Fa-f]{{1,{digits}}}", text):
         raise InputError(
             f"{attribute} = {shown(text)}: allowed: up to {digits} hexadecimal digits", where=where
         )
-    return int(plain, 16)
+    return int(text, 16)
 
 
-def _values_of(
-    element: Element, index: int, subindex: int, where: str
-) -> list[tuple[ControllerObject, Element]]:
-    text = element.get("actualValue")
-    if text is None:
-        return []
-    label = ControllerObject(index=index, subindex=subindex, value=0).label
-    if not _INTEGER.match(text.strip()):
-        raise InputError(f"{label} = {shown(text)}: allowed: a whole number", where=where)
-    value = int(text.strip(), 16) if text.strip()[:2] in ("0x", "0X") else int(text)
+def _object_of(element: Element, index: int, subindex: int, text: str, where: str) -> ControllerObject:
     names = {"name": element.get("name", ""), "data_type": element.get("dataType", "")}
+    item = ControllerObject(index=index, subindex=subindex, value=0, **names)
+    if not _INTEGER.match(text):
+        raise InputError(
+            f"{item.label} = {shown(element.attrib['actualValue'])}: allowed: a whole number", where=where
+        )
     if any(len(name) > 200 for name in names.values()):
-        raise InputError(f"{label}: a name of more than 200 characters", where=where)
-    return [(ControllerObject(index=index, subindex=subindex, value=value, **names), element)]
+        raise InputError(f"{item.label}: a name of more than 200 characters", where=where)
+    return replace(item, value=int(text, 16 if text[:2] in ("0x", "0X") else 10))
 
 
 def write_settings_xml(objects: ControllerObjects) -> str:
     """Settings as ``.xdc``-style XML that :func:`read_settings_xml` turns back into the same objects."""
-    root = Element("ISO15745ProfileContainer", {"xmlns": _NAMESPACE})
-    profile = SubElement(root, "ISO15745Profile")
-    body = SubElement(SubElement(profile, "ProfileBody"), "ApplicationLayers")
-    listed = SubElement(body, "CANopenObjectList")
-    parents: dict[int, Element] = {}
-    last: int | None = None
+    root = listed = Element("ISO15745ProfileContainer", {"xmlns": _NAMESPACE})
+    for tag in ("ISO15745Profile", "ProfileBody", "ApplicationLayers", "CANopenObjectList"):
+        listed = SubElement(listed, tag)
+    parent: Element | None = None
     for item in objects.values:
-        if item.subindex == 0 or item.index != last:
-            parents[item.index] = SubElement(listed, "CANopenObject", {"index": f"{item.index:04X}"})
-        last = item.index
-        target = parents[item.index]
-        if item.subindex:
-            target = SubElement(target, "CANopenSubObject", {"subIndex": f"{item.subindex:02X}"})
+        index = f"{item.index:04X}"
+        if parent is None or item.subindex == 0 or parent.get("index") != index:
+            parent = SubElement(listed, "CANopenObject", {"index": index})
+        sub = {"subIndex": f"{item.subindex:02X}"}
+        target = SubElement(parent, "CANopenSubObject", sub) if item.subindex else parent
         more = {"name": item.name, "dataType": item.data_type, "actualValue": str(item.value)}
         target.attrib.update({key: value for key, value in more.items() if value})
     indent(root)
@@ -224,7 +212,7 @@ def settings_xml(objects: ControllerObjects, into: Path | None = None) -> tuple[
     """Settings as XML text, alone or put into a device configuration file; and what found no place there."""
     if into is None:
         return write_settings_xml(objects), ()
-    where = shown(str(into), 200)[1:-1]
+    where = shown_path(into)
     return update_settings_xml(decode(read_bytes(into, "device configuration"), where), objects, where)
 
 
@@ -239,11 +227,11 @@ def update_settings_xml(
         if not re.fullmatch(r"ns[0-9]+", prefix):
             register_namespace(prefix, uri)
     root = parsed_xml(text, where)
-    values = {(item.index, item.subindex): item.value for item in objects.values}
+    left = {item.place: item for item in objects.values}
     for item, element in _objects_in(root, where):
-        value = values.pop((item.index, item.subindex), item.value)
+        value = left.pop(item.place, item).value
         if value != item.value:
             as_hex = element.get("actualValue", "").strip()[:2] in ("0x", "0X") and value >= 0
             element.set("actualValue", f"0x{value:X}" if as_hex else str(value))
-    left = tuple(ControllerObject(index=i, subindex=s, value=0).label for i, s in values)
-    return _DECLARATION + tostring(root, encoding="unicode") + "\n", left
+    homeless = tuple(item.label for item in left.values())
+    return _DECLARATION + tostring(root, encoding="unicode") + "\n", homeless

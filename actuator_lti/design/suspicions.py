@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import isfinite, pi
 
-from actuator_lti.design.checks_elastic import elastic_warnings
 from actuator_lti.design.data_sheet import FROM
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
@@ -151,6 +150,21 @@ def _loads(design: Design) -> Iterator[str]:
         if abs(item.load_Nm or 0.0) > largest:
             key = f"requirement.{item.id}.load"
             yield f"{key}: {item.load_Nm:g} {unit} lies above load.moment_max = {largest:g} {unit}"
+
+
+def elastic_warnings(design: Design) -> Iterator[str]:
+    """A rigid self-locking drive that cannot lock its load, and a spring that nothing damps."""
+    behind, load = design.load.friction, design.load
+    free = behind is None or not (behind.viscous_Nms_rad or behind.dry_torque_Nm)
+    if free and design.coupling is not None and design.coupling.damping_Nms_rad == 0.0:
+        yield "coupling.damping: 0, and no load.friction: with the motor at rest the load keeps ringing"
+    least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
+    rigid = design.coupling is None and load.path == "self-locking"
+    if rigid and load.moment_max_Nm > 0.0 and coefficient < least * (1 - 1e-12):
+        yield (
+            f"friction.load_coefficient: {coefficient:g} is less than 1/N = {least:g}: the friction of a "
+            'self-locking drive cannot hold its load; or is load.path = "back-drivable"?'
+        )
 
 
 def _pedigree(design: Design) -> Iterator[str]:

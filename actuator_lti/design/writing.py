@@ -17,35 +17,14 @@ from actuator_lti.design.data_sheet import as_stated
 from actuator_lti.design.fields import Structure, field_of, fields_in
 from actuator_lti.design.loader import as_design, design_from_tree
 from actuator_lti.design.mistakes import Findings
-from actuator_lti.design.model import (
-    Controller,
-    ControllerObjects,
-    Design,
-    Limits,
-    Motor,
-    Parameter,
-    Tolerance,
-    Validation,
-    default_deflection,
-)
+from actuator_lti.design.model import ControllerObjects, Design, Parameter, Tolerance, default_deflection
 from actuator_lti.design.reader import Reader
-from actuator_lti.design.sections import RECORDS, SECTIONS, at_place, parts_of
+from actuator_lti.design.sections import RECORDS, SECTIONS, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
-
-# what a design has that its file does not mention: a section absent here must be written even when empty
-_BARE = Design(
-    name="",
-    title="",
-    motor=Motor(rotor_inertia_kgm2=1.0),
-    controller=Controller(period_s=1.0, computing_delay_s=0.0),
-    limits=Limits(voltage_V=1.0),
-    validation=Validation(full_deflection_rad=1.0),
-)
-
 
 _WHICH = ("rotor", "to", "locking_gear", "law", "continuous")  # mostly not said
 
@@ -74,7 +53,7 @@ def design_tree(design: Design) -> Tree:
         if section.many:
             named = {"name": part.name} if section.many == "named" else {}
             here.setdefault(section.key, []).append({**named, **table})
-        elif table or section.required or at_place(_BARE, section.place) is None:
+        elif table or section.required or section.optional:
             here[section.key] = table
     for record in RECORDS:
         items = getattr(design, record.attribute)
@@ -116,12 +95,9 @@ def _bare(value: Any, unit: str) -> Any:
 def _written(text: str) -> str | int | float:
     """A number where the text is exactly the number's own spelling, else the text."""
     for kind in (int, float):
-        try:
-            number = kind(text)
-        except ValueError:
-            continue
-        if repr(number) == text:
-            return number
+        with suppress(ValueError):
+            if repr(number := kind(text)) == text:
+                return number
     return text
 
 
@@ -135,15 +111,11 @@ def _entry(known: Parameter, constants: str) -> Any:
 
 def _tolerance(tolerance: Tolerance, unit: str) -> Any:
     width = tolerance.half_width if tolerance.kind == "uniform" else tolerance.std
-    text = _written(tolerance.text) if tolerance.text else _si(width, unit)
+    text = _written(tolerance.text) if tolerance.text else _bare(width, unit)
     if tolerance.kind == "uniform":
         return text
     bounds = {key: getattr(tolerance, key) for key in ("lower", "upper") if isfinite(getattr(tolerance, key))}
-    return {"kind": tolerance.kind, "std": text, **{key: _si(value, unit) for key, value in bounds.items()}}
-
-
-def _si(value: Any, unit: str) -> Any:
-    return value if unit == "1" else si_text(value, unit)
+    return {"kind": tolerance.kind, "std": text, **{key: _bare(bound, unit) for key, bound in bounds.items()}}
 
 
 def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.drive.choice import finite, larger, smaller, where
-from actuator_lti.drive.operating import dry_torque, segments
+from actuator_lti.drive.operating import dry_torque, friction_slopes
 from actuator_lti.drive.steady import circuit_resistance_ohm, droop, winding
 from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
@@ -112,9 +112,7 @@ def resistance_Nm(design: Design, load_Nm: float, direction: int) -> Any:
 
 def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
     """Slope of friction over the motor's speed, piece by piece: (speed from which it holds, slope)."""
-    points = design.friction.map(direction)
-    pieces: list[tuple[float, Any]]
-    pieces = list(segments(points)) if points else [(0.0, design.friction.viscous(direction))]
+    pieces = friction_slopes(design, direction)
     behind, damping = design.load.friction, design.load.moment_damping_Nms_rad
     more: Any = 0.0
     if behind is not None and design.coupling is not None:
@@ -146,15 +144,15 @@ def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) ->
         speed, cause = where(nearer, bound, speed), where(nearer, kind, cause)
     moves = stall > against
     speed, cause = where(moves, speed, 0.0), where(moves, cause, FORCE)
-    return speed, cause, against + _speed_torque(slopes, speed)
+    return speed, cause, against + slopes_torque(slopes, speed)
 
 
 def speed_torque_Nm(design: Design, speed_rad_s: Any) -> Any:
     """Torque forward of what grows with the speed: viscous friction or its map, behind too, damping."""
-    return _speed_torque(_speed_slopes(design, 1), speed_rad_s)
+    return slopes_torque(_speed_slopes(design, 1), speed_rad_s)
 
 
-def _speed_torque(slopes: list[tuple[float, Any]], speed: Any) -> Any:
+def slopes_torque(slopes: list[tuple[float, Any]], speed: Any) -> Any:
     """Torque of the speed-dependent part at a speed (0 at an unbounded one, where it has no meaning)."""
     bounded = where(finite(speed), speed, 0.0)
     total, last = 0.0, 0.0

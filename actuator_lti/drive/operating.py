@@ -109,6 +109,12 @@ def segments(points: tuple[FrictionPoint, ...]) -> list[tuple[float, float]]:
     return result or [(0.0, 0.0)]
 
 
+def friction_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
+    """(speed from which it holds, slope) of each piece of the motor's friction that grows with the speed."""
+    points = design.friction.map(direction)
+    return [*segments(points)] if points else [(0.0, design.friction.viscous(direction))]
+
+
 def _map_slope(points: tuple[FrictionPoint, ...], speed: float) -> Any:
     first, *others = segments(points)
     slope: Any = first[1]

@@ -9,9 +9,9 @@ from itertools import combinations
 import numpy as np
 
 from actuator_lti.design import with_values
+from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Correlation, Design, FrictionPoint, Gravity, Tolerance
-from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit

@@ -23,13 +23,13 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import stage_gain
+from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import TooManyTicks
 from actuator_lti.loops import ExactMargins, Loops, exact_margins, periodic_loop
 from actuator_lti.loops.periodic import PeriodicLoop
 from analyses.large_signal.tones import full_range
 from analyses.motion.settling import accepted_rad
 from nonlinear import LIMITERS, Rows
-from nonlinear.bench.loop_setup import points_of
 from nonlinear.bench.operating_motion import lasting_torque_Nm, quiet
 
 Floats = npt.NDArray[np.float64]
@@ -122,7 +122,7 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
 
     ``loops`` are sampled and sliding; in ``settle_ticks`` the linear drive settles.
     """
-    margins = {point: exact_margins(loops, point) for point in points_of(design) if point != "output"}
+    margins = {point: exact_margins(loops, point) for point in wire(design).points if point != "output"}
     result = [
         _prediction(loops, point, margins[point].gain_lower, limit, limiter)
         for point, limit, limiter in _limits(design)
@@ -145,7 +145,7 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
 
 def _limits(design: Design) -> list[tuple[str, float, str]]:
     """Every limit behind a controller whose loop may have a lower gain margin: point, limit, name."""
-    limits, points = design.limits, points_of(design)
+    limits, points = design.limits, wire(design).points
     result = [("u", limits.voltage_V, "voltage limit")]
     if "i_ref" in points:
         short = limits.voltage_V / (design.effective_motor.resistance_ohm or 1.0)

@@ -13,11 +13,11 @@ from dataclasses import replace
 from math import ceil, inf, isfinite
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.wiring import wire
 from analyses.validation.limit_values import FAR, limit_rows
 from analyses.validation.row import Row
 from analyses.validation.torque_values import torque_rows
 from analyses.validation.value_pair import Pair
-from nonlinear.bench.loop_setup import every
 from nonlinear.rows import Rows
 
 
@@ -49,7 +49,7 @@ def _profile(pair: Pair) -> Iterator[Row]:
     if outermost not in ("position", "velocity"):
         return
     model, own = pair.model.command, pair.design.command
-    T = every(pair.design, outermost) * pair.design.controller.period_s
+    T = wire(pair.design).interval[outermost] * pair.design.controller.period_s
     angle = "m" if pair.design.axis == "linear" else "rad"
     keys = ("rate_rad_s", "acceleration_rad_s2", "jerk_rad_s3")
     columns = ("profile_range", "profile_rate", "profile_acceleration")

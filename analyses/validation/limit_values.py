@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from math import inf, isfinite
 
 from actuator_lti.design.model import CurrentLoop, Design, Instruments, VelocityLoop
+from actuator_lti.drive.wiring import wire
 from analyses.validation.row import Row, judged
 from analyses.validation.torque_values import edge
 from analyses.validation.value_pair import WITHIN, Pair, only
-from nonlinear.bench.loop_setup import every, stages_of, target
 from nonlinear.rows import Rows
 from nonlinear.runs.running import Running
 
@@ -36,7 +36,7 @@ def limit_rows(pair: Pair) -> Iterator[Row]:
     yield from _limited(pair, rate=False)
     yield from _limited(pair, rate=True)
     for stage in ("current", "velocity"):
-        if stage in stages_of(pair.design):
+        if stage in pair.design.controller.stages:
             yield from _windup(pair, stage)
     yield from _overload(pair)
     yield from _supply(pair)
@@ -70,7 +70,7 @@ def _driven(pair: Pair) -> list[tuple[str, str]]:
     design = pair.design
     own = design.controller.own_law  # without a direct term it answers no command within one tick
     late = own[0] if own is not None and own[1].direct == 0.0 else ""
-    stages = [(stage, target(design, stage)) for stage in stages_of(design) if stage != late]
+    stages = [(stage, signal) for stage, signal in wire(design).target.items() if stage != late]
     outermost = {"velocity": "w_ref", "current": "i_ref", "voltage": "u"}.get(design.controller.outermost)
     return stages if outermost is None else [*stages, ("", outermost)]
 
@@ -86,7 +86,7 @@ def _limited(pair: Pair, *, rate: bool) -> Iterator[Row]:
         if not isfinite(min(limit, own)):
             continue
         updated = stage or (pair.design.controller.outermost if signal == "w_ref" else "")
-        period = every(pair.design, updated) * pair.design.controller.period_s if rate else 1.0
+        period = wire(pair.design).interval.get(updated, 1) * pair.design.controller.period_s if rate else 1.0
         size = _ask(pair, stage, min(limit, own) * period)
         found = _pushed(pair.rows(only(**{attribute: own})), pair, stage, size).value(place) / period
         words = "over one update" if rate else f"a {stage or 'direct'} command far beyond it"
@@ -105,13 +105,13 @@ def _loop(design: Design, stage: str) -> tuple[VelocityLoop | CurrentLoop | None
 def _windup(pair: Pair, stage: str) -> Iterator[Row]:
     """What the integral does at the limit, over one update from zero (model.md sections 2 and 7)."""
     model, own = (one[0] for one in (_loop(pair.model, stage), _loop(pair.design, stage)))
-    attribute = "peak_current_A" if target(pair.design, stage) == "i_ref" else "voltage_V"
+    attribute = "peak_current_A" if wire(pair.design).target[stage] == "i_ref" else "voltage_V"
     limit = float(getattr(pair.model.limits, attribute))
     ours = float(getattr(pair.design.limits, attribute))
     if model is None or own is None or model.integral_time_s is None or not isfinite(min(limit, ours)):
         return
     gain = _loop(pair.model, stage)[1]
-    T = every(pair.model, stage) * pair.model.controller.period_s
+    T = wire(pair.model).interval.get(stage, 1) * pair.model.controller.period_s
     asked = OVER * limit / gain
     rows = pair.rows(only(**{attribute: ours}))
     found = _pushed(rows, pair, stage, asked).value(f"{stage.upper()}_INTEGRATOR")

@@ -26,7 +26,7 @@ from analyses.validation.small_signal import Place
 from nonlinear import tangent
 from nonlinear.bench.derivative import tangents
 from nonlinear.bench.injection import Watched
-from nonlinear.bench.loop_setup import PATHS, LoopSetup, loop_setup, points_of, stages_of
+from nonlinear.bench.loop_setup import PATHS, LoopSetup, loop_setup
 from nonlinear.bench.operating_motion import may_stand, on_its_stand, on_the_bench, standing
 
 if TYPE_CHECKING:
@@ -102,7 +102,8 @@ class Bench:
         """Loops innermost first, break points, paths."""
         behind = self.design.coupling is not None or self.design.load.path == "back-drivable"
         paths = PATHS if behind else ("command",)  # a self-locking rigid drive does not yield to its load
-        return (*stages_of(self.design), *points_of(self.design), *paths)
+        wired = wire(self.design)
+        return (*wired.stages, *wired.points, *paths)
 
     def loop(self, name: str) -> Loop:
         """The linear loop of a stage; of the current with the rotor locked, as it is tested."""
@@ -113,7 +114,7 @@ class Bench:
     @cached_property
     def figures(self) -> dict[str, LoopFigures]:
         """Figures of the loops with the outer ones open, by stage."""
-        return {name: loop_figures(self.loop(name)) for name in stages_of(self.design)}
+        return {name: loop_figures(self.loop(name)) for name in wire(self.design).stages}
 
     def places(self) -> Iterator[Place]:
         """All of them; a tangent is measured as each is asked for."""

@@ -98,15 +98,6 @@ def regulator(e, integral, gain, step, extra, limit, law, tracking):
 
 
 @kernel
-def velocity_regulator(p, s, e, limit):
-    """The velocity controller's own law on its error."""
-    return regulator(
-        e, s[layout.S_VELOCITY_INTEGRATOR], p[layout.VELOCITY_GAIN], p[layout.VELOCITY_INTEGRAL],
-        s[layout.S_TORQUE_FEEDFORWARD], limit, p[layout.VELOCITY_WINDUP], p[layout.VELOCITY_TRACKING],
-    )  # fmt: skip
-
-
-@kernel
 def probe(p, s, io, point, value):
     """Signal after the probe at ``point``: gain times the delayed value plus the injected signal.
 

@@ -17,7 +17,6 @@ from nonlinear._kernels.blocks import (
     own_states,
     pi,
     regulator,
-    velocity_regulator,
 )
 from nonlinear._kernels.position import (
     limited,
@@ -60,7 +59,10 @@ def outer(p, s, io, th):
 @kernel
 def torque_path(p, s, e, limit):
     """Velocity controller with feed-forward: clamp with the anti-windup, filters, clamp again."""
-    out, integral, hit = velocity_regulator(p, s, e, limit)
+    out, integral, hit = regulator(
+        e, s[layout.S_VELOCITY_INTEGRATOR], p[layout.VELOCITY_GAIN], p[layout.VELOCITY_INTEGRAL],
+        s[layout.S_TORQUE_FEEDFORWARD], limit, p[layout.VELOCITY_WINDUP], p[layout.VELOCITY_TRACKING],
+    )  # fmt: skip
     s[layout.S_VELOCITY_INTEGRATOR] = integral
     stage = float(layout.FLAG_CURRENT if p[layout.HAS_CURRENT] > 0.0 else layout.FLAG_VOLTAGE)
     count = int(p[layout.TORQUE_FILTERS])
@@ -96,13 +98,6 @@ def own_velocity(p, s, io, th, measured, limit):
         s[layout.S_FLAGS_VELOCITY] += flag
     own_states(p, s, out - v)
     return out
-
-
-@kernel
-def measure_first(p, s, io, w, th):
-    """Measure the speed before the outermost stage, which takes it too."""
-    if p[layout.HAS_VELOCITY] <= 0.0 or s[layout.S_UNTIL_VELOCITY] <= 0.0:
-        s[layout.S_MEASURED_SPEED] = measured_speed(p, s, io, w, th) if p[layout.RARE_SPEED] > 0.0 else w
 
 
 @kernel
@@ -180,8 +175,9 @@ def control(p, s, io, i, w, th):
     """One tick of the controller; leaves the voltage in the state."""
     if p[layout.OVERLOAD] > 0.0:
         overload(p, s, i)
-    if p[layout.OWN_MEASURES] > 0.0:
-        measure_first(p, s, io, w, th)
+    due = p[layout.HAS_VELOCITY] <= 0.0 or s[layout.S_UNTIL_VELOCITY] <= 0.0
+    if p[layout.OWN_MEASURES] > 0.0 and due:  # before the outermost stage, which takes it too
+        s[layout.S_MEASURED_SPEED] = measured_speed(p, s, io, w, th) if p[layout.RARE_SPEED] > 0.0 else w
     if s[layout.S_UNTIL_OUTER] <= 0.0:
         s[layout.S_UNTIL_OUTER] = p[layout.OUTER_EVERY]
         outer(p, s, io, th)

@@ -237,12 +237,6 @@ def walk(p, s, whole):
 
 
 @kernel
-def ends_rest(event):
-    """Whether an event is a breakaway of either side."""
-    return event == at.MOTOR_UP or event == at.MOTOR_DOWN or event == at.LOAD_UP or event == at.LOAD_DOWN
-
-
-@kernel
 def first_event(p, s, h):
     """Time and number of the first event of the interval whose series is filled; h and 0 if none."""
     best, event = h, at.NO_EVENT
@@ -261,8 +255,9 @@ def first_event(p, s, h):
         tolerance = fill_polynomial(p, s, g, offset, h)
         number = int(s[g + at.G_EVENT])
         t = AT_ONCE
+        breaks_away = at.MOTOR_UP <= number <= at.MOTOR_DOWN or at.LOAD_UP <= number <= at.LOAD_DOWN
         # a step of the inputs can break a rest at once, even if it would hold again later
-        if not (ends_rest(number) and before < -tolerance):
+        if not (breaks_away and before < -tolerance):
             t = first_fall(s, n, best, tolerance)
         if t == AT_ONCE:
             t = 0.0

@@ -39,13 +39,6 @@ def spring_expression(p, s, side):
 
 
 @kernel
-def coupling_torque(p, s):
-    """T_s in this state, at the coupling's shaft."""
-    side = contact_side(s)
-    return side * spring_expression(p, s, side)
-
-
-@kernel
 def map_place(p, s):
     """Place of the segment of the friction map that holds."""
     side = 0 if s[layout.S_DIRECTION] >= 0.0 else at.MAP_SIDE
@@ -295,30 +288,15 @@ def elastic_slopes(p, s):
 
 
 @kernel
-def start_segment(p, s, direction):
-    """The motor slips in a direction at its present speed: find the segment of its map."""
-    s[layout.S_DIRECTION], s[at.ES_SEGMENT] = direction, 0.0
-    side = 0 if direction >= 0.0 else 1
-    for j in range(1, int(p[at.EL_SEGMENTS + side])):
-        speed = p[at.EL_MAP + side * at.MAP_SIDE + j * at.MAP_SEGMENT + at.MAP_SPEED]
-        if direction * s[layout.S_SPEED] > speed:
-            s[at.ES_SEGMENT] = float(j)
-
-
-@kernel
-def elastic_start(p, s):
-    """Set load side, twist and discrete state at t_0; the motor's own state stands in ``s``."""
-    s[at.ES_TWIST], s[at.ES_LOAD_SPEED] = p[layout.TWIST_START], p[layout.LOAD_SPEED_START]
-    s[at.ES_LOAD_ANGLE] = s[layout.S_ANGLE] / p[layout.RATIO_TO_COUPLING] - s[at.ES_TWIST]
-    put_output(p, s)
-    find_mode(p, s)
-
-
-@kernel
 def find_mode(p, s):
     """The discrete state that belongs to speeds and twist: at t_0, and after a change of parameters."""
     w, W = s[layout.S_SPEED], s[at.ES_LOAD_SPEED]
-    start_segment(p, s, 1.0 if p[at.EL_SMOOTH] > 0.0 or w > 0.0 else (-1.0 if w < 0.0 else 0.0))
+    direction = 1.0 if p[at.EL_SMOOTH] > 0.0 or w > 0.0 else (-1.0 if w < 0.0 else 0.0)
+    s[layout.S_DIRECTION], s[at.ES_SEGMENT] = direction, 0.0
+    side = 0 if direction >= 0.0 else 1
+    for j in range(1, int(p[at.EL_SEGMENTS + side])):
+        if direction * w > p[at.EL_MAP + side * at.MAP_SIDE + j * at.MAP_SEGMENT + at.MAP_SPEED]:
+            s[at.ES_SEGMENT] = float(j)
     if p[layout.RIGID] == 0.0:
         s[at.ES_LOAD] = 1.0 if p[at.EL_LOAD_SMOOTH] > 0.0 or W > 0.0 else (-1.0 if W < 0.0 else 0.0)
         start_contact(p, s)
@@ -373,23 +351,16 @@ def change_contact(p, s, event):
 
 
 @kernel
-def land_motor(p, s):
-    """The motor's speed has come to zero: rest if the drive torque is within its level, else reversal."""
-    direction = s[layout.S_DIRECTION]
-    s[layout.S_SPEED], s[layout.S_DIRECTION], s[at.ES_SEGMENT] = 0.0, 0.0, 0.0
-    enter_mode(p, s)
-    if fails(p, s, at.MOTOR_DOWN if direction > 0.0 else at.MOTOR_UP):
-        s[layout.S_DIRECTION] = -direction
+def land(p, s, speed, slip, up):
+    """A side's speed has come to zero: rest if its torque is within its level, else reversal.
 
-
-@kernel
-def land_load(p, s):
-    """The load's speed has come to zero: the same with its own level."""
-    direction = s[at.ES_LOAD]
-    s[at.ES_LOAD_SPEED], s[at.ES_LOAD] = 0.0, 0.0
+    Its speed and direction of slip stand at ``speed`` and ``slip``; ``up`` and the next are its breakaways.
+    """
+    direction = s[slip]
+    s[speed], s[slip] = 0.0, 0.0
     enter_mode(p, s)
-    if fails(p, s, at.LOAD_DOWN if direction > 0.0 else at.LOAD_UP):
-        s[at.ES_LOAD] = -direction
+    if fails(p, s, up + 1 if direction > 0.0 else up):
+        s[slip] = -direction
 
 
 @kernel
@@ -405,9 +376,9 @@ def change_mode(p, s, event):
         if s[at.ES_SEGMENT] > 0.0:
             s[at.ES_SEGMENT] -= 1.0
         else:
-            land_motor(p, s)
+            land(p, s, layout.S_SPEED, layout.S_DIRECTION, at.MOTOR_UP)
     elif event == at.LOAD_LANDS:
-        land_load(p, s)
+        land(p, s, at.ES_LOAD_SPEED, at.ES_LOAD, at.LOAD_UP)
     else:
         s[at.ES_LOAD] = 1.0 if event == at.LOAD_UP else -1.0
     enter_mode(p, s)

@@ -41,7 +41,11 @@ def prepare_elastic_sizes(p):
     while product > SHORT and levels < MOST_LEVELS:
         product *= 0.5
         levels += 1
-    p[at.EL_LEVELS], p[at.EL_TERMS] = float(levels), float(terms_of(product))
+    terms, rest = 1, product  # of the Taylor series over the shortest interval
+    while rest > 1e-18 and terms < at.MAX_TERMS:
+        terms += 1
+        rest *= product / terms
+    p[at.EL_LEVELS], p[at.EL_TERMS] = float(levels), float(max(terms, 4))
     size = at.MODE_REACH + (3 + levels) * (1 + at.STEP_SIZE)
     p[at.EL_MODE_SIZE] = float(size)
     p[layout.PARAMETER_SIZE] = float(at.EL_MODES + modes * size)
@@ -151,30 +155,22 @@ def put_mode(p, number, m):
     spring = p[at.EL_SPRING + piece * at.SPRING_SIZE + at.SPRING_STIFFNESS]
     k = spring if contact > 0 else 0.0
     c = p[layout.COUPLING_DAMPING] if contact > 0 else 0.0
-    put_electrical(p, m, direction)
-    if direction != 0.0:
-        put_motor(p, m, slope, share, k, c)
+    put_motor(p, m, direction, slope, share, k, c)
     if p[layout.RIGID] == 0.0:
         put_load_side(p, m, direction != 0.0, slips, share, k, c)
     put_weights(p, m, spring)
 
 
 @kernel
-def put_electrical(p, m, direction):
-    """The current of a motor that has one."""
-    if p[layout.SOURCE] > 0.0:
+def put_motor(p, m, direction, slope, share, k, c):
+    """The current of a motor that has one; a slipping motor under its friction and the coupling."""
+    J, L, source = p[layout.MOTOR_INERTIA], p[layout.INDUCTANCE], p[layout.SOURCE] > 0.0
+    if not source:
+        p[m + at.A_II], p[m + at.B_I] = -p[layout.RESISTANCE] / L, 1.0 / L
+    if direction == 0.0:
         return
-    L = p[layout.INDUCTANCE]
-    p[m + at.A_II], p[m + at.B_I] = -p[layout.RESISTANCE] / L, 1.0 / L
-    if direction != 0.0:
-        p[m + at.A_IW] = -p[layout.BACK_EMF] / L
-        p[m + at.A_WI] = p[layout.TORQUE_CONSTANT] / p[layout.MOTOR_INERTIA]
-
-
-@kernel
-def put_motor(p, m, slope, share, k, c):
-    """The slipping motor under its friction and the coupling."""
-    J = p[layout.MOTOR_INERTIA]
+    if not source:
+        p[m + at.A_IW], p[m + at.A_WI] = -p[layout.BACK_EMF] / L, p[layout.TORQUE_CONSTANT] / J
     p[m + at.B_W] = 1.0 / J
     p[m + at.A_WW] = -(slope + share * c / p[layout.RATIO_TO_COUPLING]) / J
     p[m + at.A_WD] = -share * k / J
@@ -206,16 +202,6 @@ def put_weights(p, m, k):
     p[weight + 2] = math.sqrt(p[layout.LOAD_INERTIA])
     free = p[m + at.A_WD] == 0.0 and p[m + at.A_VD] == 0.0
     p[weight + 3] = 0.0 if free else math.sqrt(k)
-
-
-@kernel
-def terms_of(product):
-    """Terms of the Taylor series over an interval on which the norm of A h is ``product``."""
-    terms, rest = 1, product
-    while rest > 1e-18 and terms < at.MAX_TERMS:
-        terms += 1
-        rest *= product / terms
-    return max(terms, 4)
 
 
 @kernel

@@ -25,19 +25,6 @@ COLUMNS = (0, 1, 0, 1, 2, 3, 1, 2, 3, 1, 2)
 
 
 @kernel
-def put_first_order(p, m, h, s, a):
-    """h times the matrix of the mode at ``m``, written at ``s[a]``."""
-    for j in range(at.STEP_SIZE):
-        s[a + j] = 0.0
-    for j in range(COEFFICIENTS):
-        s[a + ROWS[j] * at.STEP_COLUMNS + COLUMNS[j]] = h * p[m + j]
-    s[a + 4] = h * p[m + at.B_I]
-    s[a + at.STEP_COLUMNS + 5] = h * p[m + at.B_W]
-    s[a + 2 * at.STEP_COLUMNS + 6] = h * p[m + at.B_V]
-    s[a + 4 * at.STEP_COLUMNS + 1] = h
-
-
-@kernel
 def multiply(s, a, b, out):
     """The five rows at ``a`` times the four rows of the states at ``b``, without the inputs of ``a``."""
     for r in range(5):
@@ -52,7 +39,12 @@ def multiply(s, a, b, out):
 def put_short_step(p, m, h, s, d):
     """D over an h that is short against the mode, by its Taylor series; three places behind are used."""
     term, first, product = d + at.STEP_SIZE, d + 2 * at.STEP_SIZE, d + 3 * at.STEP_SIZE
-    put_first_order(p, m, h, s, first)
+    for j in range(at.STEP_SIZE):
+        s[first + j] = 0.0
+    for j in range(COEFFICIENTS):  # h times the matrix
+        s[first + ROWS[j] * at.STEP_COLUMNS + COLUMNS[j]] = h * p[m + j]
+    s[first + 4], s[first + at.STEP_COLUMNS + 5] = h * p[m + at.B_I], h * p[m + at.B_W]
+    s[first + 2 * at.STEP_COLUMNS + 6], s[first + 4 * at.STEP_COLUMNS + 1] = h * p[m + at.B_V], h
     for j in range(at.STEP_SIZE):
         s[d + j] = s[first + j]
         s[term + j] = s[first + j]

@@ -20,29 +20,29 @@ from actuator_lti.drive import signals
 # --- parameters of one run -------------------------------------------------------------------------
 (
     TICKS,  # number of ticks n; rows k = 0 .. n-1 are sampled at t_k = k Ts
-    PERIOD,  # Ts, s
+    PERIOD,  # Ts [s]
     EVERY_VELOCITY,  # n_v
     EVERY_POSITION,  # n_p
     DELAY_TICKS,  # q, whole ticks of the computing delay
-    DELAY_FRACTION,  # f, rest of the computing delay, s, 0 <= f < Ts
-    RESISTANCE,
-    INDUCTANCE,
-    BACK_EMF,  # kE
-    TORQUE_CONSTANT,  # kM
-    INERTIA,  # J
+    DELAY_FRACTION,  # f, rest of the computing delay, 0 <= f < Ts [s]
+    RESISTANCE,  # [ohm]
+    INDUCTANCE,  # [H]
+    BACK_EMF,  # kE [V s/rad]
+    TORQUE_CONSTANT,  # kM [N m/A]
+    INERTIA,  # J [kg m2]
     SOURCE,  # 1: no electrical dynamics
     ELASTIC_DRIVE,  # 1: coupling or friction map: the plant of the elastic block
-    SOURCE_GAIN,  # N m/V
+    SOURCE_GAIN,  # [N m/V]
     RATIO,  # N
     LAW,  # 0 coulomb, 1 tanh
-    VISCOUS,  # Cv for w > 0
-    VISCOUS_REVERSE,  # Cv for w < 0
-    DRY,  # C0 for w > 0
-    DRY_REVERSE,  # C0 for w < 0
+    VISCOUS,  # Cv for w > 0 [N m s/rad]
+    VISCOUS_REVERSE,  # Cv for w < 0 [N m s/rad]
+    DRY,  # C0 for w > 0 [N m]
+    DRY_REVERSE,  # C0 for w < 0 [N m]
     LOAD_COEFFICIENT,  # CM
     BREAKAWAY,  # breakaway ratio
-    SMOOTHING,  # w_s of the tanh law
-    OFFSET,  # constant torque against positive motion
+    SMOOTHING,  # w_s of the tanh law [rad/s]
+    OFFSET,  # constant torque against positive motion [N m]
     BACK_DRIVABLE,  # 1: T_bd = M/N
     TANH_TOLERANCE,
     TANH_LEVEL,  # >= 0: 2**level sub-steps always (order tests)
@@ -52,35 +52,35 @@ from actuator_lti.drive import signals
     FEEDFORWARD,  # k_ff
     VELOCITY_GAIN,
     VELOCITY_INTEGRAL,  # Kp T/Tn
-    CURRENT_GAIN,
-    CURRENT_INTEGRAL,
-    SPEED_LIMIT,
-    ACCELERATION_LIMIT,
-    CURRENT_LIMIT,
-    VOLTAGE_LIMIT,
+    CURRENT_GAIN,  # [V/A]
+    CURRENT_INTEGRAL,  # [V/A]
+    SPEED_LIMIT,  # [rad/s]
+    ACCELERATION_LIMIT,  # [rad/s2]
+    CURRENT_LIMIT,  # [A]
+    VOLTAGE_LIMIT,  # [V]
     SPEED_SOURCE,  # 0 ideal, 1 difference, 2 tracking loop
     DIFFERENCE_SAMPLES,  # m
-    COUNTS_PER_RAD,  # of the angle that the speed is made of; 0: not quantised
+    COUNTS_PER_RAD,  # of the angle that the speed is made of; 0: not quantised [1/rad]
     FILTER_COEFFICIENT,  # T/(TF + T); 1: no filter
-    CURRENT_START,
-    SPEED_START,
-    ANGLE_START,
-    CURRENT_INTEGRATOR_START,
+    CURRENT_START,  # [A]
+    SPEED_START,  # [rad/s]
+    ANGLE_START,  # [rad]
+    CURRENT_INTEGRATOR_START,  # [V]
     VELOCITY_INTEGRATOR_START,
-    SPEED_COMMAND_START,
-    CURRENT_COMMAND_START,
-    VOLTAGE_START,
-    LOAD,  # constant part of M_ext
-    LOAD_SLOPE,  # N m per rad of output angle
+    SPEED_COMMAND_START,  # [rad/s]
+    CURRENT_COMMAND_START,  # [A]
+    VOLTAGE_START,  # [V]
+    LOAD,  # constant part of M_ext [N m]
+    LOAD_SLOPE,  # N m per rad of output angle [N m/rad]
     LOAD_DAMPING,  # N m against the motion per rad/s of the output
-    MOMENT_PEAK,  # of moments that bend with the output angle: peak sin(order y + phase)
-    MOMENT_PEAK_2,
+    MOMENT_PEAK,  # of moments that bend with the output angle: peak sin(order y + phase) [N m]
+    MOMENT_PEAK_2,  # [N m]
     LOAD_TABLE,  # offset into the tables
     LOAD_TABLE_LENGTH,
     TORQUE_TABLE,  # extra torque at the motor shaft
     TORQUE_TABLE_LENGTH,
-    TORQUE_SLOPE,  # of the motor's own torque over its angle
-    TORQUE_PEAK,  # of one that bends with it: peak sin(order th + phase)
+    TORQUE_SLOPE,  # of the motor's own torque over its angle [N m/rad]
+    TORQUE_PEAK,  # of one that bends with it: peak sin(order th + phase) [N m]
     SUPPLY_TABLE,  # bus voltage
     SUPPLY_TABLE_LENGTH,
     MAX_EVENTS,  # per tick
@@ -98,7 +98,7 @@ from actuator_lti.drive import signals
     DERIVATIVE_COEFFICIENT,  # Tp/(TD + Tp)
     OUTPUT_SENSOR,  # 1: position from the output's sensor
     SPEED_SENSOR,  # 1: speed from the output's sensor
-    POSITION_COUNTS,  # counts per rad of the angle that the position loop reads; 0: not quantised
+    POSITION_COUNTS,  # counts per rad of the angle that the position loop reads; 0: not quantised [1/rad]
     ACCELERATION_FEEDFORWARD,  # k_aff J/(kM Tp^2), of the reference at the motor
     FRICTION_FEEDFORWARD,  # i_fr
     PROFILED,  # 1: a profile limits the command
@@ -115,23 +115,23 @@ from actuator_lti.drive import signals
     VELOCITY_TRACKING,  # T/Tt
     CURRENT_WINDUP,
     CURRENT_TRACKING,
-    BACK_EMF_FEEDFORWARD,  # share times kE
-    RESISTANCE_FEEDFORWARD,  # share times R
+    BACK_EMF_FEEDFORWARD,  # share times kE [V s/rad]
+    RESISTANCE_FEEDFORWARD,  # share times R [ohm]
     SUPPLY,  # 1: the supply is modelled; its voltage is a table: 2 that limits u, 3 that u is a share of
-    SUPPLY_VOLTAGE,  # of the source; of the table, the voltage at which gains are in volts
-    SUPPLY_RESISTANCE,
+    SUPPLY_VOLTAGE,  # of the source; of the table, the voltage at which gains are in volts [V]
+    SUPPLY_RESISTANCE,  # [ohm]
     REGENERATIVE,
-    CAPACITANCE,
-    BRAKE_VOLTAGE,
+    CAPACITANCE,  # [F]
+    BRAKE_VOLTAGE,  # [V]
     OVERLOAD,  # 1: the overload protection acts
     OVERLOAD_RATE,  # Ts/tau
     OVERLOAD_RELEASE,
-    CONTINUOUS_CURRENT,
-    CURRENT_RESOLUTION,  # A; 0: none
-    CURRENT_NOISE,  # rms
-    ANGLE_NOISE,
-    OUTPUT_NOISE,
-    JITTER,  # s, rms
+    CONTINUOUS_CURRENT,  # [A]
+    CURRENT_RESOLUTION,  # 0: none [A]
+    CURRENT_NOISE,  # rms [A]
+    ANGLE_NOISE,  # [rad]
+    OUTPUT_NOISE,  # [rad]
+    JITTER,  # s, rms [s]
     SEED,
     RIGID,  # of an elastic drive train; 1: a friction map, but no coupling
     RATIO_TO_COUPLING,  # N_c; N without a coupling
@@ -156,14 +156,14 @@ from actuator_lti.drive import signals
     OWN_STATES,  # its order n
     OWN_GAIN,  # factor on C x + D e
     OWN_READS_SPEED,  # 1: it takes the measured speed
-    OWN_COUNTS,  # counts per rad of the motor's angle that it takes; 0: not quantised
-    OWN_OUTPUT_COUNTS,  # of the output's angle
+    OWN_COUNTS,  # counts per rad of the motor's angle that it takes; 0: not quantised [1/rad]
+    OWN_OUTPUT_COUNTS,  # of the output's angle [1/rad]
     MOMENT_ORDER,
-    MOMENT_PHASE,
+    MOMENT_PHASE,  # [rad]
     MOMENT_ORDER_2,
-    MOMENT_PHASE_2,
+    MOMENT_PHASE_2,  # [rad]
     TORQUE_ORDER,
-    TORQUE_PHASE,
+    TORQUE_PHASE,  # [rad]
     COMMAND,  # first of SIGNAL_SIZE numbers
 ) = range(146)
 COLUMN_NAMES = frozenset(name for name in dir() if name.isupper())
@@ -312,51 +312,51 @@ Work = Annotated[int, "work"]  # work space: written before it is read
 _places = count()
 S_TICK: Counter = next(_places)
 S_STATUS: Flag = next(_places)
-S_CURRENT: Continuous = next(_places)
-S_SPEED: Continuous = next(_places)
-S_ANGLE: Continuous = next(_places)
+S_CURRENT: Continuous = next(_places)  # [A]
+S_SPEED: Continuous = next(_places)  # [rad/s]
+S_ANGLE: Continuous = next(_places)  # [rad]
 S_DIRECTION: Flag = next(_places)  # 1, -1 slipping, 0 at rest
-S_OUTPUT: Continuous = next(_places)  # output angle where the drive train is elastic
-S_OUTPUT_SPEED: Continuous = next(_places)
-S_HELD: Note = next(_places)  # voltage that acted last
-S_LOAD: Continuous = next(_places)  # hinge moment of this tick
-S_DRY: Continuous = next(_places)  # dry friction of this tick, forward
-S_DRY_REVERSE: Continuous = next(_places)
-S_TORQUE: Continuous = next(_places)  # torque beside motor and dry friction
+S_OUTPUT: Continuous = next(_places)  # output angle where the drive train is elastic [rad]
+S_OUTPUT_SPEED: Continuous = next(_places)  # [rad/s]
+S_HELD: Note = next(_places)  # voltage that acted last [V]
+S_LOAD: Continuous = next(_places)  # hinge moment of this tick [N m]
+S_DRY: Continuous = next(_places)  # dry friction of this tick, forward [N m]
+S_DRY_REVERSE: Continuous = next(_places)  # [N m]
+S_TORQUE: Continuous = next(_places)  # torque beside motor and dry friction [N m]
 S_EXTRA: Continuous = next(_places)  # its part that is an extra torque at the motor shaft
 S_UNTIL_OUTER: Counter = next(_places)  # ticks until the outermost stage is updated
 S_UNTIL_VELOCITY: Counter = next(_places)
-S_CURRENT_INTEGRATOR: Continuous = next(_places)
+S_CURRENT_INTEGRATOR: Continuous = next(_places)  # [V]
 S_VELOCITY_INTEGRATOR: Continuous = next(_places)
 S_POSITION_INTEGRATOR: Continuous = next(_places)
-S_SPEED_COMMAND: Continuous = next(_places)  # after both limits
-S_SPEED_REFERENCE: Continuous = next(_places)  # w_ref: the same, behind its probe
-S_CURRENT_BEFORE: Continuous = next(_places)
-S_CURRENT_REFERENCE: Continuous = next(_places)
-S_VOLTAGE_BEFORE: Note = next(_places)
-S_VOLTAGE: Continuous = next(_places)
+S_SPEED_COMMAND: Continuous = next(_places)  # after both limits [rad/s]
+S_SPEED_REFERENCE: Continuous = next(_places)  # w_ref: the same, behind its probe [rad/s]
+S_CURRENT_BEFORE: Continuous = next(_places)  # [A]
+S_CURRENT_REFERENCE: Continuous = next(_places)  # [A]
+S_VOLTAGE_BEFORE: Note = next(_places)  # [V]
+S_VOLTAGE: Continuous = next(_places)  # [V]
 S_OUTPUT_BEFORE: Note = next(_places)
 S_OUTPUT_AFTER: Note = next(_places)
-S_MEASURED_SPEED: Continuous = next(_places)
-S_FILTERED_SPEED: Continuous = next(_places)  # before the speed filters
-S_TRACKED_ANGLE: Continuous = next(_places)
-S_TRACKED_SPEED: Continuous = next(_places)
+S_MEASURED_SPEED: Continuous = next(_places)  # [rad/s]
+S_FILTERED_SPEED: Continuous = next(_places)  # before the speed filters [rad/s]
+S_TRACKED_ANGLE: Continuous = next(_places)  # [rad]
+S_TRACKED_SPEED: Continuous = next(_places)  # [rad/s]
 S_FLAGS_OUTER: Flag = next(_places)  # limiters that acted at the last update of each stage
 S_FLAGS_PROFILE: Flag = next(_places)
 S_FLAGS_VELOCITY: Flag = next(_places)
 S_FLAGS_CURRENT: Flag = next(_places)
-S_REFERENCE: Continuous = next(_places)  # shaped command of the last update, motor side, and the one before
-S_REFERENCE_BEFORE: Continuous = next(_places)
-S_ERROR: Continuous = next(_places)
-S_ERROR_RATE: Continuous = next(_places)
+S_REFERENCE: Continuous = next(_places)  # shaped command of the last update, motor side [rad]
+S_REFERENCE_BEFORE: Continuous = next(_places)  # [rad]
+S_ERROR: Continuous = next(_places)  # [rad]
+S_ERROR_RATE: Continuous = next(_places)  # [rad/s]
 S_TORQUE_FEEDFORWARD: Continuous = next(_places)  # i_ff, held
 S_PROFILE: Continuous = next(_places)  # position of the profile, its speed, the command of the last update
 S_PROFILE_SPEED: Continuous = next(_places)
 S_PROFILE_COMMAND: Continuous = next(_places)
 S_AVERAGE_PLACE: Counter = next(_places)
 S_AVERAGE_SUM: Continuous = next(_places)
-S_CURRENT_LIMIT: Flag = next(_places)  # of this tick
-S_VOLTAGE_LIMIT: Continuous = next(_places)
+S_CURRENT_LIMIT: Flag = next(_places)  # of this tick [A]
+S_VOLTAGE_LIMIT: Continuous = next(_places)  # [V]
 S_OVERLOAD: Continuous = next(_places)
 S_OVERLOADED: Flag = next(_places)
 S_EVENTS: Counter = next(_places)  # in all
@@ -386,7 +386,7 @@ S_ENERGY: Note = S_NOISE + 8
 ) = range(16)
 ENERGY_SIZE = 16
 S_COMMAND_CHAIN: Continuous = S_ENERGY + ENERGY_SIZE
-S_SPEED_CHAIN: Continuous = S_COMMAND_CHAIN + 2
+S_SPEED_CHAIN: Continuous = S_COMMAND_CHAIN + 2  # [rad/s]
 S_TORQUE_CHAIN: Continuous = S_SPEED_CHAIN + 2 * MAX_SECTIONS
 S_PROBE_PLACES: Counter = S_TORQUE_CHAIN + 2 * MAX_SECTIONS  # next place in each probe's ring
 ELASTIC_STATE = S_PROBE_PLACES + 4
@@ -406,27 +406,27 @@ SUPPLY_LIMITS, SUPPLY_SCALES = 2.0, 3.0
 # --- inputs and outputs of one tick -------------------------------------------------------------------
 (
     IN_COMMAND,  # of the outermost stage; output shaft
-    IN_LOAD,  # hinge moment beside the load's own
-    IN_TORQUE,  # extra torque at the motor shaft
-    IN_CURRENT,  # measured: what the controller sees
-    IN_SPEED,
-    IN_ANGLE,
-    IN_OUTPUT,  # output angle, or motor angle over N
-    IN_OUTPUT_SPEED,
-    IN_BUS,  # voltage that the controller has
+    IN_LOAD,  # hinge moment beside the load's own [N m]
+    IN_TORQUE,  # extra torque at the motor shaft [N m]
+    IN_CURRENT,  # measured: what the controller sees [A]
+    IN_SPEED,  # [rad/s]
+    IN_ANGLE,  # [rad]
+    IN_OUTPUT,  # output angle, or motor angle over N [rad]
+    IN_OUTPUT_SPEED,  # [rad/s]
+    IN_BUS,  # voltage that the controller has [V]
     IN_PROBE,  # four injected signals
 ) = range(10)
 (
     IO_REFERENCE,  # from here on in the order of SIGNALS: what was at t_k
-    IO_OUTPUT,
-    IO_SPEED,
-    IO_CURRENT,
-    IO_VOLTAGE,
-    IO_CURRENT_COMMAND,
-    IO_SPEED_COMMAND,
+    IO_OUTPUT,  # [rad]
+    IO_SPEED,  # [rad/s]
+    IO_CURRENT,  # [A]
+    IO_VOLTAGE,  # [V]
+    IO_CURRENT_COMMAND,  # [A]
+    IO_SPEED_COMMAND,  # [rad/s]
     IO_PROBES,  # before and after each probe
 ) = range(IN_PROBE + 4, IN_PROBE + 12)
-IO_ANGLE = IO_PROBES + 8
+IO_ANGLE = IO_PROBES + 8  # [rad]
 IO_FLAGS = IO_ANGLE + 1
 IO_OUTPUT_SPEED = IO_FLAGS + 1  # of an elastic drive: speed of the output shaft, twist, T_s
 IO_TWIST = IO_OUTPUT_SPEED + 1

@@ -16,12 +16,6 @@ FINITE = 1e15
 
 
 @kernel
-def wave_angle(p, at, angle):
-    """Order times angle plus phase, of the wave whose order and phase stand at ``p[at]``."""
-    return p[at] * angle + p[at + 1]
-
-
-@kernel
 def hinge_moment(p, s, io):
     """M_ext of this tick: constant, series, slope, damping, and what bends with the angle."""
     y = output_angle(p, s)
@@ -32,8 +26,9 @@ def hinge_moment(p, s, io):
             s[layout.S_OUTPUT_SPEED] if elastic else s[layout.S_SPEED] / p[layout.RATIO]
         )
     for j in range(layout.MOMENT_WAVES):
+        order = layout.MOMENT_ORDER + 2 * j  # its phase behind it
         if p[layout.MOMENT_PEAK + j] != 0.0:
-            M += p[layout.MOMENT_PEAK + j] * math.sin(wave_angle(p, layout.MOMENT_ORDER + 2 * j, y))
+            M += p[layout.MOMENT_PEAK + j] * math.sin(p[order] * y + p[order + 1])
     return M
 
 
@@ -44,8 +39,9 @@ def shaft_torque(p, s, io):
     if p[layout.TORQUE_SLOPE] != 0.0:
         T += p[layout.TORQUE_SLOPE] * th
     for j in range(layout.TORQUE_WAVES):
+        order = layout.TORQUE_ORDER + 2 * j
         if p[layout.TORQUE_PEAK + j] != 0.0:
-            T += p[layout.TORQUE_PEAK + j] * math.sin(wave_angle(p, layout.TORQUE_ORDER + 2 * j, th))
+            T += p[layout.TORQUE_PEAK + j] * math.sin(p[order] * th + p[order + 1])
     return T
 
 

@@ -16,18 +16,11 @@ LIMITER_BITS = np.array(layout.LIMITER_BITS)
 
 @kernel
 def record(p, io, history, rows, flag_history, row):
-    """Write the columns that every run has, and those of active probes."""
+    """Write a row: what every run has, active probes, an elastic drive's load side, a load that varies."""
     for j in range(layout.BASE_SIGNALS):
         history[j * rows + row] = io[layout.IO_REFERENCE + j]
     history[layout.HISTORY_ANGLE * rows + row] = io[layout.IO_ANGLE]
     flag_history[row] = int(io[layout.IO_FLAGS])
-    if p[layout.PROBING] > 0.0 or p[layout.ELASTIC_DRIVE] > 0.0 or p[layout.RARE_LOAD] > 0.0:
-        record_more(p, io, history, rows, row)
-
-
-@kernel
-def record_more(p, io, history, rows, row):
-    """Write both sides of each active probe, by point, then an elastic drive's load side, then the load."""
     col = layout.HISTORY_PROBES
     if p[layout.PROBING] > 0.0:
         for point in range(4):
@@ -61,32 +54,6 @@ def clear(p, out):
     if p[layout.WINDOW] > 0.0:
         turn = 2.0 * math.pi * p[layout.CYCLES] / p[layout.WINDOW]
         out[layout.OUT_PHASOR + 2], out[layout.OUT_PHASOR + 3] = math.cos(turn), math.sin(turn)
-
-
-@kernel
-def extremes(io, count, out):
-    """Update minimum and maximum of each signal."""
-    for j in range(count):
-        at = layout.OUT_EXTREMES + 2 * j
-        out[at] = min(out[at], io[layout.IO_REFERENCE + j])
-        out[at + 1] = max(out[at + 1], io[layout.IO_REFERENCE + j])
-
-
-@kernel
-def window(io, count, which, harmonics, c, s, out):
-    """Add one tick to a window; (c, s) is the unit phasor of the fundamental."""
-    for j in range(count):
-        x = io[layout.IO_REFERENCE + j]
-        at = layout.OUT_WINDOWS + (which * layout.ALL_SIGNALS + j) * layout.WINDOW_SIGNAL
-        out[at] += x
-        out[at + 1] += x * x
-        out[at + 2] = min(out[at + 2], x)
-        out[at + 3] = max(out[at + 3], x)
-        re, im = c, s
-        for h in range(harmonics):
-            out[at + layout.WINDOW_BASE + 2 * h] += x * re
-            out[at + layout.WINDOW_BASE + 2 * h + 1] += x * im
-            re, im = re * c - im * s, re * s + im * c
 
 
 @kernel
@@ -124,8 +91,8 @@ def note_limits(p, flags, first, until, out):
 
 
 @kernel
-def windows(p, io, k, count, out):
-    """Add tick k to the last window or the one before it."""
+def add_to_window(p, io, k, count, out):
+    """Add tick k to the last window or the one before it, by the unit phasor of the fundamental."""
     length = int(p[layout.WINDOW])
     into = k - (int(p[layout.TICKS]) - 2 * length)
     if into < 0:
@@ -134,8 +101,20 @@ def windows(p, io, k, count, out):
     if into == 0 or into == length:
         out[at], out[at + 1] = 1.0, 0.0
     c, s = out[at], out[at + 1]
-    window(io, count, 1 if into < length else 0, int(p[layout.HARMONICS]), c, s, out)
     out[at], out[at + 1] = c * out[at + 2] - s * out[at + 3], c * out[at + 3] + s * out[at + 2]
+    first = layout.ALL_SIGNALS if into < length else 0
+    for j in range(count):
+        x = io[layout.IO_REFERENCE + j]
+        at = layout.OUT_WINDOWS + (first + j) * layout.WINDOW_SIGNAL
+        out[at] += x
+        out[at + 1] += x * x
+        out[at + 2] = min(out[at + 2], x)
+        out[at + 3] = max(out[at + 3], x)
+        re, im = c, s
+        for h in range(int(p[layout.HARMONICS])):
+            out[at + layout.WINDOW_BASE + 2 * h] += x * re
+            out[at + layout.WINDOW_BASE + 2 * h + 1] += x * im
+            re, im = re * c - im * s, re * s + im * c
 
 
 @kernel
@@ -147,9 +126,12 @@ def reduce(p, io, k, out):
         out[layout.OUT_STEP_BEFORE] = y
     count = layout.ALL_SIGNALS if p[layout.PROBING] > 0.0 else layout.BASE_SIGNALS
     if p[layout.WITH_EXTREMES] > 0.0:
-        extremes(io, count, out)
+        for j in range(count):
+            at = layout.OUT_EXTREMES + 2 * j
+            out[at] = min(out[at], io[layout.IO_REFERENCE + j])
+            out[at + 1] = max(out[at + 1], io[layout.IO_REFERENCE + j])
     if p[layout.WINDOW] > 0.0:
-        windows(p, io, k, count, out)
+        add_to_window(p, io, k, count, out)
 
 
 @kernel
@@ -186,15 +168,6 @@ def run_block(p, s, io, block, first, count, history, flag_history, out):
 
 
 @kernel
-def finish(s, k, out):
-    """Write the final state into the results, its energies with it."""
-    out[layout.OUT_TICKS] = k
-    out[layout.OUT_TWIST] = s[elastic_layout.ES_TWIST]
-    for j in range(layout.S_COMMAND_CHAIN):
-        out[layout.OUT_STATE + j] = s[j]
-
-
-@kernel
 def run(p, s, io, block, tables, history, flag_history, out, shared):
     """Run the drive described by ``p`` from the state ``s``; returns a status number of ``layout``.
 
@@ -215,5 +188,7 @@ def run(p, s, io, block, tables, history, flag_history, out, shared):
         shared[0] = k
         if shared[1] != 0.0 and s[layout.S_STATUS] == 0.0:
             s[layout.S_STATUS] = float(layout.CANCELLED)
-    finish(s, k, out)
+    out[layout.OUT_TICKS], out[layout.OUT_TWIST] = k, s[elastic_layout.ES_TWIST]
+    for j in range(layout.S_COMMAND_CHAIN):  # the final state, its energies with it
+        out[layout.OUT_STATE + j] = s[j]
     return int(s[layout.S_STATUS])

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 
 TWO_PI = 2.0 * math.pi
-NONE, STEP, RAMP, SINE = layout.NONE, layout.STEP, layout.RAMP, layout.SINE
-TRIANGLE, CHIRP, LOG_CHIRP = layout.TRIANGLE, layout.CHIRP, layout.LOG_CHIRP
+TABLES = np.array(layout.TABLES)
+TO = np.array([layout.BLOCK_LOAD, layout.BLOCK_TORQUE, layout.BLOCK_SUPPLY])  # where each goes
 
 
 @kernel
@@ -24,7 +26,7 @@ def triangle_wave(cycles):
 def chirp_cycles(kind, f0, f1, span, s):
     """Cycles since the start of a linear or logarithmic chirp from f0 to f1 over ``span`` seconds."""
     x = min(s, span)
-    if kind == CHIRP:
+    if kind == layout.CHIRP:
         cycles = f0 * x + 0.5 * (f1 - f0) * x * x / span
     else:
         rate = math.log(f1 / f0) / span
@@ -40,7 +42,7 @@ def signal(row, at, tables, k, period):
     f0, f1 and span (chirps), offset and length in ``tables`` (table: held after its end).
     """
     kind = int(row[at])
-    if kind == NONE:
+    if kind == layout.NONE:
         return 0.0
     amplitude = row[at + 1]
     if kind == layout.TABLE:
@@ -49,13 +51,13 @@ def signal(row, at, tables, k, period):
     s = k * period - row[at + 2]
     if s < -1e-9 * period:
         return 0.0
-    if kind == SINE:
+    if kind == layout.SINE:
         return amplitude * math.sin(TWO_PI * row[at + 3] * s + row[at + 4])
-    if kind == STEP:
+    if kind == layout.STEP:
         return amplitude
-    if kind == RAMP:
+    if kind == layout.RAMP:
         return amplitude * min(s, row[at + 3])
-    if kind == TRIANGLE:
+    if kind == layout.TRIANGLE:
         return amplitude * triangle_wave(row[at + 3] * s + row[at + 4] / TWO_PI)
     return amplitude * math.sin(TWO_PI * chirp_cycles(kind, row[at + 3], row[at + 4], row[at + 5], s))
 
@@ -64,7 +66,7 @@ def signal(row, at, tables, k, period):
 def fill(row, at, tables, first, count, stride, period, out, to):
     """Sample a signal at ticks first, first + stride, ... of ``count``, into ``out[to]`` and behind."""
     times = int((count + stride - 1) / stride)
-    if int(row[at]) == SINE:
+    if int(row[at]) == layout.SINE:
         amplitude, turn, phase = row[at + 1], TWO_PI * row[at + 3], row[at + 4]
         for n in range(times):
             t = (first + n * stride) * period - row[at + 2]
@@ -72,13 +74,6 @@ def fill(row, at, tables, first, count, stride, period, out, to):
         return
     for n in range(times):
         out[to + n * stride] = signal(row, at, tables, first + n * stride, period)
-
-
-@kernel
-def add_table(tables, start, length, first, count, out, to):
-    """Write a table of one value a tick, its last value held, into ``out[to]`` and behind."""
-    for n in range(count):
-        out[to + n] = tables[start + min(first + n, length - 1)]
 
 
 @kernel
@@ -95,15 +90,11 @@ def fill_block(p, tables, first, count, stride, block):
         if p[at] > 0.0:
             to = layout.BLOCK_PROBES + point * layout.BLOCK
             fill(p, at + layout.PROBE_SIGNAL, tables, first, count, layout.EVERY_TICK, period, block, to)
-    length = int(p[layout.LOAD_TABLE_LENGTH])
-    if length > 0:
-        add_table(tables, int(p[layout.LOAD_TABLE]), length, first, count, block, layout.BLOCK_LOAD)
-    length = int(p[layout.TORQUE_TABLE_LENGTH])
-    if length > 0:
-        add_table(tables, int(p[layout.TORQUE_TABLE]), length, first, count, block, layout.BLOCK_TORQUE)
-    length = int(p[layout.SUPPLY_TABLE_LENGTH])
-    if length > 0:
-        add_table(tables, int(p[layout.SUPPLY_TABLE]), length, first, count, block, layout.BLOCK_SUPPLY)
+    for j in range(TABLES.shape[0]):  # one value a tick, the last one held
+        start, length = int(p[TABLES[j]]), int(p[TABLES[j] + 1])
+        if length > 0:
+            for n in range(count):
+                block[TO[j] + n] = tables[start + min(first + n, length - 1)]
 
 
 @kernel

@@ -10,9 +10,17 @@ from nonlinear._kernels.elastic_modes import find_mode
 from nonlinear._kernels.elastic_prepare import prepare_elastic, prepare_elastic_sizes
 from nonlinear._kernels.energy import prepare_forms
 from nonlinear._kernels.motion import put_load
+from nonlinear._kernels.sense import seed_streams
 from nonlinear._kernels.slipping import COMPLEX, describe, transition
 from nonlinear._kernels.smooth import prepare_tanh
-from nonlinear._kernels.tick import init_elastic, init_run, put_direction
+from nonlinear._kernels.tick import (
+    init_command,
+    init_controller,
+    init_elastic,
+    init_estimate,
+    init_lines,
+    put_direction,
+)
 
 
 @kernel
@@ -136,17 +144,6 @@ def prepare_plant(p, work):
 
 
 @kernel
-def prepare(p, s):
-    """Fill the derived part of ``p`` (after `prepare_run_sizes`); ``s`` lends its work space.
-
-    With energies `prepare_forms` comes next, with the tanh law `prepare_tanh`, elastic `prepare_elastic`.
-    """
-    prepare_periods(p)
-    prepare_gates(p)
-    prepare_plant(p, s)
-
-
-@kernel
 def prepare_sizes(p):
     """Work out the lengths of both rows; of an elastic drive train also its friction segments."""
     prepare_run_sizes(p)
@@ -156,8 +153,10 @@ def prepare_sizes(p):
 
 @kernel
 def derive(p, s):
-    """Fill all derived parameters; ``s`` lends its work space."""
-    prepare(p, s)
+    """Fill all derived parameters, after `prepare_sizes`; ``s`` lends its work space."""
+    prepare_periods(p)
+    prepare_gates(p)
+    prepare_plant(p, s)
     if p[layout.WITH_ENERGY] > 0.0:
         prepare_forms(p, s)
     if p[layout.LAW] > 0.0:
@@ -169,7 +168,17 @@ def derive(p, s):
 @kernel
 def init(p, s):
     """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
-    init_run(p, s)
+    for j in range(int(p[layout.STATE_SIZE])):
+        s[j] = 0.0
+    s[layout.S_CURRENT], s[layout.S_SPEED] = p[layout.CURRENT_START], p[layout.SPEED_START]
+    s[layout.S_ANGLE] = p[layout.ANGLE_START]
+    put_direction(p, s)
+    put_load(p, s, p[layout.LOAD], 0.0)
+    init_controller(p, s)
+    init_estimate(p, s)
+    init_command(p, s)
+    init_lines(p, s)
+    seed_streams(s, p[layout.SEED])
     if p[layout.ELASTIC_DRIVE] > 0.0:
         init_elastic(p, s)
 

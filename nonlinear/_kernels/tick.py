@@ -1,4 +1,4 @@
-"""The drive as a machine with a state: `init_run` once, `step` every tick.
+"""The drive as a machine with a state: `start.init` once, `step` every tick.
 
 `get` and `set_state` copy the state.  All rows are flat.
 A state copied out and set again elsewhere goes on with the same bits.
@@ -10,9 +10,9 @@ from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.blocks import TRACKING, clamp, counted, fill_ring, settle
 from nonlinear._kernels.control import control
-from nonlinear._kernels.elastic_modes import coupling_torque, elastic_start
-from nonlinear._kernels.motion import motion, put_load
-from nonlinear._kernels.sense import applied_voltage, seed_streams, sense
+from nonlinear._kernels.elastic_modes import contact_side, find_mode, put_output, spring_expression
+from nonlinear._kernels.motion import motion
+from nonlinear._kernels.sense import applied_voltage, sense
 
 
 @kernel
@@ -88,25 +88,16 @@ def put_direction(p, s):
 
 
 @kernel
-def init_run(p, s):
-    """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
-    for j in range(int(p[layout.STATE_SIZE])):
-        s[j] = 0.0
-    s[layout.S_CURRENT], s[layout.S_SPEED] = p[layout.CURRENT_START], p[layout.SPEED_START]
-    s[layout.S_ANGLE] = p[layout.ANGLE_START]
-    put_direction(p, s)
-    put_load(p, s, p[layout.LOAD], 0.0)
-    init_controller(p, s)
-    init_estimate(p, s)
-    init_command(p, s)
-    init_lines(p, s)
-    seed_streams(s, p[layout.SEED])
-
-
-@kernel
 def init_elastic(p, s):
-    """What `init_run` leaves to do for an elastic drive train: load side, contact, the output's own angle."""
-    elastic_start(p, s)
+    """What an elastic drive train has besides: load side, twist, discrete state, the output's own angle."""
+    s[elastic_layout.ES_TWIST], s[elastic_layout.ES_LOAD_SPEED] = (
+        p[layout.TWIST_START],
+        p[layout.LOAD_SPEED_START],
+    )
+    turned = s[layout.S_ANGLE] / p[layout.RATIO_TO_COUPLING]
+    s[elastic_layout.ES_LOAD_ANGLE] = turned - s[elastic_layout.ES_TWIST]
+    put_output(p, s)
+    find_mode(p, s)
     fill_ring(p, s, layout.POINT_OUTPUT, s[layout.S_OUTPUT])
     s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = s[layout.S_OUTPUT]
 
@@ -138,7 +129,8 @@ def note_more(p, s, io):
     """Note both sides of each probe, the current command under overload, an elastic drive's load side."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
         io[layout.IO_OUTPUT_SPEED], io[layout.IO_TWIST] = s[layout.S_OUTPUT_SPEED], s[elastic_layout.ES_TWIST]
-        io[layout.IO_COUPLING_TORQUE] = coupling_torque(p, s)
+        side = contact_side(s)
+        io[layout.IO_COUPLING_TORQUE] = side * spring_expression(p, s, side)
     if p[layout.OVERLOAD] > 0.0:
         io[layout.IO_CURRENT_COMMAND] = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
     if p[layout.PROBING] > 0.0:

@@ -11,7 +11,7 @@ import numpy as np
 from actuator_lti.drive.signals import Kind
 from nonlinear._kernels import layout as at
 from nonlinear.bench.lifted import Floats
-from nonlinear.bench.loop_setup import LoopSetup, every, stages_of, target
+from nonlinear.bench.loop_setup import LoopSetup
 from nonlinear.runs.running import Running
 
 RETURNED = {
@@ -49,7 +49,7 @@ class Injection:
             self.hold_ticks, self.at = 1, at.LOAD
         elif place == "command":
             self.rows.step("command", 0.0, -1.0)
-            self.hold_ticks, self.at = every(design, self.outermost), at.COMMAND + 1
+            self.hold_ticks, self.at = setup.every(self.outermost), at.COMMAND + 1
         else:
             point = setup.point
             self.rows.step(point, 0.0, -1.0)
@@ -57,8 +57,8 @@ class Injection:
             self.hold_ticks, self.at = setup.hold_ticks, probe + at.PROBE_SIGNAL + 1
             self.read_at = RETURNED[point]
         self.signals = {"i": at.S_CURRENT} | RETURNED | HELD
-        if "velocity" in stages_of(design):
-            self.signals["torque_command"] = RETURNED[target(design, "velocity")]
+        if "velocity" in setup.wired.stages:
+            self.signals["torque_command"] = RETURNED[setup.wired.target["velocity"]]
         self.size = setup.range if isfinite(setup.range) and setup.range > 0.0 else 1.0
         self.steady = float(self.rows.values[0, self.at])
 

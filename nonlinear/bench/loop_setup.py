@@ -15,6 +15,7 @@ from math import inf, lcm
 
 from actuator_lti.design.control import FEED_FORWARD
 from actuator_lti.design.model import Design
+from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
 from nonlinear.bench.operating_motion import (
@@ -25,7 +26,7 @@ from nonlinear.bench.operating_motion import (
     standing,
 )
 from nonlinear.bench.probe import Probe
-from nonlinear.bench.steady_control import current_state, own_start, velocity_state
+from nonlinear.bench.steady_control import own_start, steady_state
 from nonlinear.rows import Rows
 
 STAGES = ("current", "velocity", "position")
@@ -56,26 +57,29 @@ class LoopSetup:
     held: bool = False
 
     @cached_property
-    def stages(self) -> tuple[str, ...]:
-        """Stages that the design has, innermost first."""
-        return stages_of(self.design)
+    def wired(self) -> Drive:
+        """The drive's stages, innermost first, what each drives and how often."""
+        return wire(self.design)
 
     @cached_property
     def outer(self) -> str:
         """Outermost stage that runs."""
-        return self.loop if self.loop in STAGES or not self.stages else self.stages[-1]
+        return self.loop if self.loop in STAGES or not self.wired.stages else self.wired.stages[-1]
 
     @cached_property
     def point(self) -> str:
         """Where the instrument sits."""
-        if self.loop in PATHS:
-            return target(self.design, self.outer) if self.stages else "u"
-        return target(self.design, self.loop) if self.loop in STAGES else self.loop
+        point = self.outer if self.loop in PATHS else self.loop
+        return self.wired.target.get(point, "u" if self.loop in PATHS else self.loop)
 
     @cached_property
     def hold_ticks(self) -> int:
         """Ticks between two updates at the point."""
-        return every(self.design, producer(self.design, self.point))
+        return self.every(self.wired.producer(self.point))
+
+    def every(self, stage: str) -> int:
+        """Ticks between two updates of a stage, 1 where there is none."""
+        return self.wired.interval.get(stage, 1)
 
     @cached_property
     def base_ticks(self) -> int:
@@ -83,9 +87,8 @@ class LoopSetup:
         current, own = self.design.controller.current, self.design.controller.own_law
         fed = current is not None and current.back_emf_feedforward != 0.0
         taken = fed or (own is not None and self._own is not None and "speed" in own[1].inputs)
-        measured = taken and not self.held and "velocity" in self.stages
-        stages = self._running + (("velocity",) if measured else ())
-        return lcm(*(every(self.design, stage) for stage in stages))
+        measured = taken and not self.held and "velocity" in self.wired.stages
+        return lcm(*map(self.every, (*self._running, *(["velocity"] if measured else []))))
 
     @property
     def period_s(self) -> float:
@@ -94,7 +97,8 @@ class LoopSetup:
 
     @property
     def _running(self) -> tuple[str, ...]:
-        return self.stages[: self.stages.index(self.outer) + 1] if self.stages else ()
+        stages = self.wired.stages
+        return stages[: stages.index(self.outer) + 1] if stages else ()
 
     @property
     def _own(self) -> str | None:
@@ -119,9 +123,10 @@ class LoopSetup:
         """
         row = self._base.copy()
         row.probe(Probe(point=self.point, delay_samples=delay_samples))  # type: ignore[arg-type]
-        for place in gains_of(self.design, producer(self.design, self.point)):
-            row[place] *= gain
         self._start(row)
+        stage, own = self.wired.producer(self.point), self.design.controller.own_law
+        for place in (*GAINS[stage], *(["own_gain"] if own is not None and own[0] == stage else [])):
+            row[place] *= gain
         return row
 
     @cached_property
@@ -152,43 +157,26 @@ class LoopSetup:
         row["voltage_start"] = wanted = bias.voltage_V
         for stage in self._running:
             if stage == "position":
-                self._position(row, wanted)
                 if point == "w_ref":
                     row["speed_command_start"] = wanted
+                self._position(row, wanted)
                 return
-            if stage == "current":
-                wanted, point = self._current(row), "i_ref"
-                row["current_command_start"] = wanted
+            if stage == self._own:
+                command, output = self._own_start(row, wanted), wanted
             else:
-                wanted, point = self._velocity(row, wanted), "w_ref"
+                steady = steady_state(self.design, bias, stage, wanted)
+                row[f"{stage}_integrator_start"] = steady.integrator
+                command, output = steady.command, steady.output
+            # the current's own, or what the torque filters begin with
+            row["current_command_start"] = command if stage == "current" else output
+            wanted, point = command, "i_ref" if stage == "current" else "w_ref"
         if self.outer == "current":
             row["current_command_start"] = 0.0  # filters of a velocity controller that is out of action
         row.step(point, wanted, -1.0)
 
-    def _current(self, row: Rows) -> float:
-        """The current controller in its steady state; returns the current command."""
-        back_emf, resistance = row.value("back_emf_feedforward"), row.value("resistance_feedforward")
-        if self._own == "current":
-            return self._own_start(row, self.bias.voltage_V, resistance, back_emf * self.bias.speed_rad_s)
-        gain, integral = row.value("current_gain"), row.value("current_integral") != 0.0
-        steady = current_state(self.bias, gain, integral, back_emf, resistance)
-        row["current_integrator_start"] = steady.integrator
-        return steady.command
-
-    def _velocity(self, row: Rows, wanted: float) -> float:
-        """The velocity controller in its steady state; returns the speed command."""
-        if self._own == "velocity":
-            row["current_command_start"] = wanted
-            return self._own_start(row, wanted)
-        gain, integral = row.value("velocity_gain"), row.value("velocity_integral") != 0.0
-        steady = velocity_state(self.design, self.bias, wanted, gain, integral)
-        row["velocity_integrator_start"] = steady.integrator
-        row["current_command_start"] = steady.output  # what the torque filters begin with
-        return steady.command
-
-    def _own_start(self, row: Rows, wanted: float, direct: float = 0.0, fed: float = 0.0) -> float:
+    def _own_start(self, row: Rows, wanted: float) -> float:
         """A law of one's own in its steady state; returns the command of its stage."""
-        start = own_start(self.design, self.bias, wanted, row.value("own_gain"), direct, fed)
+        start = own_start(self.design, self.bias, wanted)
         row.values[0, at.OWN_START : at.OWN_START + len(start.states)] = start.states
         return start.command
 
@@ -217,8 +205,7 @@ class LoopSetup:
     @property
     def steady_start(self) -> bool:
         """Whether the steady state is known that a run begins in; a ramp sets what a PI of position holds."""
-        own = self.design.controller.own_law
-        if self._own is not None and own and not own_start(self.design, self.bias, 0.0, own[1].gain).steady:
+        if self._own is not None and not own_start(self.design, self.bias, 0.0).steady:
             return False
         return not (self.outer == "position" and remembers(self.design) and self.bias.speed_rad_s != 0.0)
 
@@ -258,7 +245,8 @@ def loop_setup(design: Design, loop: str, *, limits_on: bool = True, held: bool 
     InputError
         If the design has no such loop or break point, or has no operating motion.
     """
-    known = (*stages_of(design), *points_of(design), *PATHS)
+    wired = wire(design)
+    known = (*wired.stages, *wired.points, *PATHS)
     if loop not in known:
         raise InputError(f"loop = {loop!r}: one of {', '.join(known)}", where=design.name)
     result = LoopSetup(design, loop, operating_motion(design), limits_on, held)
@@ -272,42 +260,3 @@ def remembers(design: Design) -> bool:
     """Whether the position controller has a state that a ramp sets."""
     place = design.controller.position
     return place is not None and (place.integral_time_s is not None or place.derivative_time_s > 0.0)
-
-
-def gains_of(design: Design, stage: str) -> tuple[str, ...]:
-    """Columns of a row that are the gain of a stage."""
-    own = design.controller.own_law
-    return (*GAINS[stage], *(("own_gain",) if own is not None and own[0] == stage else ()))
-
-
-def stages_of(design: Design) -> tuple[str, ...]:
-    """Stages of the cascade, innermost first."""
-    control = design.controller
-    there = {"current": control.current, "velocity": control.velocity, "position": control.position}
-    return tuple(stage for stage in STAGES if there[stage] is not None)
-
-
-def target(design: Design, stage: str) -> str:
-    """The signal that a stage drives: ``u``, ``i_ref`` or ``w_ref``."""
-    stages = stages_of(design)
-    inside = stages[: stages.index(stage)]
-    return {"current": "i_ref", "velocity": "w_ref"}[inside[-1]] if inside else "u"
-
-
-def points_of(design: Design) -> tuple[str, ...]:
-    """Break points that exist, from the motor outwards."""
-    output = () if design.controller.position is None else ("output",)
-    return (*(target(design, stage) for stage in stages_of(design)), *output)
-
-
-def producer(design: Design, point: str) -> str:
-    """The stage that updates a break point; the position stage reads the output."""
-    return next((stage for stage in stages_of(design) if target(design, stage) == point), "position")
-
-
-def every(design: Design, stage: str) -> int:
-    """Ticks between two updates of a stage."""
-    control = design.controller
-    if stage == "velocity" and control.velocity is not None:
-        return control.velocity.every
-    return control.position_loop.every if stage == "position" else 1

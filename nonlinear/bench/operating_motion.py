@@ -15,7 +15,9 @@ import numpy as np
 
 from actuator_lti.design.model import Command, Coupling, Design, Friction, Instruments, LoadFriction, Sensor
 from actuator_lti.drive.angle import follows_angle, holding_moment_Nm, holding_torque_Nm
-from actuator_lti.drive.operating import Operating, segments
+from actuator_lti.drive.facts import passed_moment_Nm, slopes_torque
+from actuator_lti.drive.operating import Operating, dry_torque, friction_slopes, segments
+from actuator_lti.drive.steady import motor_torque_Nm, steady_input
 from actuator_lti.errors import InputError
 from nonlinear.bench.steady_control import commands_fit
 from nonlinear.rows import Rows
@@ -179,10 +181,8 @@ def _closed(design: Design, motion: OperatingMotion) -> OperatingMotion:
         return motion
     more = copysign(_closing_Nm(coupling), pressed) - pressed
     load_Nm = motion.load_Nm - more * design.ratio_behind_coupling
-    held, motor = operating_motion_at(design, motion.speed_rad_s, load_Nm), design.effective_motor
-    extra = (motor.torque_constant_Nm_A or 0.0) * (held.current_A - motion.current_A)
-    if motor.source_gain_Nm_V is not None:
-        extra = motor.source_gain_Nm_V * (held.voltage_V - motion.voltage_V)
+    held = operating_motion_at(design, motion.speed_rad_s, load_Nm)
+    extra = motor_torque_Nm(design, held.current_A - motion.current_A, held.voltage_V - motion.voltage_V)
     twist, torque = held.twist_rad, held.coupling_Nm
     return replace(motion, load_Nm=load_Nm, twist_rad=twist, coupling_Nm=torque, extra_Nm=extra)
 
@@ -200,11 +200,9 @@ def lasting_torque_Nm(design: Design) -> float:
 
 
 def _torque_Nm(design: Design, current_A: float) -> float:
-    motor, limits = design.effective_motor, design.limits
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V * limits.voltage_V
-    short = limits.voltage_V / (motor.resistance_ohm or 1.0)
-    return (motor.torque_constant_Nm_A or 0.0) * min(current_A, short)
+    voltage, resistance = design.limits.voltage_V, design.effective_motor.resistance_ohm
+    short = voltage / resistance if resistance else voltage
+    return float(motor_torque_Nm(design, min(current_A, short), voltage))
 
 
 def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | None:
@@ -223,32 +221,23 @@ def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | 
 
 def operating_motion_at(design: Design, speed_rad_s: float, load_Nm: float = 0.0) -> OperatingMotion:
     """The steady state at a motor speed (rad/s, either direction) under a moment at the output."""
-    friction, moment, sense = design.friction, load_Nm, copysign(1.0, speed_rad_s)
+    friction, moment, sense = design.friction, load_Nm, int(copysign(1.0, speed_rad_s))
     moment -= design.load.moment_damping_Nms_rad * speed_rad_s / design.total_ratio
     passed = 1.0 if design.load.path == "back-drivable" else 0.0
     twist = coupling_Nm = 0.0
     if design.coupling is None:
-        torque = sense * friction.load_coefficient * abs(moment) - passed * moment / design.total_ratio
+        torque = sense * friction.load_coefficient * abs(moment) - passed_moment_Nm(design, moment)
     else:
         coupling_Nm = _behind(design.load.friction, speed_rad_s / design.ratio_to_coupling)
         coupling_Nm -= moment / design.ratio_behind_coupling
         twist = design.coupling.twist_rad(coupling_Nm)
         torque = passed * coupling_Nm / design.ratio_to_coupling
         torque += sense * friction.load_coefficient * design.ratio_behind_coupling * abs(coupling_Nm)
-    torque += sense * _own(friction, abs(speed_rad_s), int(sense)) + friction.offset_torque_Nm
-    room = _room(friction, abs(speed_rad_s), int(sense))
-    current, voltage = _driven(design, torque, speed_rad_s)
+    own = dry_torque(design, 0.0, sense) + slopes_torque(friction_slopes(design, sense), abs(speed_rad_s))
+    torque += sense * float(own) + friction.offset_torque_Nm
+    room = _room(friction, abs(speed_rad_s), sense)
+    current, voltage = steady_input(design, torque, speed_rad_s)
     return OperatingMotion(speed_rad_s, current, voltage, True, load_Nm, twist, coupling_Nm, room)
-
-
-def _driven(design: Design, torque_Nm: float, speed_rad_s: float) -> tuple[float, float]:
-    """Current and voltage of a torque at a speed."""
-    motor = design.effective_motor
-    if motor.source_gain_Nm_V is not None:
-        return 0.0, torque_Nm / motor.source_gain_Nm_V
-    current = torque_Nm / (motor.torque_constant_Nm_A or 0.0)
-    back_emf = (motor.back_emf_constant_Vs_rad or 0.0) * speed_rad_s
-    return current, (motor.resistance_ohm or 0.0) * current + back_emf
 
 
 def _behind(friction: LoadFriction | None, speed_rad_s: float) -> float:
@@ -257,19 +246,6 @@ def _behind(friction: LoadFriction | None, speed_rad_s: float) -> float:
         return 0.0
     dry = copysign(friction.dry_torque_Nm, speed_rad_s)
     return dry + friction.viscous_Nms_rad * speed_rad_s + friction.offset_torque_Nm
-
-
-def _own(friction: Friction, speed_rad_s: float, sense: int) -> float:
-    """Dry and viscous friction of the motor, or its map, against a motion forward (1) or backward (-1)."""
-    points = friction.map(sense)
-    if not points:
-        return friction.dry_Nm(0.0, sense) + friction.viscous(sense) * speed_rad_s
-    torque = points[0].torque_Nm
-    pieces = segments(points)
-    ends = [start for start, _ in pieces[1:]] + [inf]
-    for (start, slope), end in zip(pieces, ends, strict=True):
-        torque += slope * max(min(speed_rad_s, end) - start, 0.0)
-    return torque
 
 
 def _room(friction: Friction, speed_rad_s: float, sense: int) -> float:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.model import Design, FilterPlace
-from nonlinear.row.filters import section
+from actuator_lti.design.model import Design
+from actuator_lti.drive.steady import filtered, winding
 
 if TYPE_CHECKING:
     from nonlinear.bench.operating_motion import OperatingMotion
@@ -23,27 +23,15 @@ def commands_fit(design: Design, motion: OperatingMotion) -> bool:
 
     What a law of one's own needs is its own affair: it is tested with the limits lifted.
     """
-    control, limits = design.controller, design.limits
-    wanted = motion.voltage_V
-    if control.current is not None and control.current.law is not None:
-        wanted = motion.current_A
-    elif control.current is not None:
-        loop = control.current
-        state = current_state(
-            motion,
-            loop.gain_V_A,
-            loop.integral_time_s is not None,
-            loop.back_emf_feedforward * (design.effective_motor.back_emf_constant_Vs_rad or 0.0),
-            loop.resistance_feedforward * (design.effective_motor.resistance_ohm or 0.0),
-        )
-        wanted = float(state.command)
-        if abs(wanted) > COMMANDED * limits.peak_current_A:
-            return False
-    if control.velocity is not None and control.velocity.law is None:
-        velocity = control.velocity
-        integral = velocity.integral_time_s is not None
-        wanted = float(velocity_state(design, motion, wanted, velocity.gain, integral).command)
-        return abs(wanted) <= COMMANDED * limits.speed_rad_s
+    limits, wanted = design.limits, motion.voltage_V
+    for stage, limit in (("current", limits.peak_current_A), ("velocity", limits.speed_rad_s)):
+        loop = getattr(design.controller, stage)
+        if loop is not None and loop.law is not None:
+            wanted = motion.current_A
+        elif loop is not None:
+            wanted = steady_state(design, motion, stage, wanted).command
+            if abs(wanted) > COMMANDED * limit:
+                return False
     return True
 
 
@@ -56,35 +44,27 @@ class Steady:
     output: float
 
 
-def current_state(
-    bias: OperatingMotion, gain: float, integral: bool, back_emf: float, resistance: float
-) -> Steady:
-    """The current controller on an operating motion; the last two are feed-forward in V s/rad and ohm."""
-    i, left = bias.current_A, bias.voltage_V - back_emf * bias.speed_rad_s
-    if integral:
-        return Steady(i, left - resistance * i, bias.voltage_V)
-    return Steady((left + gain * i) / (gain + resistance), 0.0, bias.voltage_V)
+def steady_state(design: Design, bias: OperatingMotion, stage: str, wanted: float) -> Steady:
+    """The current or velocity controller on a motion, where its output behind the filters is ``wanted``."""
+    loop, w = getattr(design.controller, stage), bias.speed_rad_s
+    if stage == "current":
+        (direct, per_speed), gain, seen, output = fed_forward(design), loop.gain_V_A, bias.current_A, wanted
+    else:
+        direct, per_speed, gain = 0.0, 0.0, loop.gain
+        seen, output = float(w * filtered(design, "speed")), float(wanted / filtered(design, "torque"))
+    rest = output - per_speed * w - direct * seen
+    if loop.integral_time_s is not None:
+        return Steady(seen, rest, output)
+    return Steady(seen + rest / (gain + direct), 0.0, output)
 
 
-def velocity_state(
-    design: Design, bias: OperatingMotion, wanted: float, gain: float, integral: bool
-) -> Steady:
-    """The velocity controller on an operating motion whose output behind the filters is ``wanted``."""
-    before = wanted / steady_gain(design, "torque")
-    seen = bias.speed_rad_s * steady_gain(design, "speed")
-    return Steady(seen, before, before) if integral else Steady(seen + before / gain, 0.0, before)
-
-
-def steady_gain(design: Design, place: FilterPlace) -> float:
-    """Gain at zero frequency of the filters of the velocity loop on the torque or the speed."""
-    velocity = design.controller.velocity
-    if velocity is None:
-        return 1.0
-    result, period_s = 1.0, velocity.every * design.controller.period_s
-    for item in velocity.filters_on(place):
-        b0, b1, b2, a1, a2 = section(item, period_s)
-        result *= (b0 + b1 + b2) / (1.0 + a1 + a2)
-    return result
+def fed_forward(design: Design) -> tuple[float, float]:
+    """What the current stage adds to the voltage, per current command in ohm and per speed in V s/rad."""
+    loop = design.controller.current
+    if loop is None:
+        return 0.0, 0.0
+    R, _, kE = winding(design.effective_motor)
+    return loop.resistance_feedforward * R, loop.back_emf_feedforward * kE
 
 
 @dataclass(frozen=True)
@@ -96,20 +76,17 @@ class OwnStart:
     steady: bool  # whether it is in its steady state: with angles that grow, its states grow evenly
 
 
-def own_start(
-    design: Design, bias: OperatingMotion, wanted: float, gain: float, direct: float = 0.0, fed: float = 0.0
-) -> OwnStart:
-    """Solve for states x_k = x0 + k x1 and the command of a law times ``gain`` whose stage gives ``wanted``.
-
-    The stage adds ``direct`` per command to the law's output, and ``fed`` besides.
-    """
+def own_start(design: Design, bias: OperatingMotion, wanted: float) -> OwnStart:
+    """Solve for states x_k = x0 + k x1 and the command of a law of one's own whose stage gives ``wanted``."""
     own = design.controller.own_law
     assert own is not None
     stage, law = own
     A, B, C, D, _ = law.sampled
-    n, T = len(A), design.controller.period_s * getattr(getattr(design.controller, stage), "every", 1)
+    n, gain = len(A), law.gain
+    T = design.controller.period_s * getattr(getattr(design.controller, stage), "every", 1)
+    direct, per_speed = fed_forward(design) if stage == "current" else (0.0, 0.0)
     e0, e1, per_command = (
-        np.array([part[name] for name in law.inputs]) for part in _inputs(design, stage, bias, T)
+        np.array([part.get(name, 0.0) for name in law.inputs]) for part in _inputs(design, stage, bias, T)
     )
     eye, none = np.eye(n), np.zeros((n, n))
     table = np.block([
@@ -118,7 +95,8 @@ def own_start(
         [eye - A, eye, -(B @ per_command)[:, None]],
         [gain * C[None], np.zeros((1, n)), np.array([[gain * (D @ per_command) + direct]])],
     ])  # fmt: skip
-    right = np.concatenate([B @ e1, [-gain * (D @ e1)], B @ e0, [wanted - gain * (D @ e0) - fed]])
+    left = wanted - gain * (D @ e0) - per_speed * bias.speed_rad_s
+    right = np.concatenate([B @ e1, [-gain * (D @ e1)], B @ e0, [left]])
     scale = np.maximum(np.abs(table).max(axis=1), np.finfo(float).tiny)
     table, right = table / scale[:, None], right / scale
     found = np.linalg.lstsq(table, right, rcond=None)[0]
@@ -133,11 +111,7 @@ def _inputs(design: Design, stage: str, bias: OperatingMotion, T: float) -> tupl
     output = bias.output_rad(design)
     at_output = stage == "position" and design.controller.position_loop.sensor == "output"
     measured = {"position": N * output if at_output else 0.0, "velocity": w, "current": bias.current_A}[stage]
-    start = {
-        "command": 0.0, "error": -measured, "speed": w, "angle": 0.0, "current": bias.current_A,
-        "output_angle": output, "output_speed": w / N,
-    }  # fmt: skip
-    gained = dict.fromkeys(start, 0.0) | {"angle": w * T, "output_angle": w * T / N}
-    if stage == "position":
-        gained["command"] = w * T
-    return start, gained, dict.fromkeys(start, 0.0) | {"command": 1.0, "error": 1.0}
+    start = {"error": -measured, "speed": w, "current": bias.current_A, "output_angle": output,
+             "output_speed": w / N}  # fmt: skip
+    gained = {"angle": w * T, "output_angle": w * T / N, "command": w * T if stage == "position" else 0.0}
+    return start, gained, {"command": 1.0, "error": 1.0}

@@ -7,13 +7,13 @@ import re
 
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.compiled.program import Program
-from actuator_lti.compiled.structs import struct_text
+from actuator_lti.compiled.structs import Member, struct_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_hash
 from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import exporter_version, plain, refuse_prefix
 from nonlinear.export.controller_cut import Controller, begins, controller_of
-from nonlinear.export.controller_names import signal_words, state_words
+from nonlinear.export.controller_names import SIGNAL_AT, member_words
 from nonlinear.export.controller_vectors import roundings, vectors_text
 from nonlinear.export.program import FLAGS, c_text, filled, single
 
@@ -119,10 +119,14 @@ def _constants(ours: Controller, upper: str) -> str:
 
 
 def _structs(ours: Controller) -> str:
-    parts = begins(ours.p)
-    state = struct_text(ours.state, lambda each: state_words(parts[each.first]))
-    signals = (struct_text(one, lambda each: signal_words(each.first)) for one in (ours.measured, ours.out))
-    return "\n\n".join([state, *signals])
+    names = begins(ours.p)
+    state = struct_text(ours.state, lambda each: member_words(names[each.first]))
+    return "\n\n".join([state, *(struct_text(each, _signal_words) for each in (ours.measured, ours.out))])
+
+
+def _signal_words(member: Member) -> str:
+    counts = "count of the encoder; it may go round at 2**32"
+    return member_words(SIGNAL_AT[member.first]) if member.first in SIGNAL_AT else counts
 
 
 def _sizes(ours: Controller, single_precision: bool) -> str:

@@ -24,7 +24,7 @@ from nonlinear._kernels.control import control
 from nonlinear._kernels.state_kinds import COUNTER, state_kinds
 from nonlinear._kernels.tick import init_command, init_controller, init_estimate
 from nonlinear.export.c_files import exported
-from nonlinear.export.controller_names import signal_name, state_name
+from nonlinear.export.controller_names import SIGNAL_AT, member_name
 
 Floats = npt.NDArray[np.float64]
 MOTOR_COUNTS, OUTPUT_COUNTS = layout.IO_SIZE, layout.IO_SIZE + 1  # places of inputs that are whole numbers
@@ -220,7 +220,7 @@ def _state(design: Design, p: Floats, functions: list[Leftover]) -> Iterable[Mem
         is_int = kinds[begin] == COUNTER or name.startswith("S_FLAGS_")
         kind: Kind = "count" if count else "int" if is_int else "float"
         several = ends[begin] - begin > 1 or name == "LAW_STATES"
-        yield Member(state_name(design, name, counts=count), begin, length if several else 0, kind)
+        yield Member(member_name(design, name, counts=count), begin, length if several else 0, kind)
 
 
 def _members(design: Design, functions: list[Leftover], row: str) -> Iterable[Member]:
@@ -231,7 +231,7 @@ def _members(design: Design, functions: list[Leftover], row: str) -> Iterable[Me
             yield Member("motor_counts" if place == MOTOR_COUNTS else "output_counts", place, 0, "count")
         else:
             kind: Kind = "int" if place == layout.IO_FLAGS else "float"
-            yield Member(signal_name(design, place), place, 0, kind)
+            yield Member(member_name(design, SIGNAL_AT[place]), place, 0, kind)
 
 
 def _zeroed(start: Leftover, state: Struct) -> None:

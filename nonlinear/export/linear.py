@@ -47,20 +47,6 @@ REMEMBERED = np.array([
 
 
 @kernel
-def without_outer(q, stage):
-    """Take the stages outside of one away; its command is then that of the drive.
-
-    A velocity stage whose slower measurement is fed to the voltage stays, its output cut off.
-    """
-    if stage == CURRENT or stage == VELOCITY:
-        q[layout.HAS_POSITION], q[layout.COMMAND_FILTERS] = 0.0, 0.0
-    if stage == CURRENT:
-        q[layout.RESISTANCE_FEEDFORWARD] = 0.0
-        if repeats(q, stage) == 1:
-            q[layout.HAS_VELOCITY] = 0.0
-
-
-@kernel
 def cut_of(q, stage):
     """Where the loop of a stage is cut: with a law of one's own at the break point that it drives."""
     own = q[layout.OWN_STAGE]
@@ -72,12 +58,6 @@ def cut_of(q, stage):
     if position or (stage == VELOCITY and own == layout.OWN_VELOCITY):
         return AT_CURRENT if q[layout.HAS_CURRENT] > 0.0 else AT_VOLTAGE
     return stage
-
-
-@kernel
-def cut_point(q, stage):
-    """The probe that cuts the loop, or -1."""
-    return -1 if stage == CURRENT and q[layout.HAS_VELOCITY] <= 0.0 else POINT[stage]
 
 
 @kernel
@@ -128,12 +108,6 @@ def repeats(q, stage):
     if stage != AT_CURRENT and stage != AT_VOLTAGE:
         return every
     return max(command_interval(q), max(speed, every))
-
-
-@kernel
-def too_long(q):
-    """Whether the delay line or the stored angles alone pass MOST, before anything is laid out for them."""
-    return not (q[layout.DELAY_LINE] + q[layout.DIFFERENCE_SAMPLES] <= MOST)
 
 
 @kernel
@@ -237,18 +211,6 @@ def one_column(q, s, io, stage, every, size, places, count, angles, j, blocks, b
 
 
 @kernel
-def put_unit(q, s, places, j, angles):
-    """Put the drive into the j-th unit state: the motor's angle takes the stored ones with it."""
-    at_rest(q, s)
-    if j == 0:
-        for i in range(angles):
-            s[int(places[i])] = 1.0
-    else:
-        s[int(places[j])] = 1.0
-    set_off(q, s)
-
-
-@kernel
 def until_next(every, ticks):
     """Ticks until a stage runs next, so many ticks after it ran."""
     passed = ticks - every * int(ticks / every)
@@ -256,10 +218,20 @@ def until_next(every, ticks):
 
 
 @kernel
-def put_phase(q, s, ticks):
-    """Let the slower stages be where they are so many ticks after they all ran."""
+def put_unit(q, s, places, j, angles, ticks):
+    """Put the drive into the j-th unit state, -1: at rest; the motor's angle takes the stored ones with it.
+
+    The slower stages are where they are so many ticks after they all ran.
+    """
+    at_rest(q, s)
     s[layout.S_UNTIL_OUTER] = until_next(int(q[layout.OUTER_EVERY]), ticks)
     s[layout.S_UNTIL_VELOCITY] = until_next(int(q[layout.EVERY_VELOCITY]), ticks)
+    if j == 0:
+        for i in range(angles):
+            s[int(places[i])] = 1.0
+    elif j > 0:
+        s[int(places[j])] = 1.0
+    set_off(q, s)
 
 
 @kernel
@@ -269,34 +241,37 @@ def block(q, s, io, stage, first, every, places, n, angles, blocks, at, seen):
     0 where a tick failed.
     """
     for j in range(n):
-        put_unit(q, s, places, j, angles)
-        put_phase(q, s, first)
+        put_unit(q, s, places, j, angles, first)
         value = one_column(q, s, io, stage, every, 0.0, places, n, angles, j, blocks, at + j, n, seen)
         if math.isnan(value):
             return 0
         blocks[at + n * n + n + j] = value
-    at_rest(q, s)
-    put_phase(q, s, first)
+    put_unit(q, s, places, -1, angles, first)
     value = one_column(q, s, io, stage, every, 1.0, places, n, angles, MOST, blocks, at + n * n, 1, seen)
     return 0 if math.isnan(value) else 1
 
 
 @kernel
-def cut_here(q, point):
-    """Put a probe in that lets nothing through but what is injected; -1: none."""
-    if point >= 0:
-        q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_ON] = 1.0
-        q[layout.PROBES + point * layout.PROBE_SIZE + layout.PROBE_GAIN] = 0.0
+def cut_here(q, stage):
+    """Put a probe in that lets nothing through but what is injected; a loop that is run closed has none."""
+    if POINT[stage] >= 0 and (stage != CURRENT or q[layout.HAS_VELOCITY] > 0.0):
+        at = layout.PROBES + POINT[stage] * layout.PROBE_SIZE
+        q[at + layout.PROBE_ON], q[at + layout.PROBE_GAIN] = 1.0, 0.0
 
 
 @kernel
 def prepared(q, s, stage):
     """Make ``q`` the row of the linear drive with its loop cut, and derive it; 0 where it is too long."""
-    without_outer(q, stage)
-    cut_here(q, cut_point(q, stage) if stage == CURRENT else -1)  # of a velocity stage that had to stay
-    cut_here(q, cut_point(q, cut_of(q, stage)))
+    if stage == CURRENT or stage == VELOCITY:  # no stages outside; its command is then that of the drive
+        q[layout.HAS_POSITION], q[layout.COMMAND_FILTERS] = 0.0, 0.0
+    if stage == CURRENT:
+        q[layout.RESISTANCE_FEEDFORWARD] = 0.0
+        if repeats(q, stage) == 1:  # one whose slower measurement is fed to the voltage stays, its output cut
+            q[layout.HAS_VELOCITY] = 0.0
+        cut_here(q, stage)
+    cut_here(q, cut_of(q, stage))
     prepare_sizes(q)
-    if too_long(q):
+    if not (q[layout.DELAY_LINE] + q[layout.DIFFERENCE_SAMPLES] <= MOST):  # those alone pass it
         return 0
     derive(q, s)
     return 1

@@ -39,17 +39,6 @@ ROUNDED = 1e-15  # as in the linear loops: what rounding leaves of a slope
 
 
 @kernel
-def map_slope(p):
-    """Slope of the friction map's first piece for w > 0; the viscous friction without a map."""
-    if p[layout.MAP_COUNT] <= 0.0:
-        return p[layout.VISCOUS]
-    if p[layout.MAP_COUNT] < 2.0:
-        return 0.0
-    at = layout.MAP
-    return (p[at + 3] - p[at + 1]) / (p[at + 2] - p[at])
-
-
-@kernel
 def slope_at_zero(p, slope, waves, peak, order):
     """Slope of a torque over its angle at zero; what rounding leaves of it, as at a quarter turn, is none."""
     size = abs(slope)
@@ -69,7 +58,11 @@ def linear_row(p, q):
     q[layout.LOAD_SLOPE] = slope_at_zero(p, p[layout.LOAD_SLOPE], layout.MOMENT_WAVES, peak, order)
     peak, order = layout.TORQUE_PEAK, layout.TORQUE_ORDER
     q[layout.TORQUE_SLOPE] = slope_at_zero(p, p[layout.TORQUE_SLOPE], layout.TORQUE_WAVES, peak, order)
-    q[layout.VISCOUS] = map_slope(p)
+    if p[layout.MAP_COUNT] > 0.0:  # the first piece of the friction map for w > 0
+        q[layout.VISCOUS] = 0.0
+    if p[layout.MAP_COUNT] > 1.0:
+        at = layout.MAP
+        q[layout.VISCOUS] = (p[at + 3] - p[at + 1]) / (p[at + 2] - p[at])
     for k in range(CLEARED.shape[0]):
         q[CLEARED[k]] = 0.0
     for k in range(UNLIMITED.shape[0]):

@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.checks import FIRST_RELATIONS, RELATIONS
 from actuator_lti.design.mistakes import refusal_text
 from actuator_lti.design.model import Design
-from actuator_lti.design.parameters import FrozenMap
 from nonlinear.export.program import c_text
 from nonlinear.export.statement import Statement, used
 from nonlinear.export.trace import Key, Tape, followed

@@ -11,106 +11,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.bounds import BATCH_TICKS
-from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, TooManyTicks, shown, whole_number
 from nonlinear._kernels import layout as at
-from nonlinear.bench.probe import Probe
-from nonlinear.commands import Command
-from nonlinear.loads import LoadMoment, as_load
-from nonlinear.row.parameters import design_row
 from nonlinear.runs.reduced import BatchResult
 from nonlinear.runs.running import Running
-from nonlinear.runs.setup import Tables, put_run
-from nonlinear.runs.trajectory import State
-from nonlinear.runs.watch import watch
+from nonlinear.runs.setup import Run, Tables
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
-LOOK_S = 0.1  # between two looks of who watches
 CHUNK_TICKS = 2_000_000  # ticks one thread does between two looks at the queue
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reducers:
-    """What to keep of a run beside final state, limit use and events.
-
-    Parameters
-    ----------
-    window_ticks, cycles : int
-        Length of the last window (and the one before it) in ticks, and whole periods of the fundamental in
-        it (see `nonlinear.runs.reduced.whole_periods`); 0: no windows.
-    harmonics : int
-        Harmonics correlated in the windows, 0 to 9.
-    extremes : bool
-        Minimum and maximum of every signal over the whole run.
-    step_target_rad : float
-        Output angle that a step asks for; gives rise, peak and settling. 0: none.
-    step_band : float
-        Settling band, relative to the target.
-    """
-
-    window_ticks: int = 0
-    cycles: int = 1
-    harmonics: int = 1
-    extremes: bool = False
-    step_target_rad: float = 0.0
-    step_band: float = 0.02
-
-    def write(self, row: Floats) -> None:
-        """Write into a parameter row (or all rows of an array)."""
-        if not 0 <= self.harmonics <= at.MAX_HARMONICS:
-            raise InputError(f"harmonics = {self.harmonics}: must be 0 to {at.MAX_HARMONICS}")
-        if self.window_ticks and not 0 < 2 * self.cycles < self.window_ticks:
-            message = f"window of {self.window_ticks} ticks: must hold more than two ticks a period"
-            raise InputError(f"{message} ({self.cycles} periods asked for)")
-        row[..., at.WINDOW], row[..., at.CYCLES] = self.window_ticks, self.cycles
-        row[..., at.HARMONICS], row[..., at.WITH_EXTREMES] = self.harmonics, self.extremes
-        row[..., at.STEP_TARGET], row[..., at.STEP_BAND] = self.step_target_rad, self.step_band
-
-
-@dataclass(frozen=True, kw_only=True)
-class Run:
-    """One run of a batch; the names are those of `nonlinear.simulate`."""
-
-    design: Design
-    command: Command
-    duration_s: float
-    load_Nm: float | LoadMoment = 0.0
-    bias: Command | None = None
-    probes: tuple[Probe, ...] = ()
-    initial: State | None = None
-    friction_on: bool = True
-    limits_on: bool = True
-    reducers: Reducers = Reducers()
-
-    def row(self, tables: Tables) -> Floats:
-        """The parameter row of this run; time series go into ``tables``."""
-        row = design_row(self.design, friction_on=self.friction_on, limits_on=self.limits_on)
-        load, window = as_load(self.load_Nm), self.reducers.window_ticks
-        put_run(
-            row,
-            self.design,
-            self.duration_s,
-            self.command,
-            self.bias,
-            load,
-            self.probes,
-            self.initial,
-            tables,
-        )
-        if 2 * window > row[at.TICKS]:
-            message = f"window of {window} ticks: must fit twice into {row[at.TICKS]:.0f} ticks"
-            raise InputError(message, where=self.design.name)
-        self.reducers.write(row)
-        return row
 
 
 def simulate_many(
@@ -177,31 +93,28 @@ def run_rows(
     spans = _spans(rows[:, at.TICKS], threads)
     done, shared = 0, np.zeros(2)
     each = [None] * n if drives is None else drives
-    if len(spans) == 1 and ticks <= CHUNK_TICKS and watch() is None:  # not worth a thread
+    result = BatchResult(rows=rows, outs=outs, status=statuses)
+    if len(spans) == 1 and ticks <= CHUNK_TICKS:  # not worth a thread
         _run_span(rows, series, each, 0, n, outs, statuses, shared)
         if progress is not None:
             progress(n, n)
-        return BatchResult(rows=rows, outs=outs, status=statuses)
+        return result
     with ThreadPoolExecutor(max_workers=max(1, threads)) as pool:
-        waiting = [pool.submit(_run_span, rows, series, each, a, b, outs, statuses, shared) for a, b in spans]
-        sizes = {future: b - a for future, (a, b) in zip(waiting, spans, strict=True)}
+        waiting = {
+            pool.submit(_run_span, rows, series, each, a, b, outs, statuses, shared): b - a for a, b in spans
+        }
         try:
-            pending, look = set(waiting), watch()
-            while pending:
-                ended, pending = wait(pending, None if look is None else LOOK_S, FIRST_COMPLETED)
-                if look is not None:
-                    look()
-                for future in ended:
-                    future.result()
-                    done += sizes[future]
-                    if progress is not None:
-                        progress(done, n)
+            for future in as_completed(waiting):
+                future.result()
+                done += waiting[future]
+                if progress is not None:
+                    progress(done, n)
         except BaseException:
             shared[1] = 1.0  # stops the runs that are under way
             for future in waiting:
                 future.cancel()
             raise
-    return BatchResult(rows=rows, outs=outs, status=statuses)
+    return result
 
 
 def _run_span(

@@ -207,10 +207,7 @@ def _hold_signal(p: Floats, place: int, tables: Floats, tick: int) -> bool:
     if kind == at.NONE or p[place + 1] == 0.0:
         return True
     if kind == at.TABLE:
-        offset, length = int(p[place + 3]), int(p[place + 4])
-        left = tables[offset + min(tick, length - 1) : offset + length]
-        p[place + 3], p[place + 4] = offset + length - 1, 1.0
-        return bool((left == left[-1]).all())
+        return _hold_table(p, place + 3, tables, tick)
     if kind == at.RAMP:
         p[place + 1] *= p[place + 3]
     over = time >= (p[place + 3] if kind == at.RAMP else 0.0)

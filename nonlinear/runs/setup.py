@@ -1,4 +1,4 @@
-"""Commands, loads, probes and the initial state written into a run's row and tables."""
+"""What a drive is asked to do in a run, and how that is written into the run's row and tables."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from actuator_lti.errors import InputError, finite_number, shown
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.commands import Command, numbers_of, write
-from nonlinear.loads import LoadMoment
+from nonlinear.loads import LoadMoment, as_load
+from nonlinear.row.parameters import design_row
 from nonlinear.runs.trajectory import State
 
 Floats = npt.NDArray[np.float64]
@@ -37,31 +38,82 @@ class Tables:
         self.size += values.size
         return self.size - values.size, values.size
 
-    def append(self, other: Tables) -> int:
-        """Append all series of another set; returns where they begin."""
-        base = self.size
-        self.parts.extend(other.parts)
-        self.size += other.size
-        return base
-
     def joined(self) -> Floats:
         """One array for the kernel."""
         return np.concatenate(self.parts) if self.parts else np.zeros(1)
 
 
-def put_run(
-    row: Floats, design: Design, duration_s: float, command: Command, bias: Command | None,
-    load: LoadMoment, probes: Sequence[Probe], initial: State | None, tables: Tables,
-) -> None:  # fmt: skip
-    """Write what a drive is asked to do in one run: how long, commands, load, probes, and where it begins."""
-    row[at.TICKS] = ticks_of(duration_s, design.controller.period_s)
-    for place, signal in ((at.COMMAND, command), (at.BIAS, bias)):
-        if signal is not None:
-            check_frequency(design, signal)
-            _put_signal(row, place, signal, tables)
-    _put_load(row, load, tables)
-    _put_probes(row, probes, tables)
-    put_state(row, initial or State())
+@dataclass(frozen=True, kw_only=True)
+class Reducers:
+    """What to keep of a run beside final state, limit use and events.
+
+    Parameters
+    ----------
+    window_ticks, cycles : int
+        Length of the last window (and the one before it) in ticks, and whole periods of the fundamental in
+        it (see `nonlinear.runs.reduced.whole_periods`); 0: no windows.
+    harmonics : int
+        Harmonics correlated in the windows, 0 to 9.
+    extremes : bool
+        Minimum and maximum of every signal over the whole run.
+    step_target_rad : float
+        Output angle that a step asks for; gives rise, peak and settling. 0: none.
+    step_band : float
+        Settling band, relative to the target.
+    """
+
+    window_ticks: int = 0
+    cycles: int = 1
+    harmonics: int = 1
+    extremes: bool = False
+    step_target_rad: float = 0.0
+    step_band: float = 0.02
+
+    def write(self, row: Floats) -> None:
+        """Write into a parameter row (or all rows of an array)."""
+        if not 0 <= self.harmonics <= at.MAX_HARMONICS:
+            raise InputError(f"harmonics = {self.harmonics}: must be 0 to {at.MAX_HARMONICS}")
+        if self.window_ticks and not 0 < 2 * self.cycles < self.window_ticks:
+            message = f"window of {self.window_ticks} ticks: must hold more than two ticks a period"
+            raise InputError(f"{message} ({self.cycles} periods asked for)")
+        row[..., at.WINDOW], row[..., at.CYCLES] = self.window_ticks, self.cycles
+        row[..., at.HARMONICS], row[..., at.WITH_EXTREMES] = self.harmonics, self.extremes
+        if self.step_target_rad:
+            row[..., at.STEP_TARGET], row[..., at.STEP_BAND] = self.step_target_rad, self.step_band
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """One run of a batch; the names are those of `nonlinear.simulate`."""
+
+    design: Design
+    command: Command
+    duration_s: float
+    load_Nm: float | LoadMoment = 0.0
+    bias: Command | None = None
+    probes: tuple[Probe, ...] = ()
+    initial: State | None = None
+    friction_on: bool = True
+    limits_on: bool = True
+    reducers: Reducers = Reducers()
+
+    def row(self, tables: Tables) -> Floats:
+        """The parameter row of this run; time series go into ``tables``."""
+        design = self.design
+        row = design_row(design, friction_on=self.friction_on, limits_on=self.limits_on)
+        row[at.TICKS] = ticks_of(self.duration_s, design.controller.period_s)
+        for place, signal in ((at.COMMAND, self.command), (at.BIAS, self.bias)):
+            if signal is not None:
+                check_frequency(design, signal)
+                _put_signal(row, place, signal, tables)
+        _put_load(row, as_load(self.load_Nm), tables)
+        _put_probes(row, self.probes, tables)
+        put_state(row, self.initial or State())
+        if 2 * self.reducers.window_ticks > row[at.TICKS]:
+            message = f"window of {self.reducers.window_ticks} ticks: must fit twice into"
+            raise InputError(f"{message} {row[at.TICKS]:.0f} ticks", where=design.name)
+        self.reducers.write(row)
+        return row
 
 
 def ticks_of(duration_s: float, period_s: float) -> int:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
 from os import PathLike
-from threading import Thread
 
 import numpy as np
 import numpy.typing as npt
@@ -17,16 +17,16 @@ from actuator_lti.errors import NumericalError, finite_number, whole_number
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe
 from nonlinear.commands import Command
-from nonlinear.loads import LoadMoment, as_load
-from nonlinear.row.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE, design_row
+from nonlinear.loads import LoadMoment
+from nonlinear.row.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE
 from nonlinear.runs.running import Running
-from nonlinear.runs.setup import Tables, put_run, put_supply, put_torque
+from nonlinear.runs.setup import Run, Tables, put_supply, put_torque
 from nonlinear.runs.trajectory import STATUS, LimitUse, State, Trajectory
-from nonlinear.runs.watch import watch
 from nonlinear.runs.wrap import wrap
 
 Floats = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
+LOOK_S = 0.1  # between two looks at a run
 
 
 def simulate(
@@ -122,10 +122,11 @@ def simulate(
     >>> run.time_s.size, bool(abs(run.output_angle_rad[-1] - 0.01) < 1e-3)
     (1000, True)
     """
-    design = as_design(design)
-    row = design_row(design, friction_on=friction_on, limits_on=limits_on)
-    tables = Tables()
-    put_run(row, design, duration_s, command, bias, as_load(load_Nm), probes, initial, tables)
+    design, tables = as_design(design), Tables()
+    row = Run(
+        design=design, command=command, duration_s=duration_s, load_Nm=load_Nm, bias=bias, probes=probes,
+        initial=initial, friction_on=friction_on, limits_on=limits_on,
+    ).row(tables)  # fmt: skip
     row[at.WITH_ENERGY] = energy
     row[at.TANH_TOLERANCE] = finite_number("tanh_tolerance", tanh_tolerance)
     row[at.MAX_EVENTS] = min(whole_number("max_events", max_events), 2**53)
@@ -169,30 +170,20 @@ def _named_limits(run: Trajectory) -> Mapping[str, LimitUse]:
 
 
 def _call(drive: Running, history: Floats, flags: np.ndarray, out: Floats, progress: Progress | None) -> int:
-    """Call the kernel; with ``progress``, in a thread that is watched and can be interrupted."""
+    """Call the kernel; with ``progress``, in a thread that is looked at and can be interrupted."""
     from nonlinear.native import resume
 
-    shared, look, result = np.zeros(2), watch(), list[int]()
-
-    def call() -> None:
-        result.append(resume(drive.p, drive.s, drive.tables, history, flags, out, shared))
-
-    if progress is None and look is None:
-        call()
-        return result[0]
-    thread, total = Thread(target=call), int(drive.p[at.TICKS])
-    thread.start()
-    try:
-        while thread.is_alive():
-            thread.join(0.1)
-            if look is not None:
-                look()
-            if progress is not None and thread.is_alive():
+    shared, total = np.zeros(2), int(drive.p[at.TICKS])
+    given = (drive.p, drive.s, drive.tables, history, flags, out, shared)
+    if progress is None:
+        return resume(*given)
+    with ThreadPoolExecutor(max_workers=1) as pool:
+        future = pool.submit(resume, *given)
+        try:
+            while wait([future], LOOK_S).not_done:
                 progress(int(shared[0]), total)
-    except BaseException:
-        shared[1] = 1.0
-        thread.join()
-        raise
-    if progress is not None:
-        progress(int(shared[0]), total)  # a run may end before it was looked at once
-    return result[0]
+        except BaseException:
+            shared[1] = 1.0
+            raise
+    progress(int(shared[0]), total)  # a run may end before it was looked at once
+    return future.result()

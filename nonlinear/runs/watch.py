@@ -1,32 +1,14 @@
-"""Who waits for a simulation: somebody who looks at it and may stop it; a line on a terminal."""
+"""A line on a terminal that says what is being waited for."""
 
 from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 
-Watch = Callable[[], None]
 PATIENCE_S = 1.0
 _told: set[str] = set()
-_watching: ContextVar[Watch | None] = ContextVar("watching", default=None)
-
-
-@contextmanager
-def watched(look: Watch) -> Iterator[None]:
-    """Call ``look`` some times a second while anything is simulated inside; what it raises ends the runs."""
-    token = _watching.set(look)
-    try:
-        yield
-    finally:
-        _watching.reset(token)
-
-
-def watch() -> Watch | None:
-    """Who looks now."""
-    return _watching.get()
 
 
 @contextmanager

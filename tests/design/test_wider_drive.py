@@ -8,9 +8,9 @@ import pytest
 
 from actuator_lti.design import check_design, load_design, read_design_text, write_design
 from actuator_lti.design.checks_control import TRACKING_LIMIT
-from actuator_lti.design.checks_elastic import elastic_warnings
 from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.sections import part_at, template_of, with_part
+from actuator_lti.design.suspicions import elastic_warnings
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
 from tests.validation.random_drives import full_drive

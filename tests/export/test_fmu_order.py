@@ -12,7 +12,7 @@ from fmu_host import Host, Refused, fmpy, hosted, needs_compiler, written
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import zig_command
 from actuator_lti.design.access import parameter_value, with_values
-from actuator_lti.design.parameters import FrozenMap
+from actuator_lti.design.asked import FrozenMap
 from actuator_lti.errors import InputError
 from nonlinear import commands, simulate
 from nonlinear.export.trace import trace_keys

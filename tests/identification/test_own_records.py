@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from actuator_lti import load_design
+from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.model import Tolerance
-from actuator_lti.design.parameters import FrozenMap
 from analyses.identification.inverse import fit_records
 from analyses.records.consistency import check_record
 from analyses.records.open_record import open_record

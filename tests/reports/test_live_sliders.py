@@ -20,9 +20,9 @@ from typer.testing import CliRunner
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import with_values
+from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.model import Design
-from actuator_lti.design.parameters import FrozenMap
 from actuator_lti.errors import InputError
 from reports.cli.app import build
 

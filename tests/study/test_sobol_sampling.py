@@ -17,8 +17,7 @@ from actuator_lti.errors import InputError
 from analyses.monte_carlo.statistics import MOST, SHARES, Sketch, clopper_pearson, column_statistics
 from analyses.monte_carlo.task import StepCheck, step_columns, step_rows, step_units
 from analyses.studies.sampling import Factor, Sampler, read_table, sampler_of
-from nonlinear import commands
-from nonlinear.runs.batch import Reducers, Run, simulate_many
+from nonlinear import Reducers, Run, commands, simulate_many
 
 R, L = "motor.resistance", "motor.inductance"
 

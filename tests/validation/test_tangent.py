@@ -9,6 +9,7 @@ from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import shipped_designs
 from actuator_lti.design.model import Design
+from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops import Loops, exact_margins, periodic_loop
 from analyses.validation import CHECKS, validate
@@ -18,7 +19,6 @@ from analyses.validation.small_signal import nearest_pole, small_signal
 from nonlinear import tangent
 from nonlinear.bench.derivative import Tangent
 from nonlinear.bench.lifted import GRID, relative
-from nonlinear.bench.loop_setup import points_of, stages_of
 from nonlinear.bench.operating_motion import on_its_stand, on_the_bench, operating_motion, operating_motion_at
 from tests.validation.random_drives import full_drive, is_stable
 
@@ -35,7 +35,7 @@ def stood(design: Design) -> tuple[Design, Loops]:
 def predicted(bench: Design, loops: Loops, place: str) -> np.ndarray:
     if place == "current":
         return np.asarray(assemble_loops(bench, rotor="locked").current.plain_closed(Z))
-    if place in stages_of(bench):
+    if place in wire(bench).stages:
         return np.asarray(loops.present[place].plain_closed(Z))
     return periodic_loop(loops, place).closed(Z)
 
@@ -48,7 +48,7 @@ def agrees(found: Tangent, wanted: np.ndarray) -> bool:
 def test_shipped_drives(name: str) -> None:
     """Every loop and break point of every shipped drive, with a stated error of 1e-7 or less."""
     bench, loops = stood(load_design(name))
-    for place in (*stages_of(bench), *points_of(bench)):
+    for place in (*wire(bench).stages, *wire(bench).points):
         found = tangent(bench, place)
         assert found.stated_error <= 1e-7, place
         assert agrees(found, predicted(bench, loops, place)), place
@@ -61,7 +61,7 @@ def test_random_drives(seed: int) -> None:
         bench, loops = stood(full_drive(seed))
     except InputError:
         pytest.skip("no steady motion within the limits")
-    for place in (*stages_of(bench), *points_of(bench)):
+    for place in (*wire(bench).stages, *wire(bench).points):
         assert agrees(tangent(bench, place), predicted(bench, loops, place)), place
 
 

@@ -1,0 +1,240 @@
+"""Relations between the keys of motor, gears, coupling, load, friction, supply and limits."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from math import inf, isclose, log, pi
+from typing import Any
+
+from actuator_lti.design.mistakes import Refusal, Rule, readable
+from actuator_lti.design.model import Design
+from actuator_lti.design.plant import no_load_speed
+from actuator_lti.design.sections import part_at
+from actuator_lti.design.spellings import split_quantity
+from actuator_lti.files.reading import shown
+
+MAX_MAP_POINTS = 16  # of each direction
+_ELECTRICAL = {
+    "resistance": "resistance_ohm",
+    "inductance": "inductance_H",
+    "torque_constant": "torque_constant_Nm_A",
+    "back_emf_constant": "back_emf_constant_Vs_rad",
+}
+_TORQUE_OVER_VOLTAGE = {"rms-line": (3**0.5, "sqrt(3)"), "peak-phase": (1.5, "3/2")}
+_PER_VOLT = re.compile(r"/ ?V|\bV\^?-1|V⁻¹|KV\b")  # a speed constant, kE upside down
+_AC = ": see motor.constants, if it is an AC motor"
+_FACTORS = {
+    f"sqrt(2), rms against peak{_AC}": 2**0.5,
+    f"sqrt(3), phase against line-line{_AC}": 3**0.5,
+    f"sqrt(3/2), rms line-line against N m/A rms{_AC}": 1.5**0.5,
+    f"sqrt(3) and sqrt(2) together, V rms of a phase against N m/A peak{_AC}": 6**0.5,
+    f"3/2, dq against phase{_AC}": 1.5,
+    "60/(2 pi), per rpm against per rad/s": 9.549296585513721,
+    "1000, rpm against krpm or mN*m against N*m": 1e3,
+    "9.549 V/krpm": 1e3 / 9.549296585513721,
+}
+"""The usual factors between conventions of data sheets."""
+
+
+def check_motor(design: Design) -> Iterator[Refusal]:
+    """R, L, kM and kE together or none of them, and kE as kM has it."""
+    motor = design.motor
+    given = {key: getattr(motor, attribute) for key, attribute in _ELECTRICAL.items()}
+    if motor.source_gain_Nm_V is not None:
+        for key, value in given.items():
+            if value is not None:
+                yield f"motor.{key}", value, "not allowed beside motor.source_gain"
+        return
+    for key, value in given.items():
+        if value is None:
+            words = "R, L, kM and kE together, or motor.source_gain alone"
+            yield f"motor.{key}", "", f"missing; allowed: {words}{_without(key, design)}"
+    same = design.effective_motor
+    kM, kE = same.torque_constant_Nm_A, same.back_emf_constant_Vs_rad
+    if kM is not None and kE is not None and abs(kE - kM) > 0.1 * kM * (1 + 1e-12):
+        wanted = given["back_emf_constant"] * kM / kE
+        off, words = min((abs(abs(log(kE / kM)) - log(factor)), words) for words, factor in _FACTORS.items())
+        allowed = (
+            f"allowed: within 10 % of {wanted:g}{_as_written(design, 'back_emf_constant', kM / kE)}, as "
+            f"motor.torque_constant = {_stated(design, 'torque_constant')} has it (in SI the two are one "
+            f"constant){f'; the ratio is {words}' if off < 0.08 else ''}"
+        )
+        yield "motor.back_emf_constant", _stated(design, "back_emf_constant"), allowed
+
+
+def _stated(design: Design, key: str) -> str:
+    """A constant of the motor in SI, and as the file has it."""
+    return f"{getattr(design.motor, _ELECTRICAL[key]):g}{_as_written(design, key, 1.0)}"
+
+
+def _as_written(design: Design, key: str, times: float) -> str:
+    """So many times a constant in the unit of its file, in brackets; nothing where that is the SI one."""
+    item = design.parameters.get(f"motor.{key}")
+    if item is None or item.value != getattr(design.motor, _ELECTRICAL[key]):
+        return ""
+    number, unit = split_quantity(item.text)
+    if isclose(number, item.value, rel_tol=1e-4):
+        return ""
+    return f" ({number * (1.0 / times if _PER_VOLT.search(unit) else times):.4g} {unit})"
+
+
+def _without(key: str, design: Design) -> str:
+    """What to write where the sheet does not have it."""
+    other = {"torque_constant": "back_emf_constant", "back_emf_constant": "torque_constant"}.get(key, "")
+    held = getattr(design.motor, _ELECTRICAL[other]) if other else None
+    if held is not None and design.motor.constants == "dc":
+        return f"; of a DC motor it is the number of motor.{other} in SI, {held:g}"
+    if held is not None:
+        ratio, words = _TORQUE_OVER_VOLTAGE[design.motor.constants]
+        number, sign = (held * ratio, "times") if key == "torque_constant" else (held / ratio, "over")
+        return f"; with these motor.constants it is motor.{other} {sign} {words} in SI, {number:g}"
+    usual = "; where the sheet has none, R times the electrical time constant, 0.1 to 1 ms of a small motor"
+    return usual if key == "inductance" else ""
+
+
+def check_temperature(design: Design) -> Iterator[Refusal]:
+    """What heat leaves of R, kM and kE."""
+    for key in ("winding", "magnet") if design.temperature is not None else ():
+        yield from readable(_hot(design.temperature, key))
+
+
+def _hot(heat: Any, key: str) -> Iterator[Refusal]:
+    value = getattr(heat, f"{key}_degC")
+    per_K = heat.resistance_per_K if key == "winding" else heat.magnet_per_K
+    if 1.0 + per_K * (value - heat.reference_degC) < 0.05:
+        yield f"temperature.{key}", f"{value:g} degC", "R, kM and kE must keep 5 % of their value"
+
+
+def check_place(design: Design) -> Iterator[Refusal]:
+    """Refuse names of gears that are none; whatever asks for an inertia needs the coupling's place."""
+    for path, attribute in (("coupling", "after"), ("load", "locking_gear")):
+        yield from readable(_no_gear(design, path, attribute))
+
+
+def _no_gear(design: Design, path: str, attribute: str) -> Iterator[Refusal]:
+    name, names = getattr(part_at(design, path), attribute, None), [gear.name for gear in design.gears]
+    if name is not None and name not in names:
+        known = ", ".join(names) or "none, as there are no gears; leave it out"
+        yield f"{path}.{attribute}", shown(f"{name}"), f"is no gear; allowed: {known}"
+
+
+def _locking(design: Design) -> Iterator[Refusal]:
+    """A self-locking stage behind the coupling, or whose friction would give energy."""
+    coupling, locking = design.coupling, design.load.locking_gear
+    if coupling is None:
+        return
+    if design.load.path != "self-locking":
+        if locking is not None:
+            yield "load.locking_gear", f'"{locking}"', 'allowed with load.path = "self-locking"'
+        return
+    names = [gear.name for gear in design.gears]
+    locks = names.index(locking) + 1 if locking else len(names)
+    least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
+    drivable = 'or load.path = "back-drivable"'  # the default locks itself
+    if design.gears_before_coupling < locks:
+        allowed = (
+            f"lies before the self-locking stage; allowed: {', '.join(names[locks - 1 :])}, "
+            f"load.locking_gear with a gear before the coupling, {drivable}"
+        )
+        yield "coupling.after", f'"{coupling.after or ""}"', allowed
+    elif coefficient < least * (1 - 1e-12):
+        reason = "a self-locking stage with less than 1/N gives energy"
+        allowed = f"{reason}; allowed: at least {least:g}, {drivable}"
+        yield "friction.load_coefficient", f"{coefficient:g}", allowed
+
+
+def _bends(design: Design) -> Iterator[Refusal]:
+    """Torques and stiffnesses of a spring that bends: each with its other, in order."""
+    coupling = design.coupling
+    if coupling is None:
+        return
+    bends = [(coupling.torque_1_Nm, coupling.stiffness_2_Nm_rad)]
+    bends.append((coupling.torque_2_Nm, coupling.stiffness_3_Nm_rad))
+    for number, (torque, stiffness) in enumerate(bends, 1):
+        key, beside = f"coupling.torque_{number}", f"coupling.stiffness_{number + 1}"
+        if (torque is None) != (stiffness is None):
+            given, missing = (key, beside) if stiffness is None else (beside, key)
+            yield given, f"{torque or stiffness:g}", f"allowed with {missing} beside it"
+    first, second = bends[0][0], bends[1][0]
+    if second is not None and (first is None or first >= second):
+        allowed = "above coupling.torque_1" if first is not None else "with coupling.torque_1"
+        yield "coupling.torque_2", f"{second:g}", f"allowed: {allowed}"
+
+
+def _friction_points(design: Design) -> Iterator[Refusal]:
+    for name, direction in (("forward", 1), ("reverse", -1)) if design.friction.points else ():
+        points = design.friction.map(direction)
+        speeds, torques = [point.speed_rad_s for point in points], [point.torque_Nm for point in points]
+        if not speeds or speeds[0] != 0.0:
+            yield "friction.point", name, "allowed: the first point at speed 0"
+        if any(speed in speeds[:k] for k, speed in enumerate(speeds)):
+            yield "friction.point", name, "allowed: each speed once"
+        if len(speeds) > MAX_MAP_POINTS:
+            yield "friction.point", f"{len(speeds)} points", f"allowed: at most {MAX_MAP_POINTS}"
+        if len(torques) > 1 and torques[-1] < torques[-2]:
+            yield "friction.point", name, "allowed: not falling at the end, as the last slope continues"
+
+
+def _top_speed(design: Design) -> Iterator[Refusal]:
+    speed, top = design.limits.speed_rad_s, no_load_speed(design)
+    if top < speed < inf:
+        unit = "m/s" if design.axis == "linear" else "rad/s"
+        turns = "" if design.axis == "linear" else f" ({top * 30.0 / pi:.4g} rpm)"
+        allowed = f"the supply cannot reach it; allowed: at most U/kE = {top:.4g} {unit}{turns}"
+        yield "limits.speed", f"{speed:.4g} {unit}", allowed
+
+
+_SOURCE = "not allowed with motor.source_gain, which "
+_PEAK_TIME = ("limits.peak_time", "{d.limits.peak_time_s:g} s")
+PLANT_CHECKS = (
+    Rule("control.current", "a table", f"{_SOURCE}has no current",
+         lambda d: d.controller.current is not None and not d.motor.has_electrical_dynamics),
+    Rule("supply", "a table", f"{_SOURCE}draws no current",
+         lambda d: d.supply is not None and not d.motor.has_electrical_dynamics),
+    Rule("temperature", "a table", f"{_SOURCE}has no winding",
+         lambda d: d.temperature is not None and not d.motor.has_electrical_dynamics),
+    Rule(*_PEAK_TIME, "needs a current loop, [control.current]",
+         lambda d: d.limits.peak_time_s is not None and d.controller.current is None),
+    Rule(*_PEAK_TIME, "needs limits.peak_current and limits.continuous_current",
+         lambda d: d.limits.peak_time_s is not None
+         and (d.limits.peak_current_A == inf or d.limits.continuous_current_A == inf)),
+    Rule(*_PEAK_TIME, "allowed: with peak_current above continuous_current",
+         lambda d: d.limits.peak_time_s is not None
+         and d.limits.peak_current_A <= d.limits.continuous_current_A < inf),
+    Rule("supply.brake_voltage", "{d.supply.brake_voltage_V:g} V",
+         "allowed: at least limits.voltage = {d.limits.voltage_V:g} V",
+         lambda d: d.supply is not None and d.supply.brake_voltage_V is not None
+         and d.supply.brake_voltage_V < d.limits.voltage_V),
+    *(
+        Rule(f"supply.{key}", f"{{d.supply.{attribute}:g}}", "allowed with regenerative = false",
+             lambda d, attribute=attribute: d.supply is not None and d.supply.regenerative
+             and getattr(d.supply, attribute) is not None)
+        for key, attribute in (("capacitance", "capacitance_F"), ("brake_voltage", "brake_voltage_V"))
+    ),
+    Rule("supply.regenerative", "false", "needs supply.capacitance, which takes the energy",
+         lambda d: d.supply is not None and not d.supply.regenerative and d.supply.capacitance_F is None),
+    Rule("load.gravity", "a table", "allowed on a rotary axis; a linear one takes a constant load",
+         lambda d: d.load.gravity is not None and d.axis == "linear"),
+    *(
+        Rule(f"friction.{key}", f"{{d.friction.{attribute}:g}}", "not allowed beside friction.point",
+             lambda d, attribute=attribute: d.friction.points and getattr(d.friction, attribute))
+        for key, attribute in (("dry_torque", "dry_torque_Nm"), ("viscous", "viscous_Nms_rad"))
+    ),
+    Rule("friction.law", '"{d.friction.law}"', 'allowed with friction.point: "coulomb"',
+         lambda d: d.friction.points and d.friction.law != "coulomb"),
+    _friction_points,
+    Rule("load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone",
+         lambda d: d.coupling is None and d.load.friction is not None),
+    Rule("coupling.stiffness", "{d.coupling.stiffness_Nm_rad:g}",
+         "allowed with an inertia behind it; load.inertia, or that of a gear behind it, is missing",
+         lambda d: d.coupling is not None and d.load_side_inertia_kgm2 <= 0.0),
+    _bends,
+    Rule("friction.law", '"tanh"', 'allowed with a coupling: "coulomb"',
+         lambda d: d.coupling is not None and d.friction.law == "tanh"),
+    _locking, _top_speed,
+    Rule("limits.continuous_current", "{d.limits.continuous_current_A:g} A",
+         "allowed: at most limits.peak_current = {d.limits.peak_current_A:g} A",
+         lambda d: d.limits.peak_current_A < d.limits.continuous_current_A < inf),
+)  # fmt: skip
+"""Each gives the settings that contradict each other: key, value, what is allowed."""
