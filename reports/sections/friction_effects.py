@@ -227,7 +227,8 @@ def _summary(result: FrictionEffects, fine: float, small: str) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
     swing = noticed(result.design, settlings)
     if swing is not None:
-        return f"Friction alone keeps the drive from rest after a step: {told(result.design, swing, fine, small)}."
+        ends = told(result.design, swing, fine, small)
+        return f"Friction alone keeps the drive from rest after a step: {ends}."
     left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
     does = f"{f'The {result.integrator}' if result.integrator else 'No'} controller integrates"
     if left:
