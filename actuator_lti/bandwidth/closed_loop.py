@@ -15,16 +15,15 @@ from actuator_lti.bandwidth.exact_gain import exact_gain
 from actuator_lti.bandwidth.measured import measured_bandwidth
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
 from actuator_lti.errors import InputError
-from actuator_lti.margins.axis_parts import axis_ends, axis_parts, distances_over
-from actuator_lti.margins.axis_search import Factored, half_turn, passages
+from actuator_lti.margins.along import Along
+from actuator_lti.margins.axis_search import half_turn
 from actuator_lti.margins.delays.form import delay_form, in_series
 from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS, Distance
 from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.loop import exact_loop, exact_polynomials
-from actuator_lti.margins.factored import Response, factored
+from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import Given, given_of, unwarped, whole_samples
 from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
-from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.exact_fraction import Fraction, dc_noise, double, exact_fraction, shown
 from actuator_lti.systems.measured_response import is_measured
@@ -171,6 +170,7 @@ def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
         result = [response.smallest(distance) for distance in _PEAKS]
     elif whole is None:
         result = nearest_behind_delay(loop_of(given, warp=True), delay_s, _PEAKS)
+        result = [(value, unwarped(w, given.period_s)) for value, w in result]
     else:
         loop = exact_loop(replace(given, samples=whole))
         result = [smallest(loop, distance) for distance in _PEAKS]
@@ -186,36 +186,32 @@ def _db(inverse: float) -> float:
 def nearest_behind_delay(
     loop: RationalLoop, delay_s: float, distances: tuple[Distance, ...]
 ) -> list[tuple[float, float]]:
-    """Smallest values of distances, each with its frequency; `Doubtful` where they could not be checked."""
-    response, factors = _factors(loop, delay_s)
+    """Smallest values of distances, each with its w; `Doubtful` where they could not be checked."""
+    late = loop.behind(delay_s)
+    factors = factored(late)
     with np.errstate(all="ignore"):
-        parts, _, _ = axis_parts(factors, None)
-        return distances_over(factors, response, parts, axis_ends(factors, response), distances)
+        return Along(factors, late, None).nearest(distances)
 
 
 def first_turn(loop: RationalLoop, delay_s: float, floor: float) -> float | None:
     """Where the phase first falls to 90 deg below that at zero frequency; ``None``: not above the floor."""
-    response, factors = _factors(loop, delay_s)
+    late = loop.behind(delay_s)
+    factors = factored(late)
     with np.errstate(all="ignore"):
         level = half_turn(factors.log_at(0.0)[1]) - 0.5 * math.pi
         if factors.delay:  # no factor turns by more than half a turn
             top = (factors.roots.size + 1.0) * math.pi / factors.delay
         else:
             top = _AT_NYQUIST * max(float(np.abs(factors.roots).max(initial=0.0)), 1.0)
-        top = float(passages(factors, 0.0, top, math.log(floor)).min(initial=top))
-        turns = passages(factors, 0.0, top, level, 1)
+        top = float(factors.passages(0.0, top, math.log(floor)).min(initial=top))
+        turns = factors.passages(0.0, top, level, 1)
         if not turns.size:
             return None
         sign = cmath.exp(-1j * level)
 
         def beyond(w: float) -> float:
-            return float(np.angle(response.at(np.array([w]))[0] * sign))
+            return float(np.angle(late.at(np.array([w]))[0] * sign))
 
         near = float(turns[0])
         w = brentq(beyond, near * (1.0 - _NEAR), near * (1.0 + _NEAR), xtol=1e-300, rtol=1e-14)
-        return response.frequency(float(w))
-
-
-def _factors(loop: RationalLoop, delay_s: float) -> tuple[Response, Factored]:
-    response = Response(loop, delay_s / (loop.period_s or 1.0))
-    return response, factored(response, sorted_poles(loop.A, loop.in_z))
+        return late.frequency(float(w))

@@ -1,84 +1,30 @@
-"""Crossings, closed-loop poles, smallest distances of an exact loop: each from a certified root."""
+"""Crossings and smallest distances of an exact loop: each from a certified root."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
 
 from flint import acb, arb, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.margins.assemble import Crossing
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.loop import ExactLoop
 from actuator_lti.margins.exact.roots import (
-    HalfPlanes,
     Split,
     all_roots,
     at_enough_bits,
     free_of,
-    half_planes,
     positive_roots,
     split,
 )
-from actuator_lti.margins.single import GainMargin, PhaseMargin
 from actuator_lti.margins.trust import TOUCH
 
 _FIRST_BITS = 96
 _ACCURATE = 56  # bits of a figure
 _NEAR = 1e-3  # relative: a pair this close may be a touch
 _ZERO = 1e-18  # of a distance
-
-
-@dataclass(frozen=True)
-class Crossing:
-    """Where L meets the unit circle or the negative real axis: w of the s-plane, L there."""
-
-    w: float
-    L: complex
-    touch: bool = False
-
-    def gain_margin(self, rad_s: float) -> GainMargin:
-        """As one of the negative real axis, at a frequency of its own."""
-        return GainMargin(float(1.0 / abs(self.L)), rad_s, self.touch)
-
-    def phase_margin(self, rad_s: float) -> PhaseMargin:
-        """As one of the unit circle."""
-        deg = math.degrees(math.atan2(-self.L.imag, -self.L.real))
-        return PhaseMargin((deg if deg > -180.0 else 180.0) + 0.0, rad_s, self.touch)
-
-
-@dataclass(frozen=True)
-class Findings:
-    """All crossings of an exact loop, ends included, and where its closed-loop poles lie: each on demand."""
-
-    loop: ExactLoop
-
-    @cached_property
-    def closed(self) -> HalfPlanes:
-        """Closed-loop poles, hidden modes and those at infinity (z = -1) left out."""
-        return half_planes(self.loop.closed)
-
-    @cached_property
-    def hidden(self) -> HalfPlanes:
-        """Hidden modes; those at infinity left out."""
-        return half_planes(self.loop.hidden)
-
-    @property
-    def closed_at_end(self) -> int:
-        """Closed-loop poles at z = -1."""
-        return self.loop.degree - self.loop.closed.degree()
-
-    @property
-    def unstable(self) -> int:
-        """Closed-loop poles outside the stable region, hidden modes among them."""
-        return self.closed.right + self.hidden.right
-
-    @property
-    def on_border(self) -> int:
-        """Closed-loop poles exactly on the border, hidden modes left out."""
-        return self.closed.on_border + self.closed_at_end
 
 
 def crossings(loop: ExactLoop, merge: bool = False) -> tuple[tuple[Crossing, ...], tuple[Crossing, ...]]:

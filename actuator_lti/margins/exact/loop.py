@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from flint import fmpz, fmpz_mat, fmpz_poly
 
-from actuator_lti.margins.exact.roots import Polynomial, half_planes
+from actuator_lti.margins.exact.roots import HalfPlanes, Polynomial, half_planes
 from actuator_lti.margins.given import ULP, Given
 
 _S = fmpz_poly([0, 1])
@@ -29,10 +30,40 @@ class ExactLoop:
     hidden_degree: int  # the same for the hidden modes
     sampled: bool  # whether s comes from z
 
+    @cached_property
+    def zeros(self) -> HalfPlanes:
+        """Zeros of L."""
+        return half_planes(self.N)
+
+    @cached_property
+    def poles(self) -> HalfPlanes:
+        """Poles of L, those at infinity left out here and below."""
+        return half_planes(self.D)
+
+    @cached_property
+    def closed_poles(self) -> HalfPlanes:
+        """Closed-loop poles, hidden modes left out."""
+        return half_planes(self.N + self.D)
+
+    @cached_property
+    def hidden_modes(self) -> HalfPlanes:
+        """Hidden modes."""
+        return half_planes(self.hidden)
+
     @property
-    def closed(self) -> fmpz_poly:
-        """Characteristic polynomial of the closed loop, hidden modes left out."""
-        return self.N + self.D
+    def closed_at_end(self) -> int:
+        """Closed-loop poles at z = -1."""
+        return self.degree - (self.N + self.D).degree()
+
+    @property
+    def unstable(self) -> int:
+        """Closed-loop poles outside the stable region, hidden modes among them."""
+        return self.closed_poles.right + self.hidden_modes.right
+
+    @property
+    def on_border(self) -> int:
+        """Closed-loop poles exactly on the border, hidden modes left out."""
+        return self.closed_poles.on_border + self.closed_at_end
 
     @property
     def hidden_at_end(self) -> int:
@@ -49,11 +80,9 @@ def neighbours(given: Given, loop: ExactLoop, told: int = 1) -> list[ExactLoop]:
     """The same from data 8 ulp away.
 
     Where more modes on the border cancel exactly than are ``told`` by their place, what is seen is moved and
-    they stay: data next to these would
-    have a pole beside a zero there, and nothing in common with the loop.
+    they stay: data next to these would have a pole beside a zero there, and nothing in common with the loop.
     """
-    hidden = half_planes(loop.hidden)
-    if hidden.on_border <= told and not loop.hidden_at_end:
+    if loop.hidden_modes.on_border <= told and not loop.hidden_at_end:
         return [exact_loop(near) for near in given.neighbours()]
     return [replace(loop, N=_moved(loop.N, way), D=_moved(loop.D, way)) for way in (1, -1)]
 

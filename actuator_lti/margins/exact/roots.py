@@ -88,11 +88,6 @@ class HalfPlanes:
         return tuple(complex(root) for root in self.roots)
 
     @property
-    def pairs(self) -> tuple[tuple[float, int], ...]:
-        """The same in double precision."""
-        return tuple((float(w.mid()), times) for w, times in self.border)
-
-    @property
     def on_border(self) -> int:
         """Number of roots on the axis."""
         return self.at_zero + 2 * sum(times for _, times in self.border)
