@@ -174,7 +174,8 @@ class CurrentLoop:
     """
 
     gain_V_A: Annotated[float, positive(
-        "gain", "V/A", "Kp_i", "gain of the current PI", example="20 mohm", required=True)] = ABSENT
+        "gain", "V/A", "Kp_i", "gain of the current PI; of a dq controller in V/A phase", example="20 mohm",
+        required=True)] = ABSENT
     integral_time_s: Annotated[float | None, positive("integral_time", "s", "Tn_i",
         "integral time of the current PI; without it a P controller", example="150 us")] = None
     back_emf_feedforward: Annotated[float, quantity("back_emf_feedforward", "1", "",

