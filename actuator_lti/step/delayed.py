@@ -20,7 +20,7 @@ from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecide
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.delay_stepper import step_of
 from actuator_lti.systems.exact_fraction import product
-from actuator_lti.systems.plain_delays import response
+from actuator_lti.systems.plain_system import response
 
 _FIRST = 10.0  # longest delays to step at first
 _MEET = 1e-5
