@@ -168,7 +168,8 @@ def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
         with np.errstate(all="ignore"):
             along = Along(factored(late), late, None)
         return _peaks(lambda distance: along.nearest((distance,))[0], period_s)
-    return _peaks(partial(smallest, exact_loop(replace(given, samples=whole))), period_s)
+    loop = exact_loop(replace(given, samples=whole))
+    return _peaks(partial(smallest, loop.N, loop.D), period_s)
 
 
 def _peaks(smallest_of: Callable[[Distance], tuple[float, float]], period_s: float | None) -> Peaks:

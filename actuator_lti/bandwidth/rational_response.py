@@ -46,7 +46,7 @@ class RationalResponse:
 
     def smallest(self, distance: Distance) -> tuple[float, float]:
         """Smallest value of a distance over the axis, and where."""
-        return smallest(self, distance)
+        return smallest(self.N, self.D, distance)
 
     def first_turn(self, floor: float) -> float | None:
         """Where the phase first falls to 90 deg below that at rest; ``None``: not above the floor."""

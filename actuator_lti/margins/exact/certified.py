@@ -44,7 +44,7 @@ def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = Non
         if found.problem is not None:
             found = shared(*(crossings(each, merge=True) for each in (loop, *others)))
     if found.problem is None:
-        figures = Figures(found.gains, found.reals, [smallest(loop, d) for d in (MODULUS, DISK)])
+        figures = Figures(found.gains, found.reals, [smallest(loop.N, loop.D, d) for d in (MODULUS, DISK)])
     if poles.hidden > hidden.at_zero:  # one that the data do not tell from a mode at zero
         hidden = replace(hidden, at_zero=poles.hidden)
     reason = f"{_GIVEN}, certified roots; {found.moved_text}"
