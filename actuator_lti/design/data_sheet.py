@@ -20,13 +20,14 @@ from actuator_lti.files.tree import Tree
 
 _CURRENT, _SPEED, _SHARE = "motor.no_load_current", "motor.no_load_speed", "motor.no_load_dry_share"
 SHEET: tuple[Field, ...] = (
-    positive(_CURRENT, "A", "i0", "current of the motor without a load: kM i0 = C0 + Cv w0, in place of "
-             "friction.dry_torque and friction.viscous", example="137 mA"),
-    positive(_SPEED, "{angle}/s", "w0", "speed of the motor at its no-load current", example="7580 rpm"),
-    quantity(_SHARE, "1", "", "share of the no-load torque that is dry; where it is not given a half, with a "
-             "tolerance from 0 to 1", low=0.0, high=1.0, example="0.8"),
-    positive("gear.*.efficiency", "1", "eta", "efficiency of the stage under load, driving, in place of "
-             "friction.load_coefficient; stages without one count as 1", high=1.0, example="72 %"),
+    positive("current of the motor without a load: kM i0 = C0 + Cv w0, in place of friction.dry_torque and "
+             "friction.viscous", "i0", key=_CURRENT, unit="A", example="137 mA"),
+    positive("speed of the motor at its no-load current", "w0", key=_SPEED, unit="{angle}/s",
+             example="7580 rpm"),
+    quantity("share of the no-load torque that is dry; where it is not given a half, with a tolerance from 0 "
+             "to 1", key=_SHARE, unit="1", low=0.0, high=1.0, example="0.8"),
+    positive("efficiency of the stage under load, driving, in place of friction.load_coefficient; stages "
+             "without one count as 1", "eta", key="gear.*.efficiency", unit="1", high=1.0, example="72 %"),
 )  # fmt: skip
 """Keys of a file that no part of a design has an attribute for."""
 

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuator_lti.errors import InputError, Mistakes
 from actuator_lti.files.reading import shown
@@ -27,6 +28,7 @@ _PARTS = re.compile(_KEY)
 
 Refusal = tuple[str, object, str]
 """Key, value as it is to be shown ("" for none), and what is allowed."""
+Check = Callable[["Design"], Iterator[Refusal]]
 
 
 def refusal_text(refusal: Refusal) -> str:
@@ -78,7 +80,8 @@ def readable(items: Iterable[T]) -> Iterator[T]:
         return
 
 
-class Rule(NamedTuple):
+@dataclass(frozen=True)
+class Rule:
     """What a design must not be: the key that is refused then, its value as shown, and what is allowed.
 
     The texts show values of the design ``d``, as ``{d.limits.voltage_V:g}``.

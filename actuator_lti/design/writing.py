@@ -13,11 +13,12 @@ from math import inf, isfinite
 from typing import Any, cast
 
 from actuator_lti.design.access import located
+from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, default_deflection
 from actuator_lti.design.data_sheet import as_stated
 from actuator_lti.design.fields import Structure, field_of, fields_in
 from actuator_lti.design.loader import as_design, design_from_tree
 from actuator_lti.design.mistakes import Findings
-from actuator_lti.design.model import ControllerObjects, Design, Parameter, Tolerance, default_deflection
+from actuator_lti.design.model import Design
 from actuator_lti.design.reader import Reader
 from actuator_lti.design.sections import RECORDS, SECTIONS, parts_of
 from actuator_lti.design.settings_file import object_entry

@@ -16,7 +16,7 @@ from actuator_lti.loops.flow import ALL, SOURCES, FlowProgram
 from actuator_lti.loops.result import Form
 from actuator_lti.loops.tick import TickProgram
 from actuator_lti.loops.walk import INPUTS
-from actuator_lti.systems.plain_delays import PlainDelaySystem
+from actuator_lti.systems.plain_system import PlainDelaySystem
 
 if TYPE_CHECKING:
     import control

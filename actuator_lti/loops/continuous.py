@@ -14,7 +14,7 @@ from actuator_lti.loops.limiters import LimiterPath, Response, limiter_paths
 from actuator_lti.loops.result import Loop, loop_of
 from actuator_lti.loops.sampled import whole_path
 from actuator_lti.loops.tick import seen
-from actuator_lti.systems.plain_delays import PlainDelaySystem, static
+from actuator_lti.systems.plain_system import PlainDelaySystem, static
 from actuator_lti.systems.rest_mode import without_rest_mode
 
 RATES = {"ref": ("ref", "ref_rate", "ref_rate_rate"), "cut": ("cut", "cut_rate")}

@@ -18,7 +18,7 @@ from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecided
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.delay_stepper import step_of
-from actuator_lti.systems.plain_delays import response
+from actuator_lti.systems.plain_system import response
 
 _FIRST = 10.0  # longest delays to step at first
 _MEET = 1e-5

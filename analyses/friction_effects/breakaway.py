@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from actuator_lti.design.model import Command, Design
-from actuator_lti.drive.angle import holding_torque_Nm
+from actuator_lti.drive.operating import holding_torque_Nm
 from actuator_lti.drive.steady import motor_torque_Nm, standing_gain
 from analyses.finite import finite
 from analyses.linear.static_threshold import StaticThreshold, static_threshold

@@ -165,8 +165,7 @@ class _Fits:
         start, form, recipe, held = self.start, self.settings.friction, self.recipe, self.held
         gravity = self.settings.gravity or start.load.gravity is not None
         if form == "map":
-            fit = fit_map(start, records, recipe=recipe, fixed=held, gravity=gravity)
-            model, self.laws = fit.model, fit.laws
+            model, self.laws = fit_map(start, records, recipe=recipe, fixed=held, gravity=gravity)
         else:
             model = fit_records(start, records, form=form, recipe=recipe, fixed=held, gravity=gravity)
         model = _with_commands(start, model, records)

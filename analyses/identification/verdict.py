@@ -40,6 +40,11 @@ class Item:
     limit: float | None = None
     reason: str = ""
 
+    @classmethod
+    def of(cls, id: str, label: str, wrong: str, **share: float) -> Item:
+        """What holds but for ``wrong``; empty: it holds."""
+        return cls(id=id, label=label, passed=not wrong, reason=wrong, **share)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Identified:

@@ -17,8 +17,7 @@ from typing import Any, TypeVar
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB
 from actuator_lti.bandwidth import Bandwidth, Peaks, closed_loop_bandwidth, peaks
 from actuator_lti.design.model import Design, Requirement
-from actuator_lti.drive.angle import pushes_away
-from actuator_lti.drive.operating import RotorState
+from actuator_lti.drive.operating import RotorState, pushes_away
 from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import Loop, Loops

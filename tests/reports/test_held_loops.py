@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, FrictionPoint, Requirement
-from actuator_lti.drive.angle import level
+from actuator_lti.drive.operating import level
 from analyses.linear.loop_figures import all_loop_figures, held_loop
 from analyses.margins import margins
 from analyses.specification.requirements import evaluate_requirements, tally
