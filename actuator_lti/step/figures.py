@@ -136,9 +136,7 @@ def _passage(part: Stepped | Motion, level: float, *, last: bool) -> float:
         best = above.max(initial=best) if last else above.min(initial=best)
         return (most > level) & ((b > best) if last else (a < best))
 
-    for a, series in sorted(
-        part.spans(undecided, np.abs if last else np.asarray), key=itemgetter(0), reverse=last
-    ):
+    for a, series in sorted(part.spans(undecided, of), key=itemgetter(0), reverse=last):
         roots = [root for side in sides for root in _within(series, side)]
         if roots:
             return a + (max(roots) if last else min(roots)) * part.shortest
