@@ -124,14 +124,9 @@ def _touches(v: arb, off: Callable[[arb], arb]) -> bool:
     return abs(float(off(v).mid())) <= TOUCH
 
 
-def smallest(loop: ExactLoop, distance: Distance) -> tuple[float, float]:
-    """Smallest value of a distance and its w."""
-    above, below = distance.over(loop.N, loop.D)
-    return least(split(above).square, split(below).square)
-
-
-def least(above: fmpz_poly, below: fmpz_poly) -> tuple[float, float]:
-    """Smallest sqrt(above/below) over v >= 0, infinity included, and w = sqrt(v)."""
+def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, float]:
+    """Smallest value of a distance of N/D over w >= 0, infinity included, and its w."""
+    above, below = (split(part).square for part in distance.over(N, D))
     if below.degree() < 0:
         return math.inf, 0.0
     candidates = [(_ratio(above, below, lowest=True), 0.0), (_ratio(above, below, lowest=False), math.inf)]

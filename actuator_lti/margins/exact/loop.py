@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from flint import fmpz, fmpz_mat, fmpz_poly
+from flint import fmpq, fmpz, fmpz_mat, fmpz_poly
 
 from actuator_lti.margins.exact.roots import HalfPlanes, Polynomial, half_planes
 from actuator_lti.margins.given import ULP, Given
@@ -114,6 +114,11 @@ def exact_loop(given: Given) -> ExactLoop:
 def exact_polynomials(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
     """Numerator and denominator in s or z, hidden modes among them, times one power of two."""
     return _by_coefficients(given) if given.A is None else _by_matrices(given)
+
+
+def rational(x: Any) -> fmpq:
+    """A double as the rational number that it is."""
+    return fmpq(*float(x).as_integer_ratio())
 
 
 def integers(*arrays: Any) -> tuple[list[list[int]], int]:
