@@ -27,7 +27,7 @@ from analyses.limit_cycles.describing import (
     SENSORS,
     Cause,
     counts_matter,
-    cycle_of_counts,
+    cycles_of_quantisation,
     quantum_of,
     without_nonlinearities,
 )
@@ -94,12 +94,11 @@ def linear_ratio() -> float:
 
 def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, ...]:
     """Look at every encoder whose counts a loop sees, of a position drive that settles in so many ticks."""
-    causes: tuple[Cause, ...] = ("motor-quantisation", "quantisation")
-    return tuple(_one(design, loops, cause, settle_ticks) for cause in causes if counts_matter(design, cause))
+    causes = (cause for cause in reversed(SENSORS) if counts_matter(design, cause))
+    return tuple(_one(design, loops, cause, settle_ticks) for cause in causes)
 
 
 def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Counts:
-
     sensor, other = SENSORS[cause]
     quantum, velocity = quantum_of(design, cause) or 0.0, design.controller.velocity
     at_motor = quantum * (design.total_ratio if sensor == "output" else 1.0)
@@ -117,7 +116,7 @@ def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Count
         speed_step_rad_s=at_motor / _span_s(design) if made_of else None,  # q/(m T)
         ripple_rad_s=ripple,
         ripple_at_rad_s=at,
-        cycles=tuple(confirm(design, one) for one in cycle_of_counts(design, cause)),
+        cycles=tuple(confirm(design, one) for one in cycles_of_quantisation(design, (cause,))),
         linear_rad=linear_ratio() * quantum,
         linear_seen_rad=float(TRIED[good][0]) * linear_ratio() * quantum if good.any() else None,
         off=off,

@@ -158,15 +158,14 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
 
 def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> tuple[AtRest, ...]:
     """Fundamental stiffness of the drive as it is, command held, at (frequency in Hz, moment in N m)."""
-    made, period = [], design.controller.period_s
+    made, period, every = [], design.controller.period_s, design.controller.position_loop.every
     for frequency, amplitude in asked:
-        every = design.controller.position_loop.every  # a period is a whole number of them
-        ticks = max(4, round(1.0 / (frequency * period * every))) * every
+        ticks = max(4, round(1.0 / (frequency * period * every))) * every  # a period: whole updates
         count, turn = (SKIPPED + 2) * ticks, np.exp(-2j * np.pi * np.arange(ticks) / ticks)
         moment = np.tile(-amplitude * turn.imag, SKIPPED + 2)
         run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
-        seen = (run.output_angle_rad[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum()
-        given = (moment[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum()
+        both = (moment, run.output_angle_rad)
+        given, seen = ((signal[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum() for signal in both)
         K = complex(given / seen) if seen != 0.0 else complex(np.inf)
         made.append(AtRest(amplitude, 1.0 / (ticks * period), K))
     return tuple(made)
@@ -266,10 +265,9 @@ def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
     """
     curves = []
     for state in STATES:
-        if state == "shorted" and not design.motor.has_electrical_dynamics:
-            continue
-        response = compliance(design if state == "powered" else unpowered(design, state))
-        frequency = frequencies_hz(response)
-        K = stiffness_at(response, frequency)
-        curves.append(StiffnessCurve(state, frequency, K, static_stiffness(response)))
+        if state != "shorted" or design.motor.has_electrical_dynamics:
+            response = compliance(design if state == "powered" else unpowered(design, state))
+            hertz = frequencies_hz(response)
+            K, static = stiffness_at(response, hertz), static_stiffness(response)
+            curves.append(StiffnessCurve(state, hertz, K, static))
     return tuple(curves)
