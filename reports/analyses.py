@@ -190,6 +190,7 @@ ANALYSES = (
         study=True,
         keeps=True,
         out="out/compare",
+        example="analyses.studies.study",
     ),
     Analysis(
         "montecarlo",

@@ -17,7 +17,7 @@ from actuator_lti.loops import assemble_loops
 from analyses.corners.run import Corners, corners
 from analyses.isolation import attempt, isolated
 from analyses.linear.loop_survey import LoopSurvey, survey_loops
-from analyses.margins.measured import measured_if_asked
+from analyses.margins.run import measured_if_asked
 from analyses.specification.mending import mending
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements
 from analyses.specification.weakest import WeakPoint, spread, weakest
@@ -76,7 +76,7 @@ def report(
         Sections of other documents, put before the further ones.
     response : path or control.FrequencyResponseData, optional
         A measured response, laid over the model; of what, and with how many averages behind its coherence, as
-        `analyses.margins.measured.measured_over` has it.
+        `analyses.margins.run.measured_over` has it.
     response_of : str
     averages : int, optional
     source : str, optional

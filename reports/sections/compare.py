@@ -11,7 +11,7 @@ from typing import Any
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
-from analyses.comparison.variant_figures import FigureName
+from analyses.comparison.found import FigureName
 from analyses.comparison.variants import Compared, Comparison
 from analyses.specification.requirements import RequirementVerdict
 from analyses.validation.row import Row as Check
@@ -43,10 +43,6 @@ def section(comparison: Comparison) -> list[doc.Section]:
     best["intro"] = f"{best['intro']} {compare_best.shown_words(shown)}".strip()
     made = [best, verdicts(shown), figures(shown), differences(shown)]
     return [*made, *ledger(shown), *compare_figures.sections(shown)]
-
-
-def text(comparison: Comparison | str) -> str | None:
-    return comparison if isinstance(comparison, str) else None
 
 
 def brief(comparison: Comparison) -> Brief:
