@@ -193,8 +193,8 @@ class Differences:
     def _tried(self) -> Pair:
         """Differences by steps that fall by tens, and what rounding may make of them: (steps, columns, rows).
 
-        Of each column until it had `ENOUGH` without an event: far smaller ones may be lost within the tick, where
-        no end shows it.
+        Of each column until it had `ENOUGH` without an event: far smaller ones may be lost within the tick,
+        where no end shows it.
         """
         steps, seen, tried = self._largest(), np.zeros(self.scale.size), list[Pair]()
         while len(tried) < MOST_DECADES and (seen < ENOUGH).any():
