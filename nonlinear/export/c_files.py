@@ -170,7 +170,8 @@ def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
     """The README of an export."""
     design, row = ours.design, ours.row
     what, unit = stage_words(design)
-    number = 4 if single_precision else 8
+    number, step = 4 if single_precision else 8, spare_parameters(ours) // SPARE_LEVELS
+    longer = f" A stiffer coupling needs a longer p: {step} numbers more for each factor of four."
     values = {
         "NAME": _seen(design.name),
         "TITLE": _seen(design.title),
@@ -183,15 +184,8 @@ def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
         "S": str(ours.s_size),
         "IO": str(at.IO_SIZE),
         "BYTES": str(number * (ours.p_size + ours.s_size + at.IO_SIZE)),
-        "STIFFER": _stiffer(ours),
+        "STIFFER": longer if step else "",
         "HASH": source_hash(),
         "AXIS": "linear (m, N, kg)" if design.axis == "linear" else "rotary (rad, N m, kg m2)",
     }
     return filled("README.md", values)
-
-
-def _stiffer(ours: ExportedDesign) -> str:
-    if ours.row[at.ELASTIC_DRIVE] <= 0.0:
-        return ""
-    step = spare_parameters(ours) // SPARE_LEVELS
-    return f" A stiffer coupling needs a longer p: {step} numbers more for each factor of four."
