@@ -15,8 +15,16 @@ from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
-from nonlinear.export.program import c_text, filled, header_text, replaced, single, source_hash, source_text
-from nonlinear.export.rows import place_words
+from nonlinear.export.program import (
+    c_text,
+    filled,
+    header_text,
+    place_words,
+    replaced,
+    single,
+    source_hash,
+    source_text,
+)
 from nonlinear.native import parameters
 from nonlinear.row.elastic import is_elastic
 from nonlinear.row.parameters import design_row
