@@ -3,9 +3,9 @@
 Which numbers take part, a kick at the place shows: those that it moves.  The tick is affine but for events,
 which are seen, and for what bends, of which the design says over how far: a moment over its angle, the tanh
 law beside its flat part.  So the steps begin far above the kick's own motion, or where what bends is moved by
-`BENT` of that and the tanh law is flat in every tick; and they fall by tens: larger ones bend or meet an
-event, smaller ones are lost in rounding.  Each column is taken where two successive steps agree best, by what
-their difference does to the response.  The sum of these differences is the stated error.
+`BENT` of that and the tanh law is flat in every tick; and they fall: larger ones bend or meet an event,
+smaller ones are lost in rounding.  Each column is taken where three successive steps agree best, by what
+their differences do to the response.  The sum of these is the stated error.
 """
 
 from __future__ import annotations
@@ -27,9 +27,8 @@ from nonlinear.bench.loop_setup import LoopSetup
 Parts = tuple[Floats, Floats, Floats, Floats]
 Pair = tuple[Floats, Floats]
 Places = npt.NDArray[np.intp]
-MOST_DECADES = 40  # of steps, where events forbid the larger ones
-ENOUGH, LEAST = 6, 2  # steps of a column without an event
-FAR = 1e12  # times a kick's first motion: the largest step
+FAR, SMALLER = 1e16, 0.6  # the largest step, times a kick's first motion; the next over one
+MOST, ENOUGH = 200, 10  # steps in all, where events forbid the larger ones; of a column without an event
 BENT = 1e-3  # of the way over which a torque bends, that the largest step may move it
 SLOWEST = 1e-13  # rad a sample: what is slower is at rest
 FRESH = 4  # periods from when a number is first moved, in which its motion gives its scale
@@ -84,7 +83,8 @@ class Differences:
         for k in range(readings):
             rows = np.concatenate([np.arange(n), n + np.arange(k, self.updates * readings, readings)])
             each = values[:, :, rows]
-            off = np.maximum(np.abs(np.diff(each, axis=0)), rounding[:-1, :, rows])
+            off = np.abs(np.diff(each, axis=0))  # of three successive ones
+            off = np.maximum(np.maximum(off[:-1], off[1:]), rounding[:-2, :, rows])
             sizes = np.nanmax(np.abs(each) * self.scale[:, None], axis=(0, 1))
             share = np.divide(1.0, sizes, out=np.zeros(sizes.size), where=sizes > 0.0)
             whole, _ = _best(each, off, share[None], self.scale[None])  # of the largest in each row
@@ -191,24 +191,26 @@ class Differences:
         return np.fmin(steps, bias.room_rad_s * steps / np.maximum(moved, 1e-250))
 
     def _tried(self) -> Pair:
-        """Differences by steps that fall by tens, and what rounding may make of them: (steps, columns, rows).
+        """Differences by steps that fall, and what rounding may make of them: (steps, columns, rows).
 
         Of each column until it had `ENOUGH` without an event: far smaller ones may be lost within the tick,
-        where no end shows it.
+        where no end shows it.  They fall by no power of two, by which rounding would fall alike.
         """
         steps, seen, tried = self._largest(), np.zeros(self.scale.size), list[Pair]()
-        while len(tried) < MOST_DECADES and (seen < ENOUGH).any():
+        while len(tried) < MOST and (seen < ENOUGH).any():
             values, rounding = self._differences(np.where(seen < ENOUGH, steps, 0.0))
             tried.append((values, rounding))
             seen += np.isfinite(values).all(axis=1)
-            steps = 0.1 * steps
+            steps = SMALLER * steps
             for row, far in self._bends:
                 moved = np.abs(values[:, row])
                 moved[row] = np.fmax(moved[row], 1.0)  # by the step itself
                 steps = np.fmin(steps, far / np.maximum(moved, 1e-250))
         values, rounding = (np.stack(each) for each in zip(*tried, strict=True))
-        if (seen < LEAST).any():
-            name = (*self.names, *["the injection"] * self.updates)[int(np.argmax(seen < LEAST))]
+        free = np.isfinite(values).all(axis=2)
+        stuck = ~(free[:-2] & free[1:-1] & free[2:]).any(axis=0)
+        if stuck.any():
+            name = (*self.names, *["the injection"] * self.updates)[int(np.argmax(stuck))]
             raise NumericalError(f"{self.where}: every step of {name} ends in an event")
         return values, rounding
 
@@ -241,7 +243,7 @@ class Differences:
 
 
 def _best(values: Floats, off: Floats, left: Floats, right: Floats) -> Pair:
-    """Each column by the step whose error, against the next smaller one, does least; and that error."""
+    """Each column by the step whose error, against the next smaller ones, does least; and that error."""
     felt = np.max((off @ left.T) * right.T, axis=-1)
     chosen = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
     columns = np.arange(chosen.size)
