@@ -37,14 +37,9 @@ SPARE_LEVELS = 3  # halvings of the period beyond those of the design
 class ExportedDesign:
     """What an export knows of a design.
 
-    Attributes
-    ----------
-    row : ndarray, shape (layout.SIZE,)
-        Parameters of a run: the design at rest, its load torque an input.
-    p_size, s_size : int
-        Lengths of the rows of parameters and state.
-    derived : ndarray, shape (p_size,)
-        The row with all that follows from it.
+    ``row``: parameters of a run: the design at rest, its load torque an input.
+    ``p_size``, ``s_size``: lengths of the rows of parameters and state.
+    ``derived``: the row with all that follows from it.
     """
 
     design: Design
