@@ -23,7 +23,7 @@ from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment
 from nonlinear.row.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE
 from nonlinear.runs.running import Running
-from nonlinear.runs.setup import Run, Tables, put_supply, put_torque
+from nonlinear.runs.setup import STATE_PLACES, Run, Tables, put_supply, put_torque
 from nonlinear.runs.trajectory import STATUS, Energy, LimitUse, ProbeRecord, State, Status, Trajectory
 
 Floats = npt.NDArray[np.float64]
@@ -263,13 +263,7 @@ def final_state(row: Floats, s: Floats) -> State:
     angle, speed = (
         (float(s[at.S_OUTPUT]), float(s[at.S_OUTPUT_SPEED])) if row[at.ELASTIC_DRIVE] else (None, None)
     )
-    held = {
-        "motor_angle_rad": at.S_ANGLE, "motor_speed_rad_s": at.S_SPEED, "current_A": at.S_CURRENT,
-        "current_integral_V": at.S_CURRENT_INTEGRATOR, "velocity_integral": at.S_VELOCITY_INTEGRATOR,
-        "speed_command_rad_s": at.S_SPEED_COMMAND, "current_command_A": at.S_CURRENT_REFERENCE,
-        "voltage_V": at.S_VOLTAGE,
-    }  # fmt: skip
-    numbers: dict[str, Any] = {name: float(s[place]) for name, place in held.items()}
+    numbers: dict[str, Any] = {name: float(s[place]) for name, (_, place) in STATE_PLACES.items()}
     return State(output_angle_rad=angle, output_speed_rad_s=speed, **numbers)
 
 
