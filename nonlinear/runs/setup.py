@@ -23,7 +23,7 @@ Floats = npt.NDArray[np.float64]
 
 
 CONTENT = 0.02  # of a command's range: so large a line above the Nyquist frequency is refused
-STATE_PLACES = {  # where a run begins with each number of a `State`, in the row, and ends with it, in the state
+STATE_PLACES = {  # where a run begins with each number of a `State` (in the row), and ends with it
     "motor_angle_rad": (at.ANGLE_START, at.S_ANGLE),
     "motor_speed_rad_s": (at.SPEED_START, at.S_SPEED),
     "current_A": (at.CURRENT_START, at.S_CURRENT),
