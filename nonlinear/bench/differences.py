@@ -207,8 +207,8 @@ class Differences:
                 moved[row] = np.fmax(moved[row], 1.0)  # by the step itself
                 steps = np.fmin(steps, far / np.maximum(moved, 1e-250))
         values, rounding = (np.stack(each) for each in zip(*tried, strict=True))
-        free = np.isfinite(values).all(axis=2)
-        stuck = ~(free[:-2] & free[1:-1] & free[2:]).any(axis=0)
+        free = np.asarray(np.isfinite(values).all(axis=2))
+        stuck = ~np.any(free[:-2] & free[1:-1] & free[2:], axis=0)
         if stuck.any():
             name = (*self.names, *["the injection"] * self.updates)[int(np.argmax(stuck))]
             raise NumericalError(f"{self.where}: every step of {name} ends in an event")

@@ -101,7 +101,7 @@ class Run:
     duration_s: float
     load_Nm: float | LoadMoment = 0.0
     bias: Command | None = None
-    probes: tuple[Probe, ...] = ()
+    probes: Sequence[Probe] = ()
     initial: State | None = None
     friction_on: bool = True
     limits_on: bool = True
