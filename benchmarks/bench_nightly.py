@@ -57,7 +57,7 @@ def history_rows(folder: Path, nights: int) -> Iterator[Row]:
     change_points(np.arange(10.0), 0.1)  # imports what it needs
     history = open_history(folder)
     start = time.process_time()
-    night = overview(history, Cache(folder / "cache"), study, {}, folder)
+    night = overview(history, Cache(folder / "cache"), study, folder)
     text = index(night, "nights/x")
     yield Row(
         group=GROUP,

@@ -13,8 +13,7 @@ from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS
 from actuator_lti.batch import _figures as fig
 from actuator_lti.batch.library import many_loops, quoted
 from actuator_lti.batch.parameters import Population
-from actuator_lti.drive.angle import pushes_away
-from actuator_lti.drive.operating import Operating, OperatingPoint
+from actuator_lti.drive.operating import Operating, OperatingPoint, pushes_away
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental

@@ -6,6 +6,7 @@ import importlib.util
 import os
 import platform
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -13,13 +14,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from actuator_lti.compiled.portable_executable import without_time
 from actuator_lti.errors import InputError
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-strict-aliasing")
 # values do not depend on these: nobody reads errno or the flags of exceptions
 # and numbers of a row are stored one by one: read as a pair soon after, they would be waited for
 LIBRARY_FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-slp-vectorize")
+_DEBUG = 6  # of the data directories of a Windows library
 ZIG_TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu", "wasm": "wasm32-wasi"}
 
 
@@ -67,10 +68,9 @@ def compiler_for(target: str) -> list[str]:
     InputError
         Where this machine has none; says which package brings one.
     """
-    native = target == "linux64" and HERE == "linux-x86_64"
-    wanted = "gcc or clang, or " if target == "linux64" else ""
-    allowed = f"{wanted}pip install 'actuator-lti[export]'"
-    own = native and (zig_command() is None or bool(os.environ.get("CC")))
+    allowed = f"{'gcc or clang, or ' if target == 'linux64' else ''}pip install 'actuator-lti[export]'"
+    own = target == "linux64" and HERE == "linux-x86_64"
+    own = own and (zig_command() is None or bool(os.environ.get("CC")))
     return _chosen(target, ["-target", ZIG_TARGETS[target]], allowed, own=own)
 
 
@@ -128,7 +128,32 @@ def compile_files(
             said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
             raise InputError(f"the C compiler for {target} fails: {said}", where=chosen[0])
         data = (folder / output).read_bytes()
-    return without_time(data) if output.endswith(".dll") else data
+    return _without_time(data) if output.endswith(".dll") else data
+
+
+def _without_time(data: bytes) -> bytes:
+    """A 64-bit PE file with its time stamps and the identifier of its debug file set to zero.
+
+    The same sources give the same bytes then.
+    """
+    held = bytearray(data)
+    (header,) = struct.unpack_from("<I", held, 0x3C)
+    if held[header : header + 4] != b"PE\0\0":
+        raise ValueError("not a PE file")
+    held[header + 8 : header + 12] = bytes(4)
+    sections, optional = struct.unpack_from("<H12xH", held, header + 6)
+    start = header + 24
+    address, size = struct.unpack_from("<II", held, start + 112 + 8 * _DEBUG)
+    for place in range(start + optional, start + optional + 40 * sections, 40):
+        length, first, _, offset = struct.unpack_from("<IIII", held, place + 8)
+        if first <= address < first + length:
+            begin = offset + address - first
+            for entry in range(begin, begin + size, 28):
+                held[entry + 4 : entry + 8] = bytes(4)
+                _, long, _, named = struct.unpack_from("<IIII", held, entry + 12)
+                if held[named : named + 4] == b"RSDS" and long >= 24:
+                    held[named + 4 : named + 24] = bytes(20)
+    return bytes(held)
 
 
 if __name__ == "__main__":  # for the makefile

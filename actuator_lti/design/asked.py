@@ -32,30 +32,30 @@ class Failure:
     Deflections are those of the output from where it was; the load pushes forward from the start.
     """
 
-    stop_rad: Annotated[float | None, positive(
-        "stop", "{angle}", "", "mechanical stop; default the full deflection", example="25 deg")] = None
-    deflection_rad: Annotated[float | None, positive("deflection", "{angle}", "",
-        "deflection to which the time is taken; default a tenth of the stop", example="2 deg")] = None
-    detection_s: Annotated[float | None, positive("detection_time", "s", "",
-        "from a failure to its detection; default 0.1 s", high=1e4, example="50 ms")] = None
-    load_Nm: Annotated[float | None, quantity("load", "{torque}", "",
-        "load torque that pushes the output forward; default none", example="4 N*m")] = None
+    stop_rad: Annotated[float | None, positive("mechanical stop; default the full deflection",
+        example="25 deg")] = None
+    deflection_rad: Annotated[float | None, positive("deflection to which the time is taken; default a "
+        "tenth of the stop", example="2 deg")] = None
+    detection_s: Annotated[float | None, positive("from a failure to its detection; default 0.1 s",
+        key="detection_time", high=1e4, example="50 ms")] = None
+    load_Nm: Annotated[float | None, quantity("load torque that pushes the output forward; default none",
+        example="4 N*m")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class DutyCycle:
     """The duty within the continuous rating; ``None`` is what `analyses.duty.Asked` takes for it."""
 
-    amplitude_rad: Annotated[float | None, positive("amplitude", "{angle}", "",
-        "peak of the sine, output side; default half the full deflection", example="5 deg")] = None
-    frequency_rad_s: Annotated[float | None, positive(
-        "frequency", "rad/s", "", "of the sine; default 1 Hz", example="0.5 Hz")] = None
-    load_Nm: Annotated[float | None, quantity("load", "{torque}", "",
-        "load torque, all the time; default the largest of validation.loads", example="4 N*m")] = None
-    share: Annotated[float | None, positive(
-        "share", "1", "", "share of the time in motion; default 1", high=1.0, example="0.4")] = None
-    cycle_s: Annotated[float | None, positive(
-        "cycle", "s", "", "one motion and one rest together; default 10 s", high=1e6, example="60 s")] = None
+    amplitude_rad: Annotated[float | None, positive("peak of the sine, output side; default half the full "
+        "deflection", example="5 deg")] = None
+    frequency_rad_s: Annotated[float | None, positive("of the sine; default 1 Hz", unit="rad/s",
+        example="0.5 Hz")] = None
+    load_Nm: Annotated[float | None, quantity("load torque, all the time; default the largest of "
+        "validation.loads", example="4 N*m")] = None
+    share: Annotated[float | None, positive("share of the time in motion; default 1", high=1.0,
+        example="0.4")] = None
+    cycle_s: Annotated[float | None, positive("one motion and one rest together; default 10 s", high=1e6,
+        example="60 s")] = None
 
 
 def default_deflection(axis: Axis) -> float:
@@ -67,12 +67,11 @@ def default_deflection(axis: Axis) -> float:
 class Validation:
     """What the validator and the report are to look at: deflections (output side) and load torques."""
 
-    full_deflection_rad: Annotated[float, positive(
-        "full_deflection", "{angle}", "", "largest amplitude to look at, output side", example="10 deg")]
-    amplitude_fractions: Annotated[tuple[float, ...], quantities("amplitude_fractions", "1",
-        "amplitudes as fractions of the full deflection", low=1e-09, high=1.0)] = (0.05, 0.1, 0.25, 0.5, 1.0)
-    loads_Nm: Annotated[tuple[float, ...], quantities(
-        "loads", "{torque}", "load torques to look at", low=-BIG, high=BIG)] = (0.0,)
+    full_deflection_rad: Annotated[float, positive("largest amplitude to look at, output side",
+        example="10 deg")]
+    amplitude_fractions: Annotated[tuple[float, ...], quantities("amplitudes as fractions of the full "
+        "deflection", low=1e-09, high=1.0)] = (0.05, 0.1, 0.25, 0.5, 1.0)
+    loads_Nm: Annotated[tuple[float, ...], quantities("load torques to look at", low=-BIG, high=BIG)] = (0.0,)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,15 +79,14 @@ class Requirement:
     """A limit on a figure; ``loop`` is a loop name, ``"every"``, or ``None`` for the whole drive."""
 
     id: Annotated[str, label("what reports call it")]
-    quantity: Annotated[str, choice("quantity", "the figure that is limited", tuple(QUANTITIES))]
+    quantity: Annotated[str, choice("the figure that is limited", tuple(QUANTITIES))]
     loop: Annotated[str | None, text("name of a loop, or every; not for a figure of the drive")] = None
-    rotor: Annotated[Rotor | None, choice("rotor", "which current loop is meant; default free")] = None
-    to: Annotated[ResponseTo | None, choice(
-        "to", "which response of the position loop: to the user's command (default), its profile and filter "
-        "included, or to the reference behind them")] = None
+    rotor: Annotated[Rotor | None, choice("which current loop is meant; default free")] = None
+    to: Annotated[ResponseTo | None, choice("which response of the position loop: to the user's command "
+        "(default), its profile and filter included, or to the reference behind them")] = None
     minimum: Annotated[float | None, limit("smallest value allowed")] = None
     maximum: Annotated[float | None, limit("largest value allowed")] = None
-    load_Nm: Annotated[float | None, quantity("load", "{torque}", "", "load torque at which it holds")] = None
+    load_Nm: Annotated[float | None, quantity("load torque at which it holds")] = None
     source: Annotated[str, text("where the limit comes from")] = ""
     note: Annotated[str, text("any remark")] = ""
     unit: str
@@ -117,7 +115,7 @@ class Correlation:
 
     first: Annotated[str, text("dotted key with a tolerance")]
     second: Annotated[str, text("another one")]
-    coefficient: Annotated[float, quantity("coefficient", "1", "", "their correlation", low=-1.0, high=1.0)]
+    coefficient: Annotated[float, quantity("their correlation", low=-1.0, high=1.0)]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.checks_control import CONTROL_CHECKS
 from actuator_lti.design.checks_plant import PLANT_CHECKS, check_motor, check_place, check_temperature
 from actuator_lti.design.fields import ALL_FIELDS, FIELDS, Field, Structure, fields_in
-from actuator_lti.design.mistakes import UNREAD, Findings, Refusal, readable
+from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, readable
 from actuator_lti.design.model import Correlation, Design, Requirement
 from actuator_lti.design.sections import part_at, parts_of
 from actuator_lti.files.reading import shown
@@ -67,7 +67,8 @@ def out_of_range(design: Design) -> Iterator[Refusal]:
 def _fits(field: Field, value: Any) -> bool:
     """Whether a key takes a value."""
     if isinstance(value, tuple | list):
-        return all(_fits(field, one) for one in value)
+        listed = field.kind in ("quantities", "matrix", "names")
+        return listed and all(_fits(field, one) for one in value)
     if field.kind in ("choice", "names"):
         return value in field.choices
     if field.kind in ("quantity", "integer", "quantities", "matrix"):
@@ -101,8 +102,8 @@ def _bounded(field: Field, bound: Callable[[Design], tuple[float, str]], design:
         yield field.path, f"{value:g} {unit}", f"{why}; allowed: at most {most:.4g} {unit}"
 
 
-FIRST_RELATIONS = (check_place, check_temperature, check_motor)  # the others ask for an inertia and constants
-RELATIONS = (_most, *CONTROL_CHECKS, *PLANT_CHECKS)
+FIRST_RELATIONS: tuple[Check, ...] = (check_place, check_temperature, check_motor)  # of inertia, constants
+RELATIONS: tuple[Check, ...] = (_most, *CONTROL_CHECKS, *PLANT_CHECKS)
 """Between the numbers of a drive; an exported one checks them again when they are changed."""
 
 

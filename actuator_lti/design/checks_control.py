@@ -7,11 +7,11 @@ from dataclasses import fields as part_fields
 from math import inf, pi
 from typing import Any
 
-from actuator_lti.design.control import FEED_FORWARD, stable_pair
+from actuator_lti.design.control import FEED_FORWARD, FILTER_KEYS, Filter, FilterPlace, stable_pair
 from actuator_lti.design.fields import FIELDS, Field, fields_in
 from actuator_lti.design.law import BESIDE_A_LAW, MOST_STATES, Law
-from actuator_lti.design.mistakes import UNREAD, Refusal, Rule, readable
-from actuator_lti.design.model import FILTER_KEYS, Design, Filter, FilterPlace
+from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
+from actuator_lti.design.model import Design
 
 MAX_FILTERS = 8  # of each place; the running drive has room for so many second-order sections
 _BELOW_NYQUIST = ("frequency_rad_s", "zero_rad_s", "pole_rad_s")
@@ -62,8 +62,9 @@ def _biquad(item: Filter, path: str, key: str, most: int, words: str) -> Iterato
 
 def _filter_count(design: Design) -> Iterator[Refusal]:
     places: tuple[FilterPlace, ...] = ("torque", "speed")
-    for place in places if design.controller.velocity is not None else ():
-        count = len(design.controller.velocity.filters_on(place))
+    velocity = design.controller.velocity
+    for place in places:
+        count = 0 if velocity is None else len(velocity.filters_on(place))
         if count > MAX_FILTERS:
             yield "control.velocity.filter", f"{count} on {place}", f"allowed: at most {MAX_FILTERS}"
 
@@ -101,6 +102,15 @@ def _multiples(design: Design) -> Iterator[Refusal]:
     n_p = _every(design, "position", n_v)
     if n_p % n_v:
         yield "control.position.every", n_p, f"allowed: a multiple of control.velocity.every = {n_v}"
+
+
+def _fed_forward(key: str) -> Rule:
+    return Rule(
+        f"control.position.{key}",
+        f"{{d.controller.position.{key}:g}}",
+        "allowed: 0 without a velocity loop",
+        lambda d: d.controller.velocity is None and getattr(d.controller.position, key, 0.0),
+    )
 
 
 # of a key of the command: power of its unit, the key that it needs, the limit that it has to keep
@@ -173,7 +183,8 @@ _RUNS = (
 def _laws(design: Design) -> Iterator[Refusal]:
     """A law of one's own: one in the drive, of matrices that fit, beside none of what it replaces."""
     control = design.controller
-    laws = {stage: law for stage in control.stages if (law := getattr(control, stage).law) is not None}
+    named = {f"{stage}": getattr(control, stage).law for stage in control.stages}
+    laws = {stage: law for stage, law in named.items() if law is not None}
     first = next(iter(laws), "")
     for stage in list(laws)[1:]:
         yield f"control.{stage}.law", "a table", f"allowed: at one stage; control.{first} has one"
@@ -231,19 +242,13 @@ def _matrices(law: Law, path: str) -> Iterator[Refusal]:
                 yield f"{path}{place}.{key}", "other sizes", f"allowed: {shape}, with {m} inputs"
 
 
-CONTROL_CHECKS = (
+CONTROL_CHECKS: tuple[Check, ...] = (
     _multiples,
     Rule("control.computing_delay", "{d.controller.computing_delay_s:g} s",
          "allowed: at most 100 ticks of {d.controller.period_s:g} s",
          lambda d: d.controller.computing_delay_s > 100 * d.controller.period_s),
     _filters, _filter_count, _tracking, _anti_windup, _windup,
-    *(
-        Rule(f"control.position.{key}", f"{{d.controller.position.{key}:g}}",
-             "allowed: 0 without a velocity loop",
-             lambda d, key=key: d.controller.position is not None and d.controller.velocity is None
-             and getattr(d.controller.position, key))
-        for key in FEED_FORWARD
-    ),
+    *map(_fed_forward, FEED_FORWARD),
     _command, _command_filter, _laws, _jitter,
 )  # fmt: skip
 """Each gives the settings that contradict each other: key, value, what is allowed."""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from math import inf, isclose, log, pi
 from typing import Any
 
-from actuator_lti.design.mistakes import Refusal, Rule, readable
+from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.sections import part_at
@@ -116,7 +116,8 @@ def _no_gear(design: Design, path: str, attribute: str) -> Iterator[Refusal]:
     name, names = getattr(part_at(design, path), attribute, None), [gear.name for gear in design.gears]
     if name is not None and name not in names:
         known = ", ".join(names) or "none, as there are no gears; leave it out"
-        yield f"{path}.{attribute}", shown(f"{name}"), f"is no gear; allowed: {known}"
+        given = "" if name is UNREAD else shown(name)
+        yield f"{path}.{attribute}", given, f"is no gear; allowed: {known}"
 
 
 def _locking(design: Design) -> Iterator[Refusal]:
@@ -187,7 +188,7 @@ def _top_speed(design: Design) -> Iterator[Refusal]:
 
 _SOURCE = "not allowed with motor.source_gain, which "
 _PEAK_TIME = ("limits.peak_time", "{d.limits.peak_time_s:g} s")
-PLANT_CHECKS = (
+PLANT_CHECKS: tuple[Check, ...] = (
     Rule("control.current", "a table", f"{_SOURCE}has no current",
          lambda d: d.controller.current is not None and not d.motor.has_electrical_dynamics),
     Rule("supply", "a table", f"{_SOURCE}draws no current",
@@ -206,21 +207,18 @@ PLANT_CHECKS = (
          "allowed: at least limits.voltage = {d.limits.voltage_V:g} V",
          lambda d: d.supply is not None and d.supply.brake_voltage_V is not None
          and d.supply.brake_voltage_V < d.limits.voltage_V),
-    *(
-        Rule(f"supply.{key}", f"{{d.supply.{attribute}:g}}", "allowed with regenerative = false",
-             lambda d, attribute=attribute: d.supply is not None and d.supply.regenerative
-             and getattr(d.supply, attribute) is not None)
-        for key, attribute in (("capacitance", "capacitance_F"), ("brake_voltage", "brake_voltage_V"))
-    ),
+    Rule("supply.capacitance", "{d.supply.capacitance_F:g}", "allowed with regenerative = false",
+         lambda d: d.supply is not None and d.supply.regenerative and d.supply.capacitance_F is not None),
+    Rule("supply.brake_voltage", "{d.supply.brake_voltage_V:g}", "allowed with regenerative = false",
+         lambda d: d.supply is not None and d.supply.regenerative and d.supply.brake_voltage_V is not None),
     Rule("supply.regenerative", "false", "needs supply.capacitance, which takes the energy",
          lambda d: d.supply is not None and not d.supply.regenerative and d.supply.capacitance_F is None),
     Rule("load.gravity", "a table", "allowed on a rotary axis; a linear one takes a constant load",
          lambda d: d.load.gravity is not None and d.axis == "linear"),
-    *(
-        Rule(f"friction.{key}", f"{{d.friction.{attribute}:g}}", "not allowed beside friction.point",
-             lambda d, attribute=attribute: d.friction.points and getattr(d.friction, attribute))
-        for key, attribute in (("dry_torque", "dry_torque_Nm"), ("viscous", "viscous_Nms_rad"))
-    ),
+    Rule("friction.dry_torque", "{d.friction.dry_torque_Nm:g}", "not allowed beside friction.point",
+         lambda d: d.friction.points and d.friction.dry_torque_Nm),
+    Rule("friction.viscous", "{d.friction.viscous_Nms_rad:g}", "not allowed beside friction.point",
+         lambda d: d.friction.points and d.friction.viscous_Nms_rad),
     Rule("friction.law", '"{d.friction.law}"', 'allowed with friction.point: "coulomb"',
          lambda d: d.friction.points and d.friction.law != "coulomb"),
     _friction_points,

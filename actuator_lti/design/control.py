@@ -29,6 +29,9 @@ FILTER_KEYS: dict[FilterKind, tuple[set[str], set[str]]] = {
 FilterPlace = Literal["torque", "speed"]
 Overload = Literal["thermal", "excess"]
 Stage = Literal["position", "velocity", "current", "voltage"]
+AntiWindupKey = Annotated[AntiWindup, choice("what the integral does while the output is at its limit")]
+TrackingTime = Annotated[float | None, positive("time constant of back-calculation; default the integral "
+    "time", "Tt", example="10 ms")]
 ABSENT = 0.0
 """Gain of a stage that has a law of one's own in its place."""
 
@@ -43,25 +46,23 @@ class Encoder:
     encoder without quantisation.  ``bandwidth_rad_s`` is w0 of the tracking loop (model.md section 7).
     """
 
-    counts_per_rev: Annotated[int | None, integer("counts_per_rev", 2**32, "",
-        "counts per motor revolution after quadrature (linear axis without a screw: per metre)")] = None
-    speed: Annotated[SpeedSource, choice(
-        "speed", "the speed itself, a difference of angles, or a tracking loop (observer)")] = "ideal"
-    difference_samples: Annotated[int, integer(
-        "difference_samples", 64, "m", "velocity periods that the difference spans")] = 1
-    filter_time_s: Annotated[float, not_negative(
-        "filter_time", "s", "T_F", "first-order filter of the speed", example="0 us")] = 0.0
-    bandwidth_rad_s: Annotated[float | None, positive(
-        "bandwidth", "rad/s", "w0", "natural frequency of the tracking loop (damping 1)",
-        example="300 Hz")] = None
+    counts_per_rev: Annotated[int | None, integer("counts per motor revolution after quadrature (linear "
+        "axis without a screw: per metre)", 2**32)] = None
+    speed: Annotated[SpeedSource, choice("the speed itself, a difference of angles, or a tracking loop "
+        "(observer)")] = "ideal"
+    difference_samples: Annotated[int, integer("velocity periods that the difference spans", 64, "m")] = 1
+    filter_time_s: Annotated[float, not_negative("first-order filter of the speed", "T_F",
+        example="0 us")] = 0.0
+    bandwidth_rad_s: Annotated[float | None, positive("natural frequency of the tracking loop (damping 1)",
+        "w0", unit="rad/s", example="300 Hz")] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class OutputEncoder:
     """The angle sensor at the output shaft; counts per output revolution (linear axis: per metre)."""
 
-    counts_per_rev: Annotated[int | None, integer("counts_per_rev", 2**32, "",
-        "counts per output revolution after quadrature (linear axis: per metre)")] = None
+    counts_per_rev: Annotated[int | None, integer("counts per output revolution after quadrature (linear "
+        "axis: per metre)", 2**32)] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,31 +73,21 @@ class Instruments:
     sampling instant.  ``seed`` makes a run repeatable.
     """
 
-    current_resolution_A: Annotated[float, not_negative(
-        "current_resolution", "A", "", "step of the measured current", example="5 mA")] = 0.0
-    current_noise_A: Annotated[float, not_negative(
-        "current_noise", "A", "", "noise of the current, rms", example="2 mA")] = 0.0
-    angle_noise_rad: Annotated[float, not_negative(
-        "angle_noise", "{angle}", "", "noise of the motor's angle, rms", example="0.1 mrad")] = 0.0
-    output_angle_noise_rad: Annotated[float, not_negative(
-        "output_angle_noise", "{angle}", "", "noise of the output's angle, rms", example="0.01 mrad")] = 0.0
-    jitter_s: Annotated[float, not_negative(
-        "jitter", "s", "", "deviation of the sampling instant, rms", high=1.0, example="1 us")] = 0.0
-    seed: Annotated[int, integer(
-        "seed", 2**31, "", "seed of the noise, so that a run can be repeated", low=0)] = 0
+    current_resolution_A: Annotated[float, not_negative("step of the measured current", example="5 mA")] = 0.0
+    current_noise_A: Annotated[float, not_negative("noise of the current, rms", example="2 mA")] = 0.0
+    angle_noise_rad: Annotated[float, not_negative("noise of the motor's angle, rms",
+        example="0.1 mrad")] = 0.0
+    output_angle_noise_rad: Annotated[float, not_negative("noise of the output's angle, rms",
+        example="0.01 mrad")] = 0.0
+    jitter_s: Annotated[float, not_negative("deviation of the sampling instant, rms", high=1.0,
+        example="1 us")] = 0.0
+    seed: Annotated[int, integer("seed of the noise, so that a run can be repeated", 2**31, low=0)] = 0
 
     @property
     def ideal(self) -> bool:
         """Whether nothing is to be simulated."""
-        return not any(
-            (
-                self.current_resolution_A,
-                self.current_noise_A,
-                self.angle_noise_rad,
-                self.output_angle_noise_rad,
-                self.jitter_s,
-            )
-        )
+        errors = (self.current_resolution_A, self.current_noise_A, self.angle_noise_rad)
+        return not any((*errors, self.output_angle_noise_rad, self.jitter_s))
 
 
 def stable_pair(a1: float, a2: float) -> bool:
@@ -113,28 +104,25 @@ class Filter:
     ``leadlag``: zero and pole, (s/zero + 1)/(s/pole + 1); ``biquad``: sampled coefficients ``b``, ``a``.
     """
 
-    kind: Annotated[FilterKind, choice("kind", "what the filter does")]
-    on: Annotated[FilterPlace, choice(
-        "on", "whether it filters the torque command or the measured speed")] = "torque"
-    frequency_rad_s: Annotated[float | None, positive(
-        "frequency", "rad/s", "w0", "corner of a low-pass, centre of a notch", example="100 Hz")] = None
-    order: Annotated[int, integer("order", 2, "", "order of a low-pass, 1 or 2")] = 1
-    damping: Annotated[float, positive("damping", "1", "", "damping of a low-pass of order 2", high=10.0,
+    kind: Annotated[FilterKind, choice("what the filter does")]
+    on: Annotated[FilterPlace, choice("whether it filters the torque command or the measured "
+        "speed")] = "torque"
+    frequency_rad_s: Annotated[float | None, positive("corner of a low-pass, centre of a notch", "w0",
+        unit="rad/s", example="100 Hz")] = None
+    order: Annotated[int, integer("order of a low-pass, 1 or 2", 2)] = 1
+    damping: Annotated[float, positive("damping of a low-pass of order 2", high=10.0,
         example="0.7")] = 0.7071067811865476
-    width_rad_s: Annotated[float | None, positive(
-        "width", "rad/s", "", "width of a notch", example="50 Hz")] = None
-    depth: Annotated[float, quantity(
-        "depth", "1", "", "gain of a notch at its centre: width of its zeros over that of its poles", low=0.0,
-        high=1.0, example="0.1")] = 0.0
-    zero_rad_s: Annotated[float | None, positive(
-        "zero", "rad/s", "", "zero, or frequency of a pair", example="50 rad/s")] = None
-    pole_rad_s: Annotated[float | None, positive(
-        "pole", "rad/s", "", "pole, or frequency of a pair", example="500 rad/s")] = None
-    b: Annotated[tuple[float, ...], quantities(
-        "b", "1", "numerator of a biquad in z^-1, b0 b1 b2", low=-BIG, high=BIG)] = ()
-    a: Annotated[tuple[float, ...], quantities(
-        "a", "1", "denominator of a biquad in z^-1 after the leading 1, a1 a2 (a = [0] for none)", low=-BIG,
+    width_rad_s: Annotated[float | None, positive("width of a notch", unit="rad/s", example="50 Hz")] = None
+    depth: Annotated[float, quantity("gain of a notch at its centre: width of its zeros over that of its "
+        "poles", low=0.0, high=1.0, example="0.1")] = 0.0
+    zero_rad_s: Annotated[float | None, positive("zero, or frequency of a pair", unit="rad/s",
+        example="50 rad/s")] = None
+    pole_rad_s: Annotated[float | None, positive("pole, or frequency of a pair", unit="rad/s",
+        example="500 rad/s")] = None
+    b: Annotated[tuple[float, ...], quantities("numerator of a biquad in z^-1, b0 b1 b2", low=-BIG,
         high=BIG)] = ()
+    a: Annotated[tuple[float, ...], quantities("denominator of a biquad in z^-1 after the leading 1, a1 a2 "
+        "(a = [0] for none)", low=-BIG, high=BIG)] = ()
 
     @property
     def polynomials(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -173,18 +161,16 @@ class CurrentLoop:
     The shares of back-EMF and resistance voltage that are fed forward, kE w_meas and R i_ref, are 0 to 1.
     """
 
-    gain_V_A: Annotated[float, positive(
-        "gain", "V/A", "Kp_i", "gain of the current PI", example="20 mohm", required=True)] = ABSENT
-    integral_time_s: Annotated[float | None, positive("integral_time", "s", "Tn_i",
-        "integral time of the current PI; without it a P controller", example="150 us")] = None
-    back_emf_feedforward: Annotated[float, quantity("back_emf_feedforward", "1", "",
-        "share of the back-EMF kE w added to the voltage", low=0.0, high=2.0, example="1")] = 0.0
-    resistance_feedforward: Annotated[float, quantity("resistance_feedforward", "1", "",
-        "share of R i_ref added to the voltage", low=0.0, high=2.0, example="1")] = 0.0
-    anti_windup: Annotated[AntiWindup, choice(
-        "anti_windup", "what the integral does while the output is at its limit")] = "conditional"
-    tracking_time_s: Annotated[float | None, positive("tracking_time", "s", "Tt",
-        "time constant of back-calculation; default the integral time", example="10 ms")] = None
+    gain_V_A: Annotated[float, positive("gain of the current PI; of a dq controller in V/A phase", "Kp_i",
+        example="20 mohm", required=True)] = ABSENT
+    integral_time_s: Annotated[float | None, positive("integral time of the current PI; without it a P "
+        "controller", "Tn_i", example="150 us")] = None
+    back_emf_feedforward: Annotated[float, quantity("share of the back-EMF kE w added to the voltage",
+        low=0.0, high=2.0, example="1")] = 0.0
+    resistance_feedforward: Annotated[float, quantity("share of R i_ref added to the voltage", low=0.0,
+        high=2.0, example="1")] = 0.0
+    anti_windup: AntiWindupKey = "conditional"
+    tracking_time_s: TrackingTime = None
     law: Law | None = None
 
 
@@ -195,16 +181,14 @@ class VelocityLoop:
     The gain is in A s/rad where a current loop follows, in V s/rad where the voltage does.
     """
 
-    gain: Annotated[float, positive("gain", "{drive}*s/{angle}", "Kp_w", "gain of the velocity PI",
+    gain: Annotated[float, positive("gain of the velocity PI", "Kp_w", unit="{drive}*s/{angle}",
         example="0.12 A*s/rad", required=True)] = ABSENT
-    integral_time_s: Annotated[float | None, positive("integral_time", "s", "Tn_w",
-        "integral time of the velocity PI; without it a P controller", example="15 ms")] = None
-    every: Annotated[int, integer("every", 1000, "n_v", "the velocity loop runs every so many ticks")] = 1
-    sensor: Annotated[Sensor, choice("sensor", "where the speed is measured")] = "motor"
-    anti_windup: Annotated[AntiWindup, choice(
-        "anti_windup", "what the integral does while the output is at its limit")] = "conditional"
-    tracking_time_s: Annotated[float | None, positive("tracking_time", "s", "Tt",
-        "time constant of back-calculation; default the integral time", example="10 ms")] = None
+    integral_time_s: Annotated[float | None, positive("integral time of the velocity PI; without it a P "
+        "controller", "Tn_w", example="15 ms")] = None
+    every: Annotated[int, integer("the velocity loop runs every so many ticks", 1000, "n_v")] = 1
+    sensor: Annotated[Sensor, choice("where the speed is measured")] = "motor"
+    anti_windup: AntiWindupKey = "conditional"
+    tracking_time_s: TrackingTime = None
     filters: tuple[Filter, ...] = ()
     law: Law | None = None
 
@@ -226,26 +210,24 @@ class PositionLoop:
     (A; V without a current loop) whose sign follows the command's motion.
     """
 
-    gain: Annotated[float, positive("gain", "{drive}/{angle}", "Kv",
-        "gain of the position P controller; without a velocity loop in A or V per rad of the motor "
-        "(an output sensor's angle counts times the ratio)",
-        example="120 1/s", required=True)] = ABSENT
-    every: Annotated[int, integer("every", 10000, "n_p",
-        "the position loop runs every so many ticks, a multiple of control.velocity.every")] = 1
-    feedforward: Annotated[float, not_negative("feedforward", "1", "k_ff",
-        "share of the reference's rate added to the speed command", high=10.0, example="0")] = 0.0
-    sensor: Annotated[Sensor, choice("sensor", "whose angle is fed back")] = "motor"
-    integral_time_s: Annotated[float | None, positive("integral_time", "s", "Ti",
-        "integral time of the position controller; without it no integral", example="0.5 s")] = None
-    derivative_time_s: Annotated[float, not_negative("derivative_time", "s", "Td",
-        "derivative time of the position controller", high=100.0, example="1 ms")] = 0.0
-    derivative_filter_s: Annotated[float, not_negative(
-        "derivative_filter", "s", "TD", "filter time of the derivative", high=100.0, example="0.2 ms")] = 0.0
-    acceleration_feedforward: Annotated[float, not_negative("acceleration_feedforward", "1", "k_aff",
-        "share of J/kM times the command's acceleration added to the torque command", high=10.0,
-        example="1")] = 0.0
-    friction_feedforward: Annotated[float, not_negative("friction_feedforward", "{drive}", "i_fr",
-        "added to the torque command in the direction of the command's motion", example="0.4 A")] = 0.0
+    gain: Annotated[float, positive("gain of the position P controller; without a velocity loop in A or V "
+        "per rad of the motor (an output sensor's angle counts times the ratio)", "Kv",
+        unit="{drive}/{angle}", example="120 1/s", required=True)] = ABSENT
+    every: Annotated[int, integer("the position loop runs every so many ticks, a multiple of "
+        "control.velocity.every", 10000, "n_p")] = 1
+    feedforward: Annotated[float, not_negative("share of the reference's rate added to the speed command",
+        "k_ff", high=10.0, example="0")] = 0.0
+    sensor: Annotated[Sensor, choice("whose angle is fed back")] = "motor"
+    integral_time_s: Annotated[float | None, positive("integral time of the position controller; without it "
+        "no integral", "Ti", example="0.5 s")] = None
+    derivative_time_s: Annotated[float, not_negative("derivative time of the position controller", "Td",
+        high=100.0, example="1 ms")] = 0.0
+    derivative_filter_s: Annotated[float, not_negative("filter time of the derivative", "TD", high=100.0,
+        example="0.2 ms")] = 0.0
+    acceleration_feedforward: Annotated[float, not_negative("share of J/kM times the command's acceleration "
+        "added to the torque command", "k_aff", high=10.0, example="1")] = 0.0
+    friction_feedforward: Annotated[float, not_negative("added to the torque command in the direction of "
+        "the command's motion", "i_fr", unit="{drive}", example="0.4 A")] = 0.0
     law: Law | None = None
 
     @property
@@ -262,17 +244,16 @@ class Command:
     order 1 or 2 with the time constant ``filter_time_s`` (order 2: damping ``filter_damping``).
     """
 
-    filter_time_s: Annotated[float, not_negative(
-        "filter_time", "s", "", "time constant of the command filter", high=1e4, example="5 ms")] = 0.0
-    filter_order: Annotated[int, integer("filter_order", 2, "", "order of the command filter, 1 or 2")] = 1
-    filter_damping: Annotated[float, positive(
-        "filter_damping", "1", "", "damping of a filter of order 2", high=10.0, example="1")] = 1.0
-    rate_rad_s: Annotated[float, positive(
-        "rate", "{angle}/s", "", "largest rate of the command, output side", example="20 deg/s")] = inf
-    acceleration_rad_s2: Annotated[float, positive("acceleration", "{angle}/s^2", "",
-        "largest acceleration of the command, output side", example="400 deg/s^2")] = inf
-    jerk_rad_s3: Annotated[float, positive(
-        "jerk", "{angle}/s^3", "", "largest jerk of the command, output side", example="8000 deg/s^3")] = inf
+    filter_time_s: Annotated[float, not_negative("time constant of the command filter", high=1e4,
+        example="5 ms")] = 0.0
+    filter_order: Annotated[int, integer("order of the command filter, 1 or 2", 2)] = 1
+    filter_damping: Annotated[float, positive("damping of a filter of order 2", high=10.0, example="1")] = 1.0
+    rate_rad_s: Annotated[float, positive("largest rate of the command, output side",
+        example="20 deg/s")] = inf
+    acceleration_rad_s2: Annotated[float, positive("largest acceleration of the command, output side",
+        example="400 deg/s^2")] = inf
+    jerk_rad_s3: Annotated[float, positive("largest jerk of the command, output side",
+        example="8000 deg/s^3")] = inf
 
     def lowpass(self, period_s: Any, where: str = "") -> Filter:
         """The filter, w0 = 1/`filter_time_s`, for the period of the outermost stage in s.
@@ -295,10 +276,10 @@ class Command:
 class Controller:
     """Sampling and the cascade; an absent loop is ``None``; any stage may be the outermost."""
 
-    period_s: Annotated[float, positive(
-        "period", "s", "Ts", "tick of the fastest loop", low=1e-07, high=10.0, example="100 us")]
-    computing_delay_s: Annotated[float, not_negative(
-        "computing_delay", "s", "d", "time from sampling to the voltage acting", high=10.0, example="100 us")]
+    period_s: Annotated[float, positive("tick of the fastest loop", "Ts", low=1e-07, high=10.0,
+        example="100 us")]
+    computing_delay_s: Annotated[float, not_negative("time from sampling to the voltage acting", "d",
+        high=10.0, example="100 us")]
     position: PositionLoop | None = None
     velocity: VelocityLoop | None = None
     current: CurrentLoop | None = None
@@ -347,25 +328,22 @@ class Limits:
     falls back to it after that time at the peak (model.md section 6), until its state is below ``release``.
     """
 
-    voltage_V: Annotated[float, positive(
-        "voltage", "V", "U_bus", "supply, and so the largest motor voltage", example="12 V")]
-    speed_rad_s: Annotated[float, positive(
-        "speed", "{angle}/s", "w_max", "largest speed command at the motor", example="9000 rpm")] = inf
-    acceleration_rad_s2: Annotated[float, positive("acceleration", "{angle}/s^2", "a_max",
-        "largest change of the speed command", example="30000 rev/s^2")] = inf
-    peak_current_A: Annotated[float, positive(
-        "peak_current", "A", "i_peak", "clamp of the current command", example="12 A")] = inf
-    current_rate_A_s: Annotated[float, positive("current_rate", "A/s", "",
-        "largest change of the current command (torque slope)", example="2000 A/s")] = inf
-    continuous_current_A: Annotated[float, positive(
-        "continuous_current", "A", "i_cont", "current allowed continuously (no clamp)", example="4 A")] = inf
-    peak_time_s: Annotated[float | None, positive("peak_time", "s", "t_peak",
-        "time that the peak current is allowed for, from cold; then the overload protection (I2t) acts",
-        high=1e6, example="1 s")] = None
-    release: Annotated[float, positive("release", "1", "",
-        "overload state below which the peak is allowed again", high=1.0, example="0.9")] = 0.9
-    overload: Annotated[Overload, choice(
-        "overload", "what the peak time means: a thermal model, or (i_peak^2 - i_cont^2) t")] = "thermal"
+    voltage_V: Annotated[float, positive("supply, and so the largest motor voltage", "U_bus", example="12 V")]
+    speed_rad_s: Annotated[float, positive("largest speed command at the motor", "w_max",
+        example="9000 rpm")] = inf
+    acceleration_rad_s2: Annotated[float, positive("largest change of the speed command", "a_max",
+        example="30000 rev/s^2")] = inf
+    peak_current_A: Annotated[float, positive("clamp of the current command", "i_peak", example="12 A")] = inf
+    current_rate_A_s: Annotated[float, positive("largest change of the current command (torque slope)",
+        example="2000 A/s")] = inf
+    continuous_current_A: Annotated[float, positive("current allowed continuously (no clamp)", "i_cont",
+        example="4 A")] = inf
+    peak_time_s: Annotated[float | None, positive("time that the peak current is allowed for, from cold; "
+        "then the overload protection (I2t) acts", "t_peak", high=1e6, example="1 s")] = None
+    release: Annotated[float, positive("overload state below which the peak is allowed again", high=1.0,
+        example="0.9")] = 0.9
+    overload: Annotated[Overload, choice("what the peak time means: a thermal model, or (i_peak^2 - "
+        "i_cont^2) t")] = "thermal"
 
     @property
     def overload_time_s(self) -> Any:
@@ -384,10 +362,9 @@ class Limits:
 class Supply:
     """The supply behind ``limits.voltage``: resistance, and where braking energy goes (section 6)."""
 
-    resistance_ohm: Annotated[float, not_negative(
-        "resistance", "ohm", "R_s", "resistance of supply and leads", example="50 mohm")] = 0.0
-    regenerative: Annotated[bool, flag("regenerative", "whether the source takes braking energy back")] = True
-    capacitance_F: Annotated[float | None, positive(
-        "capacitance", "F", "C", "capacitance of the bus", example="2 mF")] = None
-    brake_voltage_V: Annotated[float | None, positive("brake_voltage", "V", "U_brake",
-        "bus voltage at which the brake resistor holds it", example="60 V")] = None
+    resistance_ohm: Annotated[float, not_negative("resistance of supply and leads", "R_s",
+        example="50 mohm")] = 0.0
+    regenerative: Annotated[bool, flag("whether the source takes braking energy back")] = True
+    capacitance_F: Annotated[float | None, positive("capacitance of the bus", "C", example="2 mF")] = None
+    brake_voltage_V: Annotated[float | None, positive("bus voltage at which the brake resistor holds it",
+        "U_brake", example="60 V")] = None

@@ -20,13 +20,14 @@ from actuator_lti.files.tree import Tree
 
 _CURRENT, _SPEED, _SHARE = "motor.no_load_current", "motor.no_load_speed", "motor.no_load_dry_share"
 SHEET: tuple[Field, ...] = (
-    positive(_CURRENT, "A", "i0", "current of the motor without a load: kM i0 = C0 + Cv w0, in place of "
-             "friction.dry_torque and friction.viscous", example="137 mA"),
-    positive(_SPEED, "{angle}/s", "w0", "speed of the motor at its no-load current", example="7580 rpm"),
-    quantity(_SHARE, "1", "", "share of the no-load torque that is dry; where it is not given a half, with a "
-             "tolerance from 0 to 1", low=0.0, high=1.0, example="0.8"),
-    positive("gear.*.efficiency", "1", "eta", "efficiency of the stage under load, driving, in place of "
-             "friction.load_coefficient; stages without one count as 1", high=1.0, example="72 %"),
+    positive("current of the motor without a load: kM i0 = C0 + Cv w0, in place of friction.dry_torque and "
+             "friction.viscous", "i0", key=_CURRENT, unit="A", example="137 mA"),
+    positive("speed of the motor at its no-load current", "w0", key=_SPEED, unit="{angle}/s",
+             example="7580 rpm"),
+    quantity("share of the no-load torque that is dry; where it is not given a half, with a tolerance from 0 "
+             "to 1", key=_SHARE, unit="1", low=0.0, high=1.0, example="0.8"),
+    positive("efficiency of the stage under load, driving, in place of friction.load_coefficient; stages "
+             "without one count as 1", "eta", key="gear.*.efficiency", unit="1", high=1.0, example="72 %"),
 )  # fmt: skip
 """Keys of a file that no part of a design has an attribute for."""
 
@@ -64,18 +65,23 @@ def as_stated(tree: Tree, changed: Collection[str]) -> None:
             pairs[:] = [pair for pair in pairs if not {pair["first"], pair["second"]} <= paths]
 
 
+def _words(entry: Any) -> tuple[list[re.Match[str] | None], str]:
+    """What a sheet's own keys say in the source of a value that was read from them, and its own source."""
+    said, _, source = entry["source"].removeprefix(FROM).partition("; ")
+    return [_WORD.fullmatch(word) for word in said.split(", ")], source
+
+
 def _is_read(entry: Any, tables: Collection[str]) -> bool:
     """Whether a value of friction and its tolerance are as a sheet's keys were read: no words of a user."""
-    source = entry.get("source", "") if isinstance(entry, dict) else ""
-    words = [_WORD.fullmatch(word) for word in source.removeprefix(FROM).partition("; ")[0].split(", ")]
-    read = source.startswith(FROM) and entry.get("tolerance", _OPEN) == _OPEN
-    return read and all(word is not None and word["table"] in tables for word in words)
+    if not isinstance(entry, dict) or not entry.get("source", "").startswith(FROM):
+        return False
+    known = all(word is not None and word["table"] in tables for word in _words(entry)[0])
+    return known and entry.get("tolerance", _OPEN) == _OPEN
 
 
 def _put_back(tables: dict[str, Tree], entry: Tree) -> None:
-    words, _, source = entry["source"].removeprefix(FROM).partition("; ")
-    for word in map(_WORD.fullmatch, words.split(", ")):
-        assert word is not None
+    words, source = _words(entry)
+    for word in filter(None, words):
         stated = {"value": word["text"], "source": source, "grade": entry.get("grade", "")}
         tables[word["table"]][word["key"]] = stated
 

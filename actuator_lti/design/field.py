@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any, Literal
@@ -55,7 +55,7 @@ class Field:
     kind: Kind
     description: str
     attribute: str = ""
-    unit_template: str = "1"
+    unit_template: str = ""
     symbol: str = ""
     low: float = -inf
     high: float = inf
@@ -131,60 +131,61 @@ class Field:
         return self.kind in ("quantity", "quantities") and self.low == 0.0 and not self.low_open
 
 
-# --- a part of a design declares a key so: ``name: Annotated[type, positive(key, unit, symbol, words)]`` ---
-def quantity(key: str, unit: str, symbol: str, words: str, **more: Any) -> Field:
-    """Any finite number; ``low``, ``high``, ``example`` besides."""
-    settings = {"low": -BIG, "high": BIG, **more}
-    return Field(path=key, kind="quantity", unit_template=unit, symbol=symbol, description=words, **settings)
+# --- a part of a design declares a key so: ``resistance_ohm: Annotated[type, positive(words, symbol)]`` ---
+_UNITS = {
+    "_kgm2": "{inertia}", "_Nms_rad": "{torque}*s/{angle}", "_Nm_rad": "{torque}/{angle}",
+    "_Nm_A": "{torque}/A", "_Nm_V": "{torque}/V", "_Nm": "{torque}", "_Vs_rad": "V*s/{angle}",
+    "_rad_s3": "{angle}/s^3", "_rad_s2": "{angle}/s^2", "_rad_s": "{angle}/s", "_rad": "{angle}",
+    "_V_A": "V/A", "_K_W": "K/W", "_A_s": "A/s", "_per_K": "1/K", "_degC": "degC", "_ohm": "ohm",
+    "_kg": "kg", "_H": "H", "_F": "F", "_V": "V", "_A": "A", "_s": "s", "_m": "m",
+}  # fmt: skip
+"""What an attribute's name ends with that has this unit: the longest that fits; none is dimensionless."""
 
 
+def named_after(field: Field, attribute: str) -> Field:
+    """The key of an attribute: its name without the unit, and that unit, where the key says no other."""
+    suffix = max((one for one in _UNITS if attribute.endswith(one)), key=len, default="")
+    unit = _UNITS[suffix] if suffix else "1"
+    path, unit = field.path or attribute.removesuffix(suffix), field.unit_template or unit
+    return replace(field, path=path, unit_template=unit, attribute=attribute)
+
+
+def _declared(
+    kind: Kind, words: str, symbol: str = "", *, key: str = "", unit: str = "", **more: Any
+) -> Field:
+    return Field(path=key, kind=kind, unit_template=unit, symbol=symbol, description=words, **more)
+
+
+quantity = partial(_declared, "quantity", low=-BIG, high=BIG)
+"""Any finite number; ``key`` and ``unit`` where they are not those of the attribute's name."""
 positive = partial(quantity, low=SMALL)
 """A number above 0."""
 not_negative = partial(quantity, low=0.0)
 """A number of at least 0."""
-
-
-def degrees(key: str, words: str, example: str) -> Field:
-    """A temperature."""
-    return quantity(key, "degC", "", words, low=-273.15, high=1000.0, example=example)
-
-
-def quantities(key: str, unit: str, words: str, **more: Any) -> Field:
-    """A list of numbers."""
-    return Field(path=key, kind="quantities", unit_template=unit, description=words, **more)
-
-
-def matrix(key: str, words: str) -> Field:
-    """Rows of as many numbers each."""
-    return Field(path=key, kind="matrix", description=words, low=-BIG, high=BIG)
-
-
-def names(key: str, words: str) -> Field:
-    """Some words, those of the attribute's type, each once."""
-    return Field(path=key, kind="names", description=words)
-
-
-def integer(key: str, high: int, symbol: str, words: str, low: int = 1) -> Field:
-    """A whole number."""
-    return Field(path=key, kind="integer", symbol=symbol, description=words, low=low, high=high)
-
-
-def choice(key: str, words: str, choices: tuple[str, ...] = ()) -> Field:
-    """One of some words: those of the attribute's type, or fewer."""
-    return Field(path=key, kind="choice", choices=choices, description=words)
-
-
-def flag(key: str, words: str) -> Field:
-    """True or false."""
-    return Field(path=key, kind="flag", description=words)
-
-
-def _named(kind: Kind, words: str) -> Field:
-    """A value whose key is the attribute's name."""
-    return Field(path="", kind=kind, description=words)
-
-
-text, label = partial(_named, "text"), partial(_named, "label")
+quantities = partial(_declared, "quantities")
+"""A list of numbers."""
+matrix = partial(_declared, "matrix", low=-BIG, high=BIG)
+"""Rows of as many numbers each."""
+names = partial(_declared, "names")
+"""Some words, those of the attribute's type, each once."""
+flag = partial(_declared, "flag")
+"""True or false."""
+text, label = partial(_declared, "text"), partial(_declared, "label")
 """Any text; one that is not empty."""
-day, limit = partial(_named, "day"), partial(_named, "limit")
+day, limit = partial(_declared, "day"), partial(_declared, "limit")
 """A date; a limit of a requirement, in the unit of its quantity."""
+
+
+def degrees(words: str, example: str) -> Field:
+    """A temperature."""
+    return quantity(words, low=-273.15, high=1000.0, example=example)
+
+
+def integer(words: str, high: int, symbol: str = "", low: int = 1) -> Field:
+    """A whole number."""
+    return _declared("integer", words, symbol, low=low, high=high)
+
+
+def choice(words: str, choices: tuple[str, ...] = ()) -> Field:
+    """One of some words: those of the attribute's type, or fewer."""
+    return _declared("choice", words, choices=choices)

@@ -7,7 +7,7 @@ from dataclasses import MISSING, fields, replace
 from functools import cache
 from typing import Any, get_args
 
-from actuator_lti.design.field import Field, Structure
+from actuator_lti.design.field import Field, Structure, named_after
 from actuator_lti.design.model import Design
 from actuator_lti.design.sections import RECORDS, SECTIONS, template_of
 
@@ -16,26 +16,17 @@ __all__ = ["ALL_FIELDS", "FIELDS", "Field", "Structure", "field_of", "fields_in"
 
 def _declared(kind: type, template: str) -> Iterator[Field]:
     """The keys that a part of a design declares beside its attributes."""
+    form = "for the continuous form alone, beside the law that runs: "  # it is not the one that runs
     for item in fields(kind):
         annotated, *declared = get_args(item.type)[:2] if hasattr(item.type, "__metadata__") else (None,)
-        for field in declared:
+        for field in (named_after(one, item.name) for one in declared):
             yield replace(
                 field,
-                path=f"{template}.{field.path or item.name}",
-                attribute=item.name,
+                path=f"{template}.{field.path}",
                 required=field.required or (item.default is MISSING and item.default_factory is MISSING),
                 choices=field.choices or (_words(annotated) if field.kind in ("choice", "names") else ()),
-                description=f"{_of_form(template)}{field.description}",
+                description=form * template.endswith(".continuous") + field.description,
             )
-
-
-def _of_form(template: str) -> str:
-    """That the continuous part of a law is not the one that runs."""
-    return (
-        "for the continuous form alone, beside the law that runs: "
-        if template.endswith(".continuous")
-        else ""
-    )
 
 
 def _words(kind: Any) -> tuple[str, ...]:

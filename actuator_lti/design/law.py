@@ -40,11 +40,11 @@ class Matrices(NamedTuple):
 class StateSpace:
     """A, B, C and D of a law with one output: ``n`` states, ``m`` inputs; without A a mere gain D."""
 
-    A: Annotated[Matrix, matrix("A", "n rows of n numbers; without states left out")] = ()
-    B: Annotated[Matrix, matrix("B", "n rows, a column for each input")] = ()
-    C: Annotated[tuple[float, ...], quantities("C", "1", "one row of n numbers", **_LIST)] = ()
-    D: Annotated[tuple[float, ...], quantities(
-        "D", "1", "one row, a number for each input; zeros where left out", **_LIST)] = ()
+    A: Annotated[Matrix, matrix("n rows of n numbers; without states left out")] = ()
+    B: Annotated[Matrix, matrix("n rows, a column for each input")] = ()
+    C: Annotated[tuple[float, ...], quantities("one row of n numbers", **_LIST)] = ()
+    D: Annotated[tuple[float, ...], quantities("one row, a number for each input; zeros where left out",
+        **_LIST)] = ()
 
     def sizes(self, inputs: int) -> dict[str, tuple[str, bool]]:
         """Of each matrix the shape that it must have, and whether it has it."""
@@ -72,17 +72,17 @@ class StateSpace:
 class Law(StateSpace):
     """A discrete linear law of one stage, at that stage's period."""
 
-    inputs: Annotated[tuple[LawInput, ...], names(
-        "inputs", "the signals that it takes, a column of B and D each (state feedback: D alone), in SI: "
-        "output_angle and output_speed of the output shaft, the others of the motor")]
-    file: Annotated[str, text(
-        "a .mat or .json file with A, B, C, D and Ts, beside the design file; read in their place")] = ""
-    L: Annotated[tuple[float, ...], quantities(
-        "L", "1", "anti-windup: n numbers that the states take of u - v; zeros where left out", **_LIST)] = ()
-    gain: Annotated[float, quantity(
-        "gain", "1", "", "factor on the law; its tolerance is that of the whole law", example="1")] = 1.0
-    period_s: Annotated[float | None, positive("period", "s", "",
-        "period that the law was made for: must be that of its stage", high=1e4, example="1 ms")] = None
+    inputs: Annotated[tuple[LawInput, ...], names("the signals that it takes, a column of B and D each "
+        "(state feedback: D alone), in SI: output_angle and output_speed of the output shaft, the others of "
+        "the motor")]
+    file: Annotated[str, text("a .mat or .json file with A, B, C, D and Ts, beside the design file; read in "
+        "their place")] = ""
+    L: Annotated[tuple[float, ...], quantities("anti-windup: n numbers that the states take of u - v; zeros "
+        "where left out", **_LIST)] = ()
+    gain: Annotated[float, quantity("factor on the law; its tolerance is that of the whole law",
+        example="1")] = 1.0
+    period_s: Annotated[float | None, positive("period that the law was made for: must be that of its stage",
+        high=1e4, example="1 ms")] = None
     continuous: StateSpace | None = None
 
     @property

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuator_lti.errors import InputError, Mistakes
 from actuator_lti.files.reading import shown
@@ -27,6 +28,7 @@ _PARTS = re.compile(_KEY)
 
 Refusal = tuple[str, object, str]
 """Key, value as it is to be shown ("" for none), and what is allowed."""
+Check = Callable[["Design"], Iterator[Refusal]]
 
 
 def refusal_text(refusal: Refusal) -> str:
@@ -78,7 +80,8 @@ def readable(items: Iterable[T]) -> Iterator[T]:
         return
 
 
-class Rule(NamedTuple):
+@dataclass(frozen=True)
+class Rule:
     """What a design must not be: the key that is refused then, its value as shown, and what is allowed.
 
     The texts show values of the design ``d``, as ``{d.limits.voltage_V:g}``.
@@ -196,12 +199,12 @@ def _paths(names: list[str], tree: Any, counts: Mapping[str, int]) -> tuple[str,
     spelled: tuple[str, ...] = ("",)
     for depth, name in enumerate(names, 1):
         tree = tree.get(name) if isinstance(tree, dict) else None
-        labels = [f".{name}"]
+        labels = [name]
         if isinstance(tree, list):
             count = counts.get("\0".join(names[:depth]), 0)
             tree = tree[count - 1] if 0 < count <= len(tree) else None
             known = [tree.get(key) for key in ("name", "id", "requirement")] if isinstance(tree, dict) else []
-            texts = [label for label in known if isinstance(label, str)]
-            labels = [f".{name}.{label}" for label in (*texts[:1], count)] + [f".{name}[{count}]"]
-        spelled = tuple(f"{begin}{label}" for begin in spelled for label in labels)
+            label = next((one for one in known if isinstance(one, str)), count)
+            labels = [f"{name}.{label}", f"{name}.{count}", f"{name}[{count}]"]
+        spelled = tuple(f"{begin}.{label}" for begin in spelled for label in labels)
     return tuple(path[1:] for path in spelled)

@@ -18,32 +18,26 @@ from actuator_lti.design.asked import (
     Fact,
     Failure,
     FrozenMap,
-    ObjectFamily,
     Parameter,
     Requirement,
     Tolerance,
     Validation,
     Waiver,
-    default_deflection,
 )
 from actuator_lti.design.control import (
-    FILTER_KEYS,
     AntiWindup,
     Command,
     Controller,
     CurrentLoop,
     Encoder,
     Filter,
-    FilterKind,
     FilterPlace,
     Instruments,
     Limits,
     OutputEncoder,
-    Overload,
     PositionLoop,
     Sensor,
     SpeedSource,
-    Stage,
     Supply,
     VelocityLoop,
 )
@@ -51,19 +45,15 @@ from actuator_lti.design.field import Axis, choice, label, text
 from actuator_lti.design.law import Law, StateSpace
 from actuator_lti.design.plant import (
     Coupling,
-    Direction,
     Friction,
-    FrictionLaw,
     FrictionPoint,
     Gear,
     Gravity,
     Load,
     LoadFriction,
-    LoadPath,
     Motor,
     MotorConstants,
     Screw,
-    STANDARD_GRAVITY_m_s2,
     Temperature,
 )
 from actuator_lti.drawing.faces import draw
@@ -98,7 +88,7 @@ class Design:
     facts: tuple[Fact, ...] = ()
     objects: ControllerObjects = field(default_factory=ControllerObjects)
     parameters: Mapping[str, Parameter] = field(default_factory=FrozenMap)
-    axis: Annotated[Axis, choice("axis", "rotary (rad, N m, kg m2) or linear (m, N, kg)")] = "rotary"
+    axis: Annotated[Axis, choice("rotary (rad, N m, kg m2) or linear (m, N, kg)")] = "rotary"
     revision: Annotated[str, text("revision of this file")] = ""
     description: Annotated[str, text("what the drive is and where its figures come from")] = ""
     origin: str = ""
@@ -238,9 +228,7 @@ class Design:
         return self._quantum(self.output_encoder.counts_per_rev)
 
     def _quantum(self, counts: int | None, travel_m: float = 1.0) -> float | None:
-        if counts is None:
-            return None
-        return (travel_m if self.axis == "linear" else 2.0 * pi) / counts
+        return None if counts is None else (travel_m if self.axis == "linear" else 2.0 * pi) / counts
 
     @property
     def inertia_kgm2(self) -> float:
@@ -275,14 +263,15 @@ class Design:
             heat = self.temperature
             magnet += heat.magnet_per_K * (heat.magnet_degC - heat.reference_degC)
             winding += heat.resistance_per_K * (heat.winding_degC - heat.reference_degC)
-        return replace(
-            motor,
-            resistance_ohm=_times(motor.resistance_ohm, impedance * winding),
-            inductance_H=_times(motor.inductance_H, impedance),
-            torque_constant_Nm_A=_times(motor.torque_constant_Nm_A, torque * magnet),
-            back_emf_constant_Vs_rad=_times(motor.back_emf_constant_Vs_rad, voltage * magnet),
-            constants="dc",
-        )
+        factors = {
+            "resistance_ohm": impedance * winding,
+            "inductance_H": impedance,
+            "torque_constant_Nm_A": torque * magnet,
+            "back_emf_constant_Vs_rad": voltage * magnet,
+        }
+        stated = {name: getattr(motor, name) for name in factors}
+        same = {name: value * factors[name] for name, value in stated.items() if value is not None}
+        return replace(motor, **same, constants="dc")
 
 
 # factors on kM, on kE, and on R and L, from the data sheet to the equivalent DC motor
@@ -291,10 +280,6 @@ _EQUIVALENT: dict[MotorConstants, tuple[float, float, float]] = {
     "rms-line": (1.0 / sqrt(1.5), sqrt(2.0), 1.0),
     "peak-phase": (2.0 / sqrt(3.0), sqrt(3.0), 2.0),
 }
-
-
-def _times(value: float | None, factor: float) -> float | None:
-    return None if value is None else value * factor
 
 
 def _train_inertia(gears: tuple[Gear, ...]) -> float:

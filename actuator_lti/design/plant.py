@@ -34,32 +34,26 @@ class Motor:
     none, is the slope of a drive in motion.
     """
 
-    rotor_inertia_kgm2: Annotated[float, positive("rotor_inertia", "{inertia}", "J_motor",
-        "inertia of the rotor (linear axis: moving mass)", example="9.2 g*cm^2")]
-    resistance_ohm: Annotated[float | None, positive(
-        "resistance", "ohm", "R", "phase-phase resistance", example="55 mohm")] = None
-    inductance_H: Annotated[float | None, positive(
-        "inductance", "H", "L", "phase-phase inductance", example="6 uH")] = None
-    torque_constant_Nm_A: Annotated[float | None, positive(
-        "torque_constant", "{torque}/A", "kM", "torque per ampere", example="5.9 mN*m/A")] = None
-    back_emf_constant_Vs_rad: Annotated[float | None, positive("back_emf_constant", "V*s/{angle}", "kE",
-        "back-EMF per rad/s; a speed constant, 83.4 rpm/V, is turned over (of peak-phase it is line-line)",
-        example="5.9 mV*s/rad")] = None
-    source_gain_Nm_V: Annotated[float | None, positive("source_gain", "{torque}/V", "g",
-        "gain of an ideal torque source, instead of R, L, kM, kE", example="35.15 N/V")] = None
-    cogging_Nm: Annotated[float, not_negative("cogging", "{torque}", "",
-        "cogging or torque ripple: peak of a torque sin(Z angle + phase) that the motor makes by itself",
-        example="5 mN*m")] = 0.0
-    cogging_periods: Annotated[float, positive("cogging_periods", "rad/{angle}", "Z",
-        "periods of the cogging per revolution of the motor (linear axis: rad per m)",
+    rotor_inertia_kgm2: Annotated[float, positive("inertia of the rotor (linear axis: moving mass)",
+        "J_motor", example="9.2 g*cm^2")]
+    resistance_ohm: Annotated[float | None, positive("phase-phase resistance", "R", example="55 mohm")] = None
+    inductance_H: Annotated[float | None, positive("phase-phase inductance", "L", example="6 uH")] = None
+    torque_constant_Nm_A: Annotated[float | None, positive("torque per ampere", "kM",
+        example="5.9 mN*m/A")] = None
+    back_emf_constant_Vs_rad: Annotated[float | None, positive("back-EMF per rad/s; a speed constant, 83.4 "
+        "rpm/V, is turned over (of peak-phase it is line-line)", "kE", example="5.9 mV*s/rad")] = None
+    source_gain_Nm_V: Annotated[float | None, positive("gain of an ideal torque source, instead of R, L, "
+        "kM, kE", "g", example="35.15 N/V")] = None
+    cogging_Nm: Annotated[float, not_negative("cogging or torque ripple: peak of a torque sin(Z angle + "
+        "phase) that the motor makes by itself", example="5 mN*m")] = 0.0
+    cogging_periods: Annotated[float, positive("periods of the cogging per revolution of the motor (linear "
+        "axis: rad per m)", "Z", unit="rad/{angle}",
         most=lambda design: _most_order(design, design.motor.cogging_Nm, 1.0), example="84")] = 1.0
-    cogging_phase_rad: Annotated[float, quantity(
-        "cogging_phase", "rad", "", "phase of the cogging at motor angle zero; 180 deg: it holds there",
-        low=-7.0, high=7.0, example="180 deg")] = 0.0
-    constants: Annotated[MotorConstants, choice("constants",
-        "how the data sheet gives kM, kE, R and L: dc (phase-phase; a stepper per phase), rms-line "
-        "(N m/A rms, V rms line-line, R and L line-line), peak-phase (dq: A and V peak of a phase, R and L "
-        "per phase)")] = "dc"
+    cogging_phase_rad: Annotated[float, quantity("phase of the cogging at motor angle zero; 180 deg: it "
+        "holds there", unit="rad", low=-7.0, high=7.0, example="180 deg")] = 0.0
+    constants: Annotated[MotorConstants, choice("how the data sheet gives kM, kE, R and L: dc (phase-phase; "
+        "a stepper per phase), rms-line (N m/A rms, V rms line-line, R and L line-line), peak-phase (dq: A "
+        "and V peak of a phase, R and L per phase)")] = "dc"
 
     @property
     def has_electrical_dynamics(self) -> bool:
@@ -86,11 +80,11 @@ class Gear:
     """One reduction stage; the inertias are those of its own input and output shafts."""
 
     name: str
-    ratio: Annotated[float, positive("ratio", "1", "i", "input speed over output speed", example="66")]
-    input_inertia_kgm2: Annotated[float, not_negative("input_inertia", "{inertia}", "J_in",
-        "inertia turning with the input shaft of the stage", example="1 g*cm^2")] = 0.0
-    output_inertia_kgm2: Annotated[float, not_negative("output_inertia", "{inertia}", "J_out",
-        "inertia turning with the output shaft of the stage", example="5 g*cm^2")] = 0.0
+    ratio: Annotated[float, positive("input speed over output speed", "i", example="66")]
+    input_inertia_kgm2: Annotated[float, not_negative("inertia turning with the input shaft of the stage",
+        "J_in", example="1 g*cm^2")] = 0.0
+    output_inertia_kgm2: Annotated[float, not_negative("inertia turning with the output shaft of the stage",
+        "J_out", example="5 g*cm^2")] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,9 +95,8 @@ class Screw:
     angle x the travel p x, an inertia J the mass J/p^2.  Gears before the screw keep their ratios.
     """
 
-    lead_m: Annotated[float, positive("lead", "m", "p",
-        "travel per revolution of the screw: with it the motor's values may stand in N m, rad and kg m2, "
-        "and encoder.counts_per_rev is per revolution", example="10 mm")]
+    lead_m: Annotated[float, positive("travel per revolution of the screw: with it the motor's values may "
+        "stand in N m, rad and kg m2, and encoder.counts_per_rev is per revolution", "p", example="10 mm")]
 
     @property
     def travel_m_rad(self) -> float:
@@ -120,23 +113,22 @@ class Coupling:
     bend as data sheets of strain wave gears state it: K1 up to the torque T1, K2 up to T2, K3 beyond.
     """
 
-    stiffness_Nm_rad: Annotated[float, positive("stiffness", "{torque}/{angle}", "k",
-        "stiffness at the coupling's own shaft; of a strain wave gear K1, up to torque_1",
-        example="400 N*m/rad")]
-    torque_1_Nm: Annotated[float | None, positive("torque_1", "{torque}", "T1",
-        "torque at which the stiffness becomes stiffness_2", example="14 N*m")] = None
-    stiffness_2_Nm_rad: Annotated[float | None, positive(
-        "stiffness_2", "{torque}/{angle}", "K2", "stiffness beyond torque_1", example="25000 N*m/rad")] = None
-    torque_2_Nm: Annotated[float | None, positive("torque_2", "{torque}", "T2",
-        "torque at which the stiffness becomes stiffness_3", example="48 N*m")] = None
-    stiffness_3_Nm_rad: Annotated[float | None, positive(
-        "stiffness_3", "{torque}/{angle}", "K3", "stiffness beyond torque_2", example="29000 N*m/rad")] = None
-    damping_Nms_rad: Annotated[float, not_negative("damping", "{torque}*s/{angle}", "c",
-        "damping at the coupling's own shaft", example="0.02 N*m*s/rad")] = 0.0
-    play_rad: Annotated[float, not_negative(
-        "play", "{angle}", "2b", "total play (backlash) at its own shaft", example="2 mrad")] = 0.0
-    after: Annotated[str | None, text(
-        "name of the gear whose output shaft it is on; default the last gear")] = None
+    stiffness_Nm_rad: Annotated[float, positive("stiffness at the coupling's own shaft; of a strain wave "
+        "gear K1, up to torque_1", "k", example="400 N*m/rad")]
+    torque_1_Nm: Annotated[float | None, positive("torque at which the stiffness becomes stiffness_2", "T1",
+        example="14 N*m")] = None
+    stiffness_2_Nm_rad: Annotated[float | None, positive("stiffness beyond torque_1", "K2",
+        example="25000 N*m/rad")] = None
+    torque_2_Nm: Annotated[float | None, positive("torque at which the stiffness becomes stiffness_3", "T2",
+        example="48 N*m")] = None
+    stiffness_3_Nm_rad: Annotated[float | None, positive("stiffness beyond torque_2", "K3",
+        example="29000 N*m/rad")] = None
+    damping_Nms_rad: Annotated[float, not_negative("damping at the coupling's own shaft", "c",
+        example="0.02 N*m*s/rad")] = 0.0
+    play_rad: Annotated[float, not_negative("total play (backlash) at its own shaft", "2b",
+        example="2 mrad")] = 0.0
+    after: Annotated[str | None, text("name of the gear whose output shaft it is on; default the last "
+        "gear")] = None
 
     @property
     def pieces(self) -> tuple[tuple[Any, Any, Any], ...]:
@@ -180,25 +172,24 @@ class Coupling:
 class LoadFriction:
     """Friction behind the coupling, at its shaft: C0_l, Cv_l, breakaway ratio and constant offset."""
 
-    dry_torque_Nm: Annotated[float, not_negative("dry_torque", "{torque}", "C0_l",
-        "dry friction behind the coupling, at its shaft", example="0.1 N*m")] = 0.0
-    viscous_Nms_rad: Annotated[float, not_negative("viscous", "{torque}*s/{angle}", "Cv_l",
-        "viscous friction behind the coupling, at its shaft", example="0.01 N*m*s/rad")] = 0.0
-    breakaway_ratio: Annotated[float, quantity("breakaway_ratio", "1", "",
-        "breakaway torque over dry friction of the load side", low=1.0, high=100.0, example="1")] = 1.0
-    offset_torque_Nm: Annotated[float, quantity("offset_torque", "{torque}", "",
-        "constant torque that opposes positive motion of the load", example="0 N*m")] = 0.0
+    dry_torque_Nm: Annotated[float, not_negative("dry friction behind the coupling, at its shaft", "C0_l",
+        example="0.1 N*m")] = 0.0
+    viscous_Nms_rad: Annotated[float, not_negative("viscous friction behind the coupling, at its shaft",
+        "Cv_l", example="0.01 N*m*s/rad")] = 0.0
+    breakaway_ratio: Annotated[float, quantity("breakaway torque over dry friction of the load side", low=1.0,
+        high=100.0, example="1")] = 1.0
+    offset_torque_Nm: Annotated[float, quantity("constant torque that opposes positive motion of the load",
+        example="0 N*m")] = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gravity:
     """A pendulum at the output shaft: M_ext = m g l sin(angle + offset); angle + offset = 0 is upright."""
 
-    mass_kg: Annotated[float, positive("mass", "kg", "m", "mass of the pendulum", example="2 kg")]
-    arm_m: Annotated[float, positive(
-        "arm", "m", "l", "distance of its centre of mass from the axis", example="0.3 m")]
-    offset_rad: Annotated[float, quantity("offset", "rad", "", "angle from upright at output angle zero",
-        low=-7.0, high=7.0, example="180 deg")] = 0.0
+    mass_kg: Annotated[float, positive("mass of the pendulum", "m", example="2 kg")]
+    arm_m: Annotated[float, positive("distance of its centre of mass from the axis", "l", example="0.3 m")]
+    offset_rad: Annotated[float, quantity("angle from upright at output angle zero", unit="rad", low=-7.0,
+        high=7.0, example="180 deg")] = 0.0
 
     @property
     def peak_Nm(self) -> float:
@@ -244,29 +235,26 @@ class Load:
     fast that its mean, none, is its slope.
     """
 
-    inertia_kgm2: Annotated[float, not_negative(
-        "inertia", "{inertia}", "J_load", "inertia at the output shaft", example="2e-4 kg*m^2")] = 0.0
-    path: Annotated[LoadPath, choice(
-        "path", "whether the load torque only adds friction, or also drives the motor")] = "self-locking"
-    locking_gear: Annotated[str | None, text(
-        "name of the gear that locks itself, which stands before the coupling; default the last gear")] = None
-    moment_max_Nm: Annotated[float, not_negative(
-        "moment_max", "{torque}", "M_ext", "largest load torque at the output", example="8 N*m")] = 0.0
-    moment_slope_Nm_rad: Annotated[float, quantity("moment_slope", "{torque}/{angle}", "",
-        "load torque per output deflection: above 0 it pushes away, below 0 back to zero",
-        example="0 N*m/rad")] = 0.0
-    moment_damping_Nms_rad: Annotated[float, not_negative(
-        "moment_damping", "{torque}*s/{angle}", "D", "load torque against the motion, per output speed",
-        most=_largest_damping, example="0.02 N*m*s/rad")] = 0.0
-    gear_error_Nm: Annotated[float, not_negative("gear_error", "{torque}", "A",
-        "kinematic error of a gear as a torque on the output, A sin(n angle + phase)",
-        example="0.1 N*m")] = 0.0
-    gear_error_periods: Annotated[float, positive("gear_error_periods", "rad/{angle}", "n",
-        "periods of the gear error per revolution of the output (linear axis: rad per m)",
+    inertia_kgm2: Annotated[float, not_negative("inertia at the output shaft", "J_load",
+        example="2e-4 kg*m^2")] = 0.0
+    path: Annotated[LoadPath, choice("whether the load torque only adds friction, or also drives the "
+        "motor")] = "self-locking"
+    locking_gear: Annotated[str | None, text("name of the gear that locks itself, which stands before the "
+        "coupling; default the last gear")] = None
+    moment_max_Nm: Annotated[float, not_negative("largest load torque at the output", "M_ext",
+        example="8 N*m")] = 0.0
+    moment_slope_Nm_rad: Annotated[float, quantity("load torque per output deflection: above 0 it pushes "
+        "away, below 0 back to zero", example="0 N*m/rad")] = 0.0
+    moment_damping_Nms_rad: Annotated[float, not_negative("load torque against the motion, per output speed",
+        "D", most=_largest_damping, example="0.02 N*m*s/rad")] = 0.0
+    gear_error_Nm: Annotated[float, not_negative("kinematic error of a gear as a torque on the output, A "
+        "sin(n angle + phase)", "A", example="0.1 N*m")] = 0.0
+    gear_error_periods: Annotated[float, positive("periods of the gear error per revolution of the output "
+        "(linear axis: rad per m)", "n", unit="rad/{angle}",
         most=lambda design: _most_order(design, design.load.gear_error_Nm, design.total_ratio),
         example="2")] = 1.0
-    gear_error_phase_rad: Annotated[float, quantity("gear_error_phase", "rad", "",
-        "phase of the gear error at output angle zero", low=-7.0, high=7.0, example="0 deg")] = 0.0
+    gear_error_phase_rad: Annotated[float, quantity("phase of the gear error at output angle zero",
+        unit="rad", low=-7.0, high=7.0, example="0 deg")] = 0.0
     friction: LoadFriction | None = None
     gravity: Gravity | None = None
 
@@ -308,12 +296,9 @@ class Load:
 class FrictionPoint:
     """One point (|w|, T) of a friction map, motor side; for both directions of motion or one."""
 
-    speed_rad_s: Annotated[float, not_negative(
-        "speed", "{angle}/s", "|w|", "speed at the motor", example="10 rad/s")]
-    torque_Nm: Annotated[float, not_negative(
-        "torque", "{torque}", "T", "friction at that speed", example="2 mN*m")]
-    direction: Annotated[Direction, choice(
-        "direction", "direction of motion for which the point holds")] = "both"
+    speed_rad_s: Annotated[float, not_negative("speed at the motor", "|w|", example="10 rad/s")]
+    torque_Nm: Annotated[float, not_negative("friction at that speed", "T", example="2 mN*m")]
+    direction: Annotated[Direction, choice("direction of motion for which the point holds")] = "both"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -325,23 +310,23 @@ class Friction:
     friction map that takes the place of C0 and Cv (model.md section 6); CM and the offset add.
     """
 
-    law: Annotated[FrictionLaw, choice("law", "dry friction with stick, or smoothed by tanh")] = "coulomb"
-    dry_torque_Nm: Annotated[float, not_negative(
-        "dry_torque", "{torque}", "C0", "dry friction at the motor", example="2.25e-3 N*m")] = 0.0
-    viscous_Nms_rad: Annotated[float, not_negative(
-        "viscous", "{torque}*s/{angle}", "Cv", "viscous friction", example="5.25e-6 N*m*s/rad")] = 0.0
-    load_coefficient: Annotated[float, not_negative("load_coefficient", "{torque}/({torque})", "CM",
-        "dry friction at the motor per load torque at the output", example="1.34 mN*m/(N*m)")] = 0.0
-    breakaway_ratio: Annotated[float, quantity("breakaway_ratio", "1", "",
-        "breakaway torque over dry friction", low=1.0, high=100.0, example="1")] = 1.0
-    smoothing_speed_rad_s: Annotated[float, positive(
-        "smoothing_speed", "{angle}/s", "w_s", "speed scale of the tanh law", example="1 rad/s")] = 1.0
-    dry_torque_reverse_Nm: Annotated[float | None, not_negative("dry_torque_reverse", "{torque}", "C0-",
-        "dry friction backward, where it differs", example="2.3e-3 N*m")] = None
-    viscous_reverse_Nms_rad: Annotated[float | None, not_negative("viscous_reverse", "{torque}*s/{angle}",
-        "Cv-", "viscous friction backward, where it differs", example="5.3e-6 N*m*s/rad")] = None
-    offset_torque_Nm: Annotated[float, quantity("offset_torque", "{torque}", "",
-        "constant torque that opposes positive motion", example="0 N*m")] = 0.0
+    law: Annotated[FrictionLaw, choice("dry friction with stick, or smoothed by tanh")] = "coulomb"
+    dry_torque_Nm: Annotated[float, not_negative("dry friction at the motor", "C0",
+        example="2.25e-3 N*m")] = 0.0
+    viscous_Nms_rad: Annotated[float, not_negative("viscous friction", "Cv",
+        example="5.25e-6 N*m*s/rad")] = 0.0
+    load_coefficient: Annotated[float, not_negative("dry friction at the motor per load torque at the output",
+        "CM", unit="{torque}/({torque})", example="1.34 mN*m/(N*m)")] = 0.0
+    breakaway_ratio: Annotated[float, quantity("breakaway torque over dry friction", low=1.0, high=100.0,
+        example="1")] = 1.0
+    smoothing_speed_rad_s: Annotated[float, positive("speed scale of the tanh law", "w_s",
+        example="1 rad/s")] = 1.0
+    dry_torque_reverse_Nm: Annotated[float | None, not_negative("dry friction backward, where it differs",
+        "C0-", example="2.3e-3 N*m")] = None
+    viscous_reverse_Nms_rad: Annotated[float | None, not_negative("viscous friction backward, where it "
+        "differs", "Cv-", example="5.3e-6 N*m*s/rad")] = None
+    offset_torque_Nm: Annotated[float, quantity("constant torque that opposes positive motion",
+        example="0 N*m")] = 0.0
     points: tuple[FrictionPoint, ...] = ()
 
     def map(self, direction: int = 1) -> tuple[FrictionPoint, ...]:
@@ -383,21 +368,16 @@ class Temperature:
     The thermal resistance and time constant of the winding serve the duty cycle.
     """
 
-    winding_degC: Annotated[float, degrees(
-        "winding", "temperature of the winding in this design", "80 degC")] = 25.0
-    magnet_degC: Annotated[float, degrees(
-        "magnet", "temperature of the magnets in this design", "60 degC")] = 25.0
-    reference_degC: Annotated[float, degrees(
-        "reference", "temperature that the sheet holds for", "25 degC")] = 25.0
-    resistance_per_K: Annotated[float, quantity("resistance_coefficient", "1/K", "",
-        "change of R per kelvin (copper 0.393 %/K)", low=0.0, high=0.02, example="0.393 %/K")] = 0.00393
-    magnet_per_K: Annotated[float, quantity(
-        "magnet_coefficient", "1/K", "", "change of kM and kE per kelvin (NdFeB -0.11 %/K)", low=-0.05,
-        high=0.05, example="-0.11 %/K")] = -0.0011
-    ambient_degC: Annotated[float, degrees("ambient", "temperature around the motor", "25 degC")] = 25.0
-    winding_limit_degC: Annotated[float, degrees(
-        "winding_limit", "largest temperature of the winding", "125 degC")] = inf
-    thermal_resistance_K_W: Annotated[float | None, positive(
-        "thermal_resistance", "K/W", "R_th", "winding to ambient", example="5 K/W")] = None
-    thermal_time_s: Annotated[float | None, positive(
-        "thermal_time", "s", "", "thermal time constant of the winding", example="20 s")] = None
+    winding_degC: Annotated[float, degrees("temperature of the winding in this design", "80 degC")] = 25.0
+    magnet_degC: Annotated[float, degrees("temperature of the magnets in this design", "60 degC")] = 25.0
+    reference_degC: Annotated[float, degrees("temperature that the sheet holds for", "25 degC")] = 25.0
+    resistance_per_K: Annotated[float, quantity("change of R per kelvin (copper 0.393 %/K)",
+        key="resistance_coefficient", low=0.0, high=0.02, example="0.393 %/K")] = 0.00393
+    magnet_per_K: Annotated[float, quantity("change of kM and kE per kelvin (NdFeB -0.11 %/K)",
+        key="magnet_coefficient", low=-0.05, high=0.05, example="-0.11 %/K")] = -0.0011
+    ambient_degC: Annotated[float, degrees("temperature around the motor", "25 degC")] = 25.0
+    winding_limit_degC: Annotated[float, degrees("largest temperature of the winding", "125 degC")] = inf
+    thermal_resistance_K_W: Annotated[float | None, positive("winding to ambient", "R_th",
+        example="5 K/W")] = None
+    thermal_time_s: Annotated[float | None, positive("thermal time constant of the winding",
+        example="20 s")] = None

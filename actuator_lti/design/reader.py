@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable
+from contextlib import suppress
 from dataclasses import replace
 from datetime import date
 from math import isinf, pi, sqrt
@@ -14,7 +15,7 @@ from typing import Any
 
 from actuator_lti.asked.quantities import LOOPS, QUANTITIES
 from actuator_lti.design import model
-from actuator_lti.design.asked import FrozenMap
+from actuator_lti.design.asked import FrozenMap, default_deflection
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Axis, Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
@@ -34,12 +35,13 @@ MAX_LIST = 200
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
 _FIELD_OF_LEAD = FIELDS["screw.lead"]
-_CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk)\b\)?", re.IGNORECASE)
+_CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|phase)\b\)?", re.IGNORECASE)
 _DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
 _PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
 _AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
 _PEAK = {"rms-line": sqrt(2.0), "peak-phase": 1.0}  # of one ampere or volt of a sheet
 _DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}  # section 1 of model.md
+PHASE = "V/A phase"
 _UPSIDE_DOWN = {
     "motor.back_emf_constant": (1.0, "{angle}/(V*s)"),
     "motor.cogging_periods": (2.0 * pi, "{angle}"),
@@ -57,7 +59,7 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     records = {record.attribute: reader.items(record, tree.get(record.key, [])) for record in RECORDS}
     objects = reader.objects(tree.get("objects"))
     # 10 deg (0.01 m) without a load where the file does not say what to validate
-    fallback = model.Validation(full_deflection_rad=model.default_deflection(reader.structure.axis))
+    fallback = model.Validation(full_deflection_rad=default_deflection(reader.structure.axis))
     name = values.setdefault("name", UNREAD)
     values["title"] = UNREAD if values.get("title") is UNREAD else values.get("title") or name
     design = model.Design(
@@ -96,10 +98,14 @@ class Reader:
         self.findings.note(path, shown(value), reason)
         return UNREAD
 
+    def unread(self, path: str, reason: str) -> Any:
+        """The same of a key without a value to show."""
+        self.findings.note(path, "", reason)
+        return UNREAD
+
     def missing(self, path: str, field: Field | None = None) -> Any:
         """Note that a key is missing, which is unread."""
-        self.findings.note(path, "", f"missing{_example(field)}")
-        return UNREAD
+        return self.unread(path, f"missing{_example(field)}")
 
     def known(self, table: Tree, known: Iterable[str], path: str) -> dict[str, str]:
         """Note unknown keys; gives those that they are near to, with what only renames one."""
@@ -218,11 +224,7 @@ class Reader:
         if not isinstance(raw, list):
             return self.refuse(path, raw, "allowed: a list")
         read = tuple(self.number(field, one, f"{path}[{k}]") for k, one in enumerate(raw[:MAX_LIST], 1))
-        return read if 0 < len(raw) <= MAX_LIST else self._too_many(path, MAX_LIST)
-
-    def _too_many(self, path: str, most: int) -> Any:
-        self.findings.note(path, "", f"allowed: 1 to {most} items")
-        return UNREAD
+        return read if 0 < len(raw) <= MAX_LIST else self.unread(path, f"allowed: 1 to {MAX_LIST} items")
 
     def rows(self, field: Field, raw: Any, path: str) -> Any:
         """A list of rows of numbers."""
@@ -291,10 +293,13 @@ class Reader:
         which = ampere_unit(field.path, unit, self.constants)
         if which == unit or value == 0.0 or isinf(value) or not isinstance(text, str) or _DIRECT.search(text):
             return value
-        own = "rms" if self.constants == "rms-line" else "peak"
+        own = which.replace("dc", "rms" if self.constants == "rms-line" else "peak")
+        volts, phase = "", ""
+        if unit.startswith("V/A"):
+            volts, phase = ", volts line-line", f"; of a dq controller, of a phase: {PHASE}"
         raise InputError(
             "which amperes of the AC motor is not said; "
-            f"allowed: {which.replace('dc', own)} (its data sheet's) or {which} (the model's)"
+            f"allowed: {own} (its data sheet's{volts}) or {which} (the model's){phase}"
         )
 
     def _amperes(self, field: Field, unit: str, convention: str) -> float:
@@ -302,22 +307,22 @@ class Reader:
 
         Constants of the motor become those of its convention, rms or peak; kE against kM tells a wrong one.
         """
+        if convention == "phase":
+            return _per_phase(unit)
         given = "rms-line" if convention in ("rms", "eff") else "peak-phase"
         if self.constants == "dc":
             phase = ", where R and L are per phase" if given == "peak-phase" else ""
-            allowed = f'allowed: with motor.constants = "{given}"{phase}'
             raise InputError(
-                f"{allowed}; where the sheet's R, L, kM and kE are line-line and in these amperes: A"
+                f'allowed: with motor.constants = "{given}"{phase}; '
+                "where the sheet's R, L, kM and kE are line-line and in these amperes: A"
             )
         own = field.section == "motor"
         above, _, below = unit.partition("/")
         sized = _SIZED if own else _AMPERE
         power = len(sized.findall(above)) - len(sized.findall(below))
-        if own:
-            return float((_PEAK[given] / _PEAK[self.constants]) ** power)
-        if not power:
+        if not (own or power):
             raise InputError(f"allowed: a number with a unit like {unit}, as the model has it")
-        return float(_DC_PER[given] ** power)
+        return float((_PEAK[given] / _PEAK[self.constants] if own else _DC_PER[given]) ** power)
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:
         """A limit in the unit in which its quantity is reported."""
@@ -379,15 +384,15 @@ class Reader:
     def items(self, section: Section, raw: Any) -> Any:
         """The parts of repeated tables, each known by its name, id or number."""
         most = MAX_GEARS if section.many == "named" else MAX_LIST
-        if isinstance(raw, dict):
-            self.refuse(section.path, raw, f"allowed: [[{section.path}]] tables")
-            raw = [raw]
         if not isinstance(raw, list):
-            return self.refuse(section.path, raw, f"allowed: [[{section.path}]] tables")
+            unread = self.refuse(section.path, raw, f"allowed: [[{section.path}]] tables")
+            if not isinstance(raw, dict):
+                return unread
+            raw = [raw]
         if len(raw) > most:
-            return self._too_many(section.path, most)
+            return self.unread(section.path, f"allowed: 1 to {most} items")
         paths: list[str] = []
-        for index, table in enumerate(raw):
+        for index, table in enumerate(raw, 1):
             paths.append(self._label(section, table, index, paths))
         return tuple(self.part(section, *item) for item in zip(raw, paths, strict=True))
 
@@ -395,13 +400,13 @@ class Reader:
         """The dotted path of a repeated table; the name of one that is known by it is checked."""
         key = "name" if section.many == "named" else section.label
         name = table.get(key) if isinstance(table, dict) else None
-        path, numbered = f"{section.path}.{name}", f"{section.path}[{index + 1}]"
+        path, numbered = f"{section.path}.{name}", f"{section.path}[{index}]"
         if not key:
-            return f"{section.path}.{index + 1}"
+            return f"{section.path}.{index}"
         if section.label or not isinstance(table, dict):
             return path if isinstance(name, str) else numbered
         if name is None:
-            self.findings.note(f"{numbered}.name", "", 'missing; example: name = "planetary"')
+            self.unread(f"{numbered}.name", 'missing; example: name = "planetary"')
         elif not (isinstance(name, str) and _NAME.match(name)):
             plain = re.sub(r"[^A-Za-z0-9_-]+", "-", f"{name}").strip("-_")[:64] or "first"
             allowed = f'allowed: 1 to 64 letters, digits, - and _, no dot or space, as "{plain}"'
@@ -415,9 +420,9 @@ class Reader:
     def objects(self, raw: Any) -> model.ControllerObjects:
         """The settings that the design was imported from."""
         try:
-            return model.ControllerObjects() if raw is None else objects_from(raw, self.findings.where)
+            return objects_from({} if raw is None else raw, self.findings.where)
         except InputError as error:
-            self.findings.note("objects", "", error.message)
+            self.unread("objects", error.message)
         return model.ControllerObjects()
 
     def _travel(self, screw: Any) -> float | None:
@@ -428,11 +433,10 @@ class Reader:
             self.refuse("screw", screw, 'allowed with design.axis = "linear"')
         lead: Any = screw.get("lead") if isinstance(screw, dict) else None
         lead = lead.get("value") if isinstance(lead, dict) else lead
-        try:
-            value = self.quantity(lead, _FIELD_OF_LEAD)
-            return model.Screw(lead_m=value if _FIELD_OF_LEAD.accepts(value) else 0.01).travel_m_rad
-        except (InputError, TypeError):
-            return model.Screw(lead_m=0.01).travel_m_rad  # told where the lead itself is read
+        with suppress(InputError, TypeError):  # told where the lead itself is read
+            if _FIELD_OF_LEAD.accepts(value := self.quantity(lead, _FIELD_OF_LEAD)):
+                return model.Screw(lead_m=value).travel_m_rad
+        return model.Screw(lead_m=0.01).travel_m_rad
 
 
 def _meant(table: Tree, path: str) -> Any:
@@ -443,28 +447,23 @@ def _meant(table: Tree, path: str) -> Any:
 
 
 def _rows_flat(raw: Any) -> Any:
-    """The table of a law or of its continuous counterpart, C, D and L of one row as lists of numbers."""
-    flat = [key for key in ("C", "D", "L") if isinstance(raw, dict) and _one_row(raw.get(key))]
-    return {**raw, **{key: [each for row in raw[key] for each in row] for key in flat}} if flat else raw
-
-
-def _one_row(value: Any) -> bool:
-    """Whether a list is one row or one column of numbers, written as a matrix."""
-    rows = isinstance(value, list) and value and all(isinstance(row, list) for row in value)
-    return bool(rows) and (len(value) == 1 or all(len(row) == 1 for row in value))
+    """The table of a law or of its continuous counterpart, C, D and L of one row or column as lists."""
+    if not isinstance(raw, dict):
+        return raw
+    lists = {key: raw[key] for key in ("C", "D", "L") if isinstance(raw.get(key), list) and raw[key]}
+    rows = {key: one for key, one in lists.items() if all(isinstance(row, list) for row in one)}
+    thin = {key: one for key, one in rows.items() if len(one) == 1 or all(len(row) == 1 for row in one)}
+    return {**raw, **{key: [each for row in one for each in row] for key, one in thin.items()}}
 
 
 def _fits(field: Field, raw: Any) -> bool:
     """Whether a value that is no number is what its key takes."""
-    if field.kind == "flag":
-        return isinstance(raw, bool)
-    if not isinstance(raw, str):
-        return False
+    if field.kind == "flag" or not isinstance(raw, str):
+        return field.kind == "flag" and isinstance(raw, bool)
     if field.kind == "day":
-        try:
+        with suppress(ValueError):
             return bool(date.fromisoformat(raw))
-        except ValueError:
-            return False
+        return False
     return bool(raw.strip()) if field.kind == "label" else not field.choices or raw in field.choices
 
 
@@ -483,3 +482,10 @@ def _turned(path: str, text: Any, unit: str) -> float | None:
     except InputError:
         return None
     return one / value if value > 0.0 else None
+
+
+def _per_phase(unit: str) -> float:
+    """Of volts over amperes of a phase, the model's: R and L line-line are twice those of a phase."""
+    if not unit.startswith("V/A"):
+        raise InputError(f"allowed: a phase only in {PHASE}, a gain of volts over amperes")
+    return 2.0

@@ -10,7 +10,7 @@ from typing import Any, get_args
 from xml.etree.ElementTree import Element, ParseError, SubElement, indent, register_namespace, tostring
 
 from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH
-from actuator_lti.design.model import ControllerObject, ControllerObjects, ObjectFamily
+from actuator_lti.design.asked import ControllerObject, ControllerObjects, ObjectFamily
 from actuator_lti.design.object_dictionary import OBJECTS
 from actuator_lti.design.objects import checked_objects
 from actuator_lti.errors import InputError

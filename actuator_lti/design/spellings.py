@@ -81,19 +81,21 @@ def _alone(text: str) -> str:
 
 def split_quantity(text: str) -> tuple[float, str]:
     """Number and unit of a written quantity; ``43:1``, ``i = 8`` and ``17 bit`` are numbers without one."""
-    text = _SYMBOL.sub("", text) if len(text) <= LONGEST else text
-    if bits := _BITS.match(text) if len(text) <= LONGEST else None:
+    if len(text) > LONGEST:
+        raise ValueError("a number and a unit are wanted")
+    text = _SYMBOL.sub("", text)
+    if bits := _BITS.match(text):
         return 2.0 ** int(bits[1] or bits[2]), ""
-    if over := _OVER.match(text) if len(text) <= LONGEST else None:
+    if over := _OVER.match(text):
         above, below = float(over[1]), float(over[3])
         if over[2] == ":" and above < below:
             raise ValueError(f'a reduction is written "{over[3]}:{over[1]}"')
         return above / below if below else nan, ""
-    text = _alone(text.replace("−", "-")) if len(text) <= LONGEST else text
-    if len(text) <= LONGEST and (grouped := _GROUPS.match(text)):
+    text = _alone(text.replace("−", "-"))
+    if grouped := _GROUPS.match(text):
         text = "".join(grouped[0].split()) + text[grouped.end() :]
     text = _POWER_OF_TEN.sub(r"e\1", text.translate(_RAISED) if "10" in text else text)
-    match = _NUMBER.match(text) if len(text) <= LONGEST else None
+    match = _NUMBER.match(text)
     if match is None:
         raise ValueError("a number and a unit are wanted")
     if _THOUSANDS.match(text):
@@ -102,9 +104,9 @@ def split_quantity(text: str) -> tuple[float, str]:
         )
     if _COMMA.match(text):
         raise ValueError(f"a decimal comma; use a decimal point: {shown(text.replace(',', '.', 1))}")
-    if _SECOND.search(match.group(2)):
-        raise ValueError(f"{shown(match.group(2))} is not a unit, it has a number in it; write one number")
-    number = float(match.group(1))
+    if _SECOND.search(match[2]):
+        raise ValueError(f"{shown(match[2])} is not a unit, it has a number in it; write one number")
+    number = float(match[1])
     if not isfinite(number):
         raise ValueError("must be finite")
-    return number, match.group(2).strip()
+    return number, match[2].strip()

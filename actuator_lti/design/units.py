@@ -8,7 +8,8 @@ where SI lets the radian go (``V*s/rad`` or ``V*s``) it may be left out.
 from __future__ import annotations
 
 import re
-from collections import Counter, deque
+from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from difflib import get_close_matches
@@ -88,9 +89,8 @@ _PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")
 _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
 
 _AMPERE = re.compile(r"\bA\b")
-_TOKEN = re.compile(
-    r"\s*(?:(?P<name>[A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))|(?P<power>\^-?[1-6])|(?P<sign>[*/()]))"
-)
+_INNER = re.compile(r"\(([^()]*)\)")
+_FACTOR = re.compile(r"\s*([*/]?)\s*([A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))(?:\s*\^(-?[1-6]))?\s*")
 _WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)(?=[* ]c?m\b)")
 # Read as meant only where the unit wanted is no other: V/rad/s, %/degC.
 _MEANT = (
@@ -122,53 +122,22 @@ class UnitValue:
         return tuple(item for item in self.dimension if item[0] != "[angle]")
 
 
-def _tokens(unit: str) -> deque[str]:
-    """Names, powers, signs and parentheses, with a sign between two factors."""
-    text, position = tidy(unit), 0
-    found: deque[str] = deque()
-    while position < len(text):
-        match = _TOKEN.match(text, position)
-        if match is None or len(found) > 40:
-            raise ValueError(f"{shown(unit)} is not a unit")
-        token = match.group().strip()
-        begins = token == "(" or match.lastgroup == "name"
-        if begins and found and (found[-1] not in ("*", "/", "(")):
-            found.append("*")
-        found.append(token)
-        position = match.end()
-    return found
-
-
-def _product(tokens: deque[str], units: Units) -> Exact:
-    """A product up to the end or a closing parenthesis, from left to right; IndexError where it is none."""
-    factor, powers = _factor(tokens, units)
-    while tokens and tokens[0] in ("*", "/"):
-        sign = 1 if tokens.popleft() == "*" else -1
-        more, others = _factor(tokens, units)
-        factor *= more**sign
-        powers = _summed(powers, others, sign)
-    return factor, powers
-
-
-def _factor(tokens: deque[str], units: Units) -> Exact:
-    """A name or a product in parentheses, with its power."""
-    token = tokens.popleft()
-    if token == "(":
-        factor, powers = _product(tokens, units)
-        if tokens.popleft() != ")":
-            raise IndexError
-    elif token[0] in ")*/^":
+def _product(text: str, units: Units) -> Exact:
+    """Names with powers from left to right, what stands in parentheses first; IndexError where it is none."""
+    while inner := _INNER.search(text):
+        name = "_" * len(text)
+        units = {**units, name: _product(inner[1], units)}
+        text = f"{text[: inner.start()]} {name} {text[inner.end() :]}"
+    factors = _FACTOR.findall(text)
+    if _FACTOR.sub("", text) or factors[0][0]:
         raise IndexError
-    else:
-        factor, powers = _named(token, units)
-    if tokens and tokens[0][0] == "^":
-        power = int(tokens.popleft()[1:])
-        factor, powers = factor**power, Counter({name: power * n for name, n in powers.items()})
-    return factor, powers
-
-
-def _summed(powers: Counter[str], others: Counter[str], sign: int) -> Counter[str]:
-    return Counter({name: powers[name] + sign * others[name] for name in {**powers, **others}})
+    size, powers = Fraction(1), Counter[str]()
+    for sign, name, power in factors:
+        one, dimension = _named(name, units)
+        n = int(power or 1) * (-1 if sign == "/" else 1)
+        size *= one**n
+        powers.update({of: n * each for of, each in dimension.items()})
+    return size, powers
 
 
 @lru_cache(maxsize=1)
@@ -178,7 +147,7 @@ def _units() -> Units:
     for names, dimension in _BASE.items():
         units |= dict.fromkeys(names.split(), (Fraction(1), Counter({dimension: 1})))
     for names, (number, definition) in _DERIVED.items():
-        factor, powers = _product(_tokens(definition), units)
+        factor, powers = _product(definition, units)
         units |= dict.fromkeys(names.split(), (Fraction(number) * factor, powers))
     minute = units["min"][1] + Counter({_MINUTE: 1})
     return (
@@ -216,18 +185,14 @@ def parse_unit(unit: str) -> UnitValue:
         raise ValueError("a unit of more than 120 characters")
     if unit.strip() in ("", "1"):
         return UnitValue(1.0, ())
-    tokens = _tokens(unit)
     try:
-        factor, powers = _product(tokens, _units())
+        factor, powers = _product(tidy(unit), _units())
     except IndexError:
         raise ValueError(f"{shown(unit)} is not a unit") from None
-    if tokens:
-        raise ValueError(f"{shown(unit)} is not a unit")
     dimension = tuple(sorted((name, n) for name, n in powers.items() if n and name != _MINUTE))
-    try:
+    size = 0.0
+    with suppress(OverflowError):
         size = float(factor)
-    except OverflowError:
-        size = 0.0
     if size == 0.0:
         raise ValueError(f"{shown(unit)} is beyond the range of floats")
     return UnitValue(size, dimension, powers[_MINUTE])
@@ -237,14 +202,11 @@ def _unknown(name: str, units: Units) -> str:
     if name.lower() in _ASIDE:
         return f'"{name}" {_ASIDE[name.lower()]}'
     names = [known for known in units if known[0] != "1"]
-    cased = [one for known in names for prefix in ("", *_PREFIXES) if _same(one := prefix + known, name)]
+    prefixed = (prefix + known for known in names for prefix in ("", *_PREFIXES))
+    cased = [one for one in prefixed if one.lower() == name.lower()]
     cased.sort(key=lambda one: sum(map(ne, one, name)))  # of "mS" ms before Ms
     near = cased or get_close_matches(name, names, 1, 0.5)
     return f'unknown unit "{name}"' + (f' (nearest known: "{near[0]}")' if near else "")
-
-
-def _same(known: str, name: str) -> bool:
-    return known.lower() == name.lower()
 
 
 def scaled(number: float, factor: float) -> float:
@@ -285,42 +247,42 @@ def _kind_of(written: str, value: UnitValue) -> str:
     return f"{shown(written)} is the unit of a{'n' if kind[0] in 'aeiou' else ''} {kind}"
 
 
+_FREQUENCY = "speed or angular frequency"
+_GAIN_OF_TORQUE = (
+    "such a gain over kM, and over the ratio squared where it is of the output, is one in amperes"
+)
+_BANDWIDTH = "a bandwidth of {size:.6g} rad/s becomes a gain times "
+_ADVICE = {
+    (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
+    (_FREQUENCY, "s"): "a period of {period:.6g} s",
+    (_FREQUENCY, "A*s/rad"): f"{_BANDWIDTH}J/kM, J of all that turns, seen at the motor",
+    (_FREQUENCY, "V*s/rad"): f"{_BANDWIDTH}J R/kM, J of all that turns, seen at the motor",
+    (_FREQUENCY, "V/A"): f"{_BANDWIDTH}L",
+    ("stiffness", "A/rad"): _GAIN_OF_TORQUE,
+    ("viscous friction", "A*s/rad"): _GAIN_OF_TORQUE,
+    ("mass", "N"): "a weight is written kgf",
+    ("moment of inertia", "kg"): "a screw of lead p carries J as the mass J (2 pi/p)^2",
+    ("mass", "kg*m^2"): "a mass m on a screw of lead p is the inertia m (p/2 pi)^2",
+    ("torque", "N"): "a screw of lead p turns a torque T into the force 2 pi T/p",
+}
+"""Where engineers mix two up: what is written, the unit wanted, and how to get there."""
+
+
+@lru_cache(maxsize=1)
+def _advices() -> dict[tuple[str, Dimension], str]:
+    return {(kind, parse_unit(unit).dimension): said for (kind, unit), said in _ADVICE.items()}
+
+
 def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
-    """How to get from what is written to what is wanted, where engineers mix the two up."""
-    pair = (_kinds().get(value.dimension, ""), _kinds().get(wanted.dimension, ""))
-    if pair == ("speed or angular frequency", "gain or rate"):
-        return f"; a frequency in Hz becomes a gain in 1/s times 2 pi: {number * value.factor:.6g} 1/s"
-    if pair == ("speed or angular frequency", "time"):
-        return f"; a period of {1.0 / (number * value.factor / (2.0 * pi)):.6g} s" if number > 0 else ""
-    if pair in _ADVICE:
-        return f"; {_ADVICE[pair]}"
-    if pair[0] == "speed or angular frequency" and wanted.dimension in _GAINS_OF_BANDWIDTH:
-        of = _GAINS_OF_BANDWIDTH[wanted.dimension]
-        return f"; a bandwidth of {number * value.factor:.6g} rad/s becomes a gain times {of}"
-    if (pair[0], wanted.dimension) in _GAINS_OF_TORQUE:
-        return (
-            "; such a gain over kM, and over the ratio squared where it is of the output, is one in amperes"
-        )
+    """How to get from what is written to what is wanted."""
+    said = _advices().get((_kinds().get(value.dimension, ""), wanted.dimension))
+    if said is not None:
+        size = number * value.factor
+        period = 2.0 * pi / size if size > 0.0 else 0.0
+        return f"; {said.format(size=size, period=period)}" if period or "{period" not in said else ""
     if value.angle == 0 < wanted.angle and value.without_angle() == wanted.without_angle():
         return "; write rev or rad into it, whichever is meant"
     return ""
-
-
-_ADVICE = {
-    ("mass", "force"): "a weight is written kgf",
-    ("moment of inertia", "mass"): "a screw of lead p carries J as the mass J (2 pi/p)^2",
-    ("mass", "moment of inertia"): "a mass m on a screw of lead p is the inertia m (p/2 pi)^2",
-    ("torque", "force"): "a screw of lead p turns a torque T into the force 2 pi T/p",
-}
-_GAINS_OF_TORQUE = {
-    ("stiffness", parse_unit("A/rad").dimension),
-    ("viscous friction", parse_unit("A*s/rad").dimension),
-}
-_GAINS_OF_BANDWIDTH = {
-    parse_unit("A*s/rad").dimension: "J/kM, J of all that turns, seen at the motor",
-    parse_unit("V*s/rad").dimension: "J R/kM, J of all that turns, seen at the motor",
-    parse_unit("V/A").dimension: "L",
-}
 
 
 def compatible(value: UnitValue, wanted: UnitValue) -> bool:

@@ -13,11 +13,12 @@ from math import inf, isfinite
 from typing import Any, cast
 
 from actuator_lti.design.access import located
+from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, default_deflection
 from actuator_lti.design.data_sheet import as_stated
 from actuator_lti.design.fields import Structure, field_of, fields_in
 from actuator_lti.design.loader import as_design, design_from_tree
 from actuator_lti.design.mistakes import Findings
-from actuator_lti.design.model import ControllerObjects, Design, Parameter, Tolerance, default_deflection
+from actuator_lti.design.model import Design
 from actuator_lti.design.reader import Reader
 from actuator_lti.design.sections import RECORDS, SECTIONS, parts_of
 from actuator_lti.design.settings_file import object_entry
@@ -149,8 +150,7 @@ def with_filter(design: Design, stage: str, keys: Mapping[str, Any]) -> Design:
     path = "control.velocity.filter"
     there = design_tree(design)["control"]["velocity"].get("filter", [])
     units = with_units(design, {f"{path}.1.{key}": value for key, value in keys.items()})
-    new = {at.rpartition(".")[2]: value for at, value in units.items()}
-    return with_overrides(design, {path: [*there, new]})
+    return with_overrides(design, {path: [*there, {at.rpartition(".")[2]: one for at, one in units.items()}]})
 
 
 def overridden_text(design: Design, path: str, value: Any) -> str:
@@ -212,11 +212,9 @@ def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
     if not isinstance(here, dict):
         raise InputError(f"{path}: unknown key; allowed: a key of the design file")
     old = here.get(parts[-1])
-    if isinstance(old, dict) and not isinstance(value, Mapping):
+    if isinstance(old, dict) and "value" in old and not isinstance(value, Mapping):
         kept = {"tolerance": old["tolerance"]} if "tolerance" in old and not _width_gone(old, value) else {}
-        value = (
-            {"value": value, "source": f"changed from {old['value']}", **kept} if "value" in old else value
-        )
+        value = {"value": value, "source": f"changed from {old['value']}", **kept}
     here[parts[-1]] = value
 
 

@@ -7,7 +7,6 @@ by block stands in model.md sections 2 and 7; here is what it is as a linear sys
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -125,44 +124,20 @@ def speed_estimate(encoder: Encoder, period_s: Any) -> Block | None:
     return None
 
 
-def _lowpass(item: Filter) -> tuple[Polynomial, Polynomial]:
-    w0 = item.frequency_rad_s
-    assert w0 is not None
-    if item.order == 1:
-        return (w0,), (1.0, w0)
-    return (w0**2,), (1.0, 2 * item.damping * w0, w0**2)
-
-
-def _notch(item: Filter) -> tuple[Polynomial, Polynomial]:
-    w0, width = item.frequency_rad_s, item.width_rad_s
-    assert w0 is not None
-    assert width is not None
-    return (1.0, item.depth * width, w0**2), (1.0, width, w0**2)
-
-
-def _skewed_notch(item: Filter) -> tuple[Polynomial, Polynomial]:
-    zero, pole, width = item.zero_rad_s, item.pole_rad_s, item.width_rad_s
-    assert zero is not None
-    assert pole is not None
-    assert width is not None
-    gain = (pole / zero) ** 2
+def analog(item: Filter) -> tuple[Polynomial, Polynomial]:
+    """Numerator and denominator in s, highest power first, of a filter that is given in s."""
+    w0: Any = item.frequency_rad_s
+    zero: Any = item.zero_rad_s
+    pole: Any = item.pole_rad_s
+    width: Any = item.width_rad_s
+    if item.kind == "lowpass":
+        return ((w0,), (1.0, w0)) if item.order == 1 else ((w0**2,), (1.0, 2 * item.damping * w0, w0**2))
+    if item.kind == "notch":
+        return (1.0, item.depth * width, w0**2), (1.0, width, w0**2)
+    if item.kind == "leadlag":
+        return (pole / zero, pole), (1.0, pole)
+    gain = (pole / zero) ** 2  # of a skewed notch
     return (gain, gain * item.depth * width, pole**2), (1.0, width, pole**2)
-
-
-def _leadlag(item: Filter) -> tuple[Polynomial, Polynomial]:
-    zero, pole = item.zero_rad_s, item.pole_rad_s
-    assert zero is not None
-    assert pole is not None
-    return (pole / zero, pole), (1.0, pole)
-
-
-ANALOG: dict[str, Callable[[Filter], tuple[Polynomial, Polynomial]]] = {
-    "lowpass": _lowpass,
-    "notch": _notch,
-    "skewed-notch": _skewed_notch,
-    "leadlag": _leadlag,
-}
-"""Numerator and denominator in s, highest power first, of every filter that is given in s."""
 
 
 def centre_rad_s(item: Filter) -> Any:
@@ -186,7 +161,7 @@ def biquad(item: Filter, period_s: Any) -> Block:
     """
     if item.kind == "biquad":
         return _given(item, period_s)
-    num, den = ANALOG[item.kind](item)
+    num, den = analog(item)
     order = len(den) - 1
     w0 = centre_rad_s(item)
     if np.any(np.asarray(w0) * period_s >= np.pi):

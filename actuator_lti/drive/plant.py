@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.drive.angle import moment_slope, torque_slope
-from actuator_lti.drive.operating import CONTACT, Operating, slope_at
+from actuator_lti.drive.operating import CONTACT, Operating, moment_slope, slope_at, torque_slope
 from actuator_lti.errors import InputError
 
 if TYPE_CHECKING:

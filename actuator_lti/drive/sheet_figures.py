@@ -30,32 +30,25 @@ def sheet_figures(design: Design) -> tuple[SheetFigure, ...]:
     electrical time constant L/R: 0.1091 ms
     mechanical time constant of the rotor alone R J/kM^2: 1.454 ms
     """
-    return (*_motor(design), *_inertia(design))
-
-
-def _motor(design: Design) -> tuple[SheetFigure, ...]:
-    """Of the motor by itself, without friction; nothing of an ideal source."""
-    motor, U, linear = design.effective_motor, design.limits.voltage_V, design.axis == "linear"
+    linear, ratio = design.axis == "linear", design.total_ratio
+    unit = "kg" if linear else "kg*m^2"
+    inertia = (
+        SheetFigure(
+            "load inertia at the motor, over the ratio squared", design.load.inertia_kgm2 / ratio**2, unit
+        ),
+        SheetFigure("all inertia at the motor", design.inertia_kgm2, unit),
+    )
+    motor, U = design.effective_motor, design.limits.voltage_V
     R, L, J = motor.resistance_ohm, motor.inductance_H, motor.rotor_inertia_kgm2
     kM, kE = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
-    if R is None or L is None or kM is None or kE is None:
-        return ()
-    amperes = "A" if design.motor.constants == "dc" else "A dc"
+    if R is None or L is None or kM is None or kE is None:  # an ideal source
+        return inertia
     speed, rpm = U / kE, U / kE * 30.0 / pi
     return (
         SheetFigure("electrical time constant L/R", 1e3 * L / R, "ms"),
         SheetFigure("mechanical time constant of the rotor alone R J/kM^2", 1e3 * R * J / kM**2, "ms"),
         SheetFigure("no-load speed without friction U/kE", *((speed, "m/s") if linear else (rpm, "rpm"))),
-        SheetFigure("stall current U/R", U / R, amperes),
+        SheetFigure("stall current U/R", U / R, "A" if design.motor.constants == "dc" else "A dc"),
         SheetFigure(f"stall {'force' if linear else 'torque'} kM U/R", kM * U / R, "N" if linear else "N*m"),
-    )
-
-
-def _inertia(design: Design) -> tuple[SheetFigure, ...]:
-    """What the motor has to turn."""
-    unit, ratio = "kg" if design.axis == "linear" else "kg*m^2", design.total_ratio
-    load = design.load.inertia_kgm2 / ratio**2
-    return (
-        SheetFigure("load inertia at the motor, over the ratio squared", load, unit),
-        SheetFigure("all inertia at the motor", design.inertia_kgm2, unit),
+        *inertia,
     )

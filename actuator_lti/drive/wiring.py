@@ -13,7 +13,6 @@ from actuator_lti.drive.blocks import Block
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.plant import Plant, motor_plant
 from actuator_lti.drive.signals import SIGNALS
-from actuator_lti.drive.steady import standing_gain
 from actuator_lti.errors import InputError
 from actuator_lti.systems.sampling import DelayedHold, delayed_hold
 
@@ -126,11 +125,6 @@ class Drive:
             return None
         T = self.period_s(self.outermost) if self.stages else self.tick_s
         return blocks.biquad(command.lowpass(T, self.design.name), T)
-
-    @property
-    def acceleration_gain(self) -> Any:
-        """J/kM (J over `standing_gain`), what an acceleration of the motor needs of what drives it."""
-        return self.design.inertia_kgm2 / standing_gain(self.design)
 
     def producer(self, signal: str) -> str:
         """The stage that updates a break point (``"output"`` is read by the position stage)."""

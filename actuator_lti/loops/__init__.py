@@ -9,7 +9,6 @@ from actuator_lti.loops.periodic import (
     PeriodicLoop,
     exact_margins,
     periodic_loop,
-    periodic_loop_of,
 )
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
@@ -23,5 +22,4 @@ __all__ = [
     "assemble_loops",
     "exact_margins",
     "periodic_loop",
-    "periodic_loop_of",
 ]

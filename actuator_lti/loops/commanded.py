@@ -17,13 +17,11 @@ from scipy.optimize import brentq
 
 from actuator_lti.bandwidth import Bandwidth, closed_loop_bandwidth
 from actuator_lti.drive.profile import CommandMean
-from actuator_lti.margins.axis_search import gain_bounds
 from actuator_lti.margins.delays.form import delay_form
 from actuator_lti.margins.distances import INVERSE
-from actuator_lti.margins.factored import Response, factored
+from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import given_of
 from actuator_lti.margins.loop import Real, loop_of, rational_loop
-from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step import StepFigures
 from actuator_lti.systems.delay_response import DelayResponse
 
@@ -68,29 +66,28 @@ class _Gain:
     def __init__(self, response: Any, mean: CommandMean, dc: float) -> None:
         if hasattr(response, "delays_s"):
             response = response.to_state_space()
-        loop = loop_of(given_of(response), warp=True)
-        self._response = Response(loop)
-        self.factors = factored(self._response, sorted_poles(loop.A, loop.in_z))
+        self._loop = loop_of(given_of(response), warp=True)
+        self.factors = factored(self._loop)
         self.mean, self.dc = mean, dc
 
     def w(self, omega: float) -> float:
         """The argument of the factors."""
-        period = self._response.loop.period_s
+        period = self._loop.period_s
         return omega if period is None else math.tan(min(0.5 * omega * period, 0.5 * math.pi))
 
     def omega(self, w: Real) -> Real:
         """Angular frequency, rad/s."""
-        period = self._response.loop.period_s
+        period = self._loop.period_s
         return w if period is None else 2.0 * np.arctan(w) / period
 
     def at(self, w: float) -> float:
         """The gain."""
-        own = abs(complex(self._response.at(np.array([w]))[0]))
+        own = abs(complex(self._loop.at(np.array([w]))[0]))
         return own / self.dc * abs(complex(self.mean.response(self.omega(np.array([w])))[0]))
 
     def bounds(self, low_w: Real, high_w: Real) -> tuple[Real, Real]:
         """No less and no more than this inside each interval: the mean falls up to its first zero."""
-        own = np.array(gain_bounds(self.factors, low_w, high_w)) / self.dc
+        own = np.array(self.factors.gain_bounds(low_w, high_w)) / self.dc
         low, high = self.omega(low_w), self.omega(high_w)
         before = high <= self.mean.first_zero_rad_s
         least = np.where(before, np.abs(self.mean.response(high)), 0.0)

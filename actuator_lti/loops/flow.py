@@ -72,15 +72,18 @@ class FlowWalk(Walk):
         for r, name in enumerate(plant.states):  # left to itself
             own = (float(plant.A[r, c]) * Row.of(s) for c, s in enumerate(plant.states))
             self.rate[name] = total(own)
-        self.drive_plant(self.controllers())
+        u = self.controllers()
+        self.signals.setdefault("u", u)
+        torque, moment = self.acting()
+        for r, name in enumerate(plant.states):
+            acting = ((plant.B_u, u), (plant.B_T, torque), (plant.B_M, moment))
+            self.rate[name] += total(float(B[r]) * row for B, row in acting)
 
     def state(self, name: str) -> Row:
-        """A state."""
         self.rate.setdefault(name, Row())
         return Row.of(name)
 
     def updates(self, every: int) -> bool:
-        """Always."""
         return True
 
     def late(self, name: str, value: Row, delay_s: float) -> Row:
@@ -107,11 +110,9 @@ class FlowWalk(Walk):
         return law.continuous.matrices(len(law.inputs))
 
     def moves(self, name: str, value: Row) -> None:
-        """Its derivative."""
         self.rate[name] = value
 
     def apply(self, name: str, block: Block, value: Row) -> Row:
-        """The continuous realisation."""
         names = [f"{name}.{k}" for k in range(len(block.continuous.B))]
         return self.realised(names, block.continuous, value)
 
@@ -133,15 +134,6 @@ class FlowWalk(Walk):
         """From the speed itself, as late as the estimate."""
         age = block.age_s if "measurement" in self.delays else 0.0
         return self.late("speed", self.apply("estimate", block, speed), age)
-
-    def drive_plant(self, u: Row) -> None:
-        """What acts on the plant."""
-        plant = self.drive.plant
-        self.signals.setdefault("u", u)
-        torque, moment = self.acting()
-        for r, name in enumerate(plant.states):
-            acting = ((plant.B_u, u), (plant.B_T, torque), (plant.B_M, moment))
-            self.rate[name] += total(float(B[r]) * row for B, row in acting)
 
     def finish(self) -> Flow:
         """Matrices over all states that there are."""

@@ -73,20 +73,15 @@ class LimiterPath:
         double frequency, so that its highest value is (I^2/2) (1 + 1/sqrt(1 + (2 w tau)^2)); a constant adds
         its square and, by the product of both, a ripple of the single frequency, bounded by its amplitude.
         """
-        magnitude = np.abs(self.response(omega_rad_s))
+        magnitude, bias = np.abs(self.response(omega_rad_s)), abs(bias)
+        headroom: Any = max(self.limit - bias, 0.0)
+        if self.averaged_s is not None:  # bias^2 + 2 bias I r1 + (I^2/2) (1 + r2) = limit^2
+            omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=float))
+            r1, r2 = (1 / np.hypot(1.0, k * omega * self.averaged_s) for k in (1, 2))
+            a, b, c = (1 + r2) / 2, 2 * bias * r1, bias**2 - self.limit**2
+            headroom = np.where(c < 0, (-b + np.sqrt(np.maximum(b * b - 4 * a * c, 0.0))) / (2 * a), 0.0)
         with np.errstate(divide="ignore"):
-            if self.averaged_s is None:
-                return max(self.limit - abs(bias), 0.0) / magnitude
-            return (
-                self._mean_square_room(np.atleast_1d(np.asarray(omega_rad_s, float)), abs(bias)) / magnitude
-            )
-
-    def _mean_square_room(self, omega: np.ndarray, bias: float) -> np.ndarray:
-        """Largest amplitude I with bias^2 + 2 bias I r1 + (I^2/2) (1 + r2) at most limit^2."""
-        assert self.averaged_s is not None
-        r1, r2 = (1 / np.hypot(1.0, k * omega * self.averaged_s) for k in (1, 2))
-        a, b, c = (1 + r2) / 2, 2 * bias * r1, bias**2 - self.limit**2
-        return np.where(c < 0, (-b + np.sqrt(np.maximum(b * b - 4 * a * c, 0.0))) / (2 * a), 0.0)
+            return np.asarray(headroom / magnitude)
 
 
 @dataclass(frozen=True)
@@ -142,8 +137,7 @@ class Place:
 
 def limiter_places(wired: Drive) -> list[Place]:
     """Every limiter that the wiring has, in the order of the registry."""
-    found = (_place(wired, limiter) for limiter in LIMITERS.values())
-    return [place for place in found if place is not None]
+    return [place for limiter in LIMITERS.values() if (place := _place(wired, limiter)) is not None]
 
 
 def _place(wired: Drive, limiter: Limiter) -> Place | None:
@@ -192,14 +186,8 @@ def limiter_paths(
         response = evaluate(place.signals, place.every, place.limiter.kind == "rate")
         return lambda omega: geared * response(omega)
 
-    return {
-        place.limiter.name: LimiterPath(
-            place.limiter.name,
-            place.limit,
-            place.unit,
-            nyquist_rad_s,
-            from_output(place),
-            time if place.limiter.kind == "rms" else None,
-        )
-        for place in limiter_places(wired)
-    }
+    def path(place: Place) -> LimiterPath:
+        averaged_s, name = time if place.limiter.kind == "rms" else None, place.limiter.name
+        return LimiterPath(name, place.limit, place.unit, nyquist_rad_s, from_output(place), averaged_s)
+
+    return {place.limiter.name: path(place) for place in limiter_places(wired)}

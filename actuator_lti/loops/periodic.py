@@ -167,19 +167,15 @@ class PeriodicLoop:
         return total.reshape(z.shape)
 
 
-def periodic_loop(loops: Loops, point: str) -> PeriodicLoop:
-    """The loop at a break point of sampled loops, what no gain moves left out."""
-    return periodic_loop_of(_wired(loops), point)
-
-
 def _wired(loops: Loops) -> Drive:
     """The drive that sampled loops are of."""
     ticks = loops.tick_system
     return wire(loops.design, loops.operating) if ticks is None else ticks.program.drive
 
 
-def periodic_loop_of(wired: Drive, point: str) -> PeriodicLoop:
-    """The same of a wired drive."""
+def periodic_loop(loops: Loops | Drive, point: str) -> PeriodicLoop:
+    """The loop at a break point of sampled loops, or of a wired drive, what no gain moves left out."""
+    wired = loops if isinstance(loops, Drive) else _wired(loops)
     return _moved(_parts(point_blocks(wired, point))[0], wired.interval[wired.producer(point)] * wired.tick_s)
 
 

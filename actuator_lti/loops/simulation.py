@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.drive.wiring import COMMANDS
 from actuator_lti.errors import InputError
-from actuator_lti.loops.tick import Tick, TickProgram
+from actuator_lti.loops.tick import TickProgram
 
 if TYPE_CHECKING:
     import control
@@ -44,13 +43,9 @@ class TickSystem:
         """Names of the states, see `actuator_lti.loops.tick`."""
         return self.program.states
 
-    @cached_property
-    def _phases(self) -> list[Tick]:
-        return [self.program.tick(k) for k in range(self.ticks)]
-
     def matrices(self, phase: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """A, B, C, D of tick ``phase`` (inputs: ref, T, M)."""
-        tick, n = self._phases[phase % self.ticks], len(self.states)
+        tick, n = self.program.tick(phase), len(self.states)
         rows = np.array([tick.signals[name] for name in self.outputs])
         return tick.A, tick.B[:, :3], rows[:, :n], rows[:, n : n + 3]
 
@@ -106,14 +101,9 @@ class TickSystem:
             D.append(C_j @ B + D_j)
             A, B = A_j @ A, A_j @ B + B_j
             labels += [f"{name}[{j}]" if self.ticks > 1 else name for name in self.outputs]
-        period = self.ticks * self.program.drive.tick_s
         return control.ss(
-            A,
-            B,
-            np.vstack(C),
-            np.vstack(D),
-            period,
+            A, B, np.vstack(C), np.vstack(D), self.ticks * self.program.drive.tick_s,
             inputs=[COMMANDS[self.program.outer], "torque", "moment"],
             outputs=labels,
             states=[name.replace(".", "_") for name in self.states],
-        )
+        )  # fmt: skip

@@ -87,11 +87,9 @@ class TickWalk(Walk):
         return Row.of(name)
 
     def updates(self, every: int) -> bool:
-        """Whether k is a multiple."""
         return self.k % every == 0
 
     def held(self, name: str, value: Row | None, made: int, used: int) -> Row:
-        """Held from one update to the next."""
         if made == 1:
             assert value is not None
             return value
@@ -102,15 +100,12 @@ class TickWalk(Walk):
         return value
 
     def own_matrices(self, law: Law) -> Matrices:
-        """Those that run."""
         return law.sampled
 
     def moves(self, name: str, value: Row) -> None:
-        """At the next update."""
         self.next[name] = value
 
     def apply(self, name: str, block: own.Block, value: Row) -> Row:
-        """The sampled realisation."""
         return self.realised([f"{name}.{state}" for state in block.states], block.sampled, value)
 
     def derivative(self, name: str, value: Row, period_s: Any) -> Row:

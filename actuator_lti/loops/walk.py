@@ -20,6 +20,7 @@ from typing import Any
 from actuator_lti.design.law import Law, Matrices
 from actuator_lti.drive import blocks
 from actuator_lti.drive.blocks import Block, Realisation
+from actuator_lti.drive.steady import standing_gain
 from actuator_lti.drive.wiring import ERRORS, Drive, present
 from actuator_lti.loops.rows import Row, total
 
@@ -135,8 +136,10 @@ class Walk(ABC):
 
     def controllers(self) -> Row:
         """The cascade, outermost stage first; what it gives to the plant."""
-        self.plant_signals()
-        stages = self.program.stages
+        plant, stages = self.drive.plant, self.program.stages
+        self.signals |= {name: self.state(name) for name in plant.states}
+        for name, terms in plant.rows.items():
+            self.signals[name] = total(value * self.state(state) for state, value in terms.items())
         if not stages:
             value = self.command() if self.updates(1) else None
             return self.held("u", value, 1, 1)
@@ -152,13 +155,6 @@ class Walk(ABC):
             self.signals.setdefault(target, reference)
         assert reference is not None
         return reference
-
-    def plant_signals(self) -> None:
-        """Name the plant's states and what is a combination of them."""
-        plant = self.drive.plant
-        self.signals |= {name: self.state(name) for name in plant.states}
-        for name, terms in plant.rows.items():
-            self.signals[name] = total(value * self.state(state) for state, value in terms.items())
 
     def acting(self) -> tuple[Row, Row]:
         """Torque at the motor and moment on the output shaft: from outside, and the drive's own."""
@@ -203,8 +199,8 @@ class Walk(ABC):
             rate = self.derivative("ref", command, T)
             value = value + law.feedforward * rate
         if present(law.acceleration_feedforward):
-            gain = law.acceleration_feedforward * self.drive.acceleration_gain
-            made = gain * self.derivative("rate", rate, T)
+            needed = self.design.inertia_kgm2 / standing_gain(self.design)  # J/kM
+            made = law.acceleration_feedforward * needed * self.derivative("rate", rate, T)
             if "velocity" not in self.program.stages:
                 value = value + made
             else:

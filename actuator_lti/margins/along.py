@@ -2,76 +2,68 @@
 
 from __future__ import annotations
 
+import cmath
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
 from actuator_lti.axis._search import FAR_LOG
-from actuator_lti.margins.assemble import Figures, assembled, far_note, out_of_sight, within
-from actuator_lti.margins.axis_parts import (
-    Part,
-    axis_ends,
-    axis_parts,
-    distances_over,
-    half_turns_about,
-    merged,
-)
-from actuator_lti.margins.axis_search import Factored
-from actuator_lti.margins.distances import DISK, MODULUS
-from actuator_lti.margins.factored import Response
-from actuator_lti.margins.loop import Complex, Mask, Real
+from actuator_lti.margins.assemble import Crossing, Figures, assembled
+from actuator_lti.margins.axis_parts import axis_parts
+from actuator_lti.margins.axis_search import Factored, Place
+from actuator_lti.margins.distances import DISK, MODULUS, Distance
+from actuator_lti.margins.factored import SAME, polished
+from actuator_lti.margins.loop import Complex, RationalLoop, Real
 from actuator_lti.margins.results import StabilityMargins
-from actuator_lti.margins.single import Agreement, GainMargin, PhaseMargin
+from actuator_lti.margins.single import Agreement
+from actuator_lti.margins.trust import Doubtful
 
+_ROUNDED = 1e-12
 _METHOD = "factors of the loop, bounded over whole intervals of frequency; crossings polished by Newton"
 
 
-@dataclass(frozen=True)
 class Along:
-    """Crossings of the unit circle and of the negative real axis, and what their listing needs."""
+    """A loop searched along its factors: ``ends``, L at both of them, infinity where it has a pole.
 
-    factors: Factored
-    response: Response
-    band: tuple[float, float] | None
-    parts: list[Part]
-    ends: tuple[complex, complex]
-    listed_to: float
-    floor: float  # gain below which, behind a delay, no crossing of the real axis is listed
-    gain_x: Real
-    gain_L: Complex
-    real_x: Real
-    real_L: Complex
-    half_turns: int  # of 1 + L about the origin
-    far: int  # crossings that are not listed
+    After `polish` also ``gain_w``, ``gain_L``, ``real_w``, ``real_L``: crossings of the unit circle and of
+    the negative real axis between the ends, and ``half_turns`` of 1 + L about the origin.
+    """
 
-    @classmethod
-    def of(cls, factors: Factored, response: Response, band: tuple[float, float] | None) -> Along:
-        """Search the axis, and polish what is found by the loop itself."""
-        parts, listed_to, floor = axis_parts(factors, band)
-        ends = axis_ends(factors, response)
-        gain_w, real_w, rising, far = merged(parts)
-        gains, reals = response.polished(gain_w, gain=True), _polished(factors, response, real_w)
-        turned = half_turns_about(factors, response, parts, ends, reals[1], rising)
-        far += int(np.count_nonzero(np.abs(np.log(np.abs(reals[1]))) > FAR_LOG))
-        far += sum(-math.inf < value.real < 0.0 and out_of_sight(value) for value in ends)
-        return cls(factors, response, band, parts, ends, listed_to, floor, *gains, *reals, turned, far)
+    def __init__(self, factors: Factored, loop: RationalLoop, band: tuple[float, float] | None) -> None:
+        self.factors, self.loop, self._band = factors, loop, band
+        self._parts, self._listed_to, self._floor = axis_parts(factors, band)
+        order = factors.at_zero
+        first = complex(math.inf if order < 0.0 else 0.0) if order else complex(loop.at(np.zeros(1))[0].real)
+        self.ends = first, loop.at_end()
 
-    @property
-    def listed(self) -> Mask:
-        """Which crossings of the real axis are told as gain margins."""
-        size = np.abs(self.real_L)
-        floored = math.isfinite(self.listed_to) and self.band is None and self.factors.at_infinity
-        return np.asarray((np.abs(np.log(size)) <= FAR_LOG) & (size >= (self.floor if floored else 0.0)))
+    def polish(self) -> Along:
+        """Find the crossings of the loop itself; those beyond 200 dB, which are not listed, as the factors
+        have them.
+        """
+        parts = zip(*(part.in_w for part in self._parts), strict=True)
+        gain_w, self.real_w, self._rising = map(np.concatenate, parts)
+        self.gain_w, self.gain_L = polished(self.loop, gain_w, gain=True)
+        log_gain = self.factors.log_value(self.real_w)[0]
+        self.real_L = -np.exp(log_gain).astype(complex)
+        near = np.abs(log_gain) <= FAR_LOG
+        self.real_w[near], self.real_L[near] = polished(self.loop, self.real_w[near], gain=False)
+        self.half_turns = self._turned()
+        return self
 
     @property
-    def on_real_axis(self) -> tuple[tuple[float, complex], ...]:
-        """The argument of the loop and L at its ends, where L lies on the negative real axis there."""
-        response = self.response
-        turning = response.loop.period_s is None and response.delay
-        last = 0j if turning else response.onto_axis(self.ends[1])
-        both = ((0.0, self.ends[0]), (response.loop.end, last))
-        return tuple((x, L) for x, L in both if L.real < 0.0 and not out_of_sight(L))
+    def gains(self) -> tuple[Crossing, ...]:
+        """The crossings of the unit circle."""
+        return _crossings(self.gain_w, self.gain_L)
+
+    @property
+    def reals(self) -> tuple[Crossing, ...]:
+        """Those of the negative real axis that are listed or too far to be, the ends among them."""
+        listed = (np.abs(self.real_L) >= self._floor) | (np.log(np.abs(self.real_L)) < -FAR_LOG)
+        turning = self.loop.period_s is None and self.loop.delay
+        ends = (0.0, self.ends[0]), (math.inf, 0j if turning else self._onto_axis())
+        first, last = ([Crossing(w, L)] if -math.inf < L.real < 0.0 else [] for w, L in ends)
+        return (*first, *_crossings(self.real_w[listed], self.real_L[listed]), *last)
 
     def margins(
         self,
@@ -80,42 +72,81 @@ class Along:
         delay_s: float,
         notes: tuple[str, ...] = (),
         hidden_border: int = 0,
+        reals: tuple[Crossing, ...] | None = None,
     ) -> StabilityMargins:
-        """The result, within the band."""
-        result = assembled(
-            self.response.loop.period_s,
+        """The result, within the band; ``reals`` in place of its own."""
+        far = sum(part.found.far for part in self._parts)
+        return assembled(
+            self.loop.period_s,
             agreement,
-            Figures(
-                self._gain_margins(),
-                self._phase_margins(),
-                *distances_over(self.factors, self.response, self.parts, self.ends, (MODULUS, DISK)),
-            ),
+            Figures(self.gains, self.reals if reals is None else reals, self.nearest((MODULUS, DISK)), far),
             method=_METHOD,
-            notes=(*notes, *far_note(self.far), *self._tail_note()),
+            notes=(*notes, *self._tail_note()),
             evidence="checked",
             reason=reason,
             delay_s=delay_s,
-            band_rad_s=(0.0, self.listed_to) if math.isfinite(self.listed_to) else None,
+            listed_to=self._listed_to,
+            band_rad_s=self._band,
             hidden_border=hidden_border,
         )
-        return within(result, self.band)
 
-    def _gain_margins(self) -> tuple[GainMargin, ...]:
-        first, last = ([at for at in self.on_real_axis if bool(at[0]) == end] for end in (False, True))
-        crossed = zip(self.real_x[self.listed], self.real_L[self.listed], strict=True)
-        frequency = self.response.loop.frequency
-        return tuple(GainMargin(float(1.0 / abs(L)), frequency(x)) for x, L in (*first, *crossed, *last))
+    def nearest(self, distances: Sequence[Distance]) -> list[Place]:
+        """Smallest values of distances, each with its w."""
+        last = complex(-abs(self.ends[1])) if self.factors.delay else self.ends[1]
+        best = [min((d.at(self.ends[0]), 0.0), (d.at(last), math.inf)) for d in distances]
+        for part in self._parts:
+            found = part.factors.nearest(part.found, distances, best)
+            best = [
+                (new[0], 1.0 / new[1] if part.beyond else new[1]) if new[0] < old[0] else old
+                for new, old in zip(found, best, strict=True)
+            ]
+        inside = [w for _, w in best if 0.0 < w < math.inf]
+        L = dict(zip(inside, self.loop.at(np.array(inside)).tolist(), strict=True)) if inside else {}
+        return [(d.at(L[w]) if w in L else value, w) for d, (value, w) in zip(distances, best, strict=True)]
 
-    def _phase_margins(self) -> tuple[PhaseMargin, ...]:
-        angles = np.degrees(np.angle(-self.gain_L)).tolist()
-        return tuple(
-            PhaseMargin(deg if deg > -180.0 else 180.0, self.response.loop.frequency(x))
-            for deg, x in zip(angles, self.gain_x, strict=True)
-        )
+    def _onto_axis(self) -> complex:
+        """Where L lies on the real axis at the end; 0 where it does not come to it there.
+
+        Behind part of a sample L jumps at the Nyquist frequency to its conjugate, over the real axis at the
+        mean of both. Where L moves away from the axis before that, the crossing that goes with it lies below
+        and is listed.
+        """
+        end = self.ends[1]
+        if not self.loop.delay:
+            return end
+        towards = end.imag * (end * self.loop.rate_at_end()).imag < 0.0
+        return complex(end.real) if towards and abs(end.real) > _ROUNDED * abs(end) else 0j
+
+    def _turned(self) -> int:
+        """Turns of 1 + L about the origin from zero frequency to the end of the axis, in half turns."""
+        around = np.abs(self.real_L) > 1.0
+        cut = int(np.count_nonzero(self._rising & around)) - int(np.count_nonzero(~self._rising & around))
+        cut += sum(part.found.turns for part in self._parts)
+        angle, first = self._from_zero()
+        F = 1.0 + self.ends[1]
+        if self.loop.delay:  # onto the real axis at the end
+            angle, last = angle + _angle_between(F, complex(F.real)), cmath.phase(F)
+        else:
+            last = -_leaving(F.real, self._parts[-1].found.rate)
+        return round((angle + last - first) / math.pi) + 2 * cut
+
+    def _from_zero(self) -> tuple[float, float]:
+        """The turn of 1 + L up to just above zero frequency, and its angle there."""
+        factors, found = self.factors, self._parts[0].found
+        if not factors.at_zero < 0.0:
+            return 0.0, _leaving(1.0 + self.ends[0].real, found.rate)
+        low = float(found.known[0, 0])
+        on_real, on_axis = self.loop.at_real(low), complex(self.loop.at(np.array([low]))[0])
+        gain, phase = factors.log_at(low)
+        if not abs(on_axis * cmath.exp(complex(-gain, -phase)) - 1.0) <= SAME:  # integrators that cancel
+            raise Doubtful("poles and zeros do not make up the loop next to zero frequency")
+        turn, about = _angle_between(1.0 + on_real, 1.0 + on_axis), 0.5 * math.pi * factors.at_zero
+        turn += 2.0 * math.pi * round((about - turn) / (2.0 * math.pi))
+        return turn, cmath.phase(1.0 + on_axis)
 
     def _tail_note(self) -> tuple[str, ...]:
-        top, floor, factors = self.listed_to, self.floor, self.factors
-        if not math.isfinite(top) or self.band is not None:
+        top, factors = self._listed_to, self.factors
+        if not math.isfinite(top) or self._band is not None:
             return ()
         if not factors.at_infinity:
             every = 2.0 * math.pi / factors.delay
@@ -123,14 +154,19 @@ class Along:
                 f"gain margins beyond {top:.4g} rad/s, every {every:.4g} rad/s without end, are not listed: "
                 f"their ratio is {math.exp(-factors.log_gain):.6g}",
             )
-        quiet = -20.0 * math.log10(floor)
+        quiet = -20.0 * math.log10(self._floor)
         return (f"gain margins above {quiet:.4g} dB beyond {top:.4g} rad/s are not listed",)
 
 
-def _polished(factors: Factored, response: Response, w: Real) -> tuple[Real, Complex]:
-    """Crossings of the real axis; those beyond 200 dB, which are not listed, as the factors have them."""
-    log_gain = factors.log_value(w)[0]
-    listed = np.abs(log_gain) <= FAR_LOG
-    x, L = response.x(w), -np.exp(log_gain).astype(complex)
-    x[listed], L[listed] = response.polished(w[listed], gain=False)
-    return x, L
+def _crossings(w: Real, L: Complex) -> tuple[Crossing, ...]:
+    return tuple(Crossing(*each) for each in zip(w.tolist(), L.tolist(), strict=True))
+
+
+def _angle_between(start: complex, stop: complex) -> float:
+    """Angle from one point to another of the same closed half plane."""
+    return cmath.phase(stop * start.conjugate())
+
+
+def _leaving(F: float, rate: float) -> float:
+    """The angle of 1 + L beside an end of the axis, where it is F and its phase turns at a rate."""
+    return 0.0 if F >= 0.0 else -math.pi if rate > 0.0 else math.pi

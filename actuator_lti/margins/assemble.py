@@ -3,23 +3,40 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from actuator_lti.margins.given import unwarped
 from actuator_lti.margins.results import Evidence, StabilityMargins, Verdict
 from actuator_lti.margins.single import Agreement, DelayMargin, DiskMargin, GainMargin, PhaseMargin
 
-FARTHEST = 1e10
+_FARTHEST = 1e10  # 200 dB
+Place = tuple[float, float]  # a smallest distance, and its w
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where L meets the unit circle or the negative real axis: w of the s-plane, L there."""
+
+    w: float
+    L: complex
+    touch: bool = False
+
+    @property
+    def out_of_sight(self) -> bool:
+        """Whether it is not listed as a gain margin: that is beyond 200 dB, up or down."""
+        return not 1.0 / _FARTHEST <= abs(self.L) <= _FARTHEST
 
 
 @dataclass(frozen=True)
 class Figures:
-    """What was found on the axis; (value, rad/s) of modulus margin and disk margin."""
+    """What was found on the axis: crossings of the unit circle and of the negative real axis, distances."""
 
-    gain_margins: tuple[GainMargin, ...]
-    phase_margins: tuple[PhaseMargin, ...]
-    modulus: tuple[float, float]
-    disk: tuple[float, float]
+    gains: tuple[Crossing, ...]
+    reals: tuple[Crossing, ...]
+    nearest: Sequence[Place]  # of modulus margin and disk margin
+    far: int = 0  # crossings of the real axis that are out of sight and were only counted
 
 
 def assembled(
@@ -28,64 +45,49 @@ def assembled(
     figures: Figures | None,
     *,
     method: str,
-    notes: tuple[str, ...],
-    evidence: Evidence,
     reason: str,
+    notes: tuple[str, ...] = (),
+    evidence: Evidence = "withheld",
     delay_s: float = 0.0,
+    listed_to: float = math.inf,
     band_rad_s: tuple[float, float] | None = None,
     hidden_border: int = 0,
 ) -> StabilityMargins:
-    """Put a result together; without figures they are withheld."""
-    if band_rad_s is None:
-        band_rad_s = (0.0, math.inf if period_s is None else math.pi / period_s)
+    """Put a result together, its margins within the band; without figures they are withheld."""
     verdict = _verdict(agreement)
+    end = math.inf if period_s is None else math.pi / period_s
+    band = (0.0, min(listed_to, end)) if band_rad_s is None else band_rad_s
     if figures is None or verdict == "undecided":
         return StabilityMargins(
-            None, "undecided", (), (), (), None, None, None, period_s, delay_s, band_rad_s, method, agreement,
+            None, "undecided", (), (), (), None, None, None, period_s, delay_s, band, method, agreement,
             notes, "withheld", reason,
         )  # fmt: skip
-    return StabilityMargins(
-        verdict == "stable", verdict, figures.gain_margins, figures.phase_margins,
-        delay_margins(figures.phase_margins, period_s), *figures.modulus, DiskMargin(*figures.disk), period_s,
-        delay_s, band_rad_s, method, agreement, notes, evidence, reason, hidden_border_modes=hidden_border,
+    seen = [c for c in figures.reals if not c.out_of_sight]
+    far = figures.far + len(figures.reals) - len(seen)
+    phase_margins = tuple(_phase_margin(c, period_s) for c in figures.gains)
+    (modulus, at), (disk, disk_at) = figures.nearest
+    result = StabilityMargins(
+        verdict == "stable", verdict,
+        tuple(GainMargin(float(1.0 / abs(c.L)), unwarped(c.w, period_s), c.touch) for c in seen),
+        phase_margins, delay_margins(phase_margins, period_s),
+        modulus, unwarped(at, period_s), DiskMargin(disk, unwarped(disk_at, period_s)),
+        period_s, delay_s, band, method, agreement, (*notes, *_far_note(far)), evidence, reason,
+        hidden_border_modes=hidden_border,
     )  # fmt: skip
+    return result if band_rad_s is None else _within(result, *band_rad_s)
 
 
-def out_of_sight(L: complex) -> bool:
-    """Whether a crossing of the negative real axis is not listed: its margin is beyond 200 dB, up or down."""
-    return not 1.0 / FARTHEST <= abs(L) <= FARTHEST
+def _phase_margin(c: Crossing, period_s: float | None) -> PhaseMargin:
+    deg = math.degrees(math.atan2(-c.L.imag, -c.L.real))
+    return PhaseMargin((deg if deg > -180.0 else 180.0) + 0.0, unwarped(c.w, period_s), c.touch)
 
 
-def far_note(far: int) -> tuple[str, ...]:
+def _far_note(far: int) -> tuple[str, ...]:
     """What is said of crossings that are not listed."""
     if not far:
         return ()
     crossings = "1 crossing" if far == 1 else f"{far} crossings"
     return (f"not listed, as their margin is beyond 200 dB: {crossings} of the negative real axis",)
-
-
-def hidden_notes(at_zero: int, border: tuple[tuple[float, int], ...] = (), right: int = 0) -> tuple[str, ...]:
-    """What is said of modes that the loop neither drives nor sees: how many at zero frequency, pairs on the
-    boundary (w of the s-plane, how often), unstable ones.
-    """
-    notes = []
-    if at_zero == 1 and not border:
-        notes.append(
-            "one mode at zero frequency that the loop neither drives nor sees is left out "
-            "(it is no instability)"
-        )
-    elif at_zero or border:
-        at = f"{at_zero} at zero frequency" if at_zero else ""
-        pairs = ", ".join(f"{times} pair{'s' * (times > 1)} at {w:.6g}" for w, times in border)
-        notes.append(
-            f"modes on the stability boundary that the loop neither drives nor sees are left out "
-            f"({', '.join(filter(None, (at, pairs)))} of the s-plane): the margins are those of what is "
-            "seen; inside, the loop is not asymptotically stable"
-        )
-    if right:
-        modes = "1 unstable mode" if right == 1 else f"{right} unstable modes"
-        notes.append(f"{modes} that the loop neither drives nor sees")
-    return tuple(notes)
 
 
 def _verdict(agreement: Agreement) -> Verdict:
@@ -109,11 +111,8 @@ def delay_margins(phase_margins: tuple[PhaseMargin, ...], period_s: float | None
     return tuple(out)
 
 
-def within(margins: StabilityMargins, band: tuple[float, float] | None) -> StabilityMargins:
+def _within(margins: StabilityMargins, low: float, high: float) -> StabilityMargins:
     """The same with only the margins of a band listed."""
-    if band is None:
-        return margins
-    low, high = band
 
     def inside(listed: tuple[Any, ...]) -> tuple[Any, ...]:
         return tuple(margin for margin in listed if low <= margin.frequency_rad_s <= high)
@@ -123,5 +122,4 @@ def within(margins: StabilityMargins, band: tuple[float, float] | None) -> Stabi
         gain_margins=inside(margins.gain_margins),
         phase_margins=inside(margins.phase_margins),
         delay_margins=inside(margins.delay_margins),
-        band_rad_s=(low, high),
     )

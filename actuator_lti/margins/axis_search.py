@@ -15,7 +15,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.axis import _nearest, _search
 from actuator_lti.axis._factors import BOUNDS, slot
@@ -27,6 +26,21 @@ from actuator_lti.margins.trust import Doubtful
 _NEXT_TO_AXIS = 1e-14  # relative: a root on the axis itself is held this far from it
 _ROOM, _MORE, _MOST = 1 << 11, 8, 1 << 17  # intervals: asked for first, each time more, and no more than that
 Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Found:
+    """Where a factored loop meets the unit circle and the negative real axis."""
+
+    gain_w: Real  # in order
+    real_w: Real
+    rising: Mask  # whether the phase rises at each of ``real_w``
+    far: int  # crossings of the negative real axis beyond 200 dB, up or down, which are not looked for
+    turns: int  # rising less falling ones among those not listed where the gain is above one
+    rate: float  # of the phase, at the beginning
+    # (intervals + 1, 7): for each interval where it begins, log gain and phase there, and inside their least,
+    # then their most; the last row is the end
+    known: Real
 
 
 @dataclass(frozen=True)
@@ -74,7 +88,7 @@ class Factored:
         return turning
 
     @cached_property
-    def table(self) -> Real:
+    def _table(self) -> Real:
         """What the compiled search knows of each factor, then of the loop, see `actuator_lti.axis`."""
         roots = (self.roots.real, self.roots.imag, self._off_axis, self.weights, self._turning)
         return np.concatenate((*roots, (self.log_gain, self.phase, self.delay, self.slack)))
@@ -95,95 +109,71 @@ class Factored:
     def log_at(self, w: float) -> tuple[float, float]:
         """The same at one frequency."""
         parts = np.empty(slot(self.roots.size))
-        LIBRARY.functions.evaluated(self.roots.size, self.table, w, parts, 0)
+        LIBRARY.functions.evaluated(*self._row, w, parts, 0)
         gain, phase = parts[-5:-3].tolist()
         return gain, phase
+
+    def search(self, low: float, high: float, listed_to: float = math.inf) -> Found:
+        """Find all crossings with low < w < high; of the real axis only those up to ``listed_to``.
+
+        A crossing at w = 0 itself, where low is 0, is not listed. `Doubtful`: its side of a line is not told.
+        """
+        ends = [low, *([listed_to] if low < listed_to < high else []), high]
+        return self._searched(ends, _search.CIRCLE, 0.0, listed_to)
+
+    def passages(self, low: float, high: float, level: float, kind: int = _search.GAIN_LEVEL) -> Real:
+        """Every w between two at which the log gain (0) or the phase (1) passes a level, in order."""
+        return self._searched([low, high], kind, level, math.inf).gain_w
+
+    def _searched(self, ends: list[float], kind: int, level: float, listed_to: float) -> Found:
+        places, room = self.places, _ROOM
+        edges = np.sort(np.concatenate((ends, places[(places > ends[0]) & (places < ends[-1])])))
+        while True:
+            known, gains, reals = np.empty((room + 1, _search.KNOWN)), np.empty(room), np.empty((room, 2))
+            found = np.zeros(_search.FOUND)
+            status = LIBRARY.functions.search(
+                *self._row, kind, level, listed_to, edges.size, edges, room, known.reshape(-1), gains,
+                reals.reshape(-1), found, *self._lent(),
+            )  # fmt: skip
+            if status != _search.FULL or room > _MOST:
+                break
+            room *= _MORE
+        if status != _search.DONE:
+            where = f"{found[_search.WHERE]:.6g}"
+            raise Doubtful(f"the loop comes too near to a line at {where} to tell its side")
+        intervals, crossed, turned, far, turns = found[: _search.RATE].astype(int).tolist()
+        return Found(gains[:crossed], reals[:turned, 0], reals[:turned, 1] > 0.0, far, turns,
+                     float(found[_search.RATE]), known[: intervals + 1])  # fmt: skip
+
+    def nearest(self, found: Found, distances: Sequence[Distance], start: Sequence[Place]) -> list[Place]:
+        """Smallest values of distances, each with its w, beside ``start``: a place for each that stands for
+        what the intervals of ``found`` leave out.
+        """
+        out, known, lent = [], found.known.reshape(-1), self._lent()
+        for d, place in zip(distances, start, strict=True):
+            best = np.array(place)
+            status = LIBRARY.functions.nearest(*self._row, len(found.known) - 1, known, d.form, best, *lent)
+            if status == _nearest.MEETS:
+                raise Doubtful("the loop all but meets -1")
+            if status != _search.DONE:
+                raise Doubtful("the smallest distance to -1 was not settled")
+            out.append((float(best[0]), float(best[1])))
+        return out
+
+    def gain_bounds(self, low: Real, high: Real) -> tuple[Real, Real]:
+        """The least and the greatest gain in each of many intervals, between places."""
+        least, most = np.empty(low.size), np.empty(low.size)
+        LIBRARY.functions.gain_bounds(*self._row, low.size, low, high, least, most, *self._lent())
+        return least, most
+
+    @property
+    def _row(self) -> tuple[int, Real]:
+        return self.roots.size, self._table
+
+    def _lent(self) -> tuple[Real, Real]:
+        return np.empty((_search.DEEPEST + 2) * slot(self.roots.size)), np.empty(BOUNDS)
 
 
 def half_turn(phase: float) -> float:
     """The constant phase where L is real at w = 0: what its factors turn by cancels there."""
     return float(np.pi * round(phase / np.pi))
-
-
-@dataclass(frozen=True)
-class Found:
-    """Where a factored loop meets the unit circle and the negative real axis."""
-
-    gain_w: Real  # in order
-    real_w: Real
-    rising: Mask  # whether the phase rises at each of ``real_w``
-    far: int  # crossings of the negative real axis beyond 200 dB, up or down, which are not looked for
-    turns: int  # rising less falling ones among those not listed where the gain is above one
-    rate: float  # of the phase, at the beginning
-    intervals: int  # into how many the axis was split
-    # (intervals + 1, 7): for each where it begins, log gain and phase there, and inside their least, then
-    # their most; the last row is the end
-    known: Real
-
-
-def search(loop: Factored, low: float, high: float, listed_to: float = math.inf) -> Found:
-    """Find all crossings with low < w < high; of the real axis only those up to ``listed_to``.
-
-    A crossing at w = 0 itself, where low is 0, is not listed. `Doubtful`: its side of a line is not told.
-    """
-    ends = [low, *([listed_to] if low < listed_to < high else []), high]
-    return _searched(loop, ends, _search.CIRCLE, 0.0, listed_to)
-
-
-def passages(loop: Factored, low: float, high: float, level: float, kind: int = _search.GAIN_LEVEL) -> Real:
-    """Every w between two at which the log gain (0) or the phase (1) passes a level, in order."""
-    return _searched(loop, [low, high], kind, level, math.inf).gain_w
-
-
-def _searched(loop: Factored, ends: list[float], kind: int, level: float, listed_to: float) -> Found:
-    places = loop.places
-    edges = np.sort(np.concatenate((ends, places[(places > ends[0]) & (places < ends[-1])])))
-    room = _ROOM
-    while True:
-        known, gains, reals = np.empty((room + 1, _search.KNOWN)), np.empty(room), np.empty((room, 2))
-        found = np.zeros(_search.FOUND)
-        status = LIBRARY.functions.search(
-            *_row(loop), kind, level, listed_to, edges.size, edges, room, known.reshape(-1), gains,
-            reals.reshape(-1), found, *_lent(loop),
-        )  # fmt: skip
-        if status != _search.FULL or room > _MOST:
-            break
-        room *= _MORE
-    if status != _search.DONE:
-        raise Doubtful(f"the loop comes too near to a line at {found[_search.WHERE]:.6g} to tell its side")
-    intervals, crossed, turned, far, turns = found[: _search.RATE].astype(int).tolist()
-    return Found(gains[:crossed], reals[:turned, 0], reals[:turned, 1] > 0.0, far, turns,
-                 float(found[_search.RATE]), intervals, known[: intervals + 1])  # fmt: skip
-
-
-def nearest(
-    loop: Factored, found: Found, distances: tuple[Distance, ...], start: Sequence[Place]
-) -> list[Place]:
-    """Smallest values of distances, each with its w, beside ``start``: a place for each that stands for what
-    the intervals of ``found`` leave out.
-    """
-    out, known, lent = [], found.known.reshape(-1), _lent(loop)
-    for d, place in zip(distances, start, strict=True):
-        best = np.array(place)
-        status = LIBRARY.functions.nearest(*_row(loop), found.intervals, known, d.form, best, *lent)
-        if status == _nearest.MEETS:
-            raise Doubtful("the loop all but meets -1")
-        if status != _search.DONE:
-            raise Doubtful("the smallest distance to -1 was not settled")
-        out.append((float(best[0]), float(best[1])))
-    return out
-
-
-def gain_bounds(loop: Factored, low: Real, high: Real) -> tuple[Real, Real]:
-    """The least and the greatest gain in each of many intervals, between places."""
-    least, most = np.empty(low.size), np.empty(low.size)
-    LIBRARY.functions.gain_bounds(*_row(loop), low.size, low, high, least, most, *_lent(loop))
-    return least, most
-
-
-def _row(loop: Factored) -> tuple[int, Real]:
-    return loop.roots.size, loop.table
-
-
-def _lent(loop: Factored) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    return np.empty((_search.DEEPEST + 2) * slot(loop.roots.size)), np.empty(BOUNDS)

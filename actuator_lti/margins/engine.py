@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.margins.assemble import assembled, within
+from actuator_lti.margins.assemble import assembled
 from actuator_lti.margins.checked import checked_margins
 from actuator_lti.margins.delays.form import DelayForm, delay_form, without_series_delays
 from actuator_lti.margins.given import Given, given_of, whole_samples
@@ -93,23 +93,20 @@ def stability_margins(
             return replace(_behind_delay(*plain, band_rad_s, certify), delay_s=delay_s)
         system = system.to_state_space()
     given = given_of(system)
-    if not delay_s:
-        return within(_rational(given, certify), band_rad_s)
-    samples = None if given.period_s is None else whole_samples(delay_s / given.period_s)
-    if samples is None:
+    samples = 0 if given.period_s is None else whole_samples(delay_s / given.period_s)
+    if samples is None or (delay_s and given.period_s is None):
         return _behind_delay(given, delay_s, band_rad_s, certify)
-    late = _rational(replace(given, samples=samples), certify)
-    return replace(within(late, band_rad_s), delay_s=delay_s)
+    return replace(_rational(replace(given, samples=samples), band_rad_s, certify), delay_s=delay_s)
 
 
-def _rational(given: Given, certify: bool) -> StabilityMargins:
+def _rational(given: Given, band: tuple[float, float] | None, certify: bool) -> StabilityMargins:
     """In double precision, and by exact arithmetic where that is not sure of itself."""
     if not certify:
         with suppress(Doubtful):
-            return checked_margins(loop_of(given, warp=True))
+            return checked_margins(loop_of(given, warp=True), 0.0, band)
     from actuator_lti.margins.exact.certified import certified_margins  # python-flint only where it is needed
 
-    return certified_margins(given)
+    return certified_margins(given, band)
 
 
 def _behind_delay(
@@ -120,8 +117,13 @@ def _behind_delay(
     """
     try:
         margins = checked_margins(loop_of(given, warp=True), delay_s, band)
-    except Doubtful as error:
-        margins = _late(given, delay_s, band, str(error))
+    except Doubtful as doubt:
+        from actuator_lti.margins.exact.product import late_margins  # python-flint only where it is needed
+
+        try:
+            margins = late_margins(given, delay_s, band)
+        except Doubtful as error:
+            margins = _withheld(given.period_s, delay_s, "factors of the loop", f"{doubt}; {error}")
     if given.period_s is not None or not (certify or margins.withheld):
         return margins
     from actuator_lti.margins.delays.certified import certified_delayed_margins  # python-flint if needed
@@ -131,16 +133,6 @@ def _behind_delay(
         return certified_delayed_margins(exact_behind_delay(given, delay_s), delay_s, band, margins)
     except (NumericalError, InputError) as error:
         return replace(margins, evidence_reason=f"{margins.evidence_reason}; not certified: {error}")
-
-
-def _late(given: Given, delay_s: float, band: tuple[float, float] | None, doubt: str) -> StabilityMargins:
-    """By the zeros and poles of the exact polynomials, or withheld."""
-    from actuator_lti.margins.exact.product import late_margins  # python-flint only where it is needed
-
-    try:
-        return late_margins(given, delay_s, band)
-    except Doubtful as error:
-        return _withheld(given.period_s, delay_s, "factors of the loop", f"{doubt}; {error}")
 
 
 def _inside_delays(form: DelayForm, band: tuple[float, float] | None) -> StabilityMargins:
@@ -156,7 +148,5 @@ def _inside_delays(form: DelayForm, band: tuple[float, float] | None) -> Stabili
 
 
 def _withheld(period_s: float | None, delay_s: float, method: str, reason: str) -> StabilityMargins:
-    return assembled(
-        period_s, Agreement(None, None), None, method=method, notes=(), evidence="withheld",
-        reason=reason, delay_s=delay_s,
-    )  # fmt: skip
+    nothing = Agreement(None, None)
+    return assembled(period_s, nothing, None, method=method, reason=reason, delay_s=delay_s)

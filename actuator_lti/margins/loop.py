@@ -1,4 +1,4 @@
-"""The rational loop in the form in which all margins are found: a balanced state space."""
+"""The rational loop in the form in which all margins are found: a balanced state space, behind a delay."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _REFINEMENTS = 1
 
 @dataclass(frozen=True)
 class RationalLoop:
-    """L = d + c (p I - A)^-1 b with p = s or z, real and balanced.
+    """L = d + c (p I - A)^-1 b with p = s or z, real and balanced, behind a delay.
 
-    The argument of every response is ``x``: in the s-plane the angular frequency (s = j x), in the z-plane
-    the angle in rad, 0 to pi (z = exp(j x)). A sampled loop that was given by coefficients is held in the
-    s-plane of s = (z - 1)/(z + 1), to which its coefficients are brought exactly; x is tan(angle/2) then.
+    Frequencies are ``w`` of the s-plane: s = j w, of a sampled loop s = (z - 1)/(z + 1), w = tan(angle/2). A
+    sampled loop that was given by coefficients is held there, to which these are brought exactly. The
+    argument ``x`` of its slopes is w, or, where the matrices are those of z, the angle in rad, 0 to pi.
     """
 
     A: Real  # (n, n): state space, scaled by a diagonal similarity so that rows and columns weigh the same
@@ -40,75 +40,98 @@ class RationalLoop:
     # of a loop brought from z: the sizes of the coefficients that it was given by, in the same unit. Their
     # rounding is the accuracy of the data
     in_z_size: Real | None = None
+    delay: float = 0.0  # behind it: s, or samples
 
     @property
     def order(self) -> int:
         """Number of states."""
         return self.b.size
 
-    @property
-    def end(self) -> float:
-        """The end of the axis: infinity, or pi in the z-plane."""
-        return math.pi if self.in_z else math.inf
+    def behind(self, delay_s: float) -> RationalLoop:
+        """The loop behind a delay in place of its own."""
+        return replace(self, delay=delay_s / (self.period_s or 1.0))
 
-    def frequency(self, x: float) -> float:
-        """Angular frequency in rad/s for x."""
-        return float(x) / self.period_s if self.in_z and self.period_s else unwarped(x, self.period_s)
+    def frequency(self, w: float) -> float:
+        """Angular frequency in rad/s."""
+        return unwarped(w, self.period_s)
+
+    def x(self, w: Real) -> Real:
+        """The argument of slopes."""
+        return 2.0 * np.arctan(w) if self.in_z else w
 
     def point(self, x: Real) -> Complex:
         """Point of the stability boundary: j x, or exp(j x)."""
         return np.exp(1j * x) if self.in_z else 1j * x
 
-    def at(self, points: Any) -> Any:
-        """L at any points s or z, shape kept (1-D), in real arithmetic where they are real."""
-        return self._values(points - 1.0 if self._about_one else points)
+    def at(self, w: Real) -> Complex:
+        """L at w."""
+        x = self.x(w)
+        return self.late(x, self._values(self._variable(x)))
 
-    def response(self, x: Real) -> Complex:
-        """L on the stability boundary."""
-        return self._values(self._variable(x))
+    def at_real(self, w: float) -> float:
+        """L without the delay at a real s next to zero."""
+        p = np.array([math.exp(2.0 * math.atan(w)) if self.in_z else w], dtype=complex)
+        p -= 1.0 if self._about_one else 0.0
+        return float(self._values(p)[0].real)
+
+    def at_end(self) -> complex:
+        """L at the end of the axis: at infinity, or at Nyquist with the whole delay."""
+        if self.period_s is None:
+            return complex(self.d)
+        end = complex(self._values(self._variable(np.array([math.pi])))[0].real) if self.in_z else self.d
+        return end * complex(np.exp(-1j * math.pi * self.delay)) if self.delay else complex(end)
+
+    def late(self, x: Real, L: Complex) -> Complex:
+        """L at x behind the delay, from that without."""
+        if not self.delay:
+            return L
+        angle = x if self.period_s is None or self.in_z else 2.0 * np.arctan(x)
+        return L * np.exp(-1j * self.delay * angle)
+
+    def late_rate(self, x: Real, rate: Complex) -> Complex:
+        """d log L/dx behind the delay, from that without."""
+        if not self.delay:
+            return rate
+        turning = 1.0 if self.period_s is None or self.in_z else 2.0 / (1.0 + x * x)
+        return rate - 1j * self.delay * turning
+
+    def rate_at_end(self) -> complex:
+        """d log L/d angle at the Nyquist frequency, behind the delay."""
+        if self.in_z:
+            L, slope = self.response_and_slope(np.array([math.pi]))
+            return complex(slope[0] / L[0]) - 1j * self.delay
+        assert self.coefficients is not None
+        above, below = self.coefficients  # in u = 1/w: angle = pi - 2 u, s = j/u
+        rate = (above[1] / above[0] - below[1] / below[0]) / 1j if above[0] else math.inf
+        return -0.5 * complex(rate) - 1j * self.delay
 
     def response_and_slope(self, x: Real) -> tuple[Complex, Complex]:
-        """L and dL/dx = j dL/ds (continuous) or j z dL/dz (sampled), from c (x I - A)^-2 b."""
+        """L without the delay and dL/dx = j dL/ds (continuous) or j z dL/dz (sampled), c (x I - A)^-2 b."""
         p = self._variable(x)
         turn = 1j * self.point(x) if self.in_z else 1j
         if self.coefficients is not None:
             above, below, d_above, d_below = horner(self._with_slopes, p)
             L = above / below
             return L, turn * (d_above / below - L * (d_below / below))
-        if self.order == 0:
-            return np.full(p.shape, self.d, dtype=complex), np.zeros(p.shape, dtype=complex)
-        matrix: Complex = self._resolvent(p)
+        matrix = self._resolvent(p)
         first = np.linalg.solve(matrix, self.b[:, None])
         second = np.linalg.solve(matrix, first)
-        response: Complex = self.d + first[..., 0] @ self.c
-        return response, -turn * (second[..., 0] @ self.c)
+        return self.d + first[..., 0] @ self.c, -turn * (second[..., 0] @ self.c)
 
     def sharp_response(self, x: Real) -> Complex:
-        """L on the border, with the residual of the solution in extended precision."""
+        """L without the delay, with the residual of the solution in extended precision."""
         wide = np.asarray(x, dtype=np.longdouble) * 1j
         p = np.expm1(wide) if self._about_one else np.exp(wide) if self.in_z else wide
         if self.coefficients is not None:
             above, below = horner(np.asarray(self.coefficients, np.longdouble), p)
             return np.asarray((above / below).astype(complex))
-        if self.order == 0:
-            return np.full(p.shape, self.d, dtype=complex)
-        A = np.asarray(self._state(), np.longdouble)
+        A = np.asarray(self._state, np.longdouble)
         matrix = self._resolvent(p.astype(complex))
         X = np.zeros((p.size, self.order), dtype=np.clongdouble)
         for _ in range(_REFINEMENTS + 1):
             residual = self.b - p[:, None] * X + X @ A.T
             X = X + np.linalg.solve(matrix, residual.astype(complex)[..., None])[..., 0]
         return (X @ np.asarray(self.c, np.longdouble) + self.d).astype(complex)
-
-    def delayed(self, samples: int) -> RationalLoop:
-        """The loop behind whole samples of delay (z-plane only), each a further state."""
-        n = self.order
-        A = np.zeros((n + samples, n + samples))
-        A[:n, :n], A[n, :n] = self.A, self.c
-        A[n + 1 :, n:-1] = np.eye(samples - 1)
-        b, c = np.zeros(n + samples), np.zeros(n + samples)
-        b[:n], b[n], c[-1] = self.b, self.d, 1.0
-        return from_matrices(A, b, c, 0.0, self.period_s)
 
     @cached_property
     def _with_slopes(self) -> Complex:
@@ -127,22 +150,21 @@ class RationalLoop:
     def _about_one(self) -> bool:
         return self.in_z and self.coefficients is None
 
+    @property
     def _state(self) -> Real:
         return self.A - np.eye(self.order) if self.in_z else self.A
 
-    def _values(self, p: Any) -> Any:
+    def _values(self, p: Complex) -> Complex:
         if self.coefficients is not None:
             with np.errstate(all="ignore"):
-                above, below = horner(self._with_slopes[:2] if np.iscomplexobj(p) else self.coefficients, p)
-                return above / below
-        if self.order == 0:
-            return np.full(p.shape, self.d, dtype=p.dtype)
-        return self.d + np.linalg.solve(self._resolvent(p), self.b[:, None])[..., 0] @ self.c
+                above, below = horner(self._with_slopes[:2], p)
+                return np.asarray(above / below)
+        return np.asarray(self.d + np.linalg.solve(self._resolvent(p), self.b[:, None])[..., 0] @ self.c)
 
-    def _resolvent(self, p: Any) -> Any:
+    def _resolvent(self, p: Complex) -> Complex:
         n = self.order
-        matrix = np.empty((p.size, n, n), dtype=p.dtype)
-        matrix[:] = -self._state()
+        matrix = np.empty((p.size, n, n), dtype=complex)
+        matrix[:] = -self._state
         index = np.arange(n)
         matrix[:, index, index] += p[:, None]
         return matrix
@@ -172,13 +194,19 @@ def loop_of(given: Given, warp: bool = False) -> RationalLoop:
     ``warp`` holds a sampled transfer function in the plane of (z - 1)/(z + 1), unless it has a pole at -1.
     """
     if given.A is None:
-        late = given.behind_samples()
-        return from_coefficients(late.numerator, late.denominator, given.period_s, warp)
-    loop = from_matrices(given.A, given.b, given.c, given.d, given.period_s)
-    return loop.delayed(given.samples) if given.samples else loop
+        late = np.concatenate((given.denominator, np.zeros(given.samples)))  # the samples as poles at z = 0
+        return _from_coefficients(given.numerator, late, given.period_s, warp)
+    n, samples = given.b.size, given.samples
+    if not samples:
+        return _from_matrices(given.A, given.b, given.c, given.d, given.period_s)
+    one = _from_matrices(given.A, given.b, given.c, given.d, given.period_s)
+    A, b, c = np.zeros((n + samples, n + samples)), np.zeros(n + samples), np.zeros(n + samples)
+    A[:n, :n], A[n, :n], A[n + 1 :, n:-1] = one.A, one.c, np.eye(samples - 1)
+    b[:n], b[n], c[-1] = one.b, one.d, 1.0
+    return _from_matrices(A, b, c, 0.0, given.period_s)
 
 
-def from_matrices(
+def _from_matrices(
     A: Real, b: Real, c: Real, d: float, period_s: float | None, coefficients: Real | None = None
 ) -> RationalLoop:
     """Balance a state space; shapes (n, n), (n,), (n,)."""
@@ -191,13 +219,13 @@ def from_matrices(
     return RationalLoop(*parts, d, period_s, period_s is not None, coefficients)
 
 
-def from_coefficients(num: Real, den: Real, period_s: float | None, warp: bool = False) -> RationalLoop:
+def _from_coefficients(num: Real, den: Real, period_s: float | None, warp: bool) -> RationalLoop:
     """Companion form of num/den (highest power first), which is exact, then balanced."""
     n = den.size - 1
     if warp and period_s is not None and n:
         warped_den = warped_coefficients(den, n)
         if abs(warped_den[0]) > _AT_MINUS_ONE * np.abs(den).sum():
-            loop = from_coefficients(warped_coefficients(num, n), warped_den, None)
+            loop = _from_coefficients(warped_coefficients(num, n), warped_den, None, False)
             size = np.zeros((2, n + 1))
             size[0, n + 1 - num.size :], size[1] = np.abs(num / warped_den[0]), np.abs(den / warped_den[0])
             return replace(loop, period_s=period_s, in_z_size=size)
@@ -208,7 +236,7 @@ def from_coefficients(num: Real, den: Real, period_s: float | None, warp: bool =
     A[:1] = -below
     b = np.zeros(n)
     b[:1] = 1.0
-    return from_matrices(A, b, above - d * below, d, period_s, coefficients)
+    return _from_matrices(A, b, above - d * below, d, period_s, coefficients)
 
 
 def warped_coefficients(p: Real, degree: int) -> Real:

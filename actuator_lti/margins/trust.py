@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 
-from actuator_lti.errors import NumericalError
+from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import Complex, RationalLoop, Real, horner
 
@@ -17,8 +20,20 @@ class Doubtful(NumericalError):
     """Double precision cannot check the answer; the message says what it lacks."""
 
 
+@contextmanager
+def in_double_precision() -> Iterator[None]:
+    """`Doubtful` where double precision fails on the way."""
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except (InputError, NumericalError):
+        raise
+    except (ArithmeticError, ValueError, RuntimeError) as error:  # LinAlgError, overflow, no end of a search
+        raise Doubtful(f"double precision fails: {error}") from error
+
+
 def error_bound(loop: RationalLoop, x: Real) -> Real:
-    """Relative error of L at x that one rounding of each entry makes."""
+    """Relative error of L that one rounding of each entry makes, at arguments of its slopes."""
     if not x.size:
         return np.empty(0)
     points = loop.point(x)

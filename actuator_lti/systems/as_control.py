@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from actuator_lti.systems.plain_delays import PlainDelaySystem
-from actuator_lti.systems.plain_system import PlainSystem
+from actuator_lti.systems.plain_system import PlainDelaySystem, PlainSystem
 
 
 def as_control(system: Any) -> Any:

@@ -23,13 +23,14 @@ from control.iosys import InputOutputSystem
 from actuator_lti.errors import InputError
 from actuator_lti.margins.loop import rational_loop
 from actuator_lti.systems.control_face import ControlFace
-from actuator_lti.systems.plain_delays import PlainDelaySystem, descriptor, in_parallel, in_series, response
+from actuator_lti.systems.plain_system import PlainDelaySystem, descriptor, in_parallel, in_series, response
+
+_PARTS = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays_s")
 
 
 def _matrix(value: Any, rows: int, columns: int, name: str) -> np.ndarray:
-    array = (
-        np.asarray(value, dtype=float).reshape(rows, columns) if np.size(value) else np.zeros((rows, columns))
-    )
+    array = np.asarray(value if np.size(value) else np.zeros((rows, columns)), dtype=float)
+    array = array.reshape(rows, columns)
     if not np.all(np.isfinite(array)):
         raise InputError(f"{name}: every entry must be finite")
     return array
@@ -66,18 +67,9 @@ class DelaySystem(ControlFace):
 
     def __init__(
         self,
-        A: Any,
-        B1: Any,
-        B2: Any,
-        C1: Any,
-        C2: Any,
-        D11: Any,
-        D12: Any,
-        D21: Any,
-        D22: Any,
-        delays_s: Any,
-        **names: Any,
-    ) -> None:
+        A: Any, B1: Any, B2: Any, C1: Any, C2: Any, D11: Any, D12: Any, D21: Any, D22: Any,
+        delays_s: Any, **names: Any,
+    ) -> None:  # fmt: skip
         D11 = np.atleast_2d(np.asarray(D11, dtype=float))
         p, m = D11.shape
         self.delays_s = np.asarray(delays_s, dtype=float).reshape(-1)
@@ -90,26 +82,21 @@ class DelaySystem(ControlFace):
         self.A, self.D11 = _matrix(A, n, n, "A"), _matrix(D11, p, m, "D11")
         self.B1, self.B2 = _matrix(B1, n, m, "B1"), _matrix(B2, n, k, "B2")
         self.C1, self.C2 = _matrix(C1, p, n, "C1"), _matrix(C2, k, n, "C2")
-        self.D12, self.D21, self.D22 = (
-            _matrix(D12, p, k, "D12"),
-            _matrix(D21, k, m, "D21"),
-            _matrix(D22, k, k, "D22"),
-        )
+        self.D12, self.D21 = _matrix(D12, p, k, "D12"), _matrix(D21, k, m, "D21")
+        self.D22 = _matrix(D22, k, k, "D22")
 
     @classmethod
     def of(cls, plain: PlainDelaySystem, **names: Any) -> DelaySystem:
         """The python-control system of matrices and names."""
         if plain.states:
             names["states"] = list(plain.states)
-        inner = (plain.A, plain.B1, plain.B2, plain.C1, plain.C2)
-        return cls(*inner, plain.D11, plain.D12, plain.D21, plain.D22, plain.delays_s, **names)
+        return cls(**{part: getattr(plain, part) for part in _PARTS}, **names)
 
     @property
     def plain(self) -> PlainDelaySystem:
         """The same as matrices."""
-        parts = ("A", "B1", "B2", "C1", "C2", "D11", "D12", "D21", "D22", "delays_s")
         labels = tuple(self.state_labels) if self.nstates else ()
-        return PlainDelaySystem(**{part: getattr(self, part) for part in parts}, states=labels)
+        return PlainDelaySystem(**{part: getattr(self, part) for part in _PARTS}, states=labels)
 
     @classmethod
     def from_system(cls, system: Any, **names: Any) -> DelaySystem:
@@ -239,15 +226,16 @@ class DelaySystem(ControlFace):
 
     def poles(self) -> np.ndarray:
         """Poles; infinitely many with delays, then `NotImplementedError` (see `characteristic`)."""
-        if not self.delay_free:
-            raise NotImplementedError("a system with delays has infinitely many poles")
-        return self.to_state_space().poles()
+        return self._finitely_many("poles").poles()
 
     def zeros(self) -> np.ndarray:
         """Zeros; infinitely many with delays, then `NotImplementedError`."""
+        return self._finitely_many("zeros").zeros()
+
+    def _finitely_many(self, what: str) -> control.StateSpace:
         if not self.delay_free:
-            raise NotImplementedError("a system with delays has infinitely many zeros")
-        return self.to_state_space().zeros()
+            raise NotImplementedError(f"a system with delays has infinitely many {what}")
+        return self.to_state_space()
 
     def __neg__(self) -> DelaySystem:
         return self * -1.0

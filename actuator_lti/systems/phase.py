@@ -12,13 +12,11 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.axis_search import Factored, half_turn
 from actuator_lti.margins.delays.form import delay_form
 from actuator_lti.margins.exact.loop import exact_loop
-from actuator_lti.margins.exact.roots import half_planes
-from actuator_lti.margins.factored import Response, factored
+from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import Given, given_of
 from actuator_lti.margins.loop import Real, loop_of
 from actuator_lti.margins.measured.bounds import bounds
 from actuator_lti.margins.measured.margins import measured_points
-from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.margins.trust import Doubtful
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.measured_response import is_measured, measured_response
@@ -101,25 +99,24 @@ def _measured_phase(data: Any, omega: Real, delay_s: float) -> Real:
 def _rational_phase(given: Given, w: Real) -> Real:
     """Of a rational loop, rad, over w of the s-plane."""
     loop = loop_of(given, warp=True)
-    response = Response(loop)
     try:
-        factors = factored(response, sorted_poles(loop.A, loop.in_z))
+        factors = factored(loop)
     except Doubtful:
         factors = _exact_factors(given)
     first = 1e-3 * float(np.abs(factors.roots[factors.roots != 0.0]).min(initial=1.0))
     phase = factors.log_value(np.append(w, first))[1]
-    start = float(np.angle(response.at(np.array([first]))[0]))
+    start = float(np.angle(loop.at(np.array([first]))[0]))
     phase += half_turn(start - phase[-1])
     half_turns = round(float(phase[-1] / np.pi - 0.5 * factors.at_zero))  # odd: a negative gain
     phase = phase[:-1] - np.pi * (half_turns + half_turns % 2)
-    correction = np.angle(response.at(w) * np.exp(-1j * phase))
+    correction = np.angle(loop.at(w) * np.exp(-1j * phase))
     return phase + np.where(np.isfinite(correction), correction, 0.0)  # on a pole: between both sides
 
 
 def _exact_factors(given: Given) -> Factored:
     """From the roots of the exact polynomials, but for their constant."""
     loop = exact_loop(given)
-    above, below = (np.array(half_planes(p).values, dtype=complex) for p in (loop.N, loop.D))
+    above, below = (np.array(part.values, dtype=complex) for part in (loop.zeros, loop.poles))
     roots, weights = np.append(above, below), np.append(np.ones(above.size), -np.ones(below.size))
     roots.real[np.abs(roots.real) < _ON_AXIS * np.abs(roots.imag)] = 0.0
     return Factored(roots, weights, 0.0)

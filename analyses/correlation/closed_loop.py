@@ -18,22 +18,13 @@ from analyses.estimation.arrays import FloatArray
 from analyses.records.consistency import Finding, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
+from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record, prepared
 
 if TYPE_CHECKING:
     from nonlinear import State, Trajectory
 
 
-UNITS = {
-    "angle": "rad",
-    "output_angle": "rad",
-    "position": "m",
-    "speed": "rad/s",
-    "velocity": "m/s",
-    "current": "A",
-    "voltage": "V",
-    "force": "N",
-}
 AXIS_SIGNALS = {
     "rotary": ("angle", "output_angle", "speed", "current", "voltage"),
     "linear": ("position", "velocity", "current", "voltage", "force"),
@@ -114,7 +105,7 @@ def correlate_record(
         raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
     modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
     signals = {
-        name: compare_signals(name, UNITS[name], record.time_s, values, modelled[name])
+        name: compare_signals(name, KNOWN_UNITS[name], record.time_s, values, modelled[name])
         for name, values in measured.items()
     }
     return CorrelationResult(
@@ -210,8 +201,13 @@ def model_signals(
         part = time[:FIRST_ROWS]
 
         def off(state: State) -> float:
-            series = _series(model, go(float(part[-1]) + 2.0 * period, initial=state))
-            return _difference(measured, part, series)
+            """Sum over the signals of the squared relative difference over their first rows."""
+            series, total = _series(model, go(float(part[-1]) + 2.0 * period, initial=state)), 0.0
+            for name, values in measured.items():
+                first = values[: len(part)]
+                size, rest = float(first @ first), np.interp(part, series["time"], series[name]) - first
+                total += float(rest @ rest) / size if size > 0.0 else 0.0
+            return total
 
         if off(moving) < off(initial):
             initial = moving
@@ -222,18 +218,6 @@ def model_signals(
     limits = {name: use.fraction for name, use in run.limits.items()}
     series = _series(model, run)
     return {name: np.interp(time, series["time"], series[name]) for name in measured}, limits
-
-
-def _difference(
-    measured: Mapping[str, FloatArray], time: FloatArray, series: Mapping[str, FloatArray]
-) -> float:
-    """Sum over the signals of the squared relative difference over their first rows."""
-    total = 0.0
-    for name, values in measured.items():
-        first = values[: len(time)]
-        size, rest = float(first @ first), np.interp(time, series["time"], series[name]) - first
-        total += float(rest @ rest) / size if size > 0.0 else 0.0
-    return total
 
 
 def _series(design: Design, run: Trajectory) -> dict[str, FloatArray]:

@@ -222,7 +222,12 @@ def first_states(driven: Driven, record: Record, measured: Mapping[str, FloatArr
     place = next((name for name in ("angle", "output_angle", "position") if name in measured), None)
     first = float(measured[place][0]) if place else 0.0
     rest = State(motor_angle_rad=first if place == "angle" else ratio * first)
-    speed = _first_speed(design, measured)
+    speed = 0.0
+    for name, factor in (("velocity", ratio), ("speed", 1.0)):
+        if name in measured:
+            values = measured[name]
+            early = float(np.median(values[:FIRST_ROWS]))
+            speed = factor * early if abs(early) > IN_MOTION * float(np.max(np.abs(values))) else 0.0
     values = record.signals.get("current", np.zeros(1))
     current = float(np.median(values[:FIRST_ROWS]))
     holds = float(np.median(np.abs(values[:FIRST_ROWS]))) > 0.1 * float(np.max(np.abs(values)))
@@ -243,13 +248,3 @@ def first_states(driven: Driven, record: Record, measured: Mapping[str, FloatArr
         current_command_A=first if driven.stage == "current" else current,
         voltage_V=first if driven.stage == "voltage" else volts,
     )
-
-
-def _first_speed(design: Design, measured: Mapping[str, FloatArray]) -> float:
-    """Motor speed of the first rows, 0 where the record begins at rest."""
-    for name, factor in (("speed", 1.0), ("velocity", design.total_ratio)):
-        if name in measured:
-            values = measured[name]
-            first = float(np.median(values[:FIRST_ROWS]))
-            return factor * first if abs(first) > IN_MOTION * float(np.max(np.abs(values))) else 0.0
-    return 0.0

@@ -45,12 +45,12 @@ def summarise(results: Sequence[CorrelationResult]) -> dict[str, SignalSummary]:
 
 
 def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary:
-    outcome = [(result, result[name]) for result in results if name in result.signals]
-    signals = [signal for _, signal in outcome]
-    off = np.concatenate([signal.modelled - signal.measured for signal in signals])
-    motion = np.concatenate([signal.measured - signal.measured.mean() for signal in signals])
-    size, whole = np.linalg.norm(off), np.linalg.norm(np.concatenate([one.measured for one in signals]))
-    worst = max(outcome, key=lambda pair: pair[1].share_of_motion)
+    by_record = {result.record: result[name] for result in results if name in result.signals}
+    signals = list(by_record.values())
+    whole = np.concatenate([one.measured for one in signals])
+    off = np.concatenate([one.modelled for one in signals]) - whole
+    motion = np.concatenate([one.measured - one.measured.mean() for one in signals])
+    size, norm = np.linalg.norm(off), np.linalg.norm(whole)
     return SignalSummary(
         name=name,
         unit=signals[0].unit,
@@ -59,9 +59,9 @@ def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary
         mean_error=float(np.mean(np.abs(off))),
         rms_error=float(np.sqrt(np.mean(off**2))),
         max_error=float(np.max(np.abs(off))),
-        relative_error=float(size / whole),
-        share_of_motion=float(size / (np.linalg.norm(motion) or whole)),
-        worst=worst[0].record,
+        relative_error=float(size / norm),
+        share_of_motion=float(size / (np.linalg.norm(motion) or norm)),
+        worst=max(by_record, key=lambda record: by_record[record].share_of_motion),
     )
 
 

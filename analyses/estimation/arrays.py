@@ -28,6 +28,14 @@ def longest(marked: BoolArray) -> tuple[int, int]:
     return max(stretches(marked), key=lambda one: one[1] - one[0], default=(0, 0))
 
 
+def lasting(marked: BoolArray, least: int) -> BoolArray:
+    """Marked rows, but for those of stretches shorter than ``least``."""
+    out = np.zeros(len(marked), dtype=bool)
+    for start, stop in stretches(marked):
+        out[start:stop] = stop - start >= least
+    return out
+
+
 def picked(values: FloatArray, keep: BoolArray, rows: BoolArray) -> FloatArray:
     """Of values at the rows ``keep`` those at ``rows``, which are among them (and may be fewer)."""
     whole = np.zeros((len(keep), *values.shape[1:]))

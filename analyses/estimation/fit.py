@@ -104,26 +104,20 @@ class Fit:
         """
         table = np.array([[own.get(name, 0.0) for name in self.names] for own in slopes.values()])
         table = table.reshape(len(slopes), len(self.names))
-        own = dict(zip(slopes, (table @ self.values).tolist(), strict=True)) | dict(values or {})
-        return Fit(
-            names=tuple(slopes),
-            values=np.array([own[name] for name in slopes]),
-            covariance=table @ self.covariance @ table.T,
-        )
+        found = dict(zip(slopes, table @ self.values, strict=True)) | dict(values or {})
+        covariance = table @ self.covariance @ table.T
+        return Fit(names=tuple(slopes), values=np.array([*found.values()], float), covariance=covariance)
 
     def renamed(self, names: Mapping[str, str]) -> Fit:
         """The values that have a new name, under it, and their covariance."""
-        rows = [k for k, name in enumerate(self.names) if name in names]
-        return Fit(
-            names=tuple(names[self.names[k]] for k in rows),
-            values=self.values[rows],
-            covariance=self.covariance[np.ix_(rows, rows)],
-        )
+        return self.mapped({names[name]: {name: 1.0} for name in self.names if name in names})
 
     def beside(self, name: str, value: float, std: float) -> Fit:
         """The fit and one more value, found on its own."""
-        count = len(self.names)
-        wide = np.zeros((count + 1, count + 1))
-        wide[:count, :count], wide[count, count] = self.covariance, std**2
-        values = np.append(self.values, value)
-        return Fit(names=(*self.names, name), values=values, covariance=wide, fixed=self.fixed)
+        names, values, wide = (
+            (*self.names, name),
+            np.append(self.values, value),
+            np.pad(self.covariance, (0, 1)),
+        )
+        wide[-1, -1] = std**2
+        return Fit(names=names, values=values, covariance=wide, fixed=self.fixed)

@@ -27,11 +27,12 @@ class NotTold:
     """
 
     name: str
-    like: tuple[str, ...]
     moves: Mapping[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        return f"cannot be separated from {' and '.join(self.like)}" if self.like else "is not excited at all"
+        return (
+            f"cannot be separated from {' and '.join(self.moves)}" if self.moves else "is not excited at all"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,21 +64,20 @@ def told_apart(
     left = []
     for k, name in enumerate(names):
         size = float(np.linalg.norm(w[:, k]))
-        if size == 0.0:
-            left.append(NotTold(name=name, like=()))
-            continue
-        unit = w[:, k] / size
+        unit = w[:, k] / (size or 1.0)
         rest = unit - sum((b * float(b @ unit) for b in basis), np.zeros(len(unit)))
         own = float(np.linalg.norm(rest))
-        if own < least:
+        if own >= least:
+            kept.append(k)
+            basis.append(rest / own)
+            continue
+        moves = {}
+        if size:
             sizes = np.linalg.norm(w[:, kept], axis=0)
             share = np.linalg.lstsq(w[:, kept] / sizes, unit, rcond=None)[0]
             chosen = np.flatnonzero(np.abs(share) > 0.2 * np.abs(share).max())
             moves = {names[kept[j]]: float(share[j] * size / sizes[j]) for j in chosen}
-            left.append(NotTold(name=name, like=tuple(moves), moves=moves))
-            continue
-        kept.append(k)
-        basis.append(rest / own)
+        left.append(NotTold(name=name, moves=moves))
     return tuple(kept), tuple(left)
 
 
@@ -186,7 +186,7 @@ def autoregressive(values: FloatArray) -> tuple[FloatArray, float]:
     return best
 
 
-def between_records(values: Sequence[float], stds: Sequence[float]) -> float:
+def between_records(values: Sequence[float], stds: Sequence[float] | FloatArray) -> float:
     """Standard deviation between records beyond their own errors (Mandel and Paule); 0 for one record.
 
     The scatter with which ``sum((x - mean)^2 / (std^2 + scatter^2))`` is one less than the number of records.
@@ -212,18 +212,16 @@ def between_records(values: Sequence[float], stds: Sequence[float]) -> float:
     return float(np.sqrt(brentq(excess, 0.0, float(np.ptp(x)) ** 2 * len(x), xtol=1e-300, rtol=1e-12)))
 
 
-def scatter_of_joint(stds: Sequence[float], scatter: float) -> float:
-    """What a scatter between records does to their joint value, each weighed by its own error."""
-    weight = (np.min(stds) / np.maximum(np.asarray(stds, dtype=float), 1e-300)) ** 2
-    return float(scatter * np.sqrt(weight @ weight) / weight.sum())
-
-
 def by_record(estimates: Sequence[Fit], names: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """For each parameter: the scatter between the records that tell it, and of their joint value."""
+    """For each parameter: the scatter between the records that tell it, and of their joint value.
+
+    There each record is weighed by its own error.
+    """
     out = {}
     for name in names:
         own = [one for one in estimates if name in one]
-        stds = [one.std(name) for one in own]
+        stds = np.array([one.std(name) for one in own])
         scatter = between_records([one[name] for one in own], stds)
-        out[name] = (scatter, scatter_of_joint(stds, scatter) if scatter else 0.0)
+        weight = (np.min(stds) / np.maximum(stds, 1e-300)) ** 2 if scatter else np.ones(1)
+        out[name] = (scatter, float(scatter * np.sqrt(weight @ weight) / weight.sum()))
     return out

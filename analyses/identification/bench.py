@@ -107,7 +107,11 @@ def identify_bench(
     items = list(_items(design, findings, size, right, model, fits))
     try:
         values = fits.values(model)
-        _refuse_settings(used, values.names)
+        for record in used:
+            for key in record.settings.keys() & set(values.names):
+                allowed = f"any other key, or --fix {key}=VALUE"
+                told = f"settings.{key}: is found from all records; allowed: {allowed}"
+                raise InputError(told, where=record.name)
         made = design_with_fit(with_structure(start, model), values, source)
     except InputError as error:
         reasons = "; ".join(item.reason for item in items if item.passed is False)
@@ -165,11 +169,15 @@ class _Fits:
         start, form, recipe, held = self.start, self.settings.friction, self.recipe, self.held
         gravity = self.settings.gravity or start.load.gravity is not None
         if form == "map":
-            fit = fit_map(start, records, recipe=recipe, fixed=held, gravity=gravity)
-            model, self.laws = fit.model, fit.laws
+            model, self.laws = fit_map(start, records, recipe=recipe, fixed=held, gravity=gravity)
         else:
             model = fit_records(start, records, form=form, recipe=recipe, fixed=held, gravity=gravity)
-        model = _with_commands(start, model, records)
+        parts = []
+        for part, record in zip(model.records, records, strict=True):
+            command = command_of(start, record)
+            more = {} if command is None else {command.signal: "command of the simulated drive"}
+            parts.append(replace(part, used={**more, **part.used}))
+        model = replace(model, records=tuple(parts))
         return without_bias(start, self.design, model, records, recipe)
 
     def values(self, model: JointModel) -> Fit:
@@ -179,24 +187,6 @@ class _Fits:
     def design(self, model: JointModel) -> Design:
         """The design that comes of a model."""
         return design_with_fit(with_structure(self.start, model), self.values(model), "")
-
-
-def _refuse_settings(records: Sequence[Record], looked_for: Sequence[str]) -> None:
-    """Refuse a record's own setting of what is found from all of them."""
-    for record in records:
-        for key in record.settings.keys() & set(looked_for):
-            told = f"settings.{key}: is found from all records; allowed: any other key, or --fix {key}=VALUE"
-            raise InputError(told, where=record.name)
-
-
-def _with_commands(start: Design, model: JointModel, used: Sequence[Record]) -> JointModel:
-    """The model whose records say what their command is used for."""
-    parts = []
-    for part, record in zip(model.records, used, strict=True):
-        command = command_of(start, record)
-        more = {} if command is None else {command.signal: "command of the simulated drive"}
-        parts.append(replace(part, used={**more, **part.used}))
-    return replace(model, records=tuple(parts))
 
 
 def _items(

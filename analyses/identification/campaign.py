@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.identification.design_values import DesignValue, design_value
+from analyses.identification.design_values import design_value
 from analyses.identification.richer import RicherLaws, compare_laws
-from analyses.identification.steady import SteadyCriterion, SteadyPoint, steady_points
+from analyses.identification.steady import CRITERION, SteadyCriterion, SteadyPoint, steady_point
 from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
 from analyses.identification.verdict import Item, residual_item, simulated_item, size_item
 from analyses.records.campaign_file import Instruments
@@ -94,85 +96,71 @@ def identify_campaign(
     if constant is None:
         told = "motor.torque_constant: the design has none, so currents cannot become torques"
         raise InputError(told, design.name)
-    points, restless = steady_points(imported.runs, constant)
-    used, contradicting, findings = check_runs(design, imported.runs, points, imported.campaign.instruments)
+    campaign = imported.campaign
+    points, restless, contradicting, findings = [], [], [], {}
+    for run in imported.runs:
+        try:
+            point = steady_point(run, constant)
+        except InputError as error:
+            restless.append(SetAside(id=run.id, reason=str(error)))
+            continue
+        findings[run.id] = tuple(check_run(design, imported.runs, run, point, campaign.instruments))
+        wrong = [f"{one.subject}: {one.text}" for one in findings[run.id] if one.passed is False]
+        if wrong:
+            contradicting.append(SetAside(id=run.id, reason="; ".join(wrong)))
+        else:
+            points.append(point)
     aside = (*imported.set_aside, *restless, *contradicting)
+    settings: dict[str, Any] = {"outliers": campaign.outliers, "fixed": fixed, "kept": _values_of(design)}
     try:
-        fit = fit_surface(
-            used,
-            imported.campaign.instruments,
-            constant,
-            outliers=imported.campaign.outliers,
-            fixed=fixed,
-            kept=_values_of(design),
-        )
+        fit = fit_surface(points, campaign.instruments, constant, **settings)
     except InputError as error:
         told = "; ".join(f"{run.id}: {run.reason}" for run in aside[:3])
         message = f"{error.message} ({told})" if told else error.message
-        raise InputError(message, imported.campaign.origin) from None
-    laws = compare_laws(fit) if richer and not fixed and len(fit.points) >= 5 else None
+        raise InputError(message, campaign.origin) from None
     return CampaignResult(
         imported=imported,
         fit=fit,
-        laws=laws,
+        laws=compare_laws(fit) if richer and not fixed and len(fit.points) >= 5 else None,
         set_aside=aside,
-        criterion=SteadyCriterion(),
+        criterion=CRITERION,
         torque_constant_Nm_A=constant,
         contradicting=tuple(contradicting),
         findings=findings,
     )
 
 
-def check_runs(
+def check_run(
     design: Design,
     runs: Sequence[ImportedRun],
-    points: Sequence[SteadyPoint],
+    run: ImportedRun,
+    point: SteadyPoint,
     instruments: Instruments,
-) -> tuple[list[SteadyPoint], list[SetAside], dict[str, tuple[Finding, ...]]]:
-    """The points that agree with what is said of their runs, those runs that do not, and all findings.
+) -> Iterator[Finding]:
+    """Hold a run against its set speed and load, itself, and the design's limits.
 
-    Each is held against its set speed and load, itself, and the design's limits. The speed may be off by 5 %
-    of its setting, the load by 10 % and twice the sensor's accuracy.
+    The speed may be off by 5 % of its setting, the load by 10 % and twice the sensor's accuracy.
     """
-    by_id = {run.id: run for run in runs}
-    good, bad, findings = [], [], {}
-    for point in points:
-        run = by_id[point.run]
-        result = [*_settings(run, point, instruments), *check_record(design, run.record)]
-        result += [_same_file(other) for other in runs if _share_a_file(run, other)][:1]
-        findings[run.id] = tuple(result)
-        wrong = [f"{one.subject}: {one.text}" for one in result if one.passed is False]
-        if wrong:
-            bad.append(SetAside(id=run.id, reason="; ".join(wrong)))
-        else:
-            good.append(point)
-    return good, bad, findings
-
-
-def _share_a_file(run: ImportedRun, other: ImportedRun) -> bool:
-    """Whether the file of the load sensor of one run is that of another as well."""
-    files = [None if one.load_is_zero or one.sensor is None else one.sensor.sha256 for one in (run, other)]
-    return run is not other and bool(files[0]) and files[0] == files[1]
-
-
-def _same_file(other: ImportedRun) -> Finding:
-    text = f"the sensor's file is that of run {other.id} as well"
-    return Finding(subject="sensor file", passed=False, text=text)
-
-
-def _settings(run: ImportedRun, point: SteadyPoint, instruments: Instruments) -> Iterator[Finding]:
     speed, load = abs(run.entry.speed_rad_s or 0.0), abs(run.entry.load_Nm or 0.0)
     if speed:
         yield _against("speed", "rad/s", point.speed_rad_s, speed, SPEED_TOLERANCE)
     if load:
         sensor = 2.0 * instruments.torque_accuracy * instruments.torque_full_scale_Nm / load
         yield _against("load", "N m", point.load_Nm, load, LOAD_TOLERANCE + sensor)
+    yield from check_record(design, run.record)
+    same = (
+        other
+        for other in runs
+        if other is not run and run.sensor_file and run.sensor_file == other.sensor_file
+    )
+    for other in islice(same, 1):
+        text = f"the sensor's file is that of run {other.id} as well"
+        yield Finding(subject="sensor file", passed=False, text=text)
 
 
 def _against(what: str, unit: str, measured: float, wanted: float, allowed: float) -> Finding:
     ratio = measured / wanted
-    text = f"{what} {measured:.4g} {unit}, set {wanted:.4g} {unit}"
-    passed = abs(ratio - 1.0) <= allowed
+    text, passed = f"{what} {measured:.4g} {unit}, set {wanted:.4g} {unit}", abs(ratio - 1.0) <= allowed
     if not passed:
         factor = named_factor(ratio)
         text += f": {ratio:.4g} times" + (f", factor {factor}" if factor else "")
@@ -193,22 +181,18 @@ def campaign_items(
     fit, wrong = result.fit, result.contradicting
     why = "; ".join(f"run {run.id}: {run.reason}" for run in wrong[:3])
     why += f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
+    names, before = ("dry", "viscous", "load_coefficient"), _values_of(design)
+    found = fit.renamed(dict(zip(NAMES, names, strict=True)))
+    compared = [design_value(design, found, names[k], before[NAMES[k]]) for k in fit.told]
     label = "Runs agree with their set speed and load, themselves and the design"
     items = [
         Item(id="runs", label=label, passed=not wrong, reason=why),
-        size_item(design, _compared(design, fit), kept_constants=False, loaded=True),
+        size_item(design, [one for one in compared if one], kept_constants=False, loaded=True),
         residual_item(fit.relative_residual, limit),
     ]
     if simulated is not None:
         items.append(simulated_item("the runs", simulated, limit, "steady current, simulated"))
     return tuple(items)
-
-
-def _compared(design: Design, fit: SurfaceFit) -> list[DesignValue]:
-    names, before = ("dry", "viscous", "load_coefficient"), _values_of(design)
-    found = fit.renamed(dict(zip(NAMES, names, strict=True)))
-    values = (design_value(design, found, names[k], before[NAMES[k]]) for k in fit.told)
-    return [one for one in values if one]
 
 
 def steady_current_error(
@@ -222,10 +206,8 @@ def steady_current_error(
     """
     from nonlinear import commands, simulate
 
-    constant = design.effective_motor.torque_constant_Nm_A
-    duration = RUN_UP_S + STEADY_S
-    period = design.controller.period_s
-    if constant is None or duration / period > MOST_CAMPAIGN_TICKS:
+    constant, duration = design.effective_motor.torque_constant_Nm_A, RUN_UP_S + STEADY_S
+    if constant is None or duration / design.controller.period_s > MOST_CAMPAIGN_TICKS:
         return None
     wanted, result = [], []
     for k, point in enumerate(points, 1):
@@ -241,6 +223,4 @@ def steady_current_error(
             result.append(point.direction * constant * float(np.mean(run.current_A[late])))
         if progress is not None:
             progress(k, len(points))
-    if not wanted:
-        return None
-    return float(np.linalg.norm(np.subtract(result, wanted)) / np.linalg.norm(wanted))
+    return float(np.linalg.norm(np.subtract(result, wanted)) / np.linalg.norm(wanted)) if wanted else None

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.estimation.arrays import BoolArray, FloatArray, picked, stretches
+from analyses.estimation.arrays import BoolArray, FloatArray, lasting, picked
 from analyses.estimation.least_squares import covariance_of, solve, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
@@ -91,41 +91,35 @@ def diagnosed(
     these as the design that comes of it simulates them (none: it cannot).
     """
     whole = [_without_flat_tops(start, record, recipe) for record in records]
-    used = tuple(record for record, _ in whole)
-    found = {record.name: clipped for record, clipped in whole}
+    used, found = [record for record, _ in whole], {record.name: clipped for record, clipped in whole}
     model, simulated = fit(used)
-    lags: dict[str, Lag] = {}
-    for record, like in zip(used, simulated, strict=bool(simulated)):
+    sure: dict[int, Lag] = {}
+    for k, (record, like) in enumerate(zip(used, simulated, strict=bool(simulated))):
         own, other = (lag_of(start, one, like, model, recipe) for one in (record, like))
-        if (
-            own is not None and other is not None
-        ):  # the simulation has none, but what the analysis finds in it
+        if own is not None and other is not None:  # the simulation has none, but what is found in it
             error = float(np.hypot(own.standard_error, other.standard_error))
             lag = Lag(seconds=own.seconds - other.seconds, standard_error=error)
             found[record.name].append(_of_lag(drive_of(start, record)[1], lag))
-            lags |= {record.name: lag} if lag.is_sure else {}
-    if lags:
-        used = tuple(
-            shifted(start, record, lags[record.name].seconds) if record.name in lags else record
-            for record in used
-        )
+            sure |= {k: lag} if lag.is_sure else {}
+    if sure:
+        for k, lag in sure.items():
+            used[k] = shifted(start, used[k], lag.seconds)
         before = model
         model, simulated = fit(used)
         if before.names == model.names:
-            share = np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in lags.values()])
+            share = np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in sure.values()])
             model = _widened(model, np.sqrt(share) * (model.values - before.values))
     pairs = zip(used, simulated, strict=bool(simulated))
     seen = {record.name: followed(start, record, like) for record, like in pairs}
     for record, part in zip(used, model.records, strict=True):
         model = _with_doubts(design, start, record, seen.get(record.name), model)
-        drift = None if is_benchmark(record) else _drift(part, model)
-        if drift is not None:
-            finding, added = drift
-            found[record.name].append(finding)
+        if not is_benchmark(record):
+            told, added = _drift(part, model)
+            found[record.name] += told
             model = replace(model, covariance=model.covariance + added)
     return Diagnosed(
         model=model,
-        records=used,
+        records=tuple(used),
         followed={name: one for name, one in seen.items() if one is not None},
         findings={name: tuple(each) for name, each in found.items()},
     )
@@ -153,31 +147,30 @@ def _of_lag(signal: str, lag: Lag) -> Finding:
     subject = f"{signal.replace('_', ' ')} and motion at one time"
     late, error = 1e3 * lag.seconds, 1e3 * lag.standard_error
     if not lag.is_sure:
-        text = f"within {max(abs(late), 2.0 * error):.2g} ms"
-        return Finding(subject=subject, passed=True, text=text)
+        return Finding(subject=subject, passed=True, text=f"within {max(abs(late), 2.0 * error):.2g} ms")
     which = "later" if late > 0.0 else "earlier"
     text = f"the {signal} is {abs(late):.3g} ms (standard error {error:.1g} ms) {which} than the motion"
     return Finding(subject=subject, passed=None, text=f"{text}: taken back by as much before the fit")
 
 
-def _drift(part: RecordFit, model: JointModel) -> tuple[Finding, FloatArray] | None:
+def _drift(part: RecordFit, model: JointModel) -> tuple[list[Finding], FloatArray]:
     """Whether all torques change their scale along a record, and what that adds to the covariance.
 
     The noise (what the simulated record leaves is taken off) over the modelled torque times the time (-1 at
     the begin, 1 at the end) and over that time alone, beside the model's own columns. A value that drifts by
     +-d about its mean is uniform in that.
     """
+    moved = np.zeros_like(model.covariance)
     time, w = np.linspace(-1.0, 1.0, len(part.keep))[part.keep][part.compared], part.w[part.compared]
     table = np.column_stack([w, time * (w @ model.values), time])
     names = (*model.names, "scale", "shift")
     if len(told_apart(table, names)[0]) < len(names):
-        return None
+        return [], moved
     size = np.linalg.norm(table, axis=0)
     found = np.linalg.lstsq(table / size, part.noise, rcond=None)[0] / size
     errors = np.sqrt(np.diag(covariance_of([(table / size, part.noise - table @ found)]))) / size
     (scale, shift), told = found[-2:], []
     sure = np.abs(found[-2:]) > SURE * errors[-2:]
-    moved = np.zeros_like(model.covariance)
     if sure[0]:
         told.append(f"all torques change by {200.0 * scale:+.2g} % from begin to end")
         moved = np.outer(model.values, model.values) * scale**2 / 3.0
@@ -185,10 +178,8 @@ def _drift(part: RecordFit, model: JointModel) -> tuple[Finding, FloatArray] | N
         told.append(f"the offset by {2.0 * shift:+.2g}")
         if "offset" in model.names:
             moved[model.names.index("offset"), model.names.index("offset")] += shift**2 / 3.0
-    if not told:
-        return None
     text = f"{' and '.join(told)}: the intervals hold it"
-    return Finding(subject="drift along the record", passed=None, text=text), moved
+    return [Finding(subject="drift along the record", passed=None, text=text)] if told else [], moved
 
 
 def flat_tops(values: FloatArray) -> BoolArray:
@@ -199,11 +190,8 @@ def flat_tops(values: FloatArray) -> BoolArray:
     >>> flat_tops(np.array([0.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.0])).astype(int).tolist()
     [0, 1, 1, 1, 0, 0, 0, 0]
     """
-    out = np.zeros(len(values), dtype=bool)
-    for level in (np.max(values), np.min(values)):
-        for start, stop in stretches(np.abs(values - level) <= 1e-9 * np.ptp(values)):
-            out[start:stop] |= stop - start >= LEAST_RUN
-    return out
+    ends, near = (np.max(values), np.min(values)), 1e-9 * np.ptp(values)
+    return np.any([lasting(np.abs(values - level) <= near, LEAST_RUN) for level in ends], axis=0)
 
 
 def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> tuple[Record, list[Finding]]:
@@ -213,8 +201,7 @@ def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> 
     if is_benchmark(record) or not np.any(flat) or np.all(flat):
         return record, []
     reach = 2 * (recipe or recipe_for(record)).decimation  # of the filter before the decimation
-    near = np.convolve(flat, np.ones(2 * reach + 1), mode="same") > 0.5
-    without = replace(record, left_out=near)
+    without = replace(record, left_out=np.convolve(flat, np.ones(2 * reach + 1), mode="same") > 0.5)
     try:
         fit = fit_records(start, [without], recipe=recipe)
         whole = record_rows(start, record, "symmetric", recipe)
@@ -224,8 +211,7 @@ def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> 
     if not np.any(rows):
         return record, []
     more = np.sign(whole.y) * (whole.explained(fit, whole.names) - whole.y)
-    rest = fit.residual
-    error = float(np.std(rest)) * np.sqrt(correlation_time(rest) / np.count_nonzero(rows))
+    error = float(np.std(fit.residual)) * np.sqrt(correlation_time(fit.residual) / np.count_nonzero(rows))
     if not float(np.mean(more[rows])) > SURE * error:
         return record, []
     share = 100.0 * np.count_nonzero(flat) / len(flat)
@@ -328,7 +314,6 @@ def followed(design: Design, record: Record, simulated: Record) -> Followed | No
         return None
     size = np.linalg.norm(table[:, kept], axis=0)
     solved = solve(table[:, kept] / size, wanted - own)
-    ratio, *more = (solved.values / size).tolist()
-    ratio_error, *error = (np.sqrt(np.diag(solved.correlated)) / size).tolist()
-    scale, scale_error = (-more[0], error[0]) if more else (0.0, 0.0)
-    return Followed(ratio=ratio, ratio_error=ratio_error, scale=scale, scale_error=scale_error)
+    (ratio, *more), errors = (solved.values / size).tolist(), np.sqrt(np.diag(solved.correlated)) / size
+    scale = {"scale": -more[0], "scale_error": float(errors[1])} if more else {}
+    return Followed(ratio=ratio, ratio_error=float(errors[0]), **scale)

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Coupling, Design, LoadFriction
 from actuator_lti.errors import InputError, NumericalError
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import parameter
 from analyses.identification.asked import held_by_name
-from analyses.identification.frequency import Lines, excited_lines, period_of_excitation, response
 from analyses.identification.play import Play, play_of
 from analyses.identification.rows import drive_of
 from analyses.identification.sampled_current import held_voltage
@@ -23,10 +22,14 @@ from analyses.identification.to_design import design_with_fit
 from analyses.identification.two_mass import (
     FLOORS,
     NAMES,
+    Lines,
     TwoMass,
     angle_responses,
+    excited_lines,
     fit_two_mass,
     other_starts,
+    period_of_excitation,
+    response,
     start_of,
 )
 from analyses.identification.verdict import RESIDUAL_LIMIT, Identified, Item, inputs_item, simulated_item
@@ -87,24 +90,32 @@ def identify_frequency(
     play_record = None if play_record is None else prepared(play_record)
     if "angle" not in record.signals:
         raise InputError("the motor angle is needed for a frequency response", where=record.name)
-    reduction, behind = design.ratio_to_coupling, design.ratio_behind_coupling
-    with_torque, used = _with_torque(design, record)
+    torque, source, told, back_emf = drive_of(design, record)
+    if back_emf:
+        raise InputError("a frequency response needs the current, not the voltage", where=record.name)
     command = next((name for name in COMMANDS if name in record.signals), "current")
     period = period_of_excitation(record, command) if period_s is None else period_s
+    signals, used = {**record.signals, "torque_at_motor": torque}, {source: f"drive: {told}"}
     names = ["torque_at_motor", "angle"]
     if "output_angle" in record.signals:
         names.append("load_angle")
+        signals["load_angle"] = design.ratio_behind_coupling * record["output_angle"]
         used["output_angle"] = "load's angle"
     used |= {"angle": "motor angle", command: used.get(command, "its period")}
-    lines = _between_ticks(design, record, excited_lines(with_torque, tuple(names), period))
-    held = _held(design, dict(fixed or {}))
-    fit = _fitted(lines, reduction, held, _reaction(design, with_torque))
+    lines = excited_lines(replace(record, signals=signals), tuple(names), period)
+    lines = _between_ticks(design, record, lines)
+    reaction = _reaction(design, torque, record["angle"])
+    fit = _fitted(lines, design.ratio_to_coupling, _held(design, dict(fixed or {})), reaction)
     play = None if play_record is None else play_of(design, play_record, fit)
-    made = _made(design, fit, play, record.name, behind)
+    made = _made(design, fit, play, record.name)
     text = write_design(made)
     findings = {one.name: check_record(design, one) for one in (record, play_record) if one is not None}
     items = [inputs_item(name, result) for name, result in findings.items()]
-    items += [_misfit_item(fit), _written_item(read_design_text(text), lines, record.name, fit.reaction)]
+    why = "play, friction or another resonance: excite on one flank, in motion"
+    told = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
+    label = f"The two-mass model explains the lines ({told})"
+    items.append(Item.of("misfit", label, "" if fit.misfit <= MISFIT_LIMIT else why))
+    items.append(_written_item(read_design_text(text), lines, record.name, fit.reaction))
     return FrequencyResult(
         record=record,
         play_record=play_record,
@@ -141,26 +152,14 @@ def _between_ticks(design: Design, record: Record, lines: Lines) -> Lines:
     return replace(lines, means=means, noise=noise)
 
 
-def _with_torque(design: Design, record: Record) -> tuple[Record, dict[str, str]]:
-    """The record with the motor's torque and the angle at the coupling's load side as signals."""
-    torque, source, told, back_emf = drive_of(design, record)
-    if back_emf:
-        raise InputError("a frequency response needs the current, not the voltage", where=record.name)
-    signals = {**record.signals, "torque_at_motor": torque}
-    if "output_angle" in record.signals:
-        signals["load_angle"] = design.ratio_behind_coupling * record["output_angle"]
-    return replace(record, signals=signals), {source: f"drive: {told}"}
-
-
-def _reaction(design: Design, record: Record) -> float:
+def _reaction(design: Design, torque: FloatArray, angle: FloatArray) -> float:
     """Torque on the motor by that in the coupling: 1/N_c, and the friction that grows with it.
 
     ``CM N_r`` with the sign of the power that goes to the load, by the mean speed and current of the record:
     the flank on which it was taken.
     """
-    mean = float(np.mean(record["torque_at_motor"]))
-    turned = float(record["angle"][-1] - record["angle"][0])
-    side = np.sign(mean * turned) if abs(turned) > 1.0 else 0.0
+    turned = float(angle[-1] - angle[0])
+    side = np.sign(float(np.mean(torque)) * turned) if abs(turned) > 1.0 else 0.0
     own = design.friction.load_coefficient * design.ratio_behind_coupling
     return float(1.0 / design.ratio_to_coupling + side * own)
 
@@ -171,17 +170,14 @@ def _fitted(lines: Lines, reduction: float, held: Mapping[str, float], reaction:
     One that is merely small against its error stays: held at zero, its part would go into the others, beyond
     their errors.
     """
-    torque, load = lines.names[0], "load_angle" if "load_angle" in lines.names else None
-    start = {**start_of(lines, reduction, torque=torque), **held}
-    go = partial(fit_two_mass, lines, reduction=reduction, torque=torque, load=load, reaction=reaction)
-    fit = go(start, fixed=held)
-    if fit.misfit > MISFIT_DOUBTED:
-        for other in other_starts(start, lines, reduction):
-            with suppress(NumericalError, np.linalg.LinAlgError):
-                result = go({**other, **held}, fixed=held)
-                fit = result if result.misfit < fit.misfit else fit
-            if fit.misfit <= MISFIT_DOUBTED:
-                break
+    start = {**start_of(lines, reduction), **held}
+    fit = fit_two_mass(lines, start, reduction, fixed=held, reaction=reaction)
+    for other in other_starts(start, lines, reduction):
+        if fit.misfit <= MISFIT_DOUBTED:
+            break
+        with suppress(NumericalError, np.linalg.LinAlgError):
+            tried = fit_two_mass(lines, {**other, **held}, reduction, fixed=held, reaction=reaction)
+            fit = min(fit, tried, key=lambda one: one.misfit)
     return _held_at_zero(fit)
 
 
@@ -211,14 +207,6 @@ def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
     return held
 
 
-def _misfit_item(fit: TwoMass) -> Item:
-    result = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
-    why = "play, friction or another resonance: excite on one flank, in motion"
-    reason = "" if fit.misfit <= MISFIT_LIMIT else why
-    label = f"The two-mass model explains the lines ({result})"
-    return Item(id="misfit", label=label, passed=not reason, reason=reason)
-
-
 def _written_item(written: Design, lines: Lines, record: str, reaction: float) -> Item:
     """The response of the design as it was written against the measured lines."""
     coupling, friction = written.coupling, written.load.friction
@@ -232,30 +220,26 @@ def _written_item(written: Design, lines: Lines, record: str, reaction: float) -
         "load_viscous": 0.0 if friction is None else friction.viscous_Nms_rad,
     }
     model, _ = angle_responses(lines.omega_rad_s, values, written.ratio_to_coupling, reaction)
-    measured, relative = response(lines, "angle", lines.names[0])
+    measured, relative = response(lines)
     weight = 1.0 / np.maximum(relative, 1e-3)
     error = float(np.linalg.norm(weight * (model / measured - 1.0)) / np.linalg.norm(weight))
     return simulated_item(record, error, RESIDUAL_LIMIT, "response, line by line")
 
 
-def _made(design: Design, fit: TwoMass, play: Play | None, record: str, behind: float) -> Design:
+def _made(design: Design, fit: TwoMass, play: Play | None, record: str) -> Design:
     """The design with the identified values, their errors and correlations."""
-    old = design.coupling or Coupling(stiffness_Nm_rad=fit["stiffness"])
-    coupling = replace(
-        old,
-        stiffness_Nm_rad=fit["stiffness"],
-        damping_Nms_rad=fit["damping"],
-        play_rad=old.play_rad if play is None else max(2.0 * play.half_rad, 0.0) if play.told else 0.0,
-    )
+    behind, old = design.ratio_behind_coupling, design.coupling or Coupling(stiffness_Nm_rad=fit["stiffness"])
+    coupling = replace(old, stiffness_Nm_rad=fit["stiffness"], damping_Nms_rad=fit["damping"])
+    if play is not None:
+        coupling = replace(coupling, play_rad=max(2.0 * play.half_rad, 0.0) if play.told else 0.0)
     friction = replace(design.load.friction or LoadFriction(), viscous_Nms_rad=fit["load_viscous"])
     base = replace(design, coupling=coupling, load=replace(design.load, friction=friction))
     others = base.motor_side_inertia_kgm2 - base.motor.rotor_inertia_kgm2
     own_load = base.load_side_inertia_kgm2 - base.load.inertia_kgm2 / behind**2
     shift = {"motor_inertia": -others, "load_inertia": -own_load}
-    scale = {"load_inertia": behind**2}
     slopes, values = {}, {}
     for name in (name for name in fit.names if fit[name] > 0.0):
-        key, slope = parameter(name).key, scale.get(name, 1.0)
+        key, slope = parameter(name).key, behind**2 if name == "load_inertia" else 1.0
         slopes[key], values[key] = {name: slope}, slope * (fit[name] + shift.get(name, 0.0))
     made = fit.mapped(slopes, values)
     if play is not None and play.told:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,15 +39,6 @@ class LawChoice:
     taken: bool
 
 
-@dataclass(frozen=True, kw_only=True)
-class MapResult:
-    """All laws that were tried, and the model of the one that is taken."""
-
-    laws: tuple[LawChoice, ...]
-    model: JointModel
-    knots_rad_s: tuple[float, ...] | None
-
-
 def fit_map(
     design: Design,
     records: Sequence[Record],
@@ -55,8 +46,10 @@ def fit_map(
     recipe: Recipe | None = None,
     fixed: Mapping[str, float] | None = None,
     gravity: bool = False,
-) -> MapResult:
+) -> tuple[JointModel, tuple[LawChoice, ...]]:
     """Fit friction maps with one to four break points, and take one only where it is clearly better.
+
+    The model of the law that is taken, and all laws that were tried.
 
     The break points are found one after the other, each where it lowers the residual most among 24 speeds
     (evenly spaced in the logarithm), and then moved in turn.
@@ -70,20 +63,20 @@ def fit_map(
     speed, rest = _plain_residual(rows, plain)
     top = float(np.max(np.abs(speed)))
     n = len(rest) / correlation_time(plain.residual)
-    best, lowest, model = 0, 0.0, plain
-    laws = [_law((), plain, 0.0)]
     breaks: tuple[float, ...] = ()
+    models, laws = [plain], [_law((), plain, 0.0)]
     for count in range(1, MOST_BREAKS + 1):
         breaks = _one_more(speed, rest, top, breaks)
         if len(breaks) < count:
             break
-        tried = fitted((0.0, *breaks, top))
-        gain = _bic(tried, n) - _bic(plain, n)
-        laws.append(_law(breaks, tried, gain))
-        if gain < lowest - (0.0 if best else CLEARLY_BETTER):
-            best, lowest, model = count, gain, tried
+        models.append(fitted((0.0, *breaks, top)))
+        laws.append(_law(breaks, models[-1], _bic(models[-1], n) - _bic(plain, n)))
+    best = 0
+    for k, law in enumerate(laws):
+        if law.criterion < laws[best].criterion - (0.0 if best else CLEARLY_BETTER):
+            best = k
     laws[best] = replace(laws[best], taken=True)
-    return MapResult(laws=tuple(laws), model=model, knots_rad_s=model.knots_rad_s)
+    return models[best], tuple(laws)
 
 
 def _law(breaks: tuple[float, ...], model: JointModel, gain: float) -> LawChoice:
@@ -134,23 +127,22 @@ def _one_more(
         left = rest - w @ np.linalg.lstsq(w, rest, rcond=None)[0]
         return float(left @ left)
 
-    free = [v for v in grid if all(abs(np.log(v / b)) > 0.1 for b in result)]
+    def apart(one: float, others: Sequence[float]) -> bool:
+        return all(abs(np.log(one / other)) > 0.1 for other in others)
+
+    free = [v for v in grid if apart(v, result)]
     if not free:
         return result
-    chosen = [*result, float(min(free, key=lambda v: misfit([*result, v])))]
-    for k in range(len(chosen)):
-        chosen[k] = _moved(chosen, k, top, misfit)
-    return tuple(sorted(chosen))
-
-
-def _moved(
-    chosen: Sequence[float], place: int, top: float, misfit: Callable[[Sequence[float]], float]
-) -> float:
-    """One break point, refined between the grid's neighbours."""
-    others = [v for k, v in enumerate(chosen) if k != place]
-    here, step = np.log(chosen[place]), np.log(0.95 / LEAST_SHARE) / (GRID - 1)
-    ends = here - step, min(here + step, np.log(0.97 * top))
-    result = minimize_scalar(lambda x: misfit([*others, float(np.exp(x))]), bounds=ends, method="bounded")
-    new = float(np.exp(result.x))
-    apart = all(abs(np.log(new / v)) > 0.1 for v in others)
-    return new if apart and result.fun < misfit(chosen) else float(chosen[place])
+    chosen, step = (
+        [*result, min(free, key=lambda v: misfit([*result, v]))],
+        np.log(0.95 / LEAST_SHARE) / (GRID - 1),
+    )
+    for k, here in enumerate(chosen):  # between the grid's neighbours
+        others = chosen[:k] + chosen[k + 1 :]
+        ends = np.log(here) - step, min(np.log(here) + step, np.log(0.97 * top))
+        moved = minimize_scalar(
+            lambda x, o=others: misfit([*o, float(np.exp(x))]), bounds=ends, method="bounded"
+        )
+        if apart(np.exp(moved.x), others) and moved.fun < misfit(chosen):
+            chosen[k] = np.exp(moved.x)
+    return tuple(float(v) for v in sorted(chosen))

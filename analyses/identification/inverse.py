@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -11,14 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.least_squares import (
-    NotTold,
-    Solution,
-    by_record,
-    covariance_of,
-    solve,
-    told_apart,
-)
+from analyses.estimation.least_squares import Solution, by_record, covariance_of, solve, told_apart
 from analyses.estimation.parameters import own_std, parameter
 from analyses.identification.joint_model import (
     FrictionForm,
@@ -78,6 +72,10 @@ def fit_records(
     return replace(model, knots_rad_s=knots)
 
 
+def _stacked(blocks: Sequence[Rows], names: Sequence[str]) -> FloatArray:
+    return np.concatenate([block.columns(names) for block in blocks])
+
+
 def _fitted(
     design: Design,
     blocks: Sequence[Rows],
@@ -91,9 +89,11 @@ def _fitted(
         raise InputError(f"{unknown[0]}: no parameter of this model; there are: {', '.join(names)}")
     fixed = {name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()}
     free = [name for name in names if name not in fixed]
-    kept, left = told_apart(np.concatenate([block.columns(free) for block in blocks]), free)
+    kept, left = told_apart(_stacked(blocks, free), free)
     for one in left:
-        fixed[one.name] = Fixed(value=default_value(design, one.name), reason=_kept(one), moves=one.moves)
+        moved = " and ".join(f"{name} by {-factor:.3g} times it" for name, factor in one.moves.items())
+        why = f"{one}: the design's value kept" + (f"; an error of it moves {moved}" if moved else "")
+        fixed[one.name] = Fixed(value=default_value(design, one.name), reason=why, moves=one.moves)
     free = [free[k] for k in kept]
     if not free:
         raise InputError("nothing is left to fit: all parameters are fixed", where=blocks[0].name)
@@ -114,11 +114,9 @@ def _said(
     design: Design, blocks: Sequence[Rows], negative: Mapping[str, float], model: JointModel
 ) -> JointModel:
     """The model that says why some values are the design's, and holds what their errors move."""
-    others = np.concatenate([block.columns(model.names) for block in blocks])
     said = {}
     for name, value in negative.items():
-        column = np.concatenate([block.columns([name])[:, 0] for block in blocks])
-        moves = np.linalg.lstsq(others, column, rcond=None)[0]
+        moves = np.linalg.lstsq(_stacked(blocks, model.names), _stacked(blocks, [name])[:, 0], rcond=None)[0]
         said[name] = Fixed(
             value=model[name],
             reason="would come out negative: not determined, the design's value kept",
@@ -127,11 +125,6 @@ def _said(
         )
     covariance = model.covariance + _of_fixed(design, model.names, said)
     return replace(model, fixed={**model.fixed, **said}, covariance=covariance)
-
-
-def _kept(one: NotTold) -> str:
-    moved = " and ".join(f"{name} by {-factor:.3g} times it" for name, factor in one.moves.items())
-    return f"{one}: the design's value kept" + (f"; an error of it moves {moved}" if moved else "")
 
 
 def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed]) -> FloatArray:
@@ -172,9 +165,9 @@ def _single(
     block: Rows, free: Sequence[str], fixed: Mapping[str, Fixed], found: Mapping[str, float]
 ) -> tuple[Fit, FloatArray]:
     """One record fitted alone, and its residual: what it tells, the rest held at what all gave."""
-    kept, _ = told_apart(block.columns(free), free)
+    kept, left = told_apart(block.columns(free), free)
+    rest = {one.name: Fixed(value=found[one.name], reason="determined by other records") for one in left}
     own = tuple(free[k] for k in kept)
-    rest = {n: Fixed(value=found[n], reason="determined by other records") for n in free if n not in own}
     result = _joint([block], own, {**fixed, **rest}, np.ones(1))
     return Fit(names=own, values=result.values, covariance=result.correlated), result.residual
 
@@ -192,8 +185,17 @@ def _model(
     found |= dict(zip(free, solution.values.tolist(), strict=True))
     singles = [_single(block, free, fixed, found) for block in blocks] if len(blocks) > 1 else []
     rests = [_target(block, fixed) - block.columns(free) @ solution.values for block in blocks]
-    own = [rest for _, rest in singles] or rests
-    parts = tuple(_part(*each, free, found) for each in zip(blocks, rests, own, strict=True))
+    parts = []
+    for block, rest, own in zip(blocks, rests, [rest for _, rest in singles] or rests, strict=True):
+        other = block.explained(found, [name for name in block.names if not name.startswith(FRICTION)])
+        rows = replace(block, names=tuple(free), w=block.columns(free))
+        residuals: dict[str, Any] = {
+            "residual": rest,
+            "own_residual": own,
+            "noise": own,
+            "friction": block.y - other,
+        }
+        parts.append(RecordFit(**vars(rows), **residuals, compared=np.ones(len(own), dtype=bool)))
     scaled = [(g * part.w, g * part.own_residual) for g, part in zip(weights, parts, strict=True)]
     drive = np.concatenate([block.y for block in blocks])
     model = JointModel(
@@ -205,7 +207,7 @@ def _model(
         between={},
         fixed=dict(fixed),
         relative_residual=float(np.linalg.norm(np.concatenate(rests)) / np.linalg.norm(drive)),
-        records=parts,
+        records=tuple(parts),
         recipe=blocks[0].recipe,
         condition=solution.condition,
         weights=tuple(weights.tolist()),
@@ -221,21 +223,6 @@ def with_scatter(design: Design, model: JointModel) -> JointModel:
     kept = _of_fixed(design, model.names, model.fixed)
     between = {name: single for name, (single, _) in scatter.items()}
     return replace(model, between=between, covariance=model.covariance + extra + kept)
-
-
-def _part(
-    block: Rows, rest: FloatArray, own: FloatArray, free: Sequence[str], found: Mapping[str, float]
-) -> RecordFit:
-    other = block.explained(found, [name for name in block.names if not name.startswith(FRICTION)])
-    rows = replace(block, names=tuple(free), w=block.columns(free))
-    return RecordFit(
-        **vars(rows),
-        residual=rest,
-        own_residual=own,
-        friction=block.y - other,
-        noise=own,
-        compared=np.ones(len(own), dtype=bool),
-    )
 
 
 def held_out_residual(design: Design, model: JointModel, record: Record) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lsim
 
-from actuator_lti.design.model import Design, LoadFriction
+from actuator_lti.design.model import Coupling, Design, LoadFriction
 from analyses.estimation.arrays import FloatArray
 from analyses.identification.joint_model import Recipe
 from analyses.records.differentiation import Motion
@@ -45,17 +45,17 @@ def two_sides(
     W) - T_f,load + M/N_r``. Where the output alone is recorded, the motor's motion is that and the twist.
     Play is in what is recorded only. ``moment`` is that at the output, ``place`` the signal of the motion.
     """
-    behind = design.ratio_behind_coupling
+    behind, coupling = design.ratio_behind_coupling, design.coupling
+    assert coupling is not None
     if place in ("output_angle", "position", "velocity"):
         load = motion.scaled(1.0 / design.ratio_to_coupling)
         torque = _of_load(design, load)
-        return TwoSides(
-            motor=_with_twist(design, record, motion, torque - moment / behind, recipe),
-            load=load,
-            torque=torque,
-            told="load's own motion, the motor's by the design's stiffness",
-        )
-    load, told = _follows(design, record, motion, moment), "load's motion by the design's coupling"
+        twist = design.ratio_to_coupling / coupling.stiffness_Nm_rad * (torque - moment / behind)
+        extra = recipe.motion(twist, record.period_s)
+        motor = Motion(**{name: values + vars(extra)[name] for name, values in vars(motion).items()})
+        told = "load's own motion, the motor's by the design's stiffness"
+        return TwoSides(motor=motor, load=load, torque=torque, told=told)
+    load, told = _follows(design, coupling, record, motion, moment), "load's motion by the design's coupling"
     measured = _measured(design, record, load, moment, recipe)
     if measured is not None:
         load, told = measured, "load's motion of the output's encoder"
@@ -64,11 +64,9 @@ def two_sides(
 
 def _of_load(design: Design, load: Motion) -> FloatArray:
     """What the coupling carries without a moment: for inertia and friction behind it."""
-    friction, inertial = design.load.friction, design.load_side_inertia_kgm2 * load.acceleration
-    if friction is None:
-        return np.asarray(inertial)
-    dry = friction.dry_torque_Nm * np.sign(load.velocity)
-    return np.asarray(inertial + dry + friction.viscous_Nms_rad * load.velocity + friction.offset_torque_Nm)
+    friction = design.load.friction or LoadFriction()
+    dry = design.load_side_inertia_kgm2 * load.acceleration + friction.dry_torque_Nm * np.sign(load.velocity)
+    return np.asarray(dry + friction.viscous_Nms_rad * load.velocity + friction.offset_torque_Nm)
 
 
 def _measured(
@@ -81,22 +79,21 @@ def _measured(
     """
     if "output_angle" not in record.signals:
         return None
-    angle, period = record["output_angle"], record.period_s
-    behind = design.ratio_behind_coupling
-    made = recipe.motion(behind * angle, period)
-    noise = float(np.std(behind * angle - made.position))
-    cutoff = recipe.cutoff_hz
-    rough = noise * (2.0 * np.pi * cutoff) ** 2 * np.sqrt(0.4 * cutoff * period)
-    carried = _of_load(design, followed) - moment / behind
-    small = design.load_side_inertia_kgm2 * rough < NOISE_SHARE * float(np.std(carried))
-    return made if small else None
+    behind, cutoff = design.ratio_behind_coupling, recipe.cutoff_hz
+    angle = behind * record["output_angle"]
+    made = recipe.motion(angle, record.period_s)
+    noise = float(np.std(angle - made.position))
+    rough = noise * (2.0 * np.pi * cutoff) ** 2 * np.sqrt(0.4 * cutoff * record.period_s)
+    carried = float(np.std(_of_load(design, followed) - moment / behind))
+    return made if design.load_side_inertia_kgm2 * rough < NOISE_SHARE * carried else None
 
 
-def _follows(design: Design, record: Record, motion: Motion, moment: FloatArray) -> Motion:
+def _follows(
+    design: Design, coupling: Coupling, record: Record, motion: Motion, moment: FloatArray
+) -> Motion:
     """The load's motion that the motor's makes through the design's coupling, from rest in the twist."""
-    coupling, friction = design.coupling, design.load.friction or LoadFriction()
-    assert coupling is not None
-    k, c, inertia = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad, design.load_side_inertia_kgm2
+    friction, inertia = design.load.friction or LoadFriction(), design.load_side_inertia_kgm2
+    k, c = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad
     driver = motion.scaled(1.0 / design.ratio_to_coupling)
     viscous, dry, offset = friction.viscous_Nms_rad, friction.dry_torque_Nm, friction.offset_torque_Nm
     if inertia == 0.0:
@@ -109,19 +106,7 @@ def _follows(design: Design, record: Record, motion: Motion, moment: FloatArray)
     for _ in range(ROUNDS if dry > 0.0 else 1):
         force = pull - dry * np.sign(speed)
         rest = force[0] - (c + viscous) * speed[0]
-        _, states, _ = lsim(system, force, time, X0=[rest / k, speed[0]])
-        place, speed = states[:, 0], states[:, 1]
+        place, speed = lsim(system, force, time, X0=[rest / k, speed[0]])[1].T
     rate = (k * (driver.position - place) + c * (driver.velocity - speed) - viscous * speed) / inertia
     rate += (moment / design.ratio_behind_coupling - offset - dry * np.sign(speed)) / inertia
     return Motion(position=place, velocity=speed, acceleration=rate)
-
-
-def _with_twist(
-    design: Design, record: Record, motion: Motion, carried: FloatArray, recipe: Recipe
-) -> Motion:
-    """The motor's motion where ``motion`` is the output's: the twist under what the coupling carries."""
-    coupling = design.coupling
-    assert coupling is not None
-    twist = design.ratio_to_coupling / coupling.stiffness_Nm_rad * carried
-    extra = recipe.motion(twist, record.period_s)
-    return Motion(**{name: values + vars(extra)[name] for name, values in vars(motion).items()})

@@ -21,7 +21,7 @@ from analyses.estimation.arrays import ComplexArray, FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import told_apart
 from analyses.identification.asked import Of
-from analyses.identification.output_error import Moved, fit_output
+from analyses.identification.output_error import fit_output
 from analyses.identification.to_design import design_with_fit, with_fixed
 from analyses.identification.verdict import Identified, Item, simulated_item
 
@@ -101,25 +101,31 @@ def identify_response(
     known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
     size = np.abs(measured.response) * (measured.deviation / np.sqrt(2.0) if known else 1.0)
 
-    def parts(tried: Design) -> FloatArray:
-        return _parts(model(tried) / size)
+    def parts(values: ComplexArray) -> FloatArray:
+        return np.concatenate([(values / size).real, (values / size).imag])
 
     held = {key: Fixed(value=value, reason="fixed as asked") for key, value in (fixed or {}).items()}
     names = tuple(key for key in KEYS if key in paths_of(start) and key not in held)
-    fit, rest = _determined(start, names, parts, _parts(measured.response / size), known, progress)
+    fit, rest = _determined(
+        start, names, lambda tried: parts(model(tried)), parts(measured.response), known, progress
+    )
     fit = replace(fit, fixed={**held, **fit.fixed})
     made = design_with_fit(start, fit, f"frequency response {measured.name}")
     text = write_design(made)
     modelled = model(read_design_text(text))
     error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
+    items = [simulated_item(measured.name, error, limit, "its response, rms over the frequencies")]
+    if fit.misfit is not None:
+        level = float(chi2.sf(float(rest @ rest), len(rest) - len(fit.names)))
+        label = f"The measured deviations explain what is left (misfit {fit.misfit:.3g})"
+        why = f"by chance with a probability of {level:.1g}: another drive, or at another operating point"
+        items.insert(0, Item.of("misfit", label, "" if level > LEVEL else why))
+    ended = "it ended at the least or largest value of its key: the response wants another"
+    items += [Item.of(f"bound-{key}", f"{key} is within what its key allows", ended) for key in fit.at_bound]
     return ResponseResult(
         design=made,
         text=text,
-        items=(
-            *_noise_items(fit, rest),
-            simulated_item(measured.name, error, limit, "its response, rms over the frequencies"),
-            *(_bound_item(key) for key in fit.at_bound),
-        ),
+        items=tuple(items),
         measured=measured,
         modelled=modelled,
         loop=loop or design.controller.outermost,
@@ -137,29 +143,24 @@ def _model(
     there = (*wired.stages, *wired.points)
     if name not in there:
         raise InputError(f'--loop "{name}": allowed: {", ".join(there)}', where=design.name)
-    top, last = 0.5 / _seen(design, name, of).dt, measured.frequency_hz[-1]
-    if not last < top:
-        raise InputError(f"{last:g} Hz: the loop is sampled; allowed: below {top:g} Hz", measured.name)
+
+    def seen(tried: Design) -> Any:
+        wired = wire(tried, Operating())
+        if of == "closed":
+            return sampled.reference_to_output(wired)
+        make = sampled.stage_loop if name in wired.stages else sampled.point_loop
+        return make(wired, name).open_loop
 
     def response(tried: Design) -> ComplexArray:
-        system = _seen(tried, name, of)
+        system = seen(tried)
         value = np.asarray(system(np.exp(2j * np.pi * measured.frequency_hz * system.dt))).ravel()
         over = {"T": value, "S": np.ones_like(value)}.get(of)
         return np.asarray(value if over is None else over / (1.0 + value), dtype=np.complex128)
 
+    top, last = 0.5 / seen(design).dt, measured.frequency_hz[-1]
+    if not last < top:
+        raise InputError(f"{last:g} Hz: the loop is sampled; allowed: below {top:g} Hz", measured.name)
     return response
-
-
-def _seen(design: Design, name: str, of: Of) -> Any:
-    wired = wire(design, Operating())
-    if of == "closed":
-        return sampled.reference_to_output(wired)
-    make = sampled.stage_loop if name in wired.stages else sampled.point_loop
-    return make(wired, name).open_loop
-
-
-def _parts(values: ComplexArray) -> FloatArray:
-    return np.concatenate([values.real, values.imag])
 
 
 def _determined(
@@ -170,7 +171,10 @@ def _determined(
     known: bool,
     progress: Callable[[int, int], None] | None,
 ) -> tuple[ResponseFit, FloatArray]:
-    """The fit of what is determined, and its residual; of the others the one told worst goes first."""
+    """The fit of what is determined, and its residual; of the others the one told worst goes first.
+
+    Its errors are those by residuals of unit deviation, or by their own scatter.
+    """
     left: dict[str, str] = {}
     while names:
         found = fit_output(start, names, parts, measured, progress)
@@ -179,8 +183,12 @@ def _determined(
             left |= {one.name: str(one) for one in like}
             names = tuple(names[k] for k in kept)
             continue
-        fit = _fit(names, found, known)
-        share = fit.standard_errors / np.maximum(np.abs(fit.values), 1e-300)
+        size = np.linalg.norm(found.slopes, axis=0)
+        unit = found.slopes / size
+        variance = float(found.rest @ found.rest) / max(len(found.rest) - len(size), 1)
+        scale = max(variance, 1.0) if known else variance
+        covariance = np.asarray(scale * (np.linalg.inv(unit.T @ unit) / np.outer(size, size)))
+        share = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(found.values), 1e-300)
         worst = int(np.argmax(share))
         if share[worst] <= 1.0:
             break
@@ -192,35 +200,11 @@ def _determined(
     for key, why in left.items():
         reason = f"{why}: not determined, the design's value kept"
         fixed[key] = Fixed(value=parameter_value(start, key), reason=reason)
-    return replace(fit, fixed=fixed), found.rest
-
-
-def _fit(names: tuple[str, ...], found: Moved, known: bool) -> ResponseFit:
-    """The values with errors by residuals of unit deviation or by their own scatter; and the misfit."""
-    size = np.linalg.norm(found.slopes, axis=0)
-    unit = found.slopes / size
-    variance = float(found.rest @ found.rest) / max(len(found.rest) - len(size), 1)
-    scale = max(variance, 1.0) if known else variance
-    inverse = np.linalg.inv(unit.T @ unit) / np.outer(size, size)
-    return ResponseFit(
-        names=names,
-        values=found.values,
-        covariance=np.asarray(scale * inverse),
-        misfit=float(np.sqrt(variance)) if known else None,
-        at_bound=found.at_bound,
-    )
-
-
-def _noise_items(fit: ResponseFit, rest: FloatArray) -> list[Item]:
-    """Whether noise of the stated deviation explains what is left."""
-    if fit.misfit is None:
-        return []
-    level = float(chi2.sf(float(rest @ rest), len(rest) - len(fit.names)))
-    label = f"The measured deviations explain what is left (misfit {fit.misfit:.3g})"
-    why = f"by chance with a probability of {level:.1g}: another drive, or at another operating point"
-    return [Item(id="misfit", label=label, passed=level > LEVEL, reason="" if level > LEVEL else why)]
-
-
-def _bound_item(key: str) -> Item:
-    reason = "it ended at the least or largest value of its key: the response wants another"
-    return Item(id=f"bound-{key}", label=f"{key} is within what its key allows", passed=False, reason=reason)
+    misfit = float(np.sqrt(variance)) if known else None
+    values: dict[str, Any] = {
+        "names": names,
+        "values": found.values,
+        "covariance": covariance,
+        "fixed": fixed,
+    }
+    return ResponseFit(**values, misfit=misfit, at_bound=found.at_bound), found.rest

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -119,8 +119,6 @@ def fit_output(
 
 def _scale(design: Design, path: str, start: float) -> float:
     """What a parameter is measured by: its start, or where that is zero a part of a like one."""
-    if start != 0.0:
-        return abs(start)
     period, friction = design.controller.period_s, design.friction
     stiffness = 0.0 if design.coupling is None else design.coupling.stiffness_Nm_rad
     like = {
@@ -130,9 +128,9 @@ def _scale(design: Design, path: str, start: float) -> float:
         "coupling.damping": stiffness * period,
         "control.computing_delay": period,
     }.get(path, 0.0)
-    if like == 0.0:
+    if start == 0.0 == like:
         raise InputError(f"{path} = 0: a fit needs a start that is not zero")
-    return like
+    return abs(start) or like
 
 
 def refine_by_output_error(
@@ -216,32 +214,24 @@ def resimulate(design: Design, records: Sequence[Record], form: FrictionForm) ->
 
 
 def _one(design: Design, record: Record, form: FrictionForm) -> Resimulated:
-    if command_of(design, record) is None:
-        return _needed(design, record, form)
-    try:
-        return _simulated(design, record)
-    except InputError as error:  # a part that the simulator does not have
-        result = _needed(design, record, form)
-        return replace(result, how=f"{result.how} ({error.message})")
+    why = ""
+    if command_of(design, record) is not None:
+        try:
+            name, part = output_name(design, record), simulated_part(design, record)
+            error = correlate_record(design, part)[name].relative_error
+            first = "" if len(part) == len(record) else f"its first {len(part)} rows "
+            how = f"{name}, {first}simulated"
+            return Resimulated(record=record.name, signal=name, relative_error=error, how=how)
+        except InputError as refusal:  # a part that the simulator does not have
+            why = f" ({refusal.message})"
+    knots = [point.speed_rad_s for point in design.friction.map(1)] or None
+    rows = record_rows(design, record, form, None, knots_rad_s=knots)
+    rest = rows.y - rows.explained({name: default_value(design, name) for name in rows.names}, rows.names)
+    error = float(np.linalg.norm(rest) / np.linalg.norm(rows.y))
+    how = f"torque needed for its motion{why}"
+    return Resimulated(record=record.name, signal="drive", relative_error=error, how=how)
 
 
 def simulated_part(design: Design, record: Record) -> Record:
     """The record; of a long one the first part."""
     return record.slice(0, max(int(MOST_TICKS * design.controller.period_s / record.period_s), 2))
-
-
-def _simulated(design: Design, record: Record) -> Resimulated:
-    name, part = output_name(design, record), simulated_part(design, record)
-    rows = "" if len(part) == len(record) else f"its first {len(part)} rows "
-    error = correlate_record(design, part)[name].relative_error
-    how = f"{name}, {rows}simulated"
-    return Resimulated(record=record.name, signal=name, relative_error=error, how=how)
-
-
-def _needed(design: Design, record: Record, form: FrictionForm) -> Resimulated:
-    knots = [point.speed_rad_s for point in design.friction.map(1)] or None
-    rows = record_rows(design, record, form, None, knots_rad_s=knots)
-    rest = rows.y - rows.explained({name: default_value(design, name) for name in rows.names}, rows.names)
-    error = float(np.linalg.norm(rest) / np.linalg.norm(rows.y))
-    how = "torque needed for its motion"
-    return Resimulated(record=record.name, signal="drive", relative_error=error, how=how)

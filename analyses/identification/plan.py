@@ -94,26 +94,26 @@ def plan_motions(
     if measured is not None and measured.form != "symmetric":
         raise InputError("a plan adds to records that were fitted with symmetric friction")
     family = list(product(SHAPES, CYCLES))
-    rows, made = [], []
+    made = []
     for k, (shape, cycles) in enumerate(family, 1):
         command, record = _largest(design, shape, cycles)
-        rows.append(record_rows(design, record, "symmetric", None))
-        made.append((shape, cycles, command, record))
+        made.append((shape, cycles, command, record, record_rows(design, record, "symmetric", None)))
         if progress is not None:
             progress(k, len(family))
-    kept, _ = told_apart(np.concatenate([one.w for one in rows]), rows[0].names)
-    names = tuple(rows[0].names[k] for k in kept)
+    every = made[0][-1].names
+    kept, _ = told_apart(np.concatenate([rows.w for *_, rows in made]), every)
+    names = tuple(every[k] for k in kept)
     segments = [
         Segment(
             shape=shape,
             cycles=cycles,
             amplitude=float(np.max(np.abs(command))),
-            speed=float(np.max(np.abs(own.speed))),
+            speed=float(np.max(np.abs(rows.speed))),
             drive_rms=float(np.sqrt(np.mean(record[_drive(design)] ** 2))),
             command=command,
-            information=_information(design, record, own, kept, noise),
+            information=_information(design, record, rows, kept, noise),
         )
-        for (shape, cycles, command, record), own in zip(made, rows, strict=True)
+        for shape, cycles, command, record, rows in made
     ]
     values = np.array([default_value(design, name) for name in names])
     size = np.array([abs(v) if v else default_value(design, "dry") for v in values]) * within / COVERAGE
@@ -160,13 +160,22 @@ def _largest(design: Design, shape: str, cycles: int) -> tuple[FloatArray, Recor
     rate = float(np.max(np.abs(np.gradient(wave, PERIOD_S)))) * design.total_ratio
     amplitude = USED * min(design.validation.full_deflection_rad, design.limits.speed_rad_s / rate)
     own, name = design.limits, _drive(design)
+    wanted, place = ("position_reference", "position") if design.axis == "linear" else ("reference", "angle")
+    blank = dict.fromkeys((place, name), np.zeros(len(time)))
     for _ in range(24):
-        record, limits = _simulated(design, time, amplitude * wave)
-        drive = record[name]
+        bare = Record(
+            name="plan",
+            time_s=time,
+            signals={wanted: amplitude * wave, **blank},
+            units={},
+            counts=RowCounts(),
+        )
+        signals, limits = model_signals(design, bare, blank)
+        drive = signals[name]
         cool = float(np.sqrt(np.mean(drive**2))) <= USED * own.continuous_current_A
         small = float(np.max(np.abs(drive))) <= USED * own.peak_current_A
         if (name != "current" or (cool and small)) and not any(limits.values()):
-            return amplitude * wave, record
+            return amplitude * wave, replace(bare, signals={**bare.signals, **signals})
         amplitude *= USED
     raise InputError(f"no motion of {cycles / SEGMENT_S:g} Hz stays off the drive's limits", design.name)
 
@@ -177,15 +186,6 @@ def _times(count: int) -> FloatArray:
 
 def _drive(design: Design) -> str:
     return "voltage" if design.effective_motor.torque_constant_Nm_A is None else "current"
-
-
-def _simulated(design: Design, time: FloatArray, command: FloatArray) -> tuple[Record, dict[str, float]]:
-    """A record of a command as the design would have made it, and the limits that act."""
-    wanted, place = ("position_reference", "position") if design.axis == "linear" else ("reference", "angle")
-    blank = {place: np.zeros(len(time)), _drive(design): np.zeros(len(time))}
-    bare = Record(name="plan", time_s=time, signals={wanted: command, **blank}, units={}, counts=RowCounts())
-    signals, limits = model_signals(design, bare, blank)
-    return replace(bare, signals={**bare.signals, **signals}), limits
 
 
 def _information(

@@ -91,7 +91,9 @@ def _play_with(design: Design, record: Record, fit: TwoMass, values: Mapping[str
     friction = np.column_stack([speed, np.sign(speed)])
     names = ("middle", "play", "viscous", "dry")
     own = {"viscous": values["load_viscous"], "dry": 0.0}
-    middle, half = _first_gap(twist, inertial, k)
+    low, high = np.quantile(twist, [0.02, 0.98])  # less the elastic part there, the ends of the gap
+    elastic = float(np.quantile(np.abs(inertial), 0.9)) / k
+    middle, half = float(0.5 * (low + high)), max(0.5 * float(high - low) - elastic, 0.0)
     for _ in range(ROUNDS):
         torque = inertial + friction @ np.array([own["viscous"], own["dry"]])
         touching = _in_contact(torque, twist - middle, half, round(GUARD / (cutoff * period)))
@@ -105,7 +107,7 @@ def _play_with(design: Design, record: Record, fit: TwoMass, values: Mapping[str
             break
         own = new
     steps = _resolution(record["angle"]) / fit.reduction, behind * _resolution(record["output_angle"])
-    coarse = _coarse(float(np.hypot(*steps)), touching, 0.5 / (cutoff * period))
+    coarse = _coarse(steps, touching, 0.5 / (cutoff * period))
     std = np.sqrt(result.correlated[kept.index(1), kept.index(1)])
     return Play(
         half_rad=half,
@@ -117,32 +119,24 @@ def _play_with(design: Design, record: Record, fit: TwoMass, values: Mapping[str
     )
 
 
-def _resolution(values: FloatArray) -> float:
-    """The step of a recorded signal: the smallest difference between its values, if most are multiples."""
-    steps = np.diff(np.unique(values))
-    if not len(steps):
-        return 0.0
-    step = float(np.min(steps[steps > 1e-9 * float(np.ptp(values))], initial=np.inf))
-    shares = steps / step
-    whole = np.abs(shares - np.round(shares)) < 0.01
-    return step if np.isfinite(step) and np.mean(whole) > 0.95 else 0.0
-
-
-def _coarse(resolution_rad: float, touching: BoolArray, smooth_samples: float) -> float:
-    """Error from a resolution: uniform, averaged over the independent rows of one cycle (two contacts).
+def _coarse(steps: tuple[float, float], touching: BoolArray, smooth_samples: float) -> float:
+    """Error from resolutions: uniform, averaged over the independent rows of one cycle (two contacts).
 
     ``smooth_samples`` rows are worth one independent one after filtering.
     """
     visits = max(int(np.count_nonzero(np.diff(touching.astype(np.int8)) == 1)), 2)
     independent = np.count_nonzero(touching) / (0.5 * visits) / max(smooth_samples, 1.0)
-    return float(resolution_rad / np.sqrt(12.0 * max(independent, 1.0)))
+    return float(np.hypot(*steps) / np.sqrt(12.0 * max(independent, 1.0)))
 
 
-def _first_gap(twist: FloatArray, torque: FloatArray, stiffness: float) -> tuple[float, float]:
-    """Middle and half width of the gap, from the ends of the twist less the elastic part there."""
-    low, high = np.quantile(twist, [0.02, 0.98])
-    elastic = float(np.quantile(np.abs(torque), 0.9)) / stiffness
-    return float(0.5 * (low + high)), max(0.5 * float(high - low) - elastic, 0.0)
+def _resolution(values: FloatArray) -> float:
+    """The step of a recorded signal: the smallest difference between its values, if most are multiples."""
+    steps = np.diff(np.unique(values))
+    step = float(np.min(steps[steps > 1e-9 * float(np.ptp(values))], initial=np.inf))
+    if not np.isfinite(step):
+        return 0.0
+    shares = steps / step
+    return step if np.mean(np.abs(shares - np.round(shares)) < 0.01) > 0.95 else 0.0
 
 
 def _in_contact(torque_Nm: FloatArray, twist: FloatArray, half: float, guard_samples: int) -> BoolArray:

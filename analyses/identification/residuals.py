@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,36 +63,26 @@ def residual_tests(model: JointModel) -> tuple[ResidualTest, ...]:
     return tuple(test for part in model.records for test in _of_record(part))
 
 
-def _of_record(part: RecordFit) -> list[ResidualTest]:
+def _of_record(part: RecordFit) -> Iterator[ResidualTest]:
     rest, reach = part.noise, min(len(part.noise) // 4, MOST_LAGS)
     if reach < 1 or not np.any(rest):
-        return []
-    inputs = {"speed": part.speed, "acceleration": part.acceleration}
-    a = _whitening(rest)
-    white, *others = (
-        lfilter(a, [1.0], x)[len(a) - 1 :] for x in (rest, *(x[part.compared] for x in inputs.values()))
-    )
-    both = np.arange(-reach, reach + 1, dtype=np.int64)
-    made = [_test(part.name, "whiteness", "", white, white, both[reach + 1 :])]
-    pairs = zip(inputs, others, strict=True)
-    return made + [_test(part.name, "independence", name, white, x, both) for name, x in pairs]
-
-
-def _whitening(rest: FloatArray) -> FloatArray:
-    """Coefficients of an autoregressive model of the highest order, 10 log10 n, by least squares."""
-    order = min(int(10.0 * np.log10(len(rest))), len(rest) // 4)
+        return
+    order = min(int(10.0 * np.log10(len(rest))), len(rest) // 4)  # the highest, by least squares
     rows = np.lib.stride_tricks.sliding_window_view(rest, order + 1)[:, ::-1]
-    return np.append(1.0, -np.linalg.lstsq(rows[:, 1:], rows[:, 0], rcond=None)[0])
-
-
-def _test(
-    record: str, name: str, of: str, innovations: FloatArray, values: FloatArray, lags: IntArray
-) -> ResidualTest:
-    e, u = (x - x.mean() for x in (innovations, values))
-    size = float(np.linalg.norm(e) * np.linalg.norm(u)) or 1.0
-    count = len(e)
-    products = [float(e[max(k, 0) : count + min(k, 0)] @ u[max(-k, 0) : count - max(k, 0)]) for k in lags]
-    bound = float(norm.isf(0.5 * (1.0 - (1.0 - LEVEL) ** (1.0 / len(lags)))) / np.sqrt(count))
-    return ResidualTest(
-        record=record, name=name, input=of, lags=lags, correlation=np.array(products) / size, bound=bound
-    )
+    a = np.append(1.0, -np.linalg.lstsq(rows[:, 1:], rows[:, 0], rcond=None)[0])
+    both = np.arange(-reach, reach + 1, dtype=np.int64)
+    inputs = {"": rest, "speed": part.speed[part.compared], "acceleration": part.acceleration[part.compared]}
+    white, *_ = made = [lfilter(a, [1.0], x)[order:] for x in inputs.values()]
+    for of, x in zip(inputs, made, strict=True):
+        lags = both if of else both[reach + 1 :]
+        e, u = white - white.mean(), x - x.mean()
+        size, count = float(np.linalg.norm(e) * np.linalg.norm(u)) or 1.0, len(e)
+        products = [float(e[max(k, 0) : count + min(k, 0)] @ u[max(-k, 0) : count - max(k, 0)]) for k in lags]
+        yield ResidualTest(
+            record=part.name,
+            name="independence" if of else "whiteness",
+            input=of,
+            lags=lags,
+            correlation=np.array(products) / size,
+            bound=float(norm.isf(0.5 * (1.0 - (1.0 - LEVEL) ** (1.0 / len(lags)))) / np.sqrt(count)),
+        )

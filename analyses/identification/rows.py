@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import binary_erosion
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import BoolArray, FloatArray, stretches
+from analyses.estimation.arrays import BoolArray, FloatArray, lasting
 from analyses.identification.joint_model import (
     FrictionForm,
     JointModel,
@@ -18,8 +19,8 @@ from analyses.identification.joint_model import (
     default_value,
     friction_columns,
 )
-from analyses.identification.load_side import TwoSides, two_sides
-from analyses.identification.sampled_current import mean_current
+from analyses.identification.load_side import two_sides
+from analyses.identification.sampled_current import held_s, mean_current
 from analyses.records.consistency import place_of
 from analyses.records.differentiation import Motion, decimated
 from analyses.records.record import Record, period_of, prepared
@@ -134,7 +135,10 @@ def record_rows(
     _check(record, gravity and not free)
     recipe = recipe_for(record) if recipe is None else recipe
     motion, place = motion_of(design, record, recipe)
-    sides, motion, angle = _sides(design, record, place, motion, recipe)
+    angle, sides = np.asarray(motion.position / design.total_ratio), None
+    if design.coupling is not None:
+        sides = two_sides(design, record, place, motion, moment_of(design, record, angle)[0], recipe)
+        motion, angle = sides.motor, np.asarray(sides.load.position / design.ratio_behind_coupling)
     drive, driven_by, told = _torque(design, record, motion)
     known, source = moment_of(design, record, angle, gravity=not gravity)
     used = {place: "motion", driven_by: f"drive: {told}"}
@@ -144,26 +148,30 @@ def record_rows(
         drive = drive + known / design.total_ratio
     if sides is not None:
         known = known - design.ratio_behind_coupling * sides.torque
-        drive = drive - (_reaction(design, sides) if free else 0.0)
+        ratio = (
+            design.ratio_to_coupling
+        )  # what the load side takes but for its inertia at the motor's own pace
+        own = design.load_side_inertia_kgm2 / ratio * sides.motor.acceleration / ratio
+        drive = drive - (np.asarray(sides.torque / ratio - own) if free else 0.0)
         told = f"{told}, {sides.told}"
     names, columns = friction_columns(motion, form, knots_rad_s)
     others = [np.sin(angle), np.cos(angle), motion.velocity, np.sign(motion.velocity), known, drive]
-    part = slice(recipe.skip_samples, len(drive) - _end_skip(motion, recipe))
+    part = _used_rows(motion, recipe)
     rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
     sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
     w = [*rows[:, : columns.shape[1]].T, np.abs(known if moment is None else known + moment) * side]
     names.append("load_coefficient")
     if gravity:
         names += ["gravity_sin", "gravity_cos"]
-        share = -1.0 / design.total_ratio if free else 0.0
-        w += [share * sine, share * cosine]
+        w += [-1.0 / design.total_ratio * sine, -1.0 / design.total_ratio * cosine]
     table = np.column_stack(w)
     if record.settings:  # the values looked for are those of the shared design
         y = y - table @ [default_value(design, name) - default_value(shared, name) for name in names]
     moving = ~_at_rest(motion.velocity, period)
     if record.left_out is not None:
         moving &= ~record.left_out
-    keep = _kept_rows(moving[part], recipe.decimation)
+    apart = binary_erosion(moving[part], np.ones(2 * recipe.decimation + 1), border_value=1)
+    keep = apart[(len(apart) - 1) % recipe.decimation :: recipe.decimation]  # no sample at rest lies close by
     return Rows(
         name=record.name,
         rows_in=len(record),
@@ -192,38 +200,23 @@ def _check(record: Record, locked: bool) -> None:
         raise InputError(told)
 
 
-def _sides(
-    design: Design, record: Record, place: str, motion: Motion, recipe: Recipe
-) -> tuple[TwoSides | None, Motion, FloatArray]:
-    """Both sides of a coupling, the motion at the motor, and the output's angle."""
-    angle = np.asarray(motion.position / design.total_ratio)
-    if design.coupling is None:
-        return None, motion, angle
-    sides = two_sides(design, record, place, motion, moment_of(design, record, angle)[0], recipe)
-    return sides, sides.motor, np.asarray(sides.load.position / design.ratio_behind_coupling)
-
-
 def _torque(design: Design, record: Record, motion: Motion) -> tuple[FloatArray, str, str]:
-    """The drive torque as it acts between the samples, its signal and words."""
+    """The drive torque as it acts between the samples, its signal and words.
+
+    A recorded voltage acts later by the computing delay, and half of what it is held for.
+    """
     motor = design.effective_motor
     constant = motor.torque_constant_Nm_A or 0.0
     drive, driven_by, told, back_emf = drive_of(design, record)
     if driven_by.startswith("voltage") and not is_benchmark(record):
-        drive = np.interp(record.time_s - _late_s(design, record), record.time_s, drive)
+        late = design.controller.computing_delay_s + 0.5 * min(held_s(design), period_of(record))
+        drive = np.interp(record.time_s - late, record.time_s, drive)
     if driven_by == "current":
         drive = constant * mean_current(design, record, record["current"], motion.acceleration)
     if back_emf and motor.resistance_ohm is not None:
         back = constant if motor.back_emf_constant_Vs_rad is None else motor.back_emf_constant_Vs_rad
         drive = drive - constant * back / motor.resistance_ohm * motion.velocity
     return drive, driven_by, told
-
-
-def _late_s(design: Design, record: Record) -> float:
-    """How much later a recorded voltage acts: the computing delay, and half of what it is held for."""
-    control = design.controller
-    stage = control.current or control.velocity or control.position
-    held = control.period_s * getattr(stage, "every", 1)
-    return control.computing_delay_s + 0.5 * min(held, period_of(record))
 
 
 def rows_under(design: Design, record: Record, model: JointModel, recipe: Recipe | None = None) -> Rows:
@@ -236,34 +229,14 @@ def rows_under(design: Design, record: Record, model: JointModel, recipe: Recipe
     return record_rows(design, record, model.form, recipe, gravity=True, moment=moment, knots_rad_s=knots)
 
 
-def _end_skip(motion: Motion, recipe: Recipe) -> int:
-    """Samples to leave out at the end: those of the recipe, where the record ends in motion."""
-    speed = np.abs(motion.velocity)
+def _used_rows(motion: Motion, recipe: Recipe) -> slice:
+    """Without the samples of the recipe at the begin and, where the record ends in motion, at the end."""
+    speed, skip = np.abs(motion.velocity), recipe.skip_end_samples
     moving = float(speed[-1]) > END_SHARE * float(np.max(speed))
-    return recipe.skip_end_samples if moving and len(speed) > 4 * recipe.skip_end_samples else 0
-
-
-def _reaction(design: Design, sides: TwoSides) -> FloatArray:
-    """Torque of the load side at the motor, less its inertia's at the motor's own acceleration."""
-    ratio = design.ratio_to_coupling
-    inertia = design.load_side_inertia_kgm2 / ratio
-    return np.asarray(sides.torque / ratio - inertia * sides.motor.acceleration / ratio)
+    return slice(recipe.skip_samples, len(speed) - (skip if moving and len(speed) > 4 * skip else 0))
 
 
 def _at_rest(velocity: FloatArray, period_s: float) -> BoolArray:
     """Stretches of 30 ms or more below 0.5 % of the largest speed: the friction is not that of sliding."""
     slow = np.abs(velocity) < REST_SHARE * float(np.max(np.abs(velocity), initial=0.0))
-    out = np.zeros(len(velocity), dtype=bool)
-    least = max(round(REST_TIME_S / period_s), 6)
-    for start, stop in stretches(slow):
-        out[start:stop] = stop - start >= least
-    return out
-
-
-def _kept_rows(moving: BoolArray, factor: int) -> BoolArray:
-    """Rows after decimation that no sample at rest lies close to."""
-    count = -(-len(moving) // factor)
-    ends = len(moving) - 1 - factor * np.arange(count)[::-1]
-    rest = np.concatenate([[0], np.cumsum(~moving)])
-    low, high = np.clip(ends - factor, 0, len(moving)), np.clip(ends + factor + 1, 0, len(moving))
-    return np.asarray(rest[high] == rest[low])
+    return lasting(slow, max(round(REST_TIME_S / period_s), 6))

@@ -55,16 +55,20 @@ class HeldVoltage:
         return d - 0.5 * T + 1.0 / a + T * np.exp(-a * (T - d)) / np.expm1(-a * T)
 
 
+def held_s(design: Design) -> float:
+    """What a voltage is held for: the period of the innermost stage."""
+    control = design.controller
+    return control.period_s * getattr(control.current or control.velocity or control.position, "every", 1)
+
+
 def held_voltage(design: Design, record: Record) -> HeldVoltage | None:
     """The winding and its voltage's steps; None where samples are not taken with the ticks.
 
     A recorder of its own meets the steps at any phase, so that its samples are right in the mean.
     """
-    motor, control = design.effective_motor, design.controller
+    motor, period = design.effective_motor, held_s(design)
     if motor.resistance_ohm is None or not motor.inductance_H or record.averaged > 1:
         return None
-    stage = control.current or control.velocity or control.position
-    period = control.period_s * getattr(stage, "every", 1)
     ticks = record.period_s / period
     if round(ticks) < 1 or abs(ticks - round(ticks)) > TICK_TOLERANCE * ticks:
         return None
@@ -72,7 +76,7 @@ def held_voltage(design: Design, record: Record) -> HeldVoltage | None:
     return HeldVoltage(
         rate_1_s=motor.resistance_ohm / motor.inductance_H,
         period_s=period,
-        delay_s=control.computing_delay_s,
+        delay_s=design.controller.computing_delay_s,
         back_emf_A_per_rad_s=back / motor.resistance_ohm,
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 from actuator_lti.errors import InputError
 from analyses.estimation.arrays import FloatArray, longest
 from analyses.estimation.means import correlated_means
-from analyses.records.campaign_import import ImportedRun, SetAside
+from analyses.records.campaign_import import ImportedRun
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,6 +38,9 @@ class SteadyCriterion:
         )
 
 
+CRITERION = SteadyCriterion()
+
+
 @dataclass(frozen=True, kw_only=True)
 class SteadyWindow:
     """The part of a record that counts as steady: rows ``start:stop``, and the limit that was applied."""
@@ -51,22 +54,22 @@ class SteadyWindow:
 
 
 def find_steady_window(
-    time_s: FloatArray, speed_rad_s: FloatArray, criterion: SteadyCriterion | None = None
+    time_s: FloatArray, speed_rad_s: FloatArray, criterion: SteadyCriterion = CRITERION
 ) -> SteadyWindow:
     """The steady part of a run, which may be sampled irregularly."""
-    criterion = SteadyCriterion() if criterion is None else criterion
     period = float(np.median(np.diff(time_s)))
     samples = max(round(criterion.window_s / period), 4)
     if len(time_s) < 2 * samples:
         raise InputError(f"no steady part: the record of {len(time_s)} samples is shorter than two windows")
     slope = moving_slope(time_s, speed_rad_s, samples)
     plateau = float(np.quantile(np.abs(speed_rad_s), 0.95))
-    noise = _noise(speed_rad_s) * np.sqrt(12.0 / (samples * (samples**2 - 1.0))) / period
-    limit = max(criterion.relative_per_s * plateau, criterion.noise_factor * noise)
-    half = samples // 2
+    steps = np.abs(np.diff(speed_rad_s))  # white noise: from neighbours without the largest 1 %
+    noise = float(np.sqrt(np.mean(steps[steps <= np.quantile(steps, 0.99)] ** 2) / 2.0))
+    noise *= np.sqrt(12.0 / (samples * (samples**2 - 1.0)))
+    limit = max(criterion.relative_per_s * plateau, criterion.noise_factor * (noise / period))
+    half, trim = samples // 2, round(criterion.trim_s / period)
     moving = np.abs(speed_rad_s[half : half + len(slope)]) >= criterion.least_share * plateau
     start, stop = longest((np.abs(slope) <= limit) & moving)
-    trim = round(criterion.trim_s / period)
     start, stop = start + half + trim, stop + half - trim
     if stop - start < max(criterion.least_duration_s / period, 8.0):
         calmest = float(np.min(np.abs(slope[moving]), initial=np.inf))
@@ -92,22 +95,10 @@ def moving_slope(time_s: FloatArray, values: FloatArray, samples: int) -> FloatA
     >>> moving_slope(t, 3.0 * t + 1.0, 4).round(12).tolist()
     [3.0, 3.0, 3.0]
     """
-    t = time_s - time_s.mean()
-    x = values - values.mean()
-    st, sx, stx, stt = (_moving_sum(part, samples) for part in (t, x, t * x, t * t))
+    t, x = time_s - time_s.mean(), values - values.mean()
+    totals = [np.concatenate([[0.0], np.cumsum(part)]) for part in (t, x, t * x, t * t)]
+    st, sx, stx, stt = (total[samples:] - total[:-samples] for total in totals)
     return np.asarray((samples * stx - st * sx) / (samples * stt - st * st))
-
-
-def _moving_sum(values: FloatArray, samples: int) -> FloatArray:
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    return total[samples:] - total[:-samples]
-
-
-def _noise(speed: FloatArray) -> float:
-    """Standard deviation of white noise, from the differences of neighbours without the largest 1 %."""
-    steps = np.abs(np.diff(speed))
-    calm = steps[steps <= np.quantile(steps, 0.99)]
-    return float(np.sqrt(np.mean(calm**2) / 2.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,14 +124,12 @@ class SteadyPoint:
 
 def steady_point(run: ImportedRun, torque_constant_Nm_A: float) -> SteadyPoint:
     """Average the steady part of one run; M = kM i (paper, section 3)."""
-    record = run.record
-    window = find_steady_window(record.time_s, record["speed"])
-    part = slice(window.start, window.stop)
-    speed = record["speed"][part]
-    direction = 1 if speed.mean() > 0.0 else -1
-    load = np.zeros(len(speed)) if run.load_is_zero else record["torque"][part]
-    side = 1.0 if load.mean() >= 0.0 else -1.0
-    torque = direction * torque_constant_Nm_A * record["current"][part]
+    window = find_steady_window(run.record.time_s, run.record["speed"])
+    part = run.record.slice(window.start, window.stop)
+    speed = part["speed"]
+    load = np.zeros(len(speed)) if run.load_is_zero else part["torque"]
+    direction, side = 1 if speed.mean() > 0.0 else -1, 1.0 if load.mean() >= 0.0 else -1.0
+    torque = direction * torque_constant_Nm_A * part["current"]
     means = correlated_means(np.column_stack([torque, direction * speed, side * load]))
     mean_torque, mean_speed, mean_load = means.values.tolist()
     a, b, c = means.correlation_samples.tolist()
@@ -156,16 +145,3 @@ def steady_point(run: ImportedRun, torque_constant_Nm_A: float) -> SteadyPoint:
         correlation_samples=(a, b, c),
         load_is_zero=run.load_is_zero,
     )
-
-
-def steady_points(
-    runs: tuple[ImportedRun, ...], torque_constant_Nm_A: float
-) -> tuple[tuple[SteadyPoint, ...], tuple[SetAside, ...]]:
-    """The points of all runs, and the runs without a steady part, named."""
-    points, aside = [], []
-    for run in runs:
-        try:
-            points.append(steady_point(run, torque_constant_Nm_A))
-        except InputError as error:
-            aside.append(SetAside(id=run.id, reason=str(error)))
-    return tuple(points), tuple(aside)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.errors import InputError
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import told_apart
@@ -101,85 +100,57 @@ def fit_surface(
     torque by the slopes of the surface (effective variance, iterated), plus the scatter between runs where
     they do not agree within their noise (Mandel and Paule). The shared errors of the instruments enter the
     covariance as they act: on all runs together. ``torque_constant_Nm_A`` made the torques; ``fixed``
-    coefficients are held, ``kept`` are values that those keep which the runs do not tell apart (without
-    them: an error).
+    coefficients are held, ``kept`` are values that those keep which the runs do not tell apart.
     """
-    runs = _Runs(tuple(points), fixed or {}, kept)
-    start = runs.ordinary()
-    effects = effects_of(shared_errors(runs.points, instruments, start[2], torque_constant_Nm_A), len(runs.y))
-    size, limit = standardised(runs.free, runs.rest, runs.own_variance(start), effects)
-    aside = outliers == "set-aside"
+    runs = _Runs(points, fixed or {}, kept or {})
+    theta = runs.ordinary()
+    effects = effects_of(shared_errors(runs.points, instruments, theta[2], torque_constant_Nm_A), len(runs.y))
+    size, limit = standardised(runs.free, runs.rest, runs.own_variance(theta), effects)
+    aside, far = outliers == "set-aside", np.abs(size) > limit
     named = tuple(
-        Outlier(run=point.run, standardised=float(value), limit=limit, set_aside=aside)
-        for point, value in zip(runs.points, size, strict=True)
-        if abs(value) > limit
+        Outlier(run=points[k].run, standardised=float(size[k]), limit=limit, set_aside=aside)
+        for k in np.flatnonzero(far).tolist()
     )
     if aside and named:
-        good = tuple(point for point, value in zip(runs.points, size, strict=True) if abs(value) <= limit)
-        runs = _Runs(good, fixed or {}, kept)
+        runs = _Runs([points[k] for k in np.flatnonzero(~far).tolist()], fixed or {}, kept or {})
     return _fitted(runs, instruments, torque_constant_Nm_A, named)
 
 
-@dataclass(frozen=True)
 class _Runs:
-    """The points as a linear problem, and what of it is not fitted."""
+    """The points as a linear problem: the columns that are fitted, and the torques less what is held."""
 
-    points: tuple[SteadyPoint, ...]
-    fixed: Mapping[str, float]
-    kept: Mapping[str, float] | None
+    def __init__(
+        self, points: Sequence[SteadyPoint], fixed: Mapping[str, float], kept: Mapping[str, float]
+    ) -> None:
+        self.points = tuple(points)
+        self.x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in points]).reshape(-1, len(NAMES))
+        self.y = np.array([p.torque_Nm for p in points])
+        self.held = self._held(fixed, kept)
+        self.told = [k for k, name in enumerate(NAMES) if name not in self.held]
+        self._start = np.array([self.held[name].value if name in self.held else 0.0 for name in NAMES])
+        self.free, self.rest = self.x[:, self.told], np.asarray(self.y - self.x @ self._start)
 
-    @cached_property
-    def x(self) -> FloatArray:
-        return np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in self.points])
-
-    @cached_property
-    def y(self) -> FloatArray:
-        return np.array([p.torque_Nm for p in self.points])
-
-    @cached_property
-    def held(self) -> dict[str, Fixed]:
-        """What was asked for, and what the runs do not tell apart."""
-        held = {name: Fixed(value=value, reason="fixed as asked") for name, value in self.fixed.items()}
+    def _held(self, fixed: Mapping[str, float], kept: Mapping[str, float]) -> dict[str, Fixed]:
+        """What was asked for, and what the runs do not tell apart; two runs more than coefficients."""
+        held = {name: Fixed(value=value, reason="fixed as asked") for name, value in fixed.items()}
         names = [name for name in NAMES if name not in held]
         if not names:
             raise InputError("C0, Cv and CM are all fixed: nothing is left to identify")
-        if self.kept is None or not self.points:
-            self._check_count(len(names))
-        _, left = told_apart(self.x[:, [NAMES.index(name) for name in names]], names)
+        columns = [NAMES.index(name) for name in names]
+        left = told_apart(self.x[:, columns], names)[1] if self.points else ()
         for one in left:
-            if self.kept is None:
-                told = "the runs do not tell C0, Cv and CM apart: vary speed and load, not together only"
-                raise NumericalError(told)
-            why = "no run is loaded" if one.name == "CM" and not one.like else str(one)
-            held[one.name] = Fixed(value=self.kept[one.name], reason=f"{why}: the design's value kept")
-        self._check_count(len(NAMES) - len(held))
+            why = "no run is loaded" if one.name == "CM" and not one.moves else str(one)
+            held[one.name] = Fixed(value=kept.get(one.name, 0.0), reason=f"{why}: the design's value kept")
+        coefficients = len(NAMES) - len(held)
+        if len(self.points) < coefficients + 2:
+            words = ("one coefficient", "two coefficients", "three coefficients")[coefficients - 1]
+            told = f"{len(self.points)} usable runs: at least {coefficients + 2} are needed for {words}"
+            raise InputError(told)
         return held
-
-    def _check_count(self, coefficients: int) -> None:
-        """Two runs more than coefficients."""
-        words = {3: "three coefficients", 2: "two coefficients", 1: "one coefficient"}[coefficients]
-        least = coefficients + 2
-        if len(self.points) < least:
-            raise InputError(f"{len(self.points)} usable runs: at least {least} are needed for {words}")
-
-    @cached_property
-    def told(self) -> list[int]:
-        return [k for k, name in enumerate(NAMES) if name not in self.held]
-
-    @cached_property
-    def free(self) -> FloatArray:
-        """The columns that are fitted."""
-        return self.x[:, self.told]
-
-    @cached_property
-    def rest(self) -> FloatArray:
-        """The torques less what is held."""
-        values = np.array([self.held[name].value if name in self.held else 0.0 for name in NAMES])
-        return np.asarray(self.y - self.x @ values)
 
     def ordinary(self) -> FloatArray:
         """All coefficients, by ordinary least squares."""
-        theta = np.array([self.held[name].value if name in self.held else 0.0 for name in NAMES])
+        theta = self._start.copy()
         theta[self.told] = np.linalg.lstsq(self.free, self.rest, rcond=None)[0]
         return theta
 
@@ -188,6 +159,31 @@ class _Runs:
         along = np.array([1.0, -theta[1], -theta[2]])
         own = np.array([along @ p.covariance @ along for p in self.points])
         return np.maximum(own, 1e-8 * float(np.median(own)) + 1e-30)
+
+    def gain(self, variance: FloatArray, effects: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What makes coefficients of torques, (X' V^-1 X)^-1 X' V^-1, and V: each run's own, and the shared.
+
+        An error that is shared has a third of its bound squared.
+        """
+        covariance = np.diag(variance) + effects @ effects.T / 3.0
+        whitened = np.linalg.solve(covariance, self.free)
+        return np.asarray(np.linalg.solve(self.free.T @ whitened, whitened.T)), covariance
+
+    def scatter(self, own: FloatArray, effects: FloatArray) -> tuple[float, float]:
+        """Variance between runs that makes chi-square equal its freedom, and the Birge ratio without it."""
+        x, y, freedom = self.free, self.rest, len(self.y) - len(self.told)
+
+        def excess(extra: float) -> float:
+            gain, covariance = self.gain(own + extra, effects)
+            rest = y - x @ (gain @ y)
+            return float(rest @ np.linalg.solve(covariance, rest)) - freedom
+
+        first = excess(0.0)
+        birge = float(np.sqrt(first / freedom + 1.0))
+        if first <= 0.0:
+            return 0.0, birge
+        most = 10.0 * float(np.var(y - x @ np.linalg.lstsq(x, y, rcond=None)[0])) + float(np.max(own))
+        return float(brentq(excess, 0.0, most, xtol=1e-9 * most)), birge
 
 
 def _fitted(
@@ -198,16 +194,17 @@ def _fitted(
         own = runs.own_variance(theta)
         shared = shared_errors(runs.points, instruments, theta[2], torque_constant)
         effects = effects_of(shared, count)
-        scatter, birge = _run_scatter(runs, own, effects)
+        scatter, birge = runs.scatter(own, effects)
         gain, change = np.zeros((len(NAMES), count)), np.zeros(len(NAMES))
-        gain[runs.told] = gain_matrix(runs.free, torque_covariance(own + scatter, effects))
+        gain[runs.told], _ = runs.gain(own + scatter, effects)
         change[runs.told] = gain[runs.told] @ runs.rest - theta[runs.told]
         theta = theta + change
         if np.all(np.abs(change) <= 1e-12 * np.abs(theta)):
             break
-    variance, residual = own + scatter, runs.y - runs.x @ theta
-    random_covariance = (gain * variance) @ gain.T
-    moved = (gain @ effects).T
+    variance, residual = own + scatter, np.asarray(runs.y - runs.x @ theta)
+    random_covariance, moved = (gain * variance) @ gain.T, (gain @ effects).T
+    scaled = effects / variance[:, None]  # the most likely shared errors bend the residuals together
+    likely = np.linalg.solve(3.0 * np.eye(effects.shape[1]) + effects.T @ scaled, scaled.T @ residual)
     freedom = count - len(runs.told)
     return SurfaceFit(
         points=runs.points,
@@ -219,7 +216,7 @@ def _fitted(
         half_widths=half_widths(random_covariance, moved, freedom),
         shared_effects=effects,
         residuals_Nm=residual,
-        own_residuals_Nm=_own_residuals(residual, variance, effects),
+        own_residuals_Nm=np.asarray(residual - effects @ likely),
         residual_stds_Nm=np.sqrt(variance),
         run_scatter_Nm=float(np.sqrt(scatter)),
         birge_ratio=birge,
@@ -227,42 +224,6 @@ def _fitted(
         freedom=freedom,
         fixed=runs.held,
     )
-
-
-def _own_residuals(rest: FloatArray, variance: FloatArray, effects: FloatArray) -> FloatArray:
-    """Residuals less the most likely shared errors, which bend them together (best linear prediction)."""
-    scaled = effects / variance[:, None]
-    likely = np.linalg.solve(3.0 * np.eye(effects.shape[1]) + effects.T @ scaled, scaled.T @ rest)
-    return np.asarray(rest - effects @ likely)
-
-
-def torque_covariance(variance: FloatArray, effects: FloatArray) -> FloatArray:
-    """Covariance of the torques: each run's own, and the shared errors (a third of the bound squared)."""
-    return np.asarray(np.diag(variance) + effects @ effects.T / 3.0)
-
-
-def gain_matrix(x: FloatArray, covariance: FloatArray) -> FloatArray:
-    """The matrix that makes the coefficients of the torques: (X' V^-1 X)^-1 X' V^-1."""
-    whitened = np.linalg.solve(covariance, x)
-    return np.asarray(np.linalg.solve(x.T @ whitened, whitened.T))
-
-
-def _run_scatter(runs: _Runs, own: FloatArray, effects: FloatArray) -> tuple[float, float]:
-    """Variance between runs that makes chi-square equal its freedom, and the Birge ratio without it."""
-    x, y = runs.free, runs.rest
-    freedom = len(y) - x.shape[1]
-
-    def excess(extra: float) -> float:
-        covariance = torque_covariance(own + extra, effects)
-        rest = y - x @ (gain_matrix(x, covariance) @ y)
-        return float(rest @ np.linalg.solve(covariance, rest)) - freedom
-
-    first = excess(0.0)
-    birge = float(np.sqrt(first / freedom + 1.0))
-    if first <= 0.0:
-        return 0.0, birge
-    most = 10.0 * float(np.var(y - x @ np.linalg.lstsq(x, y, rcond=None)[0])) + float(np.max(own))
-    return float(brentq(excess, 0.0, most, xtol=1e-9 * most)), birge
 
 
 @dataclass(frozen=True, kw_only=True)

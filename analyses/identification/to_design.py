@@ -23,12 +23,8 @@ TRUNCATION_STD = 6.5
 """Standard deviations that a normal distribution is sampled to."""
 
 
-PLAIN_KEYS = (
-    "friction.viscous",
-    "friction.dry_torque",
-    "friction.viscous_reverse",
-    "friction.dry_torque_reverse",
-)
+REVERSE = ("friction.viscous_reverse", "friction.dry_torque_reverse")
+PLAIN_KEYS = ("friction.viscous", "friction.dry_torque", *REVERSE)
 INERTIAS = ("motor.rotor_inertia", "load.inertia")
 
 
@@ -48,18 +44,13 @@ def joint_values(design: Design, model: JointModel, *, inertia_to: str = INERTIA
             slopes[parameter(name).key] = {name: 1.0}
     if {"gravity_sin", "gravity_cos"} <= set(model.names):
         a, b = model["gravity_sin"], model["gravity_cos"]
-        peak, per_mass = float(np.hypot(a, b)), _moment_per_mass(design)
+        arm = 1.0 if design.load.gravity is None else design.load.gravity.arm_m
+        peak, per_mass = float(np.hypot(a, b)), float(Gravity(mass_kg=1.0, arm_m=arm).peak_Nm)
         size, turn = {"gravity_sin": a / peak, "gravity_cos": b / peak}, {"gravity_sin": -b, "gravity_cos": a}
         slopes["load.gravity.mass"] = {name: slope / per_mass for name, slope in size.items()}
         slopes["load.gravity.offset"] = {name: slope / peak**2 for name, slope in turn.items()}
         values |= {"load.gravity.mass": peak / per_mass, "load.gravity.offset": float(np.arctan2(b, a))}
     return model.mapped(slopes, values)
-
-
-def _moment_per_mass(design: Design) -> float:
-    """Of the pendulum that ``a sin(phi) + b cos(phi)`` becomes; its arm is the design's, or 1 m."""
-    arm = 1.0 if design.load.gravity is None else design.load.gravity.arm_m
-    return float(Gravity(mass_kg=1.0, arm_m=arm).peak_Nm)
 
 
 def with_structure(design: Design, model: JointModel) -> Design:
@@ -122,7 +113,9 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
     values = {p: _short(float(v)) for p, v in zip(fit.names, fit.values, strict=True)}
     if "friction.viscous_reverse" in fit.names and design.friction.offset_torque_Nm:
         values["friction.offset_torque"] = 0.0
-    design = _one_law(design, fit.names)
+    if "friction.viscous" in fit.names and not set(REVERSE) & set(fit.names):  # one law for both directions
+        friction = replace(design.friction, dry_torque_reverse_Nm=None, viscous_reverse_Nms_rad=None)
+        design = _without(replace(design, friction=friction), REVERSE)
     try:
         changed = with_values(design, values)
     except InputError as error:
@@ -142,15 +135,6 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
         parameters=FrozenMap(parameters),
         correlations=(*kept, *_correlations(fit.names, fit.correlation)),
     )
-
-
-def _one_law(design: Design, paths: Sequence[str]) -> Design:
-    """The design without friction values backward that a law for both directions takes the place of."""
-    reverse = ("friction.viscous_reverse", "friction.dry_torque_reverse")
-    if "friction.viscous" not in paths or set(reverse) & set(paths):
-        return design
-    friction = replace(design.friction, dry_torque_reverse_Nm=None, viscous_reverse_Nms_rad=None)
-    return _without(replace(design, friction=friction), reverse)
 
 
 def _tolerance(path: str, value: float, std: float) -> Tolerance | None:

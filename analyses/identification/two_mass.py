@@ -1,21 +1,124 @@
-"""A two-mass drive from its frequency response: inertias, stiffness, damping, and their intervals."""
+"""A two-mass drive from a record of a periodic excitation: lines, their noise, what fits them best."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
 
 from actuator_lti.errors import InputError, NumericalError
 from analyses.estimation.arrays import ComplexArray, FloatArray
 from analyses.estimation.fit import Fit, Fixed
-from analyses.identification.frequency import Lines
+from analyses.records.record import Record
 
+MIN_PERIODS = 4
+TOP = 0.4  # of the sampling frequency: lines above are not looked at
+BESIDE = 6
+"""Places on either side of a line that its noise is taken from; a sharp resonance allows no more."""
+EXCITED = 25.0
+"""A line counts as excited where its power is this many times that of its noise."""
 NAMES = ("motor_inertia", "load_inertia", "stiffness", "damping", "viscous", "load_viscous")
 """J_m at the motor, J_l at its own shaft, k and c at the coupling, Cv at the motor, Cv_l behind."""
 FLOORS = ("damping", "viscous", "load_viscous")
 """What no drive has negative, but an estimate of it by its error may be."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lines:
+    """Spectral lines at the excited frequencies: of the motor's torque, the motor's angle, and the load's.
+
+    The last may be left out. ``means`` are complex amplitudes over all periods, shape (signals, lines);
+    ``noise`` is their covariance, shape (lines, signals, signals), from the spectrum beside each line, with
+    ``freedom`` (complex) degrees.
+    """
+
+    omega_rad_s: FloatArray
+    means: ComplexArray
+    noise: ComplexArray
+    names: tuple[str, ...]
+    periods: int
+    freedom: int
+
+
+def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Lines:
+    """The lines of a periodic excitation; the first signal shows which of them are excited.
+
+    The period is a whole number of samples; the first one is left out, for the transient. A signal that
+    drifts (an angle under a mean speed) loses the straight line of its mean rate first. The noise of a line
+    is what the spectrum of the whole record holds beside it, where a periodic signal has nothing. (The
+    scatter between periods would be too large: what a motion that is not periodic leaves at the ends of one
+    period comes back at the start of the next with the opposite sign, and goes out of the mean.)
+    """
+    samples = round(period_s / record.period_s)
+    if samples < 8 or abs(samples * record.period_s - period_s) > 1e-3 * record.period_s:
+        told = f"must be a whole number (8 or more) of samples of {record.period_s:g} s"
+        raise InputError(f"period {period_s:g} s: {told}", where=record.name)
+    periods = len(record) // samples - 1
+    if periods < MIN_PERIODS:
+        told = f"{periods} periods of {period_s:g} s after the first: at least {MIN_PERIODS}"
+        raise InputError(told, where=record.name)
+    start = len(record) - periods * samples
+    spectra = np.array([_spectrum(record[name][start:], periods, samples) for name in names])
+    reach = min(periods - 1, BESIDE)
+    places = np.arange(0, spectra.shape[1] - reach, periods)
+    away = np.array([step for step in range(-reach, reach + 1) if step])
+    beside, means = spectra[:, np.abs(places[:, None] + away)], spectra[:, places]
+    noise = np.einsum("akr,bkr->kab", beside, beside.conj()) / len(away)
+    hertz, power = np.arange(len(places)) / period_s, np.abs(means[0]) ** 2
+    largest = float(np.max(power[1:], initial=0.0))
+    floor = np.maximum(np.real(noise[:, 0, 0]), 1e-24 * largest)
+    chosen = (power > EXCITED * floor) & (power > 1e-6 * largest) & (hertz > 0.0)
+    chosen &= hertz <= TOP / record.period_s
+    if np.count_nonzero(chosen) < MIN_PERIODS:
+        raise InputError(f"{names[0]}: no lines of a period of {period_s:g} s are excited", where=record.name)
+    return Lines(
+        omega_rad_s=np.asarray(2.0 * np.pi * hertz[chosen]),
+        means=means[:, chosen],
+        noise=noise[chosen],
+        names=names,
+        periods=periods,
+        freedom=len(away),
+    )
+
+
+def _spectrum(values: FloatArray, periods: int, samples: int) -> ComplexArray:
+    """Amplitudes of the whole record, a line at every ``periods``-th place; the mean rate is taken off."""
+    block = values[: periods * samples].reshape(periods, samples)
+    rate = (block[-1].mean() - block[0].mean()) / max((periods - 1) * samples, 1)
+    straight = rate * np.arange(periods * samples)
+    return np.asarray(np.fft.rfft(block.ravel() - straight) * (2.0 / (periods * samples)))
+
+
+def response(lines: Lines, k: int = 1) -> tuple[ComplexArray, FloatArray]:
+    """Frequency response from the torque to the signal of a number, and its relative standard error."""
+    of, by = lines.means[k], lines.means[0]
+    n = lines.noise
+    relative = np.real(n[:, k, k]) / np.abs(of) ** 2 + np.real(n[:, 0, 0]) / np.abs(by) ** 2
+    relative = relative - 2.0 * np.real(n[:, k, 0] / (of * by.conj()))
+    return of / by, np.sqrt(np.maximum(relative, 0.0))
+
+
+def period_of_excitation(record: Record, name: str) -> float:
+    """The period with which a recorded command repeats itself, five times or more."""
+    values = record[name] - np.polyval(np.polyfit(record.time_s, record[name], 1), record.time_s)
+    n = len(values)
+    size = next_fast_len(2 * n, real=True)
+    spectrum = rfft(values, size)
+    correlation = irfft(np.abs(spectrum) ** 2, size)[:n]
+    power, early = np.cumsum(values[::-1] ** 2)[::-1], np.cumsum(values**2)
+    lags = np.arange(1, n // (MIN_PERIODS + 1))
+    alike = correlation[lags] / np.sqrt(np.maximum(power[lags] * early[n - 1 - lags], 1e-300))
+    fallen = int(np.argmax(alike < 0.5))
+    peaks = np.flatnonzero(alike[fallen:] > 0.98) + fallen
+    if not len(alike) or not fallen or not len(peaks):
+        told = f"{name} does not repeat itself {MIN_PERIODS + 1} times: give the period of the excitation"
+        raise InputError(told, where=record.name)
+    group = peaks[peaks <= peaks[0] * 1.02 + 2]
+    best = group[int(np.argmax(alike[group]))]
+    return float(lags[best] * record.period_s)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +148,7 @@ class TwoMass(Fit):
             lambda p: float(np.sqrt(p["stiffness"] * (1 / p["load_inertia"] + 1 / (p["motor_inertia"] * n2))))
         )
 
-    def _derived(self, of: Callable[[dict[str, float]], float]) -> tuple[float, float]:
+    def _derived(self, of: Callable[[Mapping[str, float]], float]) -> tuple[float, float]:
         own = {name: self[name] for name in NAMES}
         middle = of(own)
         steps = {name: 1e-6 * max(abs(own[name]), 1e-300) for name in self.names}
@@ -75,9 +178,6 @@ def fit_two_mass(
     start: Mapping[str, float],
     reduction: float,
     *,
-    torque: str = "torque",
-    motor: str = "angle",
-    load: str | None = None,
     fixed: Mapping[str, float] | None = None,
     reaction: float | None = None,
 ) -> TwoMass:
@@ -85,16 +185,14 @@ def fit_two_mass(
 
     Each line's residual ``th - G torque`` is divided by its own standard deviation, which the spectrum
     beside it gives (errors in variables; Pintelon and Schoukens, System Identification, 2nd ed., section
-    9.11). The lines are of the motor torque, the motor angle and, where recorded, the load's angle;
-    ``start`` has the names of ``NAMES``, ``reduction`` is N_c, up to the coupling, ``reaction`` the torque
-    on the motor by that in the coupling, 1/N_c by default.
+    9.11). ``start`` has the names of ``NAMES``, ``reduction`` is N_c, up to the coupling, ``reaction`` the
+    torque on the motor by that in the coupling, 1/N_c by default.
     """
     from scipy.optimize import least_squares
 
-    held = dict(fixed or {})
+    held, outputs = dict(fixed or {}), len(lines.names) - 1
     names = tuple(name for name in NAMES if name not in held)
     scale = _scales(start, names)
-    outputs = [motor] if load is None else [motor, load]
 
     def unpacked(q: FloatArray) -> dict[str, float]:
         own = dict(zip(names, (q * scale).tolist(), strict=True))
@@ -102,7 +200,7 @@ def fit_two_mass(
 
     def residual(q: FloatArray) -> FloatArray:
         g = angle_responses(lines.omega_rad_s, unpacked(q), reduction, reaction)
-        both = _whitened(lines, outputs, torque, g[: len(outputs)])
+        both = _whitened(lines, g[:outputs])
         return np.concatenate([both.real, both.imag]) * np.sqrt(2.0)
 
     begin = np.array([max(abs(start.get(name, 0.0)), scale[k]) for k, name in enumerate(names)]) / scale
@@ -112,21 +210,19 @@ def fit_two_mass(
     size = np.linalg.norm(fit.jac, axis=0)
     if np.any(size == 0.0):
         raise NumericalError(f"the lines do not tell {names[int(np.argmin(size))]}; hold it with --fix")
-    freedom = max(len(fit.fun) - len(names), 1)
-    few, loss = _weighed(lines.freedom, len(outputs))
-    misfit = float(np.sqrt(2.0 * fit.cost / freedom / few))
+    few, loss = _weighed(lines.freedom, outputs)
+    misfit = float(np.sqrt(2.0 * fit.cost / max(len(fit.fun) - len(names), 1) / few))
     inverse = np.linalg.inv((fit.jac / size).T @ (fit.jac / size)) / np.outer(size, size)
-    covariance = inverse * few * loss * max(misfit, 1.0) ** 2 * np.outer(scale, scale)
     own = unpacked(fit.x)
     return TwoMass(
         names=names,
         values=np.array([own[name] for name in names]),
-        covariance=np.asarray(covariance),
+        covariance=np.asarray(inverse * few * loss * max(misfit, 1.0) ** 2 * np.outer(scale, scale)),
         fixed={name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()},
         reduction=reduction,
         reaction=1.0 / reduction if reaction is None else reaction,
         misfit=misfit,
-        lines=len(lines.omega_rad_s) * len(outputs),
+        lines=len(lines.omega_rad_s) * outputs,
     )
 
 
@@ -155,53 +251,43 @@ def _scales(start: Mapping[str, float], names: tuple[str, ...]) -> FloatArray:
     return np.array([max(abs(start.get(name, 0.0)), size.get(name, 0.0)) for name in names])
 
 
-def _whitened(
-    lines: Lines, outputs: Sequence[str], by: str, responses: Sequence[ComplexArray]
-) -> ComplexArray:
+def _whitened(lines: Lines, responses: Sequence[ComplexArray]) -> ComplexArray:
     """Residuals ``output - G torque`` of every line, whitened by their covariance.
 
     The residuals of two outputs share the noise of the torque, so they are whitened together.
     """
-    j = lines.names.index(by)
-    rows = [lines.names.index(output) for output in outputs]
-    mix = np.zeros((len(lines.omega_rad_s), len(rows), len(lines.names)), dtype=complex)
-    mix[:, range(len(rows)), rows] = 1.0
-    mix[:, :, j] -= np.array(responses).T
+    count = len(responses)
+    mix = np.zeros((len(lines.omega_rad_s), count, count + 1), dtype=complex)
+    mix[:, range(count), range(1, count + 1)] = 1.0
+    mix[:, :, 0] -= np.array(responses).T
     rest = np.einsum("krs,sk->kr", mix, lines.means)
     covariance = np.einsum("krs,kst,kqt->krq", mix, lines.noise, mix.conj())
-    floor = 1e-24 * np.array([np.abs(lines.means[k]) ** 2 for k in rows]).T
-    covariance = covariance + floor[:, :, None] * np.eye(len(rows))
-    root = np.linalg.cholesky(covariance)
+    floor = 1e-24 * np.abs(lines.means[1:]).T ** 2
+    root = np.linalg.cholesky(covariance + floor[:, :, None] * np.eye(count))
     return np.asarray(np.linalg.solve(root, rest[:, :, None])[:, :, 0].ravel())
 
 
-def start_of(lines: Lines, reduction: float, *, torque: str = "torque") -> dict[str, float]:
+def start_of(lines: Lines, reduction: float) -> dict[str, float]:
     """Starting values from the response itself: its lowest and highest part, its valley and its peak.
 
     Below the antiresonance the whole inertia moves, above the resonance the motor's alone.
     """
-    k, j = lines.names.index("angle"), lines.names.index(torque)
     omega = lines.omega_rad_s
-    inertia = np.abs(lines.means[j] / (omega**2 * lines.means[k]))
-    third = max(len(omega) // 8, 2)
-    whole, own = float(np.median(inertia[:third])), float(np.median(inertia[-third:]))
-    valley = float(omega[int(np.argmax(inertia))])
-    behind = max(whole - own, 0.05 * whole) * reduction**2
-    motor = min(own, 0.95 * whole)
-    return {"motor_inertia": motor, "load_inertia": behind, "stiffness": behind * valley**2}
+    inertia = np.abs(lines.means[0] / (omega**2 * lines.means[1]))
+    part = max(len(omega) // 8, 2)
+    whole, own = float(np.median(inertia[:part])), float(np.median(inertia[-part:]))
+    valley, behind = float(omega[int(np.argmax(inertia))]), max(whole - own, 0.05 * whole) * reduction**2
+    return {"motor_inertia": min(own, 0.95 * whole), "load_inertia": behind, "stiffness": behind * valley**2}
 
 
-def other_starts(start: Mapping[str, float], lines: Lines, reduction: float) -> list[dict[str, float]]:
+def other_starts(start: Mapping[str, float], lines: Lines, reduction: float) -> Iterator[dict[str, float]]:
     """Starts all over the range of the lines, for where the valley of the response drowns in noise.
 
     The whole inertia of ``start`` is split between the sides, with the antiresonance at six frequencies.
     """
     whole = start["motor_inertia"] + start["load_inertia"] / reduction**2
     low, high = float(np.min(lines.omega_rad_s)), float(np.max(lines.omega_rad_s))
-    result = []
-    for share in (0.5, 0.2, 0.8):
-        for valley in np.geomspace(low, high, 8)[1:-1]:
-            behind = (1.0 - share) * whole * reduction**2
-            sides = {"motor_inertia": share * whole, "load_inertia": behind}
-            result.append({**start, **sides, "stiffness": behind * float(valley) ** 2})
-    return result
+    for share, valley in product((0.5, 0.2, 0.8), np.geomspace(low, high, 8)[1:-1]):
+        behind = (1.0 - share) * whole * reduction**2
+        sides = {"motor_inertia": share * whole, "load_inertia": behind}
+        yield {**start, **sides, "stiffness": behind * float(valley) ** 2}

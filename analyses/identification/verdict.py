@@ -40,6 +40,11 @@ class Item:
     limit: float | None = None
     reason: str = ""
 
+    @classmethod
+    def of(cls, id: str, label: str, wrong: str, **share: float) -> Item:
+        """What holds but for ``wrong``; empty: it holds."""
+        return cls(id=id, label=label, passed=not wrong, reason=wrong, **share)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Identified:
@@ -58,17 +63,16 @@ class Identified:
 
 def inputs_item(record: str, findings: Sequence[Finding]) -> Item:
     """Whether a record agrees with itself and with the design's limits."""
-    label = f"{record} agrees with itself and the design"
+    id, label = f"inputs-{record}", f"{record} agrees with itself and the design"
     if not findings:
-        return Item(id=f"inputs-{record}", label=label, passed=None, reason="nothing to hold it against")
+        return Item(id=id, label=label, passed=None, reason="nothing to hold it against")
     wrong = [f"{one.subject}: {one.text}" for one in findings if one.passed is False]
-    return Item(id=f"inputs-{record}", label=label, passed=not wrong, reason="; ".join(wrong))
+    return Item.of(id, label, "; ".join(wrong))
 
 
 def share_item(id: str, label: str, value: float, limit: float, otherwise: str) -> Item:
     """A share of the drive signal against its limit, and what it means beyond."""
-    reason = "" if value <= limit else otherwise
-    return Item(id=id, label=label, passed=not reason, value=value, limit=limit, reason=reason)
+    return Item.of(id, label, "" if value <= limit else otherwise, value=value, limit=limit)
 
 
 def residual_item(residual: float, limit: float) -> Item:
@@ -88,8 +92,8 @@ def sampling_items(record: Record) -> Iterator[Item]:
         f"the current leaves the line between its neighbours by {100.0 * off:.0f} % of its rms: "
         "sampled too slowly, or noise; the inertia cannot be trusted"
     )
-    slow, label = off > LARGEST_LINE_ERROR, f"{record.name}: current sampled fast enough"
-    yield Item(id=f"sampling-{record.name}", label=label, passed=not slow, reason=reason if slow else "")
+    label = f"{record.name}: current sampled fast enough"
+    yield Item.of(f"sampling-{record.name}", label, reason if off > LARGEST_LINE_ERROR else "")
 
 
 def kept_items(fit: Fit, held: Collection[str], axis: str) -> Iterator[Item]:
@@ -102,10 +106,9 @@ def kept_items(fit: Fit, held: Collection[str], axis: str) -> Iterator[Item]:
 
 def rows_item(rows: int, parameters: int) -> Item:
     """Whether there are enough rows for an error that can be trusted."""
-    enough = rows >= ROWS_EACH * parameters
-    why = f"{rows} rows for {parameters} parameters, {ROWS_EACH * parameters} wanted: take a longer record"
-    label = "Rows enough for the parameters"
-    return Item(id="rows", label=label, passed=enough, reason="" if enough else why)
+    least = ROWS_EACH * parameters
+    why = f"{rows} rows for {parameters} parameters, {least} wanted: take a longer record"
+    return Item.of("rows", "Rows enough for the parameters", "" if rows >= least else why)
 
 
 def held_out_item(record: str, residual: float, fit: float, limit: float) -> Item:

@@ -17,6 +17,8 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops import Loops
+from actuator_lti.loops.limiters import onset
+from actuator_lti.loops.sampled import reference_to_output
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.tones import TANH_TOLERANCE, tone
 from analyses.linear.responses import response_at
@@ -65,9 +67,7 @@ def sweep_from_rest(
     if not (asked > 0.0).all() or not (asked < 0.5 / (n * tick_s)).all():
         raise InputError(f"frequency_hz: positive and below {0.5 / (n * tick_s):g} Hz (Nyquist)")
     tones = [tone(float(hz), design, UPDATES, least_cycles=2) for hz in asked]
-    hertz, ticks, cycles = (
-        np.array([getattr(t, k) for t in tones]) for k in ("frequency_hz", "ticks", "cycles")
-    )
+    hertz, ticks, cycles = np.array([(t.frequency_hz, t.ticks, t.cycles) for t in tones]).T
     amplitude = np.broadcast_to(np.asarray(amplitude_rad, dtype=float), asked.shape).copy()
     rows = Rows.of(design, asked.size)
     rows["tanh_tolerance"] = TANH_TOLERANCE
@@ -91,9 +91,7 @@ def sweep_from_rest(
         stick_fraction=result.window_stick_fraction,
         distortion=result.distortion("motor_speed_rad_s"),
         unsteadiness=result.unsteadiness("output_angle_rad"),
-        limiter=tuple(
-            LIMITERS[int(np.argmax(row))] if row.any() else "" for row in limiter_fractions(result)
-        ),
+        limiter=tuple(LIMITERS[np.argmax(row)] if row.any() else "" for row in limiter_fractions(result)),
     )
 
 
@@ -103,8 +101,6 @@ def _linear(design: Design, frequency_hz: Floats, speed_rad_s: float | None) -> 
     The output is looked at in every tick, as the simulator does; at the instants of the position loop the
     answer is the same but for the images of a held signal.
     """
-    from actuator_lti.loops.sampled import reference_to_output
-
     point = "sliding" if speed_rad_s is None else "describing-function"
     at = Operating(point=point, speed_amplitude_rad_s=speed_rad_s)  # type: ignore[arg-type]
     omega, mean = 2.0 * np.pi * frequency_hz, command_mean(design)
@@ -114,8 +110,6 @@ def _linear(design: Design, frequency_hz: Floats, speed_rad_s: float | None) -> 
 
 def free_amplitude(design: Design, loops: Loops, frequency_hz: Floats, part: float) -> Floats:
     """Command amplitude: a part of full deflection, at most half of what reaches a limit."""
-    from actuator_lti.loops.limiters import onset
-
     full = design.validation.full_deflection_rad
     border = onset(loops, 2.0 * np.pi * frequency_hz).amplitude_rad
     return np.minimum(part * full, 0.5 * border)

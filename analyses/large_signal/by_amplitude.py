@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from math import ceil, nan
 
 import numpy as np
@@ -68,14 +69,12 @@ def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
         if margins.delay_margin is not None and margins.delay_margin.samples:
             hertz = margins.delay_margin.frequency_rad_s / (2.0 * np.pi)
             asked.append(("delay", margins.delay_margin.samples, hertz))
-        for kind, linear, hertz in asked:
-            for size in SIZES:
-                for friction_on in (False, True) if rough else (False,):
-                    release = _Release(bench, name, kind, hertz, SIZES[size], friction_on)
-                    value, seen = _first(release, linear)
-                    found = (linear, value, FURTHEST * linear, bench.setup(name).period_s, *seen)
-                    about = (bench.design.axis, release.coarser, release.too_long)
-                    yield AmplitudeMargin(name, kind, size, SIZES[size], friction_on, *found, *about)
+        for (kind, linear, hertz), size, friction_on in product(asked, SIZES, (False, True)[: 1 + rough]):
+            release = _Release(bench, name, kind, hertz, SIZES[size], friction_on)
+            value, seen = _first(release, linear)
+            found = (linear, value, FURTHEST * linear, bench.setup(name).period_s, *seen)
+            about = (bench.design.axis, release.coarser, release.too_long)
+            yield AmplitudeMargin(name, kind, size, SIZES[size], friction_on, *found, *about)
 
 
 def _first(release: _Release, linear: float) -> tuple[float | None, tuple[str, float]]:

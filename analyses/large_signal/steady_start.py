@@ -90,7 +90,7 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
         A, B = A_j @ A, A_j @ B + B_j[:, 0]
     z = np.exp(1j * omega_rad_s * M * Ts)
     x = states_at(A, B[:, None], z)[..., 0]
-    angle, speed = system.outputs.index("output_angle"), "w_ref" in system.outputs
+    angle = system.outputs.index("output_angle")
     output = np.zeros(len(z), dtype=complex)
     for j, ((A_b, B_b), (_, _, C, D)) in enumerate(zip(before, phases, strict=True)):
         seen = (x @ A_b.T + B_b) @ C[angle] + D[angle, 0]
@@ -101,21 +101,20 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     coupling = loops.design.coupling
     places = {**PLACES, **ELASTIC} if coupling is not None and coupling.play_rad == 0.0 else PLACES
     states = {places[name]: x[:, k] for k, name in enumerate(system.states) if name in places}
-    if speed:
+    if "w_ref" in system.outputs:
         row = system.outputs.index("w_ref")
         C, D = phases[0][2], phases[0][3]
         states["speed_command_start"] = (x @ C[row] + D[row, 0]) / z
     radius = float(np.max(np.abs(np.linalg.eigvals(A))))
-    stable = radius < 1.0
-    periods = min(math.ceil(-DECAY / math.log(radius)), LONGEST_PERIODS) if 0.0 < radius < 1.0 else 1
-    if not stable:
-        periods = 500
+    periods = 1 if radius < 1.0 else 500
+    if 0.0 < radius < 1.0:
+        periods = min(math.ceil(-DECAY / math.log(radius)), LONGEST_PERIODS)
     mean = command_mean(loops.design)
     if mean is not None:  # in front of the loop: all that follows it is that much smaller and later
         before_loop = mean.response(omega_rad_s)
         output, states = output * before_loop, {name: x * before_loop for name, x in states.items()}
         periods += math.ceil(mean.samples * loops.design.controller.position_loop.every / M)
-    return LinearSteadyState(output, states, stable, periods * M)
+    return LinearSteadyState(output, states, radius < 1.0, periods * M)
 
 
 def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limited: np.ndarray) -> None:
@@ -135,9 +134,9 @@ def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limite
     rows["angle_start"][which] = -limit * lag / omega[which]
     rows["speed_start"][which] = rows["speed_command_start"][which] = limit
     current, voltage = steady_input(design, speed_torque_Nm(design, limit), limit)
-    cascaded = design.controller.current is not None
-    rows["current_start"][which] = current
-    rows["voltage_start"][which] = voltage
-    rows["current_command_start"][which] = current if cascaded else 0.0
-    rows["current_integrator_start"][which] = voltage if cascaded else 0.0
-    rows["velocity_integrator_start"][which] = current if cascaded else voltage
+    rows["current_start"][which], rows["voltage_start"][which] = current, voltage
+    if design.controller.current is None:
+        rows["velocity_integrator_start"][which] = voltage
+    else:
+        rows["velocity_integrator_start"][which] = rows["current_command_start"][which] = current
+        rows["current_integrator_start"][which] = voltage

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, isfinite, log
 from typing import Any
@@ -18,7 +17,6 @@ from analyses.large_signal.steady_start import LinearSteadyState, linear_steady_
 from analyses.linear.responses import response_at
 from nonlinear import Rows
 from nonlinear.runs.reduced import BatchResult
-from nonlinear.runs.running import Running
 
 LEAST_UPDATES = 96  # updates of the position loop in a window: peaks are seen to 1 - cos(pi/96) = 0.05 %
 DECADES_BELOW, FACTOR_ABOVE = 1.6, 8.0
@@ -49,9 +47,8 @@ def tone(
     Updates and periods of a window have no common factor, so that a sampled sinusoid is seen at as many
     phases as there are updates: its largest sample is its peak to ``1 - cos(pi/updates)``.
     """
-    control = design.controller
-    every = control.position_loop.every
-    T = every * control.period_s
+    every = design.controller.position_loop.every
+    T = every * design.controller.period_s
     cycles = max(least_cycles, math.ceil(least_updates * frequency_hz * T))
     updates = round(cycles / (frequency_hz * T))
     while math.gcd(cycles, updates) > 1:
@@ -61,14 +58,12 @@ def tone(
 
 def frequency_range_hz(design: Design, loops: Loops) -> tuple[float, float]:
     """Give the range around the bandwidth of the position loop in which large signals are looked at."""
-    T = design.controller.position_loop.every * design.controller.period_s
-    nyquist = 0.5 / T
+    nyquist = 0.5 / (design.controller.position_loop.every * design.controller.period_s)
     grid = np.geomspace(nyquist * 1e-5, nyquist * 0.999, 400)
     magnitude = np.abs(response_at(loops.plain_response, 2.0 * np.pi * grid))
     below = np.flatnonzero(magnitude < math.sqrt(0.5))
     bandwidth = float(grid[below[0]]) if below.size else nyquist
-    high = min(bandwidth * FACTOR_ABOVE, HIGHEST * nyquist)
-    return bandwidth / 10.0**DECADES_BELOW, high
+    return bandwidth / 10.0**DECADES_BELOW, min(bandwidth * FACTOR_ABOVE, HIGHEST * nyquist)
 
 
 def tones(design: Design, loops: Loops, count: int) -> tuple[Tone, ...]:
@@ -90,8 +85,8 @@ def work_ticks(design: Design, loops: Loops, count: int) -> int:
 def amplitudes(design: Design, count: int, smallest_rad: float | None) -> np.ndarray:
     """Give command amplitudes up to full deflection, among them those that the design asks for.
 
-    ``smallest_rad``: command that just overcomes dry friction at once (`analyses.linear.static_threshold`);
-    the range begins at twice that, within 1/20000 to 1/200 of full deflection.
+    ``smallest_rad``: command that just overcomes dry friction at once; the range begins at twice that, within
+    1/20000 to 1/200 of full deflection.
     """
     full = design.validation.full_deflection_rad
     wanted = sorted({fraction * full for fraction in design.validation.amplitude_fractions})
@@ -144,19 +139,14 @@ def run_tones(
     if not insist:
         return rows.run()
     drives = [rows.running(k) for k in range(len(rows))]
-    return _gone_on(rows, drives, rows.run(drives=drives), start.settling_ticks)
-
-
-def _gone_on(rows: Rows, drives: Sequence[Running], result: BatchResult, settling_ticks: int) -> BatchResult:
-    """Go on with the runs that are not steady."""
+    result = rows.run(drives=drives)
     moving = result.window_stick_fraction < 1.0
     late = np.flatnonzero(result.ok & moving & (result.unsteadiness("output_angle_rad") > STEADY))
     if not len(late):
         return result
     longer = rows.take(late)
-    longer["ticks"] += LONGER * settling_ticks + np.ceil(
-        np.minimum(MORE_WINDOWS * longer["window"], MORE_TICKS)
-    )
+    more = np.ceil(np.minimum(MORE_WINDOWS * longer["window"], MORE_TICKS))
+    longer["ticks"] += LONGER * start.settling_ticks + more
     return result.with_part(late, longer.run(drives=[drives[int(k)] for k in late]))
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from math import inf, pi
+from math import inf, log, pi
 
 import numpy as np
 import numpy.typing as npt
@@ -22,12 +22,12 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design, Sensor
 from actuator_lti.loops import Loops
 from analyses.large_signal.conditional import step_rows
-from analyses.large_signal.tones import LONGEST_TICKS, full_range, tone
+from analyses.large_signal.tones import LONGEST_TICKS, TIME_CONSTANTS, full_range, tone
 from analyses.limit_cycles.describing import (
     SENSORS,
     Cause,
     counts_matter,
-    cycle_of_counts,
+    cycles_of_quantisation,
     quantum_of,
     without_nonlinearities,
 )
@@ -44,6 +44,7 @@ SPEEDS = (0.05, 0.382, 1.382, 5.1)  # counts a sample: few, and so that no patte
 PART = 0.3  # of the drive's speed: no faster is looked at
 SAMPLES = 2000  # of a window at constant speed
 UPDATES = 400  # of the position loop in a window of a sine
+SETTLED = 1e4  # what begins at rest is that much smaller by then: far below `WITHIN`
 TRIED = np.array([0.1, 0.3, 1.0, 2.0, 4.0, 16.0, 64.0, 256.0])  # of the amplitude from which it is linear
 
 
@@ -88,18 +89,21 @@ def counted_gain(ratio: float, offset: float = 0.0) -> float:
 @cache
 def linear_ratio() -> float:
     """Amplitude in counts from which the gain is 1 to `WITHIN`, whatever the bias."""
-    off = np.array([max(abs(counted_gain(r, d) - 1.0) for d in OFFSETS) for r in RATIOS])
-    return float(RATIOS[int(np.flatnonzero(off > WITHIN)[-1]) + 1])
+    ratio = float(RATIOS[-1])
+    for smaller in RATIOS[::-1]:
+        if any(abs(counted_gain(smaller, d) - 1.0) > WITHIN for d in OFFSETS):
+            break
+        ratio = float(smaller)
+    return ratio
 
 
 def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, ...]:
     """Look at every encoder whose counts a loop sees, of a position drive that settles in so many ticks."""
-    causes: tuple[Cause, ...] = ("motor-quantisation", "quantisation")
-    return tuple(_one(design, loops, cause, settle_ticks) for cause in causes if counts_matter(design, cause))
+    causes = (cause for cause in reversed(SENSORS) if counts_matter(design, cause))
+    return tuple(_one(design, loops, cause, settle_ticks) for cause in causes)
 
 
 def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Counts:
-
     sensor, other = SENSORS[cause]
     quantum, velocity = quantum_of(design, cause) or 0.0, design.controller.velocity
     at_motor = quantum * (design.total_ratio if sensor == "output" else 1.0)
@@ -117,7 +121,7 @@ def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Count
         speed_step_rad_s=at_motor / _span_s(design) if made_of else None,  # q/(m T)
         ripple_rad_s=ripple,
         ripple_at_rad_s=at,
-        cycles=tuple(confirm(design, one) for one in cycle_of_counts(design, cause)),
+        cycles=tuple(confirm(design, one) for one in cycles_of_quantisation(design, (cause,))),
         linear_rad=linear_ratio() * quantum,
         linear_seen_rad=float(TRIED[good][0]) * linear_ratio() * quantum if good.any() else None,
         off=off,
@@ -172,7 +176,7 @@ def _linearity(design: Design, ideal: Design, loops: Loops, output_rad: float, s
     for one in (design, ideal):  # nothing else that is not linear: no play, no friction
         rows = Rows.of(without_nonlinearities(one), TRIED.size, friction_on=False, limits_on=False)
         rows.sine("command", output_rad / gain * TRIED, sine.frequency_hz)
-        rows["ticks"] = settle_ticks + 2 * sine.ticks
+        rows["ticks"] = np.ceil(settle_ticks * log(SETTLED) / TIME_CONSTANTS) + sine.ticks
         rows.window(sine.ticks, sine.cycles)
         run = rows.run()
         seen.append(run.phasor("output_angle_rad"))

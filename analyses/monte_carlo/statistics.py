@@ -82,8 +82,7 @@ def clopper_pearson(passed: int, count: int) -> tuple[float, float]:
     return low, high
 
 
-def _integers() -> np.ndarray:
-    return np.empty(0, dtype=np.int64)
+_NONE = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -95,8 +94,8 @@ class Sketch:
     """
 
     dropped: int = 0
-    keys: np.ndarray = field(default_factory=_integers)
-    counts: np.ndarray = field(default_factory=_integers)
+    keys: np.ndarray = field(default_factory=lambda: _NONE)
+    counts: np.ndarray = field(default_factory=lambda: _NONE)
     missing: int = 0
     low: int = 0
     high: int = 0
@@ -153,24 +152,16 @@ class Sketch:
 
     def order_statistics(self, ranks: Iterable[int]) -> list[float]:
         """Values of ranks (from 0) among all that are defined, infinities at the ends."""
-        ends, values = np.cumsum(self.counts), self.values
-        found = []
-        for rank in ranks:
-            inner = rank - self.low
-            if 0 <= inner < self.finite:
-                found.append(float(values[np.searchsorted(ends, inner, side="right")]))
-            else:
-                found.append(-math.inf if inner < 0 else math.inf)
-        return found
+        ends = np.concatenate([[self.low], self.low + np.cumsum(self.counts)])
+        values = np.concatenate([[-math.inf], self.values, [math.inf]])
+        return [float(value) for value in values[np.searchsorted(ends, list(ranks), side="right")]]
 
     def histogram(self) -> tuple[tuple[float, ...], tuple[int, ...]]:
         """Edges and counts of bins of equal width, for drawing."""
         if not self.maximum > self.minimum:
             return ((self.minimum, self.maximum), (self.finite,)) if self.finite else ((), ())
         edges = np.linspace(self.minimum, self.maximum, SHOWN_BINS + 1)
-        place = np.clip(np.searchsorted(edges, self.values, side="right") - 1, 0, SHOWN_BINS - 1)
-        counts = np.zeros(SHOWN_BINS, dtype=np.int64)
-        np.add.at(counts, place, self.counts)
+        counts, _ = np.histogram(self.values, edges, weights=self.counts)
         return tuple(edges.tolist()), tuple(counts.tolist())
 
 

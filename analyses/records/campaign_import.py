@@ -37,6 +37,11 @@ class ImportedRun:
         """Whether the clutch is disconnected: the load torque is exactly zero, and none is needed."""
         return self.entry.load_Nm == 0.0
 
+    @property
+    def sensor_file(self) -> str:
+        """SHA-256 of the load sensor's own file; empty where the run does not use one."""
+        return "" if self.load_is_zero or self.sensor is None else self.sensor.sha256
+
 
 @dataclass(frozen=True, kw_only=True)
 class SetAside:
@@ -57,12 +62,12 @@ class ImportedCampaign:
     @property
     def rows_in(self) -> int:
         """Data rows in the files of the runs that are used."""
-        return sum(c.rows_in for c in self._counts())
+        return sum(counts.rows_in for counts in self._counts())
 
     @property
     def rows_out(self) -> int:
         """Rows that were kept of them."""
-        return sum(c.rows_out for c in self._counts())
+        return sum(counts.rows_out for counts in self._counts())
 
     @property
     def inputs(self) -> tuple[InputUse, ...]:
@@ -103,29 +108,26 @@ def import_campaign(
         If no run at all can be used.
     """
     runs, aside = [], []
-    for k, entry in enumerate(campaign.runs):
+    for k, entry in enumerate(campaign.runs, 1):
         try:
             runs.append(import_run(campaign, entry))
         except InputError as error:
             aside.append(SetAside(id=entry.id, reason=str(error)))
         if progress is not None:
-            progress(k + 1, len(campaign.runs))
+            progress(k, len(campaign.runs))
     if not runs:
-        raise InputError(
-            f"none of the {len(aside)} runs can be used; the first: {aside[0].reason}", where=campaign.origin
-        )
+        told = f"none of the {len(aside)} runs can be used; the first: {aside[0].reason}"
+        raise InputError(told, where=campaign.origin)
     return ImportedCampaign(campaign=campaign, runs=tuple(runs), set_aside=tuple(aside))
 
 
 def import_run(campaign: Campaign, entry: RunEntry) -> ImportedRun:
     """Read one run's files and put them on the drive's clock."""
-    drive = read_record(entry.drive, campaign.drive)
-    sensor = None
+    drive, sensor = read_record(entry.drive, campaign.drive), None
     if entry.sensor is not None:
         if campaign.sensor is None:
-            raise InputError(
-                f"run {entry.id} has a sensor file, but there is no [sensor]", where=campaign.origin
-            )
+            told = f"run {entry.id} has a sensor file, but there is no [sensor]"
+            raise InputError(told, where=campaign.origin)
         sensor = read_record(entry.sensor, campaign.sensor)
     return assemble_run(campaign, entry, drive, sensor)
 
@@ -139,14 +141,9 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
     elif "torque" not in drive.signals:
         if sensor is None:
             raise InputError(f"run {entry.id}: no torque signal and no sensor file", where=campaign.origin)
-        record, join = join_records(
-            drive,
-            sensor,
-            first_signal=campaign.join.drive_signal,
-            second_signal=campaign.join.sensor_signal,
-            method=campaign.join.method,
-            offset_s=entry.offset_s,
-        )
+        how = campaign.join
+        signals = {"first_signal": how.drive_signal, "second_signal": how.sensor_signal}
+        record, join = join_records(drive, sensor, **signals, method=how.method, offset_s=entry.offset_s)
     if not np.any(record["speed"]):
         raise InputError("the speed is zero throughout", where=drive.name)
     return ImportedRun(entry=entry, record=record, join=join, sensor=sensor)

@@ -83,24 +83,17 @@ def join_records(
         The first record with the second one's signals added (linear interpolation), cut to the time both
         cover; and how it was done.
     """
-    finders = {"event": _by_event, "correlation": _by_correlation}
     if method == "given":
         if offset_s is None:
             raise InputError('join method "given": needs an offset', where=second.name)
         join = ClockJoin(offset_s=offset_s)
-    elif method in finders:
+    else:
         a = Series(first.time_s, np.abs(first[first_signal]))
         b = Series(second.time_s, np.abs(second[second_signal]))
         where = f"{first.name} with {second.name}"
         _check_durations(a, b, where)
-        join = replace(finders[method](a, b, where), method=method)
-    else:
-        raise InputError(f'join method "{method}": "event", "correlation" or "given"')
-    join = replace(join, first_signal=first_signal, second_signal=second_signal)
-    return _joined(first, second, join), join
-
-
-def _joined(first: Record, second: Record, join: ClockJoin) -> Record:
+        join = (_by_event if method == "event" else _by_correlation)(a, b, where)
+    join = replace(join, method=method, first_signal=first_signal, second_signal=second_signal)
     time = join.offset_s + join.rate * second.time_s
     start = int(np.searchsorted(first.time_s, time[0]))
     stop = int(np.searchsorted(first.time_s, time[-1], side="right"))
@@ -111,29 +104,17 @@ def _joined(first: Record, second: Record, join: ClockJoin) -> Record:
         raise InputError(f'both records hold a signal "{min(clash)}"', where=second.name)
     cut = first.slice(start, stop)
     added = {name: np.interp(cut.time_s, time, values) for name, values in second.signals.items()}
-    return replace(
+    joined = replace(
         cut,
         signals=MappingProxyType({**cut.signals, **added}),
         units=MappingProxyType({**first.units, **second.units}),
         notes=(*first.notes, *second.notes, str(join)),
     )
+    return joined, join
 
 
-@dataclass(frozen=True)
-class MotionEvents:
-    """Start of a motion, and its end where the record shows it."""
-
-    start_s: float
-    stop_s: float | None
-
-    @property
-    def span_s(self) -> float:
-        """What the motion lasts; 0 where its end is not shown."""
-        return 0.0 if self.stop_s is None else self.stop_s - self.start_s
-
-
-def motion_events(time_s: FloatArray, magnitude: FloatArray) -> MotionEvents | None:
-    """First rise through half of the plateau, and last fall below it, by linear interpolation.
+def motion_events(time_s: FloatArray, magnitude: FloatArray) -> tuple[float, float] | None:
+    """First rise through half of the plateau, and how much later the last fall below it is (0: not shown).
 
     The plateau is the 95 % point of the magnitude, its floor the 1 % point. None where there is no rise: a
     flat signal, or one that is up from the beginning.
@@ -142,9 +123,9 @@ def motion_events(time_s: FloatArray, magnitude: FloatArray) -> MotionEvents | N
     --------
     >>> import numpy as np
     >>> t = np.arange(0.0, 10.0, 0.1)
-    >>> e = motion_events(t, np.clip(t - 2.0, 0.0, 1.0))
-    >>> round(e.start_s, 6), e.stop_s
-    (2.5, None)
+    >>> start, lasts = motion_events(t, np.clip(t - 2.0, 0.0, 1.0))
+    >>> round(start, 6), lasts
+    (2.5, 0.0)
     """
     floor, plateau = np.quantile(magnitude, [0.01, 0.95])
     level = 0.5 * (floor + plateau)
@@ -157,14 +138,13 @@ def motion_events(time_s: FloatArray, magnitude: FloatArray) -> MotionEvents | N
         share = (level - magnitude[k]) / (magnitude[k + 1] - magnitude[k])
         return float(time_s[k] + share * (time_s[k + 1] - time_s[k]))
 
-    stop = None if up[-1] == len(magnitude) - 1 else crossing(int(up[-1]))
-    return MotionEvents(crossing(int(up[0]) - 1), stop)
+    start = crossing(int(up[0]) - 1)
+    return start, 0.0 if up[-1] == len(magnitude) - 1 else crossing(int(up[-1])) - start
 
 
 def _check_durations(a: Series, b: Series, where: str) -> None:
     """Refuse two records in which one motion lasts differently long: no clock is off by so much."""
-    events = motion_events(*a), motion_events(*b)
-    span_a, span_b = (0.0 if one is None else one.span_s for one in events)
+    span_a, span_b = (0.0 if one is None else one[1] for one in (motion_events(*a), motion_events(*b)))
     if not (span_a > 0.0 and span_b > 0.0):
         return
     ratio = span_a / span_b
@@ -173,11 +153,8 @@ def _check_durations(a: Series, b: Series, where: str) -> None:
         return
     factor = named_factor(ratio)
     told = f"factor {factor}" if factor else "a clock is off, or the records are of two runs"
-    raise InputError(
-        f"the motion lasts {span_a:.4g} s in one record and {span_b:.4g} s in the other, "
-        f"{ratio:.4f} times as long: {told}",
-        where=where,
-    )
+    lasts = f"the motion lasts {span_a:.4g} s in one record and {span_b:.4g} s in the other"
+    raise InputError(f"{lasts}, {ratio:.4f} times as long: {told}", where=where)
 
 
 def _by_event(a: Series, b: Series, where: str) -> ClockJoin:
@@ -185,11 +162,12 @@ def _by_event(a: Series, b: Series, where: str) -> ClockJoin:
     if first is None or second is None:
         told = "no event: neither signal may be flat, and each must start below half of its plateau"
         raise InputError(told, where=where)
+    (start_a, span_a), (start_b, span_b) = first, second
     step = np.hypot(np.median(np.diff(a.time_s)), np.median(np.diff(b.time_s))) / np.sqrt(12.0)
     rate, rate_std = 1.0, None
-    if first.span_s and second.span_s and step / second.span_s < RATE_SPREAD / 10.0:
-        rate, rate_std = first.span_s / second.span_s, float(np.sqrt(2.0) * step / second.span_s)
-    offset = first.start_s - rate * second.start_s
+    if span_a and span_b and step / span_b < RATE_SPREAD / 10.0:
+        rate, rate_std = span_a / span_b, float(np.sqrt(2.0) * step / span_b)
+    offset = start_a - rate * start_b
     moved = np.interp(a.time_s, offset + rate * b.time_s, b.values)
     quality = float(np.corrcoef(a.values, moved)[0, 1])
     return ClockJoin(offset_s=offset, offset_std_s=float(step), rate=rate, rate_std=rate_std, quality=quality)
@@ -268,8 +246,7 @@ class _Pair:
     def quality(self, p: FloatArray) -> float:
         """Correlation coefficient over the overlap."""
         x, y = self.both(p)
-        alike = len(x) >= 10 and np.std(y) > 0.0 and np.std(x) > 0.0
-        return float(np.corrcoef(x, y)[0, 1]) if alike else 0.0
+        return float(np.corrcoef(x, y)[0, 1]) if len(x) >= 10 and np.std(y) * np.std(x) > 0.0 else 0.0
 
 
 def _gauss_newton(pair: _Pair, parameters: int) -> tuple[FloatArray, FloatArray]:

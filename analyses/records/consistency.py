@@ -98,10 +98,9 @@ def _moving(*signals: FloatArray) -> BoolArray:
     return np.any([np.abs(values) > IN_MOTION * np.max(np.abs(values)) for values in signals], axis=0)
 
 
-def _inner(values: FloatArray) -> FloatArray:
+def _inner(record: Record) -> slice:
     """Without the twentieth part at both ends, where a filter starts and stops."""
-    cut = len(values) // 20
-    return values[cut : len(values) - cut] if cut else values
+    return slice(len(record) // 20, len(record) - len(record) // 20)
 
 
 def _ratio(y: FloatArray, x: FloatArray) -> tuple[float, float]:
@@ -243,8 +242,19 @@ def _steps(design: Design, record: Record) -> Finding | None:
     step = np.diff(place[1]) / np.diff(record.time_s)
     rows = np.lib.stride_tricks.sliding_window_view(step, 6)
     count = np.min(np.abs(step), where=step != 0.0, initial=inf)
-    missing, places = _times_its_neighbours(rows, 2, [0, 1, 3, 4], count)
-    filled, _ = _times_its_neighbours(rows, 3, [0, 1, 4, 5], count)
+
+    def times_its_neighbours(at: int, beside: list[int]) -> tuple[FloatArray, int]:
+        """A step of each row over those beside it, 0 where these are not alike; how many are."""
+        mean, size = rows[:, beside].mean(axis=1), np.abs(rows[:, beside].mean(axis=1))
+        alike = np.all(np.abs(rows[:, beside] - mean[:, None]) < STEADY * size[:, None], axis=1)
+        noise = 1.4826 * float(np.median(np.abs(rows[:, at] - mean)))  # of a normal deviation
+        alike &= (STEADY * size > count) & (0.5 * size > SURE * noise)
+        return np.divide(rows[:, at], mean, out=np.zeros(len(mean)), where=alike), int(
+            np.count_nonzero(alike)
+        )
+
+    missing, places = times_its_neighbours(2, [0, 1, 3, 4])
+    filled, _ = times_its_neighbours(3, [0, 1, 4, 5])
     lost = float(np.sum(np.round(missing[missing > 1.5]) - 1.0))
     copied = int(np.count_nonzero((rows[:, 2] == 0.0) & (filled > 1.5)))
     if not places:
@@ -254,18 +264,6 @@ def _steps(design: Design, record: Record) -> Finding | None:
     words = f"{' and '.join(told) or 'none is of two rows'}, of {places} places where the motion tells"
     words += ": take the record again, or give the times at which rows were taken" if told else ""
     return Finding(subject=f"steps of the {place[0]} from row to row", passed=not told, text=words)
-
-
-def _times_its_neighbours(
-    rows: FloatArray, at: int, beside: list[int], count: float
-) -> tuple[FloatArray, int]:
-    """A step of each row over those beside it, 0 where these are not alike; how many are."""
-    others = rows[:, beside]
-    mean = others.mean(axis=1)
-    alike = np.all(np.abs(others - mean[:, None]) < STEADY * np.abs(mean)[:, None], axis=1)
-    noise = 1.4826 * float(np.median(np.abs(rows[:, at] - mean)))  # of a normal deviation
-    alike &= (STEADY * np.abs(mean) > count) & (0.5 * np.abs(mean) > SURE * noise)
-    return np.divide(rows[:, at], mean, out=np.zeros(len(mean)), where=alike), int(np.count_nonzero(alike))
 
 
 def _other(record: Record, name: str, rate: FloatArray, moves: BoolArray) -> str:
@@ -305,7 +303,7 @@ def _twist_share(design: Design, record: Record) -> float:
     moment = float(np.max(np.abs(record["torque"]))) if "torque" in record.signals else 0.0
     moment = max(moment, float(np.max(np.abs(design.load.moment_Nm(own)))))
     slope = np.gradient(np.gradient(_smooth(record, own), record.time_s), record.time_s)
-    moment += design.load.inertia_kgm2 * float(np.sqrt(np.mean(_inner(slope) ** 2)))
+    moment += design.load.inertia_kgm2 * float(np.sqrt(np.mean(slope[_inner(record)] ** 2)))
     behind = design.ratio_behind_coupling
     twist = 0.5 * design.coupling.play_rad + design.coupling.stretch_rad(moment / behind)
     return twist / behind / max(float(np.std(own)), 1e-300)
@@ -321,16 +319,15 @@ def electrical_parts(design: Design, record: Record) -> dict[str, tuple[float, f
     place = place_of(design, record)
     if ohm is None or back is None or not {"voltage", "current"} <= set(record.signals):
         return {}
-    if "speed" in record.signals:
-        speed = record["speed"]
-    elif place is not None:
+    speed = record.signals.get("speed")
+    if speed is None and place is not None:
         speed = np.gradient(place[1], record.time_s)
-    else:
+    if speed is None:
         return {}
     u, i, w = (_smooth(record, values) for values in (record["voltage"], record["current"], speed))
     if motor.inductance_H is not None:  # of a direct drive as large as the rest
         u = u - motor.inductance_H * np.gradient(i, record.period_s)
-    u, i, w = (_thinned(record, _inner(values)) for values in (u, i, w))
+    u, i, w = (_thinned(record, values[_inner(record)]) for values in (u, i, w))
     parts = np.column_stack([ohm * i, back * w])
     size, total = np.linalg.norm(parts, axis=0), parts.sum(axis=1)
     if len(u) < LEAST_ROWS or not np.any(total):
@@ -346,10 +343,9 @@ def _electrical(design: Design, record: Record) -> Finding | None:
     told = [_counted(design, name, *ends) for name, ends in electrical_parts(design, record).items()]
     if not told:
         return None
-    each = [one for one, _ in told]
+    each, words = zip(*told, strict=True)
     passed = False if False in each else None if None in each else True
-    text = "; ".join(words for _, words in told)
-    return Finding(subject="voltage against R i + kE w", passed=passed, text=text)
+    return Finding(subject="voltage against R i + kE w", passed=passed, text="; ".join(words))
 
 
 def resistance_doubt(design: Design, record: Record) -> float:

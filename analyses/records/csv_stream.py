@@ -1,9 +1,16 @@
-"""CSV records of any length, block by block: bounded memory, and an account of every row."""
+"""CSV records of any length, block by block: bounded memory, and an account of every row.
+
+A block goes through Arrow's reader where it is clean, else line by line.
+"""
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import math
+import re
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import BinaryIO
 
@@ -12,15 +19,18 @@ import numpy as np
 from actuator_lti.bounds import CSV_LINE_BYTES, CSV_ROWS
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import open_regular
+from actuator_lti.start.extras import need
 from analyses.estimation.arrays import FloatArray
-from analyses.records.csv_rows import Block, Columns, careful_rows, clean, fast_rows, read_header
 from analyses.records.record import Record, RowCounts
-from analyses.records.spec import RecordSpec
-from analyses.records.table_record import SiRows, record_of_rows
+from analyses.records.spec import MISSING_TEXTS, CsvFormat, RecordSpec
+from analyses.records.table_record import Block, SiRows, record_of_rows
 
 BLOCK_BYTES = 1 << 22
 MAX_LINE_BYTES = CSV_LINE_BYTES.most
 MAX_ROWS = CSV_ROWS.most
+_RUN_OF_BLANKS = re.compile(rb"[ \t]+")
+STAMP = re.compile(rb"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?")
+"""A time stamp of ISO 8601: to the second, its fraction, its zone."""
 
 
 def read_csv_record(path: str | Path, spec: RecordSpec, *, max_rows: int = MAX_ROWS) -> Record:
@@ -57,25 +67,24 @@ def stream_csv(
 
 
 def _blocks(path: Path, spec: RecordSpec, counts: RowCounts, digest: hashlib._Hash) -> Iterator[Block]:
-    layout, origin = spec.format, str(path)
-    columns: Columns | None = None
+    layout, origin, header = spec.format, str(path), tuple[str, ...]()
     with open_regular(path, "CSV file") as stream:
         for data in _line_blocks(stream, origin):
             digest.update(data)
             line = counts.lines + 1
             counts.lines += data.count(b"\n") + (not data.endswith(b"\n"))
-            text = clean(data, layout, counts)
-            if columns is None:
-                header, text, line = read_header(text, line, layout, counts, origin)
+            text = _clean(data, layout, counts)
+            if not header:
+                header, text, line = _read_header(text, line, layout, counts, origin)
                 if not header:
                     continue
-                columns = Columns(header=header, positions=spec.positions(header, origin))
+                positions = spec.positions(header, origin)
                 counts.columns = header
             if not text:
                 continue
-            block = fast_rows(text, line, columns, layout)
+            block = _fast_rows(text, line, header, positions, layout)
             if block is None:
-                block = careful_rows(text, line, columns, spec, counts, origin)
+                block = _careful_rows(text, line, header, positions, spec, counts, origin)
             else:
                 counts.rows_in += len(block.lines)
             yield block
@@ -83,8 +92,10 @@ def _blocks(path: Path, spec: RecordSpec, counts: RowCounts, digest: hashlib._Ha
 
 def _line_blocks(stream: BinaryIO, origin: str) -> Iterator[bytes]:
     """Blocks that end at a line end; the last one may lack it."""
-    rest = b""
-    data = _without_bom(stream.read(BLOCK_BYTES), origin)
+    rest, data = b"", stream.read(BLOCK_BYTES)
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        raise InputError("is UTF-16; save it as UTF-8", where=origin)
+    data = data.removeprefix(b"\xef\xbb\xbf")
     while data:
         if b"\0" in data:
             told = "holds NUL bytes: not a text file (UTF-16 is not read; save it as UTF-8)"
@@ -101,10 +112,148 @@ def _line_blocks(stream: BinaryIO, origin: str) -> Iterator[bytes]:
         yield rest
 
 
-def _without_bom(data: bytes, origin: str) -> bytes:
-    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise InputError("is UTF-16; save it as UTF-8", where=origin)
-    return data.removeprefix(b"\xef\xbb\xbf")
+def _clean(data: bytes, layout: CsvFormat, counts: RowCounts) -> bytes:
+    """Line ends to newline, row ends cut off, runs of blanks to one tab, time stamps to seconds."""
+    if layout.stamps:
+        data = STAMP.sub(lambda stamp: _seconds(stamp, layout, counts), data)
+    data = data.replace(b"\r\n", b"\n")
+    if layout.separator == "whitespace":
+        data = _RUN_OF_BLANKS.sub(b"\t", data).replace(b"\n\t", b"\n").replace(b"\t\n", b"\n").lstrip(b"\t")
+    if layout.row_end:
+        end = layout.row_end.encode(layout.encoding)
+        data = data.replace(end + b"\n", b"\n").removesuffix(end)
+    return data
+
+
+def _seconds(stamp: re.Match[bytes], layout: CsvFormat, counts: RowCounts) -> bytes:
+    """Seconds from the first stamp's whole second, all digits of the fraction kept; UTC without a zone."""
+    try:
+        read = datetime.fromisoformat((stamp[1] + (stamp[3] or b"")).decode())
+    except ValueError:
+        return stamp[0]
+    read = read if read.tzinfo else read.replace(tzinfo=UTC)
+    counts.first_stamp = counts.first_stamp or read
+    whole = (read - counts.first_stamp).total_seconds()
+    return f"{whole:.0f}{layout.decimal}{(stamp[2] or b'0').decode()}".encode()
+
+
+def _separator(layout: CsvFormat) -> str:
+    """The one that stands in cleaned text."""
+    return "\t" if layout.separator == "whitespace" else layout.separator
+
+
+def _fast_rows(
+    data: bytes, first_line: int, header: tuple[str, ...], positions: tuple[int, ...], layout: CsvFormat
+) -> Block | None:
+    """A whole cleaned block through Arrow's reader; None where any line needs a closer look."""
+    need("pyarrow", "tables", "a record")
+    import pyarrow as pa
+    import pyarrow.csv as pc
+
+    if layout.comment and layout.comment.encode(layout.encoding) in data:
+        return None
+    lines = data.count(b"\n") + (not data.endswith(b"\n"))
+    names = [str(position) for position in range(len(header))]
+    wanted = list(dict.fromkeys(names[position] for position in positions))
+    convert = pc.ConvertOptions(
+        column_types=dict.fromkeys(wanted, pa.float64()),
+        include_columns=wanted,
+        null_values=list(MISSING_TEXTS),
+        decimal_point=layout.decimal,
+    )
+    parse = pc.ParseOptions(delimiter=_separator(layout), quote_char=False, ignore_empty_lines=False)
+    read = pc.ReadOptions(column_names=names, use_threads=False, block_size=len(data) + 1)
+    try:
+        table = pc.read_csv(pa.BufferReader(data), read, parse, convert)
+    except (pa.ArrowException, UnicodeDecodeError):
+        return None
+    values = np.column_stack([table.column(names[position]).to_numpy() for position in positions])
+    if table.num_rows != lines or np.isnan(values).all(axis=1).any() or np.isinf(values).any():
+        return None
+    return Block(values=values, lines=np.arange(first_line, first_line + lines))
+
+
+def _careful_rows(
+    data: bytes,
+    first_line: int,
+    header: tuple[str, ...],
+    positions: tuple[int, ...],
+    spec: RecordSpec,
+    counts: RowCounts,
+    origin: str,
+) -> Block:
+    """A cleaned block line by line: comments and blanks counted, every faulty row named or dropped."""
+    layout = spec.format
+    text = data.decode(layout.encoding, errors="replace")
+    rows, numbers = [], []
+    for number, line in enumerate(text.removesuffix("\n").split("\n"), first_line):
+        stripped = line.strip()
+        if not stripped:
+            counts.blanks += 1
+        elif layout.comment and stripped.startswith(layout.comment):
+            counts.comments += 1
+        else:
+            counts.rows_in += 1
+            cells = line.split(_separator(layout))
+            try:
+                if len(cells) != len(header):
+                    raise ValueError(f"{len(cells)} columns where {len(header)} are expected")
+                rows.append([_number(cells[k], header[k], layout.decimal) for k in positions])
+                numbers.append(number)
+            except ValueError as error:
+                if spec.bad_rows == "error":
+                    raise InputError(str(error), where=f"{origin}:{number}") from None
+                counts.drop("not a row of numbers", f"line {number}, {error}")
+    values = np.array(rows, dtype=np.float64).reshape(len(rows), len(positions))
+    return Block(values=values, lines=np.array(numbers, dtype=np.int64))
+
+
+def _number(cell: str, name: str, decimal: str) -> float:
+    text = cell.strip().strip('"').strip()
+    if text in MISSING_TEXTS:
+        return math.nan
+    try:
+        if "_" in text or (decimal == "," and "." in text):
+            raise ValueError(text)
+        value = float(text.replace(",", ".") if decimal == "," else text)
+    except ValueError:
+        told = f'column "{name}" = "{text[:40]}": not a number (decimal mark "{decimal}")'
+        raise ValueError(told) from None
+    if not math.isfinite(value):
+        raise ValueError(f'column "{name}" = "{text[:40]}": not finite')
+    return value
+
+
+def _read_header(
+    text: bytes, line: int, layout: CsvFormat, counts: RowCounts, origin: str
+) -> tuple[tuple[str, ...], bytes, int]:
+    """Column names, the text after the header, and the number of its first line.
+
+    Comment and blank lines before the header are passed over and counted. The text is empty where the header
+    has not come yet.
+    """
+    comment = layout.comment.encode(layout.encoding)
+    while text:
+        head, _, rest = text.partition(b"\n")
+        stripped = head.strip()
+        if line <= layout.skip_lines:
+            counts.header += 1
+        elif not stripped:
+            counts.blanks += 1
+        elif comment and stripped.startswith(comment):
+            counts.comments += 1
+        elif not layout.has_header:
+            return layout.names, text, line
+        else:
+            counts.header += 1
+            try:
+                cells = next(csv.reader([head.decode(layout.encoding)], delimiter=_separator(layout)))
+            except (UnicodeDecodeError, LookupError, csv.Error, StopIteration) as error:
+                told = f"the line of column names cannot be read: {error}"
+                raise InputError(told, where=f"{origin}:{line}") from None
+            return tuple(cell.strip() for cell in cells), rest, line + 1
+        text, line = rest, line + 1
+    return (), b"", line
 
 
 class BoundedRows:

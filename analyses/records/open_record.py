@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.mat5 import MatContent
 from actuator_lti.files.reading import as_path, open_regular, read_campaign_toml
 from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
-from analyses.records.csv_rows import STAMP
+from analyses.records.csv_stream import STAMP
 from analyses.records.inputs import spec_of_names
 from analyses.records.naming import is_unit
 from analyses.records.readers import TABLES, columns_of, load_mat, names_in, read_record
@@ -85,11 +84,15 @@ def open_records(path: str | Path) -> list[Record]:
         raise InputError("is empty; allowed: a line of names, then rows of numbers", where=str(path))
     spec, why = _spec_of_file(path, suffix)
     record = read_record(path, spec)
+    gain = record.constants.get("gtau")
+    if gain is not None and "voltage" in record.signals:  # the force of an EMPS record
+        signals = {**record.signals, "force": gain * record["voltage"]}
+        record = replace(record, signals=signals, units={**record.units, "force": "N"})
     notes = ("" if one.signal else why.get(one.column, "") for one in record.inputs)
     inputs = tuple(
         replace(one, note=note or one.note) for one, note in zip(record.inputs, notes, strict=True)
     )
-    return [replace(_with_gain(record), inputs=inputs)]
+    return [replace(record, inputs=inputs)]
 
 
 def _described(path: Path) -> list[Record]:
@@ -130,8 +133,19 @@ def _settings(table: Table) -> dict[str, str | float]:
 
 def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str]]:
     """The layout of a file from the names in it; for each column that is not read: why."""
+    spec: RecordSpec | None = None
+    why: Mapping[str, str] = {}
     if suffix == ".mat":
-        spec, why = _spec_of_mat(path)
+        content, _ = load_mat(path)
+        if set(content.arrays) >= EMPS_COLUMNS:
+            return EMPS_SPEC, {}
+        named = {key: names_in(content, one.shape[1]) for key, one in content.arrays.items() if one.ndim == 2}
+        wide = [key for key, names in named.items() if names and min(content.arrays[key].shape) > 1]
+        layouts = iter([CsvFormat(), *(CsvFormat(matrix=key, names=named[key]) for key in wide)])
+        while spec is None and (
+            layout := next(layouts, None)
+        ):  # vectors by name, then each matrix with names
+            spec, why = spec_of_names(tuple(columns_of(content, layout, path)), layout)
     elif suffix in TABLES:
         spec, why = spec_of_names(tuple(TABLES[suffix](path)[0]))
     else:
@@ -147,34 +161,6 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
     return spec, why
 
 
-def _spec_of_mat(path: Path) -> tuple[RecordSpec | None, Mapping[str, str]]:
-    content, _ = load_mat(path)
-    if set(content.arrays) >= EMPS_COLUMNS:
-        return EMPS_SPEC, {}
-    why: Mapping[str, str] = {}
-    for layout in _layouts(content):
-        spec, why = spec_of_names(tuple(columns_of(content, layout, path)), layout)
-        if spec is not None:
-            return spec, why
-    return None, why
-
-
-def _layouts(content: MatContent) -> list[CsvFormat]:
-    """Vectors by name, then each matrix that has a list of names beside it."""
-    wide = [(name, values.shape) for name, values in content.arrays.items() if min(values.shape) > 1]
-    named = [(name, names_in(content, shape[1])) for name, shape in wide if len(shape) == 2]
-    return [CsvFormat(), *(CsvFormat(matrix=name, names=names) for name, names in named if names)]
-
-
-def _with_gain(record: Record) -> Record:
-    """The force of an EMPS record, from the gain that the file holds."""
-    gain = record.constants.get("gtau")
-    if gain is None or "voltage" not in record.signals:
-        return record
-    signals = {**record.signals, "force": gain * record["voltage"]}
-    return replace(record, signals=signals, units={**record.units, "force": "N"})
-
-
 def _columns_of_csv(head: str) -> tuple[tuple[str, ...], CsvFormat]:
     """Column names, separator and decimal mark from the first lines of a file.
 
@@ -187,9 +173,11 @@ def _columns_of_csv(head: str) -> tuple[tuple[str, ...], CsvFormat]:
     comma = separator != "," and any(_DECIMAL_COMMA.search(line) for _, line in lines[1:50])
     columns = _cells(header, separator)
     rows = [(k, _cells(line, separator)) for k, line in lines[1:3]]
-    units = _units_row(rows[0][1]) if rows else ()
-    if units:
+    units = tuple(cell.strip("[]()- ") for cell in rows[0][1]) if rows else ()
+    if any(unit.strip("1") for unit in units) and all(not unit or is_unit(unit) for unit in units):
         at, _ = rows.pop(0)
+    else:
+        units = ()
     stamps = [STAMP.fullmatch(cell.encode()) is not None for cell in rows[0][1]] if rows else []
     told = [unit or ("s" if stamp else "") for unit, stamp in zip_longest(units, stamps, fillvalue="")]
     names = tuple(f"{name} [{unit}]" if unit else name for name, unit in zip_longest(columns, told))
@@ -204,10 +192,3 @@ def _cells(line: str, separator: str) -> tuple[str, ...]:
         return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=separator), []))
     except csv.Error:
         return ()
-
-
-def _units_row(cells: Sequence[str]) -> tuple[str, ...]:
-    """The units of a row that holds nothing else, empty where a cell is; none where it is no such row."""
-    units = tuple(cell.strip("[]()- ") for cell in cells)
-    known = all(not unit or is_unit(unit) for unit in units)
-    return units if known and any(unit.strip("1") for unit in units) else ()

@@ -10,7 +10,6 @@ from typing import Annotated, Literal
 
 from actuator_lti.design.units import compatible, parse_unit
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import FloatArray
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import RESAMPLE_TOLERANCE
 
@@ -192,18 +191,6 @@ def _position(column: str | int, header: Sequence[str], where: str) -> int:
     return header.index(column)
 
 
-@dataclass(frozen=True)
-class Converter:
-    """``(raw + offset) * factor``, and the SI unit of the result."""
-
-    offset: float
-    factor: float
-    si_unit: str
-
-    def __call__(self, raw: FloatArray) -> FloatArray:
-        return (raw + self.offset) * self.factor
-
-
 def unit_factor(unit: str, known: str | None, what: str) -> float:
     """Factor from ``unit`` to SI; refused where its dimension is not that of ``known``."""
     try:
@@ -216,15 +203,14 @@ def unit_factor(unit: str, known: str | None, what: str) -> float:
     return result.factor
 
 
-def converter(signal: SignalColumn) -> Converter:
-    """The conversion of one signal.
+def to_si(signal: SignalColumn) -> tuple[float, str]:
+    """The factor of ``raw + offset`` of one signal, and the SI unit of the result.
 
     Examples
     --------
-    >>> import numpy as np
-    >>> rpm = converter(SignalColumn(name="speed", column="n", unit="rpm"))
-    >>> rpm(np.array([9000.0])).round(3).tolist(), rpm.si_unit
-    ([942.478], 'rad/s')
+    >>> factor, unit = to_si(SignalColumn(name="speed", column="n", unit="rpm"))
+    >>> round(9000.0 * factor, 3), unit
+    (942.478, 'rad/s')
     """
     known = KNOWN_UNITS.get(signal.name)
     factor = unit_factor(signal.unit, known, f"signals.{signal.name}")
@@ -233,4 +219,4 @@ def converter(signal: SignalColumn) -> Converter:
         raise InputError(f'signals.{signal.name}.value = "{signal.value}": only of a current or a voltage')
     factor *= 1.0 if forms is None else forms[signal.value]
     factor *= TO_LINE if signal.between == "phase" else 1.0
-    return Converter(signal.offset, signal.scale * factor, known or f"SI of {signal.unit}")
+    return signal.scale * factor, known or f"SI of {signal.unit}"

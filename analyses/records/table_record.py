@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
@@ -10,11 +11,10 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown_path
-from analyses.estimation.arrays import BoolArray, FloatArray
-from analyses.records.csv_rows import Block
+from analyses.estimation.arrays import BoolArray, FloatArray, IntArray
 from analyses.records.inputs import inputs_of
 from analyses.records.record import Record, RowCounts, check_error, line_error
-from analyses.records.spec import RecordSpec, converter, unit_factor
+from analyses.records.spec import RecordSpec, to_si, unit_factor
 
 
 def filled(
@@ -44,17 +44,15 @@ def filled(
     return whole, notes
 
 
-def several_rates(counts: RowCounts) -> list[str]:
-    """A word where most rows were dropped for a missing value."""
-    lacking = counts.dropped.get(LACKING, 0)
-    told = (
-        f"{lacking} of {counts.rows_in} rows lack a value and are dropped: for signals logged at several "
-        'rates give missing = "interpolate" in a record file'
-    )
-    return [told] if 2 * lacking > counts.rows_in else []
-
-
 LACKING = "with a missing value"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Block:
+    """Numbers of the wanted columns, shape (n, columns), NaN where missing, and the file line of each row."""
+
+    values: FloatArray
+    lines: IntArray
 
 
 class SiRows:
@@ -67,35 +65,31 @@ class SiRows:
     def __init__(self, spec: RecordSpec, counts: RowCounts, origin: str) -> None:
         self._spec, self._counts, self._origin = spec, counts, origin
         self._factor = spec.time.tick_s or unit_factor(spec.time.unit, "s", "time")
-        self._converters = [converter(signal) for signal in spec.signals]
+        self._factors = [to_si(signal)[0] for signal in spec.signals]
         self._row, self._wraps, self._last_time = 0, 0.0, -np.inf
         self._last_raw: float | None = None
 
     def __call__(self, block: Block) -> FloatArray:
         """Rows of time and signals, shape (n, 1 + signals)."""
-        spec, period = self._spec.time, self._spec.time.period_s
+        spec, times = self._spec, self._spec.time
         block = self._without_missing(block)
-        if period is not None:
-            time = (self._row + np.arange(len(block.values))) * period
+        if times.period_s is not None:
+            time, raw = (self._row + np.arange(len(block.values))) * times.period_s, block.values
             self._row += len(time)
-            raw = block.values
         else:
-            if spec.minimum is not None:
-                late = block.values[:, 0] >= spec.minimum
-                block = self._kept(block, late, f"time below {spec.minimum:g}")
+            if times.minimum is not None:
+                late = block.values[:, 0] >= times.minimum
+                block = self._kept(block, late, f"time below {times.minimum:g}")
             time = self._unwrapped(block.values[:, 0]) * self._factor
             keep = self._increases(time, block)
             time, raw = time[keep], self._kept(block, keep, "whose time does not increase").values[:, 1:]
         self._counts.rows_out += len(time)
-        return np.column_stack([time, *self._signals(raw)])
-
-    def _signals(self, raw: FloatArray) -> list[FloatArray]:
-        made, first = [], 0
-        for signal, own in zip(self._spec.signals, self._converters, strict=True):
+        signals, first = [], 0
+        for signal, factor in zip(spec.signals, self._factors, strict=True):
             signs = [sign for sign, _ in signal.terms(self._counts.columns)]
-            made.append(own(raw[:, first : first + len(signs)] @ signs))
+            signals.append((raw[:, first : first + len(signs)] @ signs + signal.offset) * factor)
             first += len(signs)
-        return made
+        return np.column_stack([time, *signals])
 
     def _without_missing(self, block: Block) -> Block:
         looked_at = block.values
@@ -144,7 +138,14 @@ def record_of_columns(
     """Read the columns that a spec names; NaN and disorder in time are treated as in a CSV file."""
     header = tuple(vectors)
     names = [header[k] for k in spec.positions(header, str(path))]
-    columns = [_vector(vectors[name], name, path) for name in names]
+    columns = [vectors[name].ravel() for name in names]
+    for name, column in zip(names, columns, strict=True):
+        shape = vectors[name].shape
+        if max(shape) != column.size:
+            raise InputError(f'"{name}" has the shape {shape}: a vector is wanted', where=str(path))
+        infinite = np.isinf(column)
+        if infinite.any():
+            raise InputError(f'"{name}": not finite', where=f"{path}, row:{infinite.argmax() + 1}")
     if len(set(map(len, columns))) > 1:
         told = ", ".join(f"{name} {len(column)}" for name, column in zip(names, columns, strict=True))
         raise InputError(f"the vectors differ in length: {told}", where=str(path))
@@ -153,15 +154,6 @@ def record_of_columns(
     block = Block(values=table, lines=np.arange(1, len(table) + 1))
     rows = SiRows(spec, counts, f"{path}, row")(block)
     return record_of_rows(rows, spec, path, counts, digest, constants=constants)
-
-
-def _vector(vector: FloatArray, name: str, path: Path) -> FloatArray:
-    if max(vector.shape) != vector.size:
-        raise InputError(f'"{name}" has the shape {vector.shape}: a vector is wanted', where=str(path))
-    infinite = np.isinf(vector.ravel())
-    if infinite.any():
-        raise InputError(f'"{name}": not finite', where=f"{path}, row:{infinite.argmax() + 1}")
-    return vector.ravel()
 
 
 def record_of_rows(
@@ -179,17 +171,23 @@ def record_of_rows(
     time, *columns = (np.ascontiguousarray(column) for column in rows.T)
     named = {signal.name: column for signal, column in zip(spec.signals, columns, strict=True)}
     signals, made = filled(time, named, spec.resample_tolerance, str(path))
-    notes = [f"averaged over {averaged} rows to bound memory"] if averaged > 1 else []
+    notes = [f"averaged over {averaged} rows to bound memory"] * (averaged > 1) + made
+    lacking = counts.dropped.get(LACKING, 0)
+    if 2 * lacking > counts.rows_in:
+        notes.append(
+            f"{lacking} of {counts.rows_in} rows lack a value and are dropped: for signals logged at several "
+            'rates give missing = "interpolate" in a record file'
+        )
     return Record(
         name=shown_path(path.name),
         time_s=time,
         signals=MappingProxyType(signals),
-        units=MappingProxyType({signal.name: converter(signal).si_unit for signal in spec.signals}),
+        units=MappingProxyType({signal.name: to_si(signal)[1] for signal in spec.signals}),
         counts=counts,
         averaged=averaged,
         sha256=digest,
         constants=MappingProxyType(dict(constants or {})),
-        notes=(*notes, *made, *several_rates(counts)),
+        notes=tuple(notes),
         inputs=inputs_of(spec, counts.columns),
         resample_tolerance=spec.resample_tolerance,
     )

@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.wiring import wire
-from actuator_lti.loops import assemble_loops, exact_margins, periodic_loop, periodic_loop_of
+from actuator_lti.loops import assemble_loops, exact_margins, periodic_loop
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.limiters import LimiterPath, limiter_places
 from analyses.linear.loop_figures import LoopFigures, loop_figures
@@ -215,7 +215,7 @@ class Bench:
         setup = longer.setup("u")
 
         def poles() -> Complexes:
-            return periodic_loop_of(wire(longer.linear, setup.bias.operating(longer.drive)), "u").modes()
+            return periodic_loop(wire(longer.linear, setup.bias.operating(longer.drive)), "u").modes()
 
         return tangent(longer.drive, "u", setup=setup), poles
 

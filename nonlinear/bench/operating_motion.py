@@ -14,9 +14,16 @@ from math import copysign, cosh, inf, isfinite
 import numpy as np
 
 from actuator_lti.design.model import Command, Coupling, Design, Friction, Instruments, LoadFriction, Sensor
-from actuator_lti.drive.angle import follows_angle, holding_moment_Nm, holding_torque_Nm
 from actuator_lti.drive.facts import passed_moment_Nm, slopes_torque
-from actuator_lti.drive.operating import Operating, dry_torque, friction_slopes, segments
+from actuator_lti.drive.operating import (
+    Operating,
+    dry_torque,
+    follows_angle,
+    friction_slopes,
+    holding_moment_Nm,
+    holding_torque_Nm,
+    segments,
+)
 from actuator_lti.drive.steady import motor_torque_Nm, steady_input
 from actuator_lti.errors import InputError
 from nonlinear.bench.steady_control import commands_fit

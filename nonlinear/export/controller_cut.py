@@ -10,10 +10,11 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.compiled.form import number
 from actuator_lti.compiled.kernel import kernel
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.compiled.program import Program
-from actuator_lti.compiled.residual import Leftover, Residual, number
+from actuator_lti.compiled.residual import Leftover, Residual
 from actuator_lti.compiled.structs import Member, Rows, Struct, emit_structs, split_index
 from actuator_lti.compiled.unread import without_unread
 from actuator_lti.design.law import LAW_INPUTS

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.errors import InputError
 from reports.analyses import FURTHER
 from reports.cli.options import (
@@ -76,7 +77,6 @@ def report(
 
     Try: actuator-lti report joint --also corners --also failures --pdf --out out/joint
     """
-    from actuator_lti.asked.verdict import Verdict
     from actuator_lti.design.loader import design_text
     from reports import build
     from reports.cli.errors import leave_with
@@ -101,16 +101,15 @@ def report(
         source=None if changes else design_text(design),
         step=partial(progress, quiet=quiet),
     )
-    written: tuple[Path, ...] = (out / "report.html", out / "report.json")
+    written = [out / "report.html", out / "report.json"]
     if pdf:
         from reports.pdf import write_pdf
 
-        written = (*written, write_pdf(made, out / "report.pdf", whole=not summary))
-    passed = bool(made["verdict"]["passed"])
+        written.append(write_pdf(made, out / "report.pdf", whole=not summary))
     if as_json:
         print_line(dumps(made).rstrip("\n"))
     else:
         first, *more = verdict_words(made["verdict"])
         print_verdict(Verdict(made["verdict"]["verdict"]), f"{drive.name}: {first}")
         print_line("\n".join([*more, *map(str, written)]))
-    leave_with(passed)
+    leave_with(made["verdict"]["passed"])

@@ -38,7 +38,6 @@ class Change:
 
     @property
     def delta(self) -> float | None:
-        """How far it moved."""
         return None if self.before is None or self.after is None else self.after - self.before
 
 
@@ -64,7 +63,6 @@ class Comparison:
 
     @cached_property
     def regressions(self) -> tuple[Change, ...]:
-        """The changes for the worse."""
         return tuple(c for c in self.changes if c.worse)
 
 
@@ -88,21 +86,17 @@ class Columns:
 
     def compare(self, before: np.ndarray, after: np.ndarray) -> tuple[Change, ...]:
         """List every figure that moved beyond its tolerance, appeared or vanished; the worst first."""
-        moved, allowed = np.flatnonzero(self.moved(before, after)), self.allowed(before, after)
-        changes = [_change(self.figures[k], *map(float, (before[k], after[k], allowed[k]))) for k in moved]
+        allowed, changes = self.allowed(before, after), []
+        for k in np.flatnonzero(self.moved(before, after)):
+            of = self.figures[k]
+            old, new = (float(value) if np.isfinite(value) else None for value in (before[k], after[k]))
+            about: dict[str, Any] = {"figure": of.name, "unit": of.unit, "kind": of.kind}
+            about |= {"before": old, "after": new, "tolerance": float(allowed[k])}
+            changes.append(Change(**about, worse=_worse(of, old, new)))
         return tuple(sorted(changes, key=_order))
 
 
-def _change(figure: Figure, before: float, after: float, tolerance: float) -> Change:
-    old, new = (value if math.isfinite(value) else None for value in (before, after))
-    return Change(
-        figure=figure.name, unit=figure.unit, kind=figure.kind, before=old, after=new, tolerance=tolerance,
-        worse=_worse(figure, old, new),
-    )  # fmt: skip
-
-
 def _worse(figure: Figure, old: float | None, new: float | None) -> bool | None:
-    """Whether a change is for the worse; None where no direction is known."""
     if figure.kind == "verdict":
         return new == 0.0 or (new is None and old == 1.0)
     if old is None or new is None or not figure.better:
@@ -133,13 +127,15 @@ class Between:
         earlier = [r for r in past if r.run < result.run]
         good = [r for r in earlier if r.home is not None]
         if not good:
-            return Comparison(
-                note="no earlier night has a result" if earlier else "first night of this design"
-            )
+            first = "no earlier night has a result" if earlier else "first night of this design"
+            return Comparison(note=first)
         skipped = sum(good[-1].run < night < result.run for night in self._runs)
         note = f"{skipped} night(s) without a result before; compared with the last that has one"
         found = self._compare(good[-1], result, note if skipped else "")
-        return replace(found, changes=self._flapping(found.changes, past))
+        shown = found.changes[:SHOWN_CHANGES]  # only what a page shows is looked at for going to and fro
+        courses = self.history.matrix(past[-WINDOW:], [c.figure for c in shown]).T
+        marked = [replace(c, flapping=flaps(x, c.tolerance)) for c, x in zip(shown, courses, strict=True)]
+        return replace(found, changes=(*marked, *found.changes[SHOWN_CHANGES:]))
 
     def baseline(self, result: Result, approval: Baseline | None) -> Comparison:
         """What changed since the approved night, else since the first that has a result."""
@@ -152,9 +148,8 @@ class Between:
         if first.run == result.run:
             note = "this is the first night: nothing to compare with"
             return Comparison(run=self.history.runs[-1], note=note)
-        return self._compare(
-            first, result, "nobody has approved a baseline yet: compared with the first night"
-        )
+        note = "nobody has approved a baseline yet: compared with the first night"
+        return self._compare(first, result, note)
 
     def _compare(self, old: Result, new: Result, note: str) -> Comparison:
         before, after = self._runs[old.run], self._runs[new.run]
@@ -164,13 +159,10 @@ class Between:
             return Comparison(run=before, note=note)
         columns = self._columns_of(old, new)
         changes = columns.compare(*self.history.matrix((old, new), columns.names))
-        inputs = [self.history.inputs(result) for result in (old, new)]
-        parameters, settings = (
-            _differences(*(each.get(kind, {}) for each in inputs)) for kind in ("parameters", "settings")
-        )
+        was, now = (self.history.inputs(result) for result in (old, new))
         cause = Cause(
-            parameters=parameters,
-            settings=settings,
+            parameters=_differences(was.get("parameters", {}), now.get("parameters", {})),
+            settings=_differences(was.get("settings", {}), now.get("settings", {})),
             libraries=_differences(before.libraries, after.libraries),
             commits=self._commits(before, after),
             code=before.code != after.code,
@@ -186,27 +178,18 @@ class Between:
             self._columns[key] = Columns(list(known.values()), self.tolerances)
         return self._columns[key]
 
-    def _flapping(self, changes: tuple[Change, ...], past: list[Result]) -> tuple[Change, ...]:
-        """Mark those of the changes that a page shows that go to and fro."""
-        shown = changes[:SHOWN_CHANGES]
-        values = self.history.matrix(past[-WINDOW:], [c.figure for c in shown])
-        marked = [
-            replace(c, flapping=flaps(column, c.tolerance)) for c, column in zip(shown, values.T, strict=True)
-        ]
-        return (*marked, *changes[SHOWN_CHANGES:])
-
     def _commits(self, old: Run, new: Run) -> tuple[tuple[str, str], ...]:
         """First lines of the commits between two nights, each with where: those of the code, of the study."""
-        places = {"code": (_CODE, old.code_commit, new.code_commit)}
-        own = (old.study_commit, new.study_commit)
-        if self.origin is not None and own != places["code"][1:]:
-            places["study"] = (self.origin, *own)
-        return tuple((where, line) for where, each in places.items() for line in commits_between(*each))
+        code, own = (old.code_commit, new.code_commit), (old.study_commit, new.study_commit)
+        lines = [("code", line) for line in commits_between(_CODE, *code)]
+        if self.origin is not None and own != code:
+            lines += [("study", line) for line in commits_between(self.origin, *own)]
+        return tuple(lines)
 
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Differences:
     def text(value: object) -> str:
         return "(none)" if value is None else str(value)
 
-    names = [*new, *(name for name in old if name not in new)]
+    names = dict.fromkeys([*new, *old])
     return tuple((n, text(old.get(n)), text(new.get(n))) for n in names if old.get(n) != new.get(n))

@@ -39,20 +39,17 @@ def headlines(designs: Sequence[DesignView]) -> tuple[Headline, ...]:
     for design in designs:
         if design.last_night.changes:
             groups.setdefault(cause_words(design.last_night.cause), []).append(design)
-    made = [_headline(cause, result) for cause, result in groups.items()]
+    made = []
+    for cause, changed in groups.items():
+        first, *more = sorted(changed, key=lambda d: (not d.last_night.regressions, d.rank))
+        shown = main_changes(first.last_night)
+        effect = change_words(shown[0], first.last_night, first.verdicts) if shown else NO_FIGURE
+        worse = bool(shown[0].worse if shown else first.last_night.regressions)
+        made.append(Headline(cause=cause, effect=effect, worse=worse, designs=(first, *more)))
     return tuple(sorted(made, key=lambda one: not one.worse))
 
 
-def _headline(cause: str, result: Sequence[DesignView]) -> Headline:
-    first, *more = sorted(result, key=lambda d: (not d.last_night.regressions, d.rank))
-    shown = main_changes(first.last_night)
-    effect = change_words(shown[0], first.last_night, first.verdicts) if shown else NO_FIGURE
-    worse = bool(shown[0].worse if shown else first.last_night.regressions)
-    return Headline(cause=cause, effect=effect, worse=worse, designs=(first, *more))
-
-
 def cause_words(cause: Cause) -> str:
-    """Say in one phrase what differs between two nights, the design itself first."""
     values = [f"{name} {_step(old, new)}" for name, old, new in (*cause.parameters, *cause.settings)]
     if values:
         more = len(values) - 2
@@ -66,7 +63,6 @@ def cause_words(cause: Cause) -> str:
 
 
 def cause_lines(cause: Cause) -> list[str]:
-    """What lies behind a change, one line each."""
     kinds = {"parameter": cause.parameters, "setting": cause.settings, "library": cause.libraries}
     lines = [f"{kind} {name}: {old} → {new}" for kind, each in kinds.items() for name, old, new in each]
     lines += [f"commit ({where}) {line}" for where, line in cause.commits]
@@ -93,14 +89,10 @@ def change_words(change: Change, comparison: Comparison, verdicts: Sequence[Tree
     name, moved = change.figure.removesuffix(_DISTANCE), change
     if change.kind == "distance":
         moved = next((c for c in comparison.changes if c.figure == name + _VALUE), change)
-        label = _turned(next((v["label"] for v in verdicts if v["id"] == name), name))
+        label = next((v["label"] for v in verdicts if v["id"] == name), name)
+        place, colon, what = label.partition(": ")  # of "Position loop: phase margin", say
+        label = one_line(f"{what} of the {place[:1].lower()}{place[1:]}" if colon else label, 100)
     else:
         *_, row, column = ["", *name.split(" / ")]
         label = one_line(f"{column[:1].lower()}{column[1:]} of {row}" if row else column, 100)
     return f"{label} {or_none(moved.before)} → {or_none(moved.after)} {change.unit}".rstrip()
-
-
-def _turned(label: str) -> str:
-    """Turn "Position loop: phase margin" into "phase margin of the position loop"."""
-    place, colon, what = label.partition(": ")
-    return one_line(f"{what} of the {place[:1].lower()}{place[1:]}" if colon else label, 100)

@@ -42,17 +42,11 @@ class Tolerances:
         for rule in self.rules:
             if fnmatch.fnmatchcase(figure.name.lower(), rule.pattern.lower()):
                 return rule.absolute, rule.relative
-        return _declared(figure), RELATIVE
-
-
-def _declared(figure: Figure) -> float:
-    """The tolerance that the registry of quantities has for a figure: of its column, else of its unit."""
-    quantity = _BY_HEADING.get(figure.name.rpartition(" / ")[2])
-    if quantity is None:
-        return _BY_UNIT.get(figure.unit, FLOOR)
-    if figure.unit in (quantity.unit, ""):
-        return quantity.tolerance
-    return quantity.tolerance * _IN_UNIT.get((quantity.unit, figure.unit), 0.0) or FLOOR
+        quantity = _BY_HEADING.get(figure.name.rpartition(" / ")[2])
+        if quantity is None:
+            return _BY_UNIT.get(figure.unit, FLOOR), RELATIVE
+        scale = 1.0 if figure.unit in (quantity.unit, "") else _IN_UNIT.get((quantity.unit, figure.unit), 0.0)
+        return quantity.tolerance * scale or FLOOR, RELATIVE
 
 
 def read_tolerances(table: Mapping[str, object], where: str) -> Tolerances:

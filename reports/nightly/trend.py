@@ -48,22 +48,18 @@ def change_points(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ..
         return ()
     noise = float(np.median(np.abs(np.diff(x)))) / (0.6745 * math.sqrt(2.0))
     scale = max(noise, tolerance / 3.0, 1e-12 * float(np.max(np.abs(x))))
-    ends = _segments((x - x[0]) / scale, 2.0 * math.log(len(x)))
+    ends, z = [1], (x - x[0]) / scale
+    if len(x) > 2:
+        import ruptures
+
+        search = ruptures.KernelCPD(kernel="linear", min_size=1)
+        ends = search.fit_predict(z.reshape(-1, 1), pen=2.0 * math.log(len(x)))[:-1]
     levels = [float(np.mean(part)) for part in np.split(x, ends)]
     return tuple(
         ChangePoint(index=int(there[end]), before=before, after=after)
         for end, before, after in zip(ends, levels[:-1], levels[1:], strict=True)
         if abs(after - before) > tolerance
     )
-
-
-def _segments(z: np.ndarray, penalty: float) -> list[int]:
-    import ruptures
-
-    if len(z) == 2:
-        return [1]
-    result = ruptures.KernelCPD(kernel="linear", min_size=1).fit_predict(z.reshape(-1, 1), pen=penalty)
-    return [int(i) for i in result[:-1]]
 
 
 def flaps(values: np.ndarray, tolerance: float) -> bool:

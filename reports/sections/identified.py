@@ -18,7 +18,7 @@ def judged(
 ) -> doc.Section:
     """Put the section of one kind together: its verdict first, in words and item by item."""
     status: doc.Status = "pass" if found.passed else "fail"
-    first = [verdict_block(found.items)]
+    first = [doc.verdicts(map(_verdict, found.items), "bench checks")]
     if not found.passed:
         said = (
             "The design is written as it was accepted, a check failed"
@@ -41,18 +41,12 @@ def verdict_words(items: Sequence[Item], result: str) -> str:
     return f"{first.label} fails{why}{more}. {result}"
 
 
-def verdict_block(items: Sequence[Item]) -> doc.Block:
-    """The verdict, item by item; shares in per cent."""
-    return doc.verdicts(map(_verdict, items), "bench checks")
-
-
 def _verdict(item: Item) -> doc.VerdictItem:
-    value = None if item.value is None else 100.0 * item.value
-    limit = None if item.limit is None else 100.0 * item.limit
-    unit, comparison = "" if value is None else "%", "" if limit is None else "<="
+    """One item; shares in per cent."""
+    value, limit = (None if share is None else 100.0 * share for share in (item.value, item.limit))
     return doc.verdict(
-        item.id, item.label, value=value, limit=limit, unit=unit, comparison=comparison, passed=item.passed,
-        reason=item.reason,
+        item.id, item.label, value=value, limit=limit, unit="" if value is None else "%",
+        comparison="" if limit is None else "<=", passed=item.passed, reason=item.reason,
     )  # fmt: skip
 
 

@@ -10,12 +10,11 @@ import numpy as np
 from actuator_lti.files.atomic import write_text
 from analyses.estimation.parameters import parameter
 from analyses.identification.bench import BenchResult
-from analyses.identification.frequency import response
 from analyses.identification.frequency_bench import FrequencyResult
 from analyses.identification.measured_response import ResponseResult
 from analyses.identification.plan import Plan
 from analyses.identification.run import CampaignAnswer
-from analyses.identification.two_mass import NAMES, angle_responses
+from analyses.identification.two_mass import NAMES, angle_responses, response
 from analyses.identification.verdict import Identified
 from reports import document as doc
 from reports.charts import style
@@ -161,14 +160,12 @@ def _response_figures(result: FrequencyResult) -> list[doc.Block]:
     model = angle_responses(lines.omega_rad_s, own, fit.reduction, fit.reaction)
     hertz = lines.omega_rad_s / (2.0 * np.pi)
     figures = []
-    for k, (signal, label) in enumerate((("angle", "motor angle"), ("load_angle", "load angle"))):
-        if signal not in lines.names:
-            continue
-        measured, _ = response(lines, signal, lines.names[0])
+    for k, label in enumerate(("motor angle", "load angle")[: len(lines.names) - 1], 1):
+        measured, _ = response(lines, k)
         chart = style.Chart(width=style.WIDE, height=320.0)
         panel = chart.panel("frequency, Hz", f"{label} over torque, rad/(N m)", "xy")
         panel.points(hertz, np.abs(measured), "measured", colour=style.BLUE)
-        panel.curve(hertz, np.abs(model[k]), "two-mass model", **style.series(1))
+        panel.curve(hertz, np.abs(model[k - 1]), "two-mass model", **style.series(1))
         caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
         figures.append(doc.figure("response", chart, caption))
     return figures

@@ -129,7 +129,12 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[doc.Block]:
         doc.column("load", "Load", "N m", format="fix:2"),
         doc.column("remaining", "Random variance remaining", "%", format="fix:1"),
     ]
-    rows = _grouped(suggestion)
+    rows: list[doc.Row] = []
+    for (speed, load), runs in groupby(suggestion.runs, key=lambda run: (run.speed_rad_s, run.load_Nm)):
+        same = list(runs)  # the same point several times is one row
+        first, last = same[0].order, same[-1].order
+        order = str(first) if first == last else f"{first} to {last}"
+        rows.append({"order": order, "speed": speed, "load": load, "remaining": 100.0 * same[-1].remaining})
     note = ""
     if suggestion.largest_shared is not None:
         note = (
@@ -151,19 +156,6 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[doc.Block]:
             "Margins and their uncertainty from the friction, slow motion", suggestion.margins, margins
         ),
     ]
-
-
-def _grouped(suggestion: CampaignSuggestion) -> list[doc.Row]:
-    """Suggested runs, the same point several times in one row."""
-    rows: list[doc.Row] = []
-    for point, runs in groupby(suggestion.runs, key=lambda run: (run.speed_rad_s, run.load_Nm)):
-        same = list(runs)
-        first, last = same[0].order, same[-1].order
-        order = str(first) if first == last else f"{first} to {last}"
-        rows.append(
-            {"order": order, "speed": point[0], "load": point[1], "remaining": 100.0 * same[-1].remaining}
-        )
-    return rows
 
 
 def account_blocks(result: CampaignResult) -> list[doc.Block]:

@@ -59,7 +59,6 @@ def text(result: MonteCarloResult | Design) -> str | None:
 
 
 def _result(result: MonteCarloResult) -> str:
-    """Say how many samples meet everything, and which requirement fails most often."""
     words = f"{result.tally.words('requirements')} under tolerances"
     each = {odds.id: odds for odds in result.odds}
     if (every := each.pop("all", None)) is None:
@@ -233,15 +232,11 @@ def _driver(place: int, item: tuple[str, list[Driver]]) -> str:
 
 
 def _worst_table(result: MonteCarloResult) -> doc.Block:
-    columns = [
-        doc.of("requirement", "requirement", "Worst case for"),
-        doc.of(lambda case: "" if case.file is None else case.file.name, "file", "Design file"),
-    ]
-    for k, path in enumerate(result.paths):
-        columns.append(doc.of(partial(_parameter, path), f"p{k}", path, format="sig:5"))
+    columns = [doc.column("requirement", "Worst case for"), doc.column("file", "Design file")]
+    columns += [doc.column(f"p{k}", path, format="sig:5") for k, path in enumerate(result.paths)]
+    rows = []
+    for case in result.worst:
+        values = (case.parameters[path] for path in result.paths)
+        rows.append((case.requirement, "" if case.file is None else case.file.name, *values))
     note = "Each is saved as a design that `report` opens."
-    return doc.listing("Worst designs, SI values", result.worst, columns, note)
-
-
-def _parameter(path: str, case: WorstCase) -> float:
-    return case.parameters[path]
+    return doc.table("Worst designs, SI values", columns, rows, note)

@@ -37,7 +37,6 @@ def write(result: TuningResult, folder: Path | None) -> list[str]:
 
 
 def summary(result: TuningResult) -> str:
-    """What came out, in two or three sentences."""
     over = f"the nominal design and {result.corners - 1} corners of the tolerance box"
     if result.corners == 1:
         over = "the nominal design (no value has a tolerance)"
@@ -83,7 +82,6 @@ def _verdict(r: BindingRequirement) -> doc.VerdictItem:
 
 
 def gains(result: TuningResult) -> doc.Block:
-    """Gains in SI and in the motion controller's objects."""
     note = (
         "Tuned: rounded to the steps of the motion controller's objects, where the drive is that controller."
     )
@@ -102,8 +100,6 @@ def gains(result: TuningResult) -> doc.Block:
 
 
 def confirmed(result: TuningResult) -> doc.Block:
-    """The requirements by certified margins."""
-
     def limit(v: RequirementVerdict) -> float | None:
         return v.requirement.minimum if v.requirement.minimum is not None else v.requirement.maximum
 

@@ -12,8 +12,7 @@ from typer.testing import CliRunner
 
 from actuator_lti import assemble_loops
 from actuator_lti.loops import exact_margins
-from actuator_lti.systems.plain_delays import PlainDelaySystem
-from actuator_lti.systems.plain_system import PlainSystem
+from actuator_lti.systems.plain_system import PlainDelaySystem, PlainSystem
 from reports.cli.app import build
 from reports.linear_models import margins_tree
 

@@ -267,7 +267,7 @@ def test_a_gain_margin_at_nyquist_is_listed_once() -> None:
     assert [g.ratio for g in found.gain_margins] == pytest.approx([g.ratio for g in truth.gain_margins])
 
 
-def test_a_periodic_loop_of_many_states_has_its_poles(tmp_path) -> None:
+def test_a_periodic_loop_many_states_has_its_poles(tmp_path) -> None:
     """Seed 51345: 153 states at the voltage, their poles on circles; the search for them gave up."""
     design = smooth(*made(random_drive, [51345]))
     (found,) = in_node([design], tmp_path)

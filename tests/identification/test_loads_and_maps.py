@@ -103,11 +103,11 @@ def _axis_record(law: str, seed: int = 0) -> Record:
 
 def test_a_friction_map_is_found_with_its_break_points() -> None:
     """Truth: 30, 18, 15 N at 0, 0.01, 0.05 m/s, then rising 100 N per m/s."""
-    fit = fit_map(load_design("emps"), [_axis_record("map")])
-    taken = next(law for law in fit.laws if law.taken)
+    model, laws = fit_map(load_design("emps"), [_axis_record("map")])
+    taken = next(law for law in laws if law.taken)
     assert taken.breaks_rad_s == pytest.approx((0.01, 0.05), rel=0.25)
     assert taken.criterion < -100.0
-    knots, model = fit.knots_rad_s, fit.model
+    knots = model.knots_rad_s
     assert knots is not None
     torque = [model[f"map_{k}"] for k in range(len(knots))]
     speeds = np.array([0.003, 0.02, 0.04, 0.1, 0.15])
@@ -118,9 +118,9 @@ def test_a_friction_map_is_found_with_its_break_points() -> None:
 def test_a_plain_law_needs_no_map() -> None:
     """Over five draws of noise the criterion never takes a map for a drive that has none."""
     for seed in range(5):
-        fit = fit_map(load_design("emps"), [_axis_record("plain", seed)])
-        assert fit.knots_rad_s is None
-        assert next(law for law in fit.laws if law.taken).name.startswith("plain")
+        model, laws = fit_map(load_design("emps"), [_axis_record("plain", seed)])
+        assert model.knots_rad_s is None
+        assert next(law for law in laws if law.taken).name.startswith("plain")
 
 
 def test_the_map_goes_into_the_design_with_its_errors() -> None:

@@ -10,8 +10,7 @@ from loop_designs import sprung
 from actuator_lti import assemble_loops, closed_loop_bandwidth, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, Gravity
-from actuator_lti.drive.angle import moment_slope
-from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.operating import Operating, moment_slope
 from analyses.linear.loop_figures import all_loop_figures
 
 QUARTERS = (radians(90), radians(270), radians(-90), -3 * pi / 2, 5 * pi / 2)

@@ -15,8 +15,7 @@ from actuator_lti.batch.static import drive_figures
 from actuator_lti.design import parameter_value, with_overrides, with_values
 from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Command, Design, Encoder, Filter, FrictionPoint, Load, PositionLoop
-from actuator_lti.drive.angle import moment_slope
-from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.operating import Operating, moment_slope
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental

@@ -10,9 +10,8 @@ from loop_designs import controlled
 from actuator_lti import InputError, load_design
 from actuator_lti.design import model, read_design_text
 from actuator_lti.design.writing import write_design
-from actuator_lti.drive.angle import follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
-from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.operating import Operating, follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.tick import TickProgram
 from nonlinear import State, commands, simulate

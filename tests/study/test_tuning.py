@@ -25,8 +25,8 @@ from actuator_lti.design.objects import export_objects
 from actuator_lti.errors import InputError
 from analyses.tuning import TuningSettings, tune
 from analyses.tuning.problem import loop_requirements, problem_of, read_requirement
-from analyses.tuning.rules import magnitude_optimum, rule_gains, symmetric_optimum
 from analyses.tuning.solve import maximise
+from analyses.tuning.start import magnitude_optimum, rule_gains, symmetric_optimum
 
 PERIOD, DELAY = 1e-3, 3e-3
 QUICK = TuningSettings(curve=False, check=False)

@@ -24,8 +24,8 @@ from actuator_lti.design.model import (
 )
 from actuator_lti.errors import InputError
 from analyses.tuning import TuningSettings, tune
-from analyses.tuning.placing import allowed_range, place, step_of_gain
 from analyses.tuning.problem import loop_requirements, problem_of
+from analyses.tuning.start import allowed_range, place, step_of_gain
 
 QUICK = TuningSettings(curve=False, check=False)
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 from flint import acb, arb, ctx
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.assemble import Figures, assembled, far_note, hidden_notes, out_of_sight
+from actuator_lti.margins.assemble import Crossing, Figures, Place, assembled
 from actuator_lti.margins.delays.axis import GAIN, IMAGINARY, NOWHERE, Axis, smallest, turn, zeros
 from actuator_lti.margins.delays.exact import ExactDelayLoop
 from actuator_lti.margins.distances import DISK, MODULUS
-from actuator_lti.margins.exact.certified import difference
-from actuator_lti.margins.exact.crossings import Crossing
+from actuator_lti.margins.exact.decided import ACROSS, Lists, Shared, hidden_notes, shared
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
@@ -36,45 +37,36 @@ def certified_delayed_margins(
     are where the search for smaller ones begins. `NumericalError`: something could not be determined.
     """
     with ctx.workprec(_BITS):
-        answer, problem = _compared(loops, band, merge=False)
-        if problem is not None:
-            answer, problem = _compared(loops, band, merge=True)
-        near = _known(start)
-        if problem is None:
-            axis = Axis(loops[0])
-            near = [smallest(axis, d, known) for d, known in zip((MODULUS, DISK), near, strict=True)]
-    gains, reals, unstable, listed_to = answer
-    low, high = (0.0, listed_to) if band is None else band
-    figures = Figures(
-        tuple(c.gain_margin(c.w) for c in reals if low <= c.w <= high and not out_of_sight(c.L)),
-        tuple(c.phase_margin(c.w) for c in gains if low <= c.w <= high),
-        near[0],
-        near[1],
-    )
-    hidden = loops[0].hidden
-    unstable += hidden.right  # proven by the turn of N + D; the count in double precision stands beside it
+        axes = [Axis(loop) for loop in loops]
+        counts = [_unstable(axis) for axis in axes]
+        found, figures = Shared((), (), problem=ACROSS), None
+        if len(set(counts)) == 1:
+            found = shared(*(_crossings(axis, band) for axis in axes))
+            if found.problem is not None:
+                found = shared(*(_crossings(axis, band, merge=True) for axis in axes))
+        if found.problem is None:
+            near = zip((MODULUS, DISK), _known(start), strict=True)
+            figures = Figures(found.gains, found.reals, [smallest(axes[0], d, known) for d, known in near])
+    hidden, listed_to = loops[0].hidden, loops[0].beyond(_FLOOR)
+    unstable = counts[0] + hidden.right  # proven by the turn of N + D; double precision's stands beside it
     second = None if start is None else start.agreement.unstable_nyquist
-    notes = (
-        *hidden_notes(hidden.at_zero, hidden.pairs, hidden.right),
-        *far_note(sum(out_of_sight(c.L) for c in reals)),
-    )
-    if band is None:
-        notes = (*notes, f"gain margins above 40 dB beyond {listed_to:.4g} rad/s are not listed")
+    tail = (f"gain margins above 40 dB beyond {listed_to:.4g} rad/s are not listed",)
     return assembled(
         None,
-        Agreement(None, None) if problem else Agreement(unstable, second if second == unstable else None),
-        figures if problem is None else None,
+        Agreement(unstable, second if second == unstable else None) if figures else Agreement(None, None),
+        figures,
         method=_METHOD,
-        notes=notes,
-        evidence="certified" if problem is None else "withheld",
-        reason=problem or _REASON,
+        notes=(*hidden_notes(hidden), *found.notes, *(tail if band is None else ())),
+        evidence="certified",
+        reason=found.problem or _REASON,
         delay_s=delay_s,
-        band_rad_s=(low, high),
+        listed_to=listed_to,
+        band_rad_s=band,
         hidden_border=hidden.on_border,
     )
 
 
-def _known(start: StabilityMargins | None) -> list[tuple[float, float]]:
+def _known(start: StabilityMargins | None) -> list[Place]:
     """Both distances as double precision has them, each with its frequency."""
     if start is None or start.modulus_frequency_rad_s is None or start.disk_margin is None:
         return [NOWHERE] * 2
@@ -82,43 +74,25 @@ def _known(start: StabilityMargins | None) -> list[tuple[float, float]]:
     return [(modulus, start.modulus_frequency_rad_s), (disk.alpha, disk.frequency_rad_s)]
 
 
-_Answer = tuple[tuple[Crossing, ...], tuple[Crossing, ...], int, float]
-
-
-def _compared(
-    loops: tuple[ExactDelayLoop, ...], band: tuple[float, float] | None, merge: bool
-) -> tuple[_Answer, str | None]:
-    """The answer, and what neighbours 8 ulp away say against it.
+def _crossings(axis: Axis, band: tuple[float, float] | None, merge: bool = False) -> Lists:
+    """Gain crossovers and crossings of the negative real axis, up to where they are listed.
 
     With ``merge`` a gain of one at zero frequency, within `TOUCH`, is no crossover; that of the given doubles
     may lie at any frequency below the loop's own.
     """
-    answer, *others = (_answer(loop, band, merge) for loop in loops)
-    problem = None
-    for gains, reals, unstable, _ in others:
-        if unstable != answer[2]:
-            problem = f"{ULP} ulp of the entries move a closed-loop pole across the stability boundary"
-        problem = problem or difference(answer[0], gains, "|L| = 1")
-        problem = problem or difference(answer[1], reals, "the real axis")
-    return answer, problem
-
-
-def _answer(loop: ExactDelayLoop, band: tuple[float, float] | None, merge: bool) -> _Answer:
-    """Gain crossovers, crossings of the negative real axis, unstable closed-loop poles; how far they go."""
-    axis = Axis(loop)
-    start = loop.lowest
+    loop = axis.loop
     top = loop.beyond(_UNDER_ONE)
     far = loop.beyond(_FLOOR) if band is None else max(band[1], top)
-    gains = [_crossing(axis, x) for x in zeros(axis, GAIN, axis.edges(start, top))]
-    reals = [_crossing(axis, x) for x in zeros(axis, IMAGINARY, axis.edges(start, far))]
+    gains = [_crossing(axis, x) for x in zeros(axis, GAIN, axis.edges(loop.lowest, top))]
+    reals = [_crossing(axis, x) for x in zeros(axis, IMAGINARY, axis.edges(loop.lowest, far))]
     reals = [c for c in reals if c.L.real < 0.0 and (band is not None or abs(c.L) >= _FLOOR)]
-    N0, D0 = loop.N.series(1)[0], loop.D.series(1)[0]
-    at_rest = None if D0 == 0 else float((N0 / D0).p) / float((N0 / D0).q)
-    if at_rest is not None and at_rest < 0.0:
+    N0, D0 = (part[0] for part in loop.at_rest)
+    at_rest = float(arb(N0 / D0)) if D0 != 0 else math.inf
+    if at_rest < 0.0:
         reals = [Crossing(0.0, complex(at_rest)), *reals]
-    if merge and at_rest is not None and abs(at_rest - 1.0) <= TOUCH:
+    if merge and abs(at_rest - 1.0) <= TOUCH:
         gains = [c for c in gains if abs(c.L - at_rest) > _AT_REST]
-    return tuple(gains), tuple(reals), _unstable(axis, axis.edges(start, top)), far
+    return tuple(gains), tuple(reals)
 
 
 def _crossing(axis: Axis, x: arb) -> Crossing:
@@ -129,11 +103,12 @@ def _crossing(axis: Axis, x: arb) -> Crossing:
     return Crossing(float(x.mid()), complex(L))
 
 
-def _unstable(axis: Axis, edges: list[float]) -> int:
+def _unstable(axis: Axis) -> int:
     """Zeros of N + D in the right half plane, from the turn of N + D along the axis (Mikhailov, retarded)."""
-    n = axis.loop.degree
-    end = sum(axis.values(arb(edges[-1])), acb(0)) / (acb(0, edges[-1]) ** n * axis.loop.lead)
-    count = arb(n) / 2 - (turn(axis, edges) - end.log().imag) / arb.pi()
+    loop = axis.loop
+    edges = axis.edges(loop.lowest, loop.beyond(_UNDER_ONE))
+    end = sum(axis.values(arb(edges[-1])), acb(0)) / (acb(0, edges[-1]) ** loop.degree * loop.lead)
+    count = arb(loop.degree) / 2 - (turn(axis, edges) - end.log().imag) / arb.pi()
     whole = count.unique_fmpz()
     if whole is None:
         raise NumericalError("the number of unstable poles could not be determined")

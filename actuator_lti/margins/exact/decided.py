@@ -1,0 +1,124 @@
+"""What the data decide: the crossings that neighbours 8 ulp away share with them, and what is said of it."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from dataclasses import dataclass
+from itertools import islice, takewhile
+from operator import attrgetter
+
+from actuator_lti.margins.assemble import Crossing
+from actuator_lti.margins.exact.roots import HalfPlanes
+from actuator_lti.margins.given import ULP
+
+ACROSS = f"{ULP} ulp of the entries move a closed-loop pole across the stability boundary"
+_MOVED = 1e-9
+_FAR_DB = 30.0
+_FAR = 10.0 ** (_FAR_DB / 20.0)  # a real-axis crossing farther from -1 than this is of no consequence
+_SAME_W = 0.05
+_SAME_GAIN = 0.5
+_BESIDE = 4
+Crossings = tuple[Crossing, ...]
+Lists = tuple[Crossings, Crossings]  # of the unit circle and of the negative real axis, in order
+
+
+@dataclass(frozen=True)
+class Shared:
+    """The crossings that the data determine."""
+
+    gains: Crossings
+    reals: Crossings
+    dropped: int = 0  # crossings of the real axis, far from -1, that they do not
+    moved: float = 0.0  # largest relative change of a crossing among the neighbours
+    problem: str | None = None  # why there is no answer
+
+    @property
+    def moved_text(self) -> str:
+        """What neighbours of the data change."""
+        what = f"move a crossing by {self.moved:.1g}" if self.moved > _MOVED else "change nothing"
+        return f"{ULP} ulp of the entries {what}"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is said of crossings that are left out."""
+        if not self.dropped:
+            return ()
+        return (
+            f"crossings of the real axis more than {_FAR_DB:g} dB from -1 that are left out, as double "
+            f"precision does not resolve them: {self.dropped}",
+        )
+
+
+def shared(ours: Lists, *others: Lists) -> Shared:
+    """Both lists of crossings, less those far from -1 that neighbours do not share, and what else differs."""
+    (gains, reals), dropped = ours, 0
+    for _, theirs in others:
+        kept = tuple(c for c in reals if not _far(c) or _partner(c, theirs))
+        dropped, reals = dropped + len(reals) - len(kept), kept
+    moved, problem = 0.0, None
+    for their_gains, their_reals in others:
+        problem = problem or _difference(gains, their_gains, "|L| = 1")
+        problem = problem or _difference(reals, their_reals, "the real axis")
+        moved = max([moved, *(_movement(c, their_gains) for c in gains)])
+        moved = max([moved, *(_movement(c, their_reals) for c in reals)])
+    return Shared(gains, reals, dropped, moved, problem)
+
+
+def _far(c: Crossing) -> bool:
+    return not 1.0 / _FAR < abs(c.L) < _FAR
+
+
+def _partner(c: Crossing, others: Crossings) -> Crossing | None:
+    """The crossing that is the same one in another list."""
+    first = bisect_left(others, c.w / (1.0 + _SAME_W), key=attrgetter("w"))
+    beside = takewhile(lambda other: other.w <= c.w * (1.0 + _SAME_W), islice(others, first, None))
+    same = (other for other in beside if c.touch == other.touch and _same_size(abs(c.L), abs(other.L)))
+    return next(same, None)
+
+
+def _same_size(a: float, b: float) -> bool:
+    return a == b or (min(a, b) > 0.0 and abs(math.log(a / b)) < _SAME_GAIN)
+
+
+def _difference(ours: Crossings, theirs: Crossings, line: str) -> str | None:
+    """Why two lists do not tell of the same crossings, those far from -1 left out."""
+    core, their_core = [c for c in ours if not _far(c)], [c for c in theirs if not _far(c)]
+    if [c.touch for c in core] == [c.touch for c in their_core]:
+        return None
+    alone = [c for c in core if _partner(c, theirs) is None]
+    alone += [c for c in their_core if _partner(c, ours) is None]
+    if not alone:
+        return None
+    return f"{ULP} ulp of the entries decide whether L meets {line} at w = {alone[0].w:.6g} of the s-plane"
+
+
+def _movement(c: Crossing, others: Crossings) -> float:
+    at = bisect_left(others, c.w, key=attrgetter("w"))
+    beside = others[max(at - _BESIDE, 0) : at + _BESIDE]
+    other = min(beside, key=lambda o: abs(o.L - c.L) + abs(o.w - c.w) / (c.w or 1.0), default=None)
+    if other is None or not 0.0 < c.w < math.inf or not c.L:
+        return 0.0
+    return max(abs(other.w / c.w - 1.0), abs(other.L / c.L - 1.0))
+
+
+def hidden_notes(hidden: HalfPlanes) -> tuple[str, ...]:
+    """What is said of modes that the loop neither drives nor sees."""
+    at_zero, border, right, notes = hidden.at_zero, hidden.border, hidden.right, []
+    if at_zero == 1 and not border:
+        notes.append(
+            "one mode at zero frequency that the loop neither drives nor sees is left out "
+            "(it is no instability)"
+        )
+    elif at_zero or border:
+        at = [f"{at_zero} at zero frequency"] if at_zero else []
+        pairs = ", ".join(f"{times} pair{'s' * (times > 1)} at {float(w.mid()):.6g}" for w, times in border)
+        notes.append(
+            f"modes on the stability boundary that the loop neither drives nor sees are left out "
+            f"({', '.join([*at, pairs] if pairs else at)} of the s-plane): the margins are those of what is "
+            "seen; inside, the loop is not asymptotically stable"
+        )
+    if right:
+        modes = "1 unstable mode" if right == 1 else f"{right} unstable modes"
+        notes.append(f"{modes} that the loop neither drives nor sees")
+    return tuple(notes)
