@@ -36,10 +36,8 @@ def large_commands(conditional: Conditional, axis: str = "rotary") -> doc.Sectio
 
 
 def findings_of(conditional: Conditional, axis: str = "rotary") -> list[doc.Finding]:
-    if not conditional.diverges:
-        return []
     text = _words(conditional, *output_unit(axis))[0]
-    return [doc.Finding(severity="fail", text=text, where="conditional")]
+    return [doc.Finding(severity="fail", text=text, where="conditional")] if conditional.diverges else []
 
 
 def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
