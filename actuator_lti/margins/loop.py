@@ -48,7 +48,8 @@ class RationalLoop:
 
     def behind(self, delay_s: float) -> RationalLoop:
         """The loop behind a delay in place of its own."""
-        return replace(self, delay=delay_s / (self.period_s or 1.0))
+        delay = delay_s / (self.period_s or 1.0)
+        return self if delay == self.delay else replace(self, delay=delay)
 
     def frequency(self, w: float) -> float:
         """Angular frequency in rad/s."""
@@ -72,6 +73,13 @@ class RationalLoop:
         p = np.array([math.exp(2.0 * math.atan(w)) if self.in_z else w], dtype=complex)
         p -= 1.0 if self._about_one else 0.0
         return float(self._values(p)[0].real)
+
+    def at_rest(self) -> complex:
+        """L at zero frequency."""
+        if self.coefficients is None or self.in_z:
+            return complex(self._values(self._variable(np.zeros(1)))[0].real)
+        above, below = self.coefficients[:, -1]
+        return complex(above / below)
 
     def at_end(self) -> complex:
         """L at the end of the axis: at infinity, or at Nyquist with the whole delay."""
