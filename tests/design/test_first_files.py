@@ -171,15 +171,9 @@ def test_pulses_are_not_guessed_to_be_counts(word: str) -> None:
     assert 'write "lines" (4 counts each) or "counts"' in text
 
 
-@pytest.mark.parametrize(
-    ("table", "words"),
-    [
-        ('acceleration = "1500 1/s²"', "write rev or rad into it"),
-        ('speed = "100 1/s"', "write rev or rad into it"),
-    ],
-)
-def test_a_speed_without_an_angle_is_asked_for_it(table: str, words: str) -> None:
-    assert words in told(DRIVE.replace("[limits]\n", f"[limits]\n{table}\n"))
+@pytest.mark.parametrize("limit", ['acceleration = "1500 1/s²"', 'speed = "100 1/s"'])
+def test_a_speed_without_an_angle_is_asked_for_it(limit: str) -> None:
+    assert "write rev or rad into it" in told(DRIVE.replace("[limits]\n", f"[limits]\n{limit}\n"))
 
 
 def test_a_gain_in_torque_is_told_how_to_become_one_in_amperes() -> None:
