@@ -159,9 +159,8 @@ def test_a_controllers_name_is_answered_with_the_command_that_reads_its_settings
     ("written", "counts"), [("4096 counts/rev", 4096), ("1024 lines/turn", 4096), ("4000 inc/rev", 4000)]
 )
 def test_counts_may_be_said_to_be_per_turn(written: str, counts: int) -> None:
-    assert (
-        read_design_text(f'{DRIVE}[encoder]\ncounts_per_rev = "{written}"\n').encoder.counts_per_rev == counts
-    )
+    design = read_design_text(f'{DRIVE}[encoder]\ncounts_per_rev = "{written}"\n')
+    assert design.encoder.counts_per_rev == counts
 
 
 @pytest.mark.parametrize("word", ["ppr", "CPT", "pulses"])
