@@ -49,16 +49,16 @@ def identify(
     """Identify a drive from its records, and hold the design that comes of it against them."""
     if asked.plan:
         return _planned(design, asked, progress)
-    of = (
-        _of_response
-        if asked.response
-        else _of_campaign
-        if asked.is_campaign
-        else _of_sweep
-        if asked.frequency_response
-        else _of_records
-    )
-    return replace(of(design, asked, progress), accepted=asked.accept)
+    made: BenchResult | CampaignAnswer | FrequencyResult | ResponseResult
+    if asked.response:
+        made = _of_response(design, asked, progress)
+    elif asked.is_campaign:
+        made = _of_campaign(design, asked, progress)
+    elif asked.frequency_response:
+        made = _of_sweep(design, asked)
+    else:
+        made = _of_records(design, asked, progress)
+    return replace(made, accepted=asked.accept)
 
 
 def _opened(paths: Sequence[Path], taken: Sequence[str] = ()) -> list[Record]:
@@ -79,7 +79,7 @@ def _planned(design: Design, asked: Asked, progress: Progress | None) -> Plan:
     return plan_motions(design, within=within, noise=noise, measured=measured, progress=progress)
 
 
-def _of_sweep(design: Design, asked: Asked, _: Progress | None) -> FrequencyResult:
+def _of_sweep(design: Design, asked: Asked) -> FrequencyResult:
     play = None if asked.play is None else open_record(asked.play)
     fixed = fixed_values(design, asked.fix)
     record = open_record(asked.files[0])
