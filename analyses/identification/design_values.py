@@ -20,7 +20,7 @@ from analyses.identification.electrical import fit_electrical
 from analyses.identification.joint_model import JointModel, Recipe, default_value
 from analyses.identification.rows import drive_of, rows_under
 from analyses.records.consistency import SURE, electrical_parts
-from analyses.records.factors import named_factor
+from analyses.records.factors import with_factor
 from analyses.records.record import Record
 
 NO_CHANCE = 1e-3
@@ -160,9 +160,8 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
 
 def told(words: str, factor: float, error: float) -> str:
     """A cause in words."""
-    named = named_factor(factor)
     found = f"a factor {factor:.3g} (standard error {error:.1g})"
-    return f"identified values are off as by {found} in {words}" + (f": factor {named}" if named else "")
+    return with_factor(f"identified values are off as by {found} in {words}", factor)
 
 
 STEP = 0.1
